@@ -1,0 +1,70 @@
+"""Every error that bad input can cause.
+
+    FocgenError                 where it is, what is wrong, and the remedy, in one line
+    ├── InputError              a file cannot be read, or lacks what it needs
+    │   ├── LogError            a log: columns, time stamps, samples
+    │   ├── RigError            a rig.toml
+    │   └── ControllerError     a controller.toml
+    ├── FitError                the data cannot determine what was asked for
+    ├── DesignError             no controller meets the wish
+    ├── PlanError               the controller cannot be realised in this arithmetic
+    ├── BuildError              the C compiler is missing or refused the code
+    └── MissingExtra            an optional library is not installed
+
+The command line prints ``focgen: error: WHERE: WHAT; REMEDY`` and exits with status 2.
+"""
+
+
+class FocgenError(Exception):
+    """Input that cannot be used.
+
+    ``where`` names the file, table or argument; ``what`` the fault, with the offending value;
+    ``remedy`` what to do about it.
+    """
+
+    def __init__(self, where: str, what: str, remedy: str):
+        self.where, self.what, self.remedy = str(where), what, remedy
+        super().__init__(f"{where}: {what}; {remedy}")
+
+    def __reduce__(self):  # three arguments, so that errors cross process boundaries
+        return type(self), (self.where, self.what, self.remedy)
+
+
+class InputError(FocgenError):
+    """A file cannot be read, or lacks what it needs."""
+
+
+class LogError(InputError):
+    """A log cannot be used."""
+
+
+class RigError(InputError):
+    """A rig.toml cannot be used."""
+
+
+class ControllerError(InputError):
+    """A controller.toml cannot be used."""
+
+
+class FitError(FocgenError):
+    """The data cannot determine what was asked for."""
+
+
+class DesignError(FocgenError):
+    """No controller meets the wish."""
+
+
+class PlanError(FocgenError):
+    """The controller cannot be realised in this arithmetic."""
+
+
+class BuildError(FocgenError):
+    """The C compiler is missing or refused the code."""
+
+
+class MissingExtra(FocgenError):
+    """An optional library is not installed; the remedy is the line that installs it."""
+
+    @classmethod
+    def of(cls, library: str, extra: str, purpose: str) -> "MissingExtra":
+        return cls(purpose, f"needs {library}, which is not installed", f"pip install 'focgen[{extra}]'")
