@@ -1,0 +1,1 @@
+"""Pure mathematics of fractional order: transfer functions, weights, exact responses, simulators."""

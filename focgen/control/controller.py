@@ -1,0 +1,88 @@
+"""A designed controller, in physical quantities only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.fractional.transfer import TransferFunction
+
+ARITHMETICS = ("f64", "f32", "q31", "q15")
+MEMORIES = ("short", "exponential")
+
+
+@dataclass(frozen=True)
+class GainSchedule:
+    """A gain, linear between ``breakpoints`` of the scheduling signal and held beyond them.
+
+    ``breakpoints`` rise strictly, in the scheduling signal's units; ``gains`` has the same length.
+    """
+
+    breakpoints: tuple[float, ...]
+    gains: tuple[float, ...]
+
+    def __call__(self, value):
+        """The gain at ``value``, any shape."""
+        return np.interp(value, self.breakpoints, self.gains)
+
+
+@dataclass(frozen=True)
+class ControllerRanges:
+    """What each signal can reach, (low, high) in physical units; ``schedule`` is None without a schedule.
+
+    Reference and measurement are in the same unit.
+    """
+
+    reference: tuple[float, float]
+    measurement: tuple[float, float]
+    output: tuple[float, float]
+    schedule: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Units:
+    """Names of the units, for comments and reports only."""
+
+    measurement: str = ""
+    output: str = ""
+    schedule: str = ""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a controller was designed from: file name and SHA-256."""
+
+    file: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Controller:
+    """One step: e = ref − meas → ``transfer`` → × gain(sched) → trapezoidal integrator, clamped → u.
+
+    ``gain`` is a constant or a :class:`GainSchedule`. With ``integrator`` the integral is clamped to
+    ``ranges.output``; without, the output itself is. ``length`` is the memory length L: the past samples
+    j = 1 … L take part. ``sample_time`` in s. ``arithmetic`` is the one it was designed for.
+    """
+
+    name: str
+    sample_time: float
+    transfer: TransferFunction
+    gain: float | GainSchedule
+    integrator: bool
+    ranges: ControllerRanges
+    length: int = 1000
+    memory: str = "short"
+    arithmetic: str = "q31"
+    units: Units = Units()
+    designed_from: Source | None = None
+
+    @property
+    def scheduled(self) -> bool:
+        """Whether the gain depends on a scheduling signal."""
+        return isinstance(self.gain, GainSchedule)
+
+    def gain_at(self, value: float | np.ndarray | None = None):
+        """The gain at a value of the scheduling signal (ignored where nothing is scheduled)."""
+        return self.gain(value) if self.scheduled else self.gain

@@ -1,0 +1,172 @@
+"""``controller.toml``: reading, checking and writing a controller.
+
+    name = "spba"
+    sample_time = 0.01                       # s
+    integrator = true                        # trapezoidal, clamped to ranges.output
+    length = 1000                            # memory length L, samples
+    memory = "short"
+    arithmetic = "q31"
+
+    [transfer]                               # eq. (8): terms [coefficient, order of s]
+    num = [[1.32, 0.6], [1.0, 0.0]]
+    den = [[1.0, 0.0]]                       # optional
+
+    [gain]                                   # or simply: gain = 2.5
+    breakpoints = [0.0, 0.1, 0.2]            # of the scheduling signal
+    gains = [480.0, 420.0, 350.0]
+
+    [ranges]                                 # physical; formats are planned for these
+    reference = [0.0, 0.02]
+    measurement = [0.0, 0.02]
+    output = [0.0, 10.0]                     # the output limits
+    schedule = [0.0, 0.25]                   # with a gain schedule only
+
+    [units]                                  # optional, for comments
+    measurement = "1/mm"
+    output = "V"
+    schedule = "bar"
+
+    [designed_from]                          # optional
+    file = "rig.toml"
+    sha256 = "…"
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import tomlkit
+
+from focgen.control.controller import (
+    ARITHMETICS,
+    MEMORIES,
+    Controller,
+    ControllerRanges,
+    GainSchedule,
+    Source,
+    Units,
+)
+from focgen.errors import ControllerError
+from focgen.fractional.transfer import TransferFunction
+from focgen.tomlfile import Table, terms_of
+
+
+def read_controller(path: str | Path) -> Controller:
+    """Read a controller. Raises ControllerError naming file, table, key and remedy."""
+    top = Table.read(path, ControllerError)
+    gain = _gain(top)
+    controller = Controller(
+        name=top.text("name", Path(path).stem),
+        sample_time=top.number("sample_time", above=0.0),
+        transfer=_transfer(top),
+        gain=gain,
+        integrator=top.flag("integrator", False),
+        ranges=_ranges(top, isinstance(gain, GainSchedule)),
+        length=_length(top),
+        memory=_choice(top, "memory", "short", MEMORIES),
+        arithmetic=_choice(top, "arithmetic", "q31", ARITHMETICS),
+        units=_units(top.table("units")),
+        designed_from=_source(top.table("designed_from")),
+    )
+    top.done()
+    return controller
+
+
+def _section(top: Table, key: str, purpose: str) -> Table:
+    table = top.table(key)
+    if table is None:
+        raise top.fail(None, f"lacks the table [{key}]", purpose)
+    return table
+
+
+def _transfer(top: Table) -> TransferFunction:
+    table = _section(top, "transfer", "give num and den as [coefficient, order of s] terms")
+    transfer = table.transfer()
+    table.done()
+    return transfer
+
+
+def _gain(top: Table) -> float | GainSchedule:
+    if not isinstance(top.values.get("gain"), dict):
+        return top.number("gain", 1.0)
+    table = top.table("gain")
+    points, gains = table.numbers("breakpoints"), table.numbers("gains")
+    table.done()
+    if len(points) != len(gains):
+        raise table.fail("gains", f"has {len(gains)} values for {len(points)} breakpoints", "give one gain for each")
+    if len(points) < 2 or any(b <= a for a, b in zip(points, points[1:])):
+        raise table.fail("breakpoints", f"is {list(points)}", "give at least two, rising strictly")
+    return GainSchedule(points, gains)
+
+
+def _ranges(top: Table, scheduled: bool) -> ControllerRanges:
+    table = _section(top, "ranges", "give reference, measurement and output as [low, high]")
+    needed = ["reference", "measurement", "output"] + ["schedule"] * scheduled
+    for key in needed:
+        table.required(key)
+    ranges = ControllerRanges(**{key: table.span(key) for key in needed})
+    if "schedule" in table and not scheduled:
+        raise table.fail("schedule", "is given, but the gain is not scheduled", "remove it or add [gain]")
+    table.done()
+    return ranges
+
+
+def _length(top: Table) -> int:
+    length = top.raw("length", 1000)
+    if not isinstance(length, int) or isinstance(length, bool) or length < 1:
+        raise top.fail("length", f"is {length!r}", "give a memory length of at least 1 sample")
+    return length
+
+
+def _choice(top: Table, key: str, default: str, choices: tuple[str, ...]) -> str:
+    value = top.text(key, default)
+    if value not in choices:
+        raise top.fail(key, f"is {value!r}", f"choose one of {', '.join(choices)}")
+    return value
+
+
+def _units(table: Table | None) -> Units:
+    if table is None:
+        return Units()
+    units = Units(*(table.text(key, "") for key in ("measurement", "output", "schedule")))
+    table.done()
+    return units
+
+
+def _source(table: Table | None) -> Source | None:
+    if table is None:
+        return None
+    table.required("file"), table.required("sha256")
+    source = Source(table.text("file"), table.text("sha256"))
+    table.done()
+    return source
+
+
+def write_controller(controller: Controller, path: str | Path) -> None:
+    """Write a controller so that :func:`read_controller` gives an equal one."""
+    Path(path).write_text(controller_text(controller), encoding="utf-8")
+
+
+def controller_text(controller: Controller) -> str:
+    """The controller as the text of its file; equal controllers give equal bytes."""
+    return tomlkit.dumps(_table(controller))
+
+
+def _table(controller: Controller) -> dict:
+    plain = ("name", "sample_time", "integrator", "length", "memory", "arithmetic")
+    table: dict = {key: getattr(controller, key) for key in plain}
+    if not controller.scheduled:
+        table["gain"] = controller.gain
+    transfer = controller.transfer
+    table["transfer"] = {"num": terms_of(transfer.num), "den": terms_of(transfer.den)}
+    if controller.scheduled:
+        table["gain"] = {key: list(values) for key, values in asdict(controller.gain).items()}
+    spans = {key: list(span) for key, span in asdict(controller.ranges).items() if span is not None}
+    table["ranges"] = spans
+    units = {key: unit for key, unit in asdict(controller.units).items() if unit}
+    if units:
+        table["units"] = units
+    if controller.designed_from:
+        table["designed_from"] = asdict(controller.designed_from)
+    return table

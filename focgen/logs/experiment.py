@@ -1,0 +1,54 @@
+"""One experiment: what every reader of logs delivers and everything else consumes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Mapping
+
+import numpy as np
+
+ROLES = ("command", "pressure", "curvature", "output", "reference")
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """Uniformly sampled signals of one experiment, by role.
+
+    ``signals`` maps a role of :data:`ROLES` to an array of shape (n,) in the log's own units; sample k
+    was taken ``k * sample_time`` seconds after ``start``. ``start`` is the session's time of sample 0 in s,
+    ``raw_time`` the logged time stamps (m,) in s before any resampling, ``notes`` what was done to the log.
+    """
+
+    name: str
+    sample_time: float
+    signals: Mapping[str, np.ndarray]
+    start: float = 0.0
+    raw_time: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
+
+    def __len__(self) -> int:
+        return len(next(iter(self.signals.values())))
+
+    def __contains__(self, role: str) -> bool:
+        return role in self.signals
+
+    def __getitem__(self, role: str) -> np.ndarray:
+        return self.signals[role]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Seconds since the first sample, shape (n,)."""
+        return np.arange(len(self)) * self.sample_time
+
+    def between(self, first: float | None, last: float | None) -> Experiment:
+        """Return the part from ``first`` to ``last`` (s within the experiment, both included)."""
+        lo = -np.inf if first is None else first - 1e-9
+        hi = np.inf if last is None else last + 1e-9
+        keep = (self.time >= lo) & (self.time <= hi)
+        begin = int(np.argmax(keep)) if keep.any() else 0
+        cut = {role: values[keep] for role, values in self.signals.items()}
+        return replace(self, signals=cut, start=self.start + begin * self.sample_time)

@@ -1,0 +1,128 @@
+"""``rig.toml``: reading, checking and writing a rig."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import tomlkit
+
+from focgen.errors import RigError
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig.model import UNITY, Actuator, LinearActuator, Ranges, Rig, Signals
+from focgen.tomlfile import Table, terms_of
+
+
+def read_rig(path: str | Path) -> Rig:
+    """Read a rig. Raises RigError naming file, table, key and remedy."""
+    top = Table.read(path, RigError)
+    rig = Rig(
+        name=top.text("name", Path(path).stem),
+        sample_time=top.number("sample_time", above=0.0),
+        signals=_signals(top),
+        actuator=_actuator(top.table("actuator")),
+        regulator=_stage(top.table("regulator")),
+        sensor=_stage(top.table("sensor")),
+        ranges=_ranges(top.table("ranges")),
+        effects=_effects(top),
+    )
+    top.done()
+    return rig
+
+
+def _signals(top: Table) -> Signals:
+    table = top.table("signals")
+    if table is None:
+        raise top.fail(None, "lacks the table [signals]", "say which log column plays which role")
+    optional = ("command", "pressure", "curvature", "reference", "run")
+    found = {role: table.text(role) for role in optional}
+    required = {}
+    for role in ("time", "output"):
+        table.required(role)
+        required[role] = table.text(role)
+    table.done()
+    if found["command"] is None and found["pressure"] is None:
+        raise table.fail(None, "has neither 'command' nor 'pressure'", "name the column of the input")
+    return Signals(**required, **found)
+
+
+def _stage(table: Table | None) -> TransferFunction:
+    if table is None:
+        return UNITY
+    transfer = _proper(table)
+    table.done()
+    return transfer
+
+
+def _actuator(table: Table | None) -> Actuator | LinearActuator | None:
+    if table is None:
+        return None
+    offset = table.number("offset", 0.0)
+    if "num" in table:
+        actuator = LinearActuator(_proper(table), offset)
+    else:
+        actuator = Actuator(table.number("T", above=0.0), _alpha(table), table.numbers("gain"), offset)
+    table.done()
+    return actuator
+
+
+def _proper(table: Table) -> TransferFunction:
+    transfer = table.transfer()
+    if not transfer.is_proper:
+        raise table.fail("num", "has a higher order than the denominator", "give a proper transfer function")
+    return transfer
+
+
+def _alpha(table: Table) -> float:
+    alpha = table.number("alpha", above=0.0)
+    if alpha >= 2.0:
+        raise table.fail("alpha", f"is {alpha:g}", "give an order in (0, 2); beyond it 1/(T s^alpha + 1) is unstable")
+    return alpha
+
+
+def _ranges(table: Table | None) -> Ranges:
+    if table is None:
+        return Ranges()
+    ranges = Ranges(table.span("command"), table.span("pressure"), table.span("output"))
+    table.done()
+    return ranges
+
+
+def _effects(top: Table) -> tuple:
+    effects = top.raw("effects", [])
+    if not isinstance(effects, list) or not all(isinstance(e, dict) and "name" in e for e in effects):
+        raise top.fail("effects", "is not a list of tables with a 'name'", "write each effect as [[effects]]")
+    return tuple(effects)
+
+
+def write_rig(rig: Rig, path: str | Path) -> None:
+    """Write a rig so that :func:`read_rig` gives an equal one."""
+    Path(path).write_text(tomlkit.dumps(rig_table(rig)), encoding="utf-8")
+
+
+def rig_table(rig: Rig) -> dict:
+    """The rig as nested dictionaries, in the order of the file."""
+    table: dict = {"name": rig.name, "sample_time": rig.sample_time}
+    table["signals"] = {role: name for role, name in asdict(rig.signals).items() if name is not None}
+    for key in ("regulator", "sensor"):
+        stage = getattr(rig, key)
+        if stage != UNITY:
+            table[key] = {"num": terms_of(stage.num), "den": terms_of(stage.den)}
+    if rig.actuator is not None:
+        table["actuator"] = _actuator_table(rig.actuator)
+    ranges = {key: list(span) for key, span in vars(rig.ranges).items() if span is not None}
+    if ranges:
+        table["ranges"] = ranges
+    if rig.effects:
+        table["effects"] = [dict(effect) for effect in rig.effects]
+    return table
+
+
+def _actuator_table(actuator: Actuator | LinearActuator) -> dict:
+    if isinstance(actuator, Actuator):
+        table = {"T": actuator.T, "alpha": actuator.alpha, "gain": list(actuator.gain)}
+    else:
+        table = {"num": terms_of(actuator.dynamics.num), "den": terms_of(actuator.dynamics.den)}
+    if actuator.offset:
+        table["offset"] = actuator.offset
+    return table

@@ -1,0 +1,96 @@
+"""The nominal chain regulator → actuator → sensor, as plain numbers with units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Mapping
+
+import numpy as np
+
+from focgen.fractional.transfer import TransferFunction
+
+UNITY = TransferFunction([(1.0, 0.0)])
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Which log column plays which role; ``None`` where a role is not logged.
+
+    ``time`` in s; ``command`` into the regulator; ``pressure`` between regulator and actuator; ``curvature``
+    between actuator and sensor; ``output`` what the controller reads; ``run`` splits a file into experiments.
+    """
+
+    time: str
+    output: str
+    command: str | None = None
+    pressure: str | None = None
+    curvature: str | None = None
+    reference: str | None = None
+    run: str | None = None
+
+    def columns(self) -> dict[str, str]:
+        """The logged roles and their columns, without ``time`` and ``run``."""
+        roles = ("command", "pressure", "curvature", "output", "reference")
+        return {role: getattr(self, role) for role in roles if getattr(self, role) is not None}
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """K(p) p through 1/(T s^alpha + 1), eq. (3) and (5).
+
+    ``T`` in s^alpha; ``gain`` are the coefficients of K(p) = gain[0] + gain[1] p + …, in output units per
+    pressure unit, per pressure unit squared, …; ``offset`` is added to the output.
+    """
+
+    T: float
+    alpha: float
+    gain: tuple[float, ...]
+    offset: float = 0.0
+
+    def K(self, pressure):
+        """The static gain K(p) at ``pressure``, any shape."""
+        return np.polynomial.polynomial.polyval(pressure, self.gain)
+
+    def drive(self, pressure):
+        """K(p) p: what the dynamics settle at, any shape."""
+        return self.K(pressure) * pressure
+
+    @property
+    def dynamics(self) -> TransferFunction:
+        """1/(T s^alpha + 1)."""
+        return TransferFunction([(1.0, 0.0)], [(self.T, self.alpha), (1.0, 0.0)])
+
+
+@dataclass(frozen=True)
+class LinearActuator:
+    """An actuator given as a transfer function, with an ``offset`` added to its output."""
+
+    dynamics: TransferFunction
+    offset: float = 0.0
+
+    def drive(self, pressure):
+        """The input of the dynamics: the pressure itself."""
+        return pressure
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """What each signal can reach, (low, high) in the log's units; ``None`` where not stated."""
+
+    command: tuple[float, float] | None = None
+    pressure: tuple[float, float] | None = None
+    output: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The nominal rig. ``sample_time`` in s; ``effects`` are the ``[[effects]]`` tables as read."""
+
+    name: str
+    sample_time: float
+    signals: Signals
+    actuator: Actuator | LinearActuator | None = None
+    regulator: TransferFunction = UNITY
+    sensor: TransferFunction = UNITY
+    ranges: Ranges = Ranges()
+    effects: tuple[Mapping[str, Any], ...] = field(default=())

@@ -1,0 +1,137 @@
+"""Reading TOML with every value checked, so that a fault names its file, table and key."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from focgen.errors import InputError
+from focgen.fractional.transfer import TransferFunction
+
+
+class Table:
+    """A TOML table that knows where it stands and which error its faults raise.
+
+    Every ``get`` marks its key as known; :meth:`done` refuses what is left over.
+    """
+
+    def __init__(self, values: Mapping[str, Any], where: str, error: type[InputError]):
+        self.values, self.where, self.error = values, where, error
+        self._known: set[str] = set()
+
+    @classmethod
+    def read(cls, path: str | Path, error: type[InputError]) -> Table:
+        """Read a file. Raises ``error`` where it is missing or is not TOML."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+            return cls(tomllib.loads(text), str(path), error)
+        except OSError as reason:
+            raise error(str(path), f"cannot be read ({reason.strerror})", "check the path") from None
+        except UnicodeDecodeError:
+            raise error(str(path), "is not UTF-8 text", "save it as UTF-8") from None
+        except tomllib.TOMLDecodeError as reason:
+            fault = str(reason).replace("\n", " ")
+            raise error(str(path), f"is not TOML: {fault}", "correct the syntax") from None
+
+    def fail(self, key: str | None, what: str, remedy: str) -> InputError:
+        """Return (not raise) the error for a fault at ``key``."""
+        place = self.where if key is None else f"{self.where} [{key}]"
+        return self.error(place, what, remedy)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def raw(self, key: str, default: Any = None) -> Any:
+        """The value as read, unchecked."""
+        self._known.add(key)
+        return self.values.get(key, default)
+
+    def required(self, key: str) -> Any:
+        """The value as read; raises where it is absent."""
+        if key not in self.values:
+            raise self.fail(None, f"lacks {key!r}", f"add {key!r}")
+        return self.raw(key)
+
+    def text(self, key: str, default: str | None = None) -> str | None:
+        """A string, or ``default`` where absent."""
+        value = self.raw(key, default)
+        if value is not None and not isinstance(value, str):
+            raise self.fail(key, f"is {value!r}, not text", "put it in quotes")
+        return value
+
+    def flag(self, key: str, default: bool) -> bool:
+        """A truth value, or ``default`` where absent."""
+        value = self.raw(key, default)
+        if not isinstance(value, bool):
+            raise self.fail(key, f"is {value!r}", "write true or false")
+        return value
+
+    def number(self, key: str, default: float | None = None, *, above: float = -math.inf) -> float:
+        """A finite number > ``above``; required where ``default`` is None."""
+        value = self.required(key) if default is None else self.raw(key, default)
+        if not _is_number(value):
+            raise self.fail(key, f"is {value!r}, not a finite number", "give a number")
+        if value <= above:
+            raise self.fail(key, f"is {value:g}", f"give a number above {above:g}")
+        return float(value)
+
+    def numbers(self, key: str) -> tuple[float, ...]:
+        """A non-empty list of finite numbers."""
+        value = self.required(key)
+        if not isinstance(value, list) or not value or not all(map(_is_number, value)):
+            raise self.fail(key, f"is {value!r}", "give a list of finite numbers")
+        return tuple(map(float, value))
+
+    def span(self, key: str) -> tuple[float, float] | None:
+        """A pair [low, high] with low < high, or None where absent."""
+        if key not in self.values:
+            return None
+        pair = self.numbers(key)
+        if len(pair) != 2 or not pair[0] < pair[1]:
+            raise self.fail(key, f"is {list(pair)}", "give [low, high] with low < high")
+        return pair[0], pair[1]
+
+    def transfer(self) -> TransferFunction:
+        """The transfer function of this table's ``num`` and (optional) ``den``."""
+        num, den = self._terms("num"), self._terms("den", [[1.0, 0.0]])
+        try:
+            return TransferFunction(num, den)
+        except ValueError as reason:
+            raise self.fail("den", str(reason), "give a denominator that is not zero") from None
+
+    def _terms(self, key: str, default: list | None = None) -> list[tuple[float, float]]:
+        value = self.required(key) if default is None else self.raw(key, default)
+        right = isinstance(value, list) and value and all(
+            isinstance(t, list) and len(t) == 2 and all(map(_is_number, t)) for t in value
+        )
+        if not right:
+            raise self.fail(key, f"is {value!r}", "give a list of [coefficient, order of s] terms")
+        return [(float(c), float(o)) for c, o in value]
+
+    def table(self, key: str) -> Table | None:
+        """A sub-table, or None where absent."""
+        value = self.raw(key)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            raise self.fail(key, f"is {value!r}, not a table", f"write it as [{key}]")
+        return Table(value, f"{self.where} [{key}]", self.error)
+
+    def done(self) -> None:
+        """Raise for keys that nothing asked for: a misspelt key must not be a silent default."""
+        unknown = sorted(set(self.values) - self._known)
+        if unknown:
+            known = ", ".join(sorted(self._known))
+            raise self.fail(None, f"has the unknown key {unknown[0]!r}", f"known here: {known}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def terms_of(polynomial) -> list[list[float]]:
+    """A polynomial as TOML writes it: [[coefficient, order], …]."""
+    return [[t.coefficient, t.order] for t in polynomial]
