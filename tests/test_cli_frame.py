@@ -1,0 +1,63 @@
+"""The frame of the command line: one line an error, statuses, JSON, whole-or-nothing output."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from focgen.cli.main import commands, main, parser
+from focgen.cli.outcome import to_json
+from focgen.errors import InputError
+from focgen.output import new_folder, write_file, write_files
+
+
+@pytest.mark.parametrize("argv", [["nonsense"], [], ["design"], ["design", "missing.toml", "--out", "x.toml"]])
+def test_unusable_input_is_one_line_and_status_2(argv, capsys):
+    assert main(argv) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("focgen: error: ") and captured.err.count("\n") == 1
+    assert "Traceback" not in captured.err
+
+
+def test_every_command_shows_a_worked_example(capsys):
+    for name in commands():
+        with pytest.raises(SystemExit):
+            parser().parse_args([name, "--help"])
+        assert f"focgen {name}" in capsys.readouterr().out.split("\n\n", 1)[1]
+
+
+def test_a_closed_pipe_is_no_error():
+    shell = f"{sys.executable} -m focgen --help | head -1"
+    done = subprocess.run(shell, shell=True, capture_output=True, text=True)
+    assert done.stdout.startswith("usage:") and done.stderr == ""
+
+
+def test_json_carries_numbers_and_null_only():
+    text = to_json({"a": np.float64(1.5), "b": float("nan"), "c": np.arange(2), "d": (1, None)})
+    assert json.loads(text) == {"a": 1.5, "b": None, "c": [0, 1], "d": [1, None]}
+
+
+def test_a_failure_leaves_nothing_behind(tmp_path):
+    target = tmp_path / "out"
+    with pytest.raises(RuntimeError):
+        with new_folder(target) as folder:
+            (folder / "half.c").write_text("int x;")
+            raise RuntimeError
+    assert not target.exists()
+
+
+def test_files_of_others_stay(tmp_path):
+    (tmp_path / "mine.txt").write_text("keep")
+    write_files(tmp_path, {"a/b.txt": "text", "c.bin": b"\x00"})
+    assert (tmp_path / "a" / "b.txt").read_text() == "text" and (tmp_path / "mine.txt").read_text() == "keep"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "c.bin", "mine.txt"]
+
+
+def test_an_unwritable_place_is_reported(tmp_path):
+    (tmp_path / "file").write_text("")
+    for write in (lambda: write_files(tmp_path / "file", {"a": "b"}), lambda: write_file(tmp_path / "file" / "x", "b")):
+        with pytest.raises(InputError, match="cannot be written"):
+            write()
