@@ -1,12 +1,15 @@
 """One look for every picture: colours that colour-blind readers tell apart, one font, the same bytes every time.
 
-    fig, (top, bottom) = figure(2, 1, sharex=True)
-    top.plot(time, curvature, color=COLOURS["measured"])
-    write_files(folder, {"steps.png": png(fig)})
+    with figure(2, 1, sharex=True) as (fig, (top, bottom)):
+        top.plot(time, curvature, color=COLOURS["measured"])
+        picture = png(fig)
+    write_files(folder, {"steps.png": picture})
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -79,9 +82,10 @@ def _matplotlib():
     return matplotlib
 
 
+@contextmanager
 def figure(rows: int = 1, columns: int = 1, size: tuple[float, float] | None = None,
-           **subplots: Any) -> tuple[Figure, Any]:
-    """Return a figure and its axes, as ``matplotlib.pyplot.subplots`` does, in the project's style.
+           **subplots: Any) -> Iterator[tuple[Figure, Any]]:
+    """Yield a figure and its axes, as ``matplotlib.pyplot.subplots`` gives them; inside the block the style holds.
 
     ``size`` in inches (default 7 wide, 2.8 a row); ``subplots`` goes to ``Figure.subplots``. Nothing is shared
     between figures and no window is opened. Raises MissingExtra where matplotlib is not installed.
@@ -93,7 +97,7 @@ def figure(rows: int = 1, columns: int = 1, size: tuple[float, float] | None = N
 
         fig = Figure(figsize=size or (7.0, 2.8 * rows + 0.4), dpi=DPI)
         FigureCanvasAgg(fig)
-        return fig, fig.subplots(rows, columns, **subplots)
+        yield fig, fig.subplots(rows, columns, **subplots)
 
 
 def png(fig: Figure) -> bytes:
