@@ -5,48 +5,76 @@ A plan describes one controller step in machine terms. Both the templates, which
 
 One step, at sample k (steps that a plan does not need are ``None`` and leave no code behind)
 --------------------------------------------------------------------------------------------
-1. Inputs. Fixed point: reference, measurement and schedule are clamped to the counts of their ranges.
+1. Inputs. Fixed point: reference, measurement and schedule are clamped to ``low`` … ``high`` of their formats.
    e_k = reference − measurement (counts of ``error``; exact, no rounding).
-2. ``direct``: p = Σ_{j=0…L} w_j e_{k−j}, the numerator's terms of order ≥ 0 in one table.
-3. ``inner`` (numerator terms of negative order, see below): r = Σ_{j=0…L} w_j e_{k−j};
-   z = clamp(z + (r + r_prev)·gain), r_prev = r: the trapezoid, h/2 inside ``gain``. p = p + z.
-4. ``feedback`` (denominators with dynamics): v_k = p − Σ_{j=1…L} w_j v_{k−j}, all weights divided by the
-   coefficient of v_k. Without it v_k = p.
-5. ``schedule``: g, linear between breakpoints, held beyond them. Without it g is constant.
-6. d_k = g·v_k, in physical output units (per second, times h/2, where an integrator follows).
-7. ``integrator``: I = clamp(I + d_k + d_{k−1}), u = I rounded to output counts.
-   Without an integrator u = clamp(d_k).
+2. ``direct``: p = Σ_{j=0…} w_j e_{k−j}, the numerator's terms of order ≥ 0 in one table.
+3. ``inner`` (numerator terms of negative order): r_k = Σ_{j=0…} w_j e_{k−j}, where the trapezoid's h/2 is inside
+   the weights; z = clamp(z + (r_k + r_{k−1})); p = p + shift(z, to_wide).
+4. ``feedback`` (denominators with dynamics; all weights divided by the coefficient of v_k):
+   S = Σ_{j=1…} w_j v_{k−j}, x = p − S + rest_{k−1}, v_k = shift(x, narrow), rest_k = x − v_k·2^narrow (before v_k is
+   saturated): what rounding drops is taken up by the next sample, so it cannot pile up in a slow recursion.
+   Floating: v_k = p − S. Without feedback v_k = shift(p, narrow) (floating: p).
+5. ``schedule``: g, linear between breakpoints, held beyond them. Without it g is ``constant_gain``.
+6. d_k = shift(g·v_k, gain_shift), in physical output units (per second, times h/2, where an integrator follows).
+7. ``integrator``: I = clamp(I + (d_k + d_{k−1})), u = shift(I, to_output). Floating: u = I.
+   Without an integrator u = clamp(d_k) to ``low`` … ``high`` of ``output``.
 
-Histories hold e (and v where there is feedback) of the L past samples; a sum is taken from the oldest
-sample to the newest, sample k last.
+Histories hold the past ``error_lags`` samples of e and the past ``filtered_lags`` samples of v.
 
-Reset takes error and schedule as having been constant for ever: both histories are filled with their
-constant values, the first step after it takes d_{k−1} with its own gain, z keeps the value that makes
-the output u0 where it can (no integrator: z = 0), and I = clamp(u0). Init is the same with zeros, but
-d_{−1} = 0. Track sets I = clamp(u_applied).
+``reset(ref, meas, u0)`` takes the error as having been constant for ever. Fixed point: ref and meas are clamped as
+in a step, u0 to the output limits. The history of e is filled with e; z = 0, r_{k−1} = r of that history. With
+feedback v = saturate(shift(steady·e, steady_shift)) fills the history of v and rest = 0; without, v is step 4's of
+that history. I = u0·2^to_output. The first step after it takes d_{k−1} = shift(g·v, gain_shift) with
+its own g (the schedule is not known before). ``init`` is the reset to ref = meas, u0 = 0, with u0 clamped alike.
+``track(u)`` sets I = clamp(u·2^to_output) and touches nothing else.
+Without an integrator u0 is not looked at and track does nothing.
+
+Flags describe the latest step (0 after init and reset; track leaves them): bit 0: u is at its high limit; bit 1: u is
+at its low limit; bit 2: the (clamped) schedule is below the first or above the last breakpoint; bit 3: an input of
+the step was outside its range and has been clamped (fixed point only).
 
 Fixed point
 -----------
-An integer count x stands for the physical value x · lsb; every lsb is a power of two. A right shift by n
-rounds half up: (x + 2^(n−1)) >> n. Every narrowing saturates to the ends of the narrower type, and a
-proof in ``proofs`` says that in range it never has to. A history sum is split into blocks of taps, oldest first,
-each with weights of its own scale: before a block is added, the running sum is shifted right by the
-block's ``align``. Products are 32×32→64 bit in q31 and 16×16→32 bit in q15; the accumulator's type is in
-``Sum.accumulator``.
+An integer count x stands for the physical value x · lsb; every lsb is a power of two. shift(x, n) rounds half up:
+(x + 2^(n−1)) >> n for n > 0, x for n = 0; n is never negative. The types:
+
+=========  ==========================================  ==========================================
+node       q15                                         q31
+=========  ==========================================  ==========================================
+inputs, e  int16                                       int32
+weights    int16, products 16×16→32                    int32, products 32×32→64
+block sum  int32                                       int64
+total, p   int32 (``wide``)                            int64 (``wide``)
+v          int16 with feedback, else int32             int32
+g          int16; g·v is exact, at most 48 bits:       int32; g·v is exact, int64
+           (v>>16)·g·2^16 + (v & 0xffff)·g
+slopes     int16, slope·(s − breakpoint) in int32      int32, in int64
+d, I, z    int32, or int64 (see the formats)           int64
+u          int16                                       int32
+=========  ==========================================  ==========================================
+
+A history sum is split into blocks of taps, each with weights of its own scale. Each block's sum starts at 0 and is exact;
+total = Σ_blocks shift(block sum, align), so all blocks meet at the lsb of ``Sum.total``. The order does not matter, as
+a proof in ``proofs`` says for each of these nodes that it cannot overflow. Every narrowing (v, u) saturates to the ends of
+its type all the same; the proofs say that in range it never has to.
 
 Floating point
 --------------
-The same structure with one block per sum, lsb 1.0 and no shifts: acc = 0; acc = acc + w·x, oldest
-first, each operation rounded to the type, never contracted.
+The same structure with one block per sum, lsb 1.0 and no shifts: acc = 0; acc = acc + w·x, from the oldest sample to
+the newest, sample k last. Each operation is rounded to the type, none is contracted; brackets are as written above.
+g = gains[i] + slopes[i]·(s − breakpoints[i]).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from focgen.control.controller import Controller
 
 Count = int | float
+
+FLAG_HIGH, FLAG_LOW, FLAG_SCHEDULE, FLAG_INPUT = 1, 2, 4, 8
 
 
 @dataclass(frozen=True)
@@ -78,77 +106,94 @@ class Format:
 class Block:
     """Taps ``first`` … ``last`` (lags, both included), which share one scale.
 
-    ``weights[i]`` belongs to lag ``first + i``; its real value is ``weights[i] * lsb``. ``align``: bits by which the
-    sum of all older blocks is shifted right, rounding, before this block is added.
+    ``weights[i]`` belongs to lag ``first + i``; its real value is ``weights[i] * lsb``. ``sum`` holds the block's own
+    sum; shifted right by ``align``, rounding, it is in counts of the total.
     """
 
     first: int
     last: int
     weights: tuple[Count, ...]
     lsb: float
+    sum: Format
     align: int
 
 
 @dataclass(frozen=True)
 class Sum:
-    """Σ_j w_j x_{k−j} over ``history`` ("error" or "filtered"); ``blocks`` oldest first.
-
-    ``accumulator`` is the running sum's format after the newest block; shifted right by ``narrow`` (negative:
-    shifted left, exact), rounded and saturated, it becomes ``result``.
-    """
+    """Σ_j w_j x_{k−j} over ``history`` ("error" or "filtered"); ``blocks`` oldest first, without gaps."""
 
     name: str
     history: str
     blocks: tuple[Block, ...]
-    accumulator: Format
-    narrow: int
-    result: Format
+    total: Format
 
     @property
     def taps(self) -> int:
         """How many weights there are."""
         return sum(len(block.weights) for block in self.blocks)
 
+    @property
+    def first(self) -> int:
+        """The smallest lag: 0, or 1 for the feedback."""
+        return self.blocks[-1].first
+
+    @property
+    def last(self) -> int:
+        """The largest lag."""
+        return self.blocks[0].last
+
+    @property
+    def weights(self) -> tuple[Count, ...]:
+        """All weights by rising lag, from lag ``first`` on, each in counts of its own block."""
+        return tuple(w for block in reversed(self.blocks) for w in block.weights)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The weights' real values by rising lag; exact."""
+        return tuple(w * block.lsb for block in reversed(self.blocks) for w in block.weights)
+
 
 @dataclass(frozen=True)
 class InnerIntegrator:
-    """z = clamp(z + shift(gain·(r + r_prev))); ``weights`` makes r.
+    """z = clamp(z + (r + r_prev)) to ``low`` … ``high`` of ``state``; ``rest`` makes r, in counts of ``state`` too.
 
-    Floating: z + gain·(r + r_prev), no shift. ``state`` bounds z in counts, and is wide; ``to_sum`` is the right
-    shift, rounding, from z to the format of p.
+    ``to_wide`` is the right shift, rounding, from z to ``Plan.wide``.
     """
 
     rest: Sum
-    gain: Count
-    gain_lsb: float
-    shift: int
     state: Format
-    to_sum: int
+    to_wide: int
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """The recursion's table, and the gain from a constant e to the v that goes with it (for ``reset``)."""
+
+    table: Sum
+    steady: Count
+    steady_shift: int
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """g = gains[i] + shift(slopes[i] · (s − breakpoints[i])) for breakpoints[i] ≤ s < breakpoints[i+1].
+    """g = gains[i] + shift(slopes[i] · (s − breakpoints[i]), slope_shifts[i]) for breakpoints[i] ≤ s < breakpoints[i+1].
 
-    All in counts; held at the first gain below and at the last gain above. ``slope_shift`` is the right shift,
-    rounding (0 floating).
+    All in counts; held at the first gain below and at the last gain from the last breakpoint on. ``slopes`` and
+    ``slope_shifts`` have one entry a segment, one fewer than ``gains``.
     """
 
     signal: Format
     breakpoints: tuple[Count, ...]
     gains: tuple[Count, ...]
     slopes: tuple[Count, ...]
-    slope_shift: int
-    gain: Format
+    slope_shifts: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Integrator:
-    """I = clamp(I + d_k + d_{k−1}) to ``low`` … ``high`` counts of ``state``; u = I shifted right by ``to_output``."""
+    """I = clamp(I + (d_k + d_{k−1})) to ``low`` … ``high`` of ``state``; u = shift(I, to_output)."""
 
     state: Format
-    low: Count
-    high: Count
     to_output: int
 
 
@@ -165,8 +210,6 @@ class Proof:
     @property
     def margin_bits(self) -> float:
         """log2 of limit / worst."""
-        import math
-
         return math.inf if self.worst == 0 else math.log2(self.limit / self.worst)
 
 
@@ -176,20 +219,27 @@ class ErrorBound:
 
     ``operator``: of d/(h/2) with an integrator and of d without one, i.e. of the signal ahead of the integrator, in
     physical units, in any one sample. ``output_per_sample``: by which the output's error can grow each sample,
-    the output's own rounding included. ``truncation``: of the operator, against an infinite memory.
+    the output's own rounding included: n samples after a reset, an init or a track it is at most n times this.
+    ``truncation``: of the operator, against an infinite memory.
+    ``operator_per_sample``: with an inner integrator the error of its state adds up until its clamp ends it; n
+    samples after a reset the operator's error is at most n times this (and ``operator``). 0 elsewhere.
+    ``parts`` splits ``operator`` by cause, for reports.
     """
 
     operator: float
     output_per_sample: float
     truncation: float | None
+    operator_per_sample: float = 0.0
+    parts: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
 class Plan:
     """A controller in machine terms; see the module's description for what one step does with it.
 
-    ``gain_shift``: right shift, rounding, from g·v to ``increment`` (d). ``constant_gain`` (counts of ``gain``) is used
-    where there is no schedule. ``output`` carries the output limits as its low and high.
+    At least one of ``direct`` and ``inner`` is there. ``wide`` holds p and x, ``filtered`` holds v, ``product`` g·v
+    before its shift. ``constant_gain`` (counts of ``gain``) is used where there is no schedule. ``increment`` holds d.
+    ``output`` carries the output limits as its low and high.
     """
 
     controller: Controller
@@ -201,16 +251,35 @@ class Plan:
     reference: Format
     measurement: Format
     error: Format
-    direct: Sum
+    direct: Sum | None
     inner: InnerIntegrator | None
-    feedback: Sum | None
+    wide: Format
+    narrow: int
+    feedback: Feedback | None
     filtered: Format
     schedule: Schedule | None
-    constant_gain: Count
     gain: Format
+    constant_gain: Count
+    product: Format
     gain_shift: int
     increment: Format
     integrator: Integrator | None
     output: Format
     proofs: tuple[Proof, ...]
     error_bound: ErrorBound
+
+    @property
+    def floating(self) -> bool:
+        """Whether the arithmetic is f64 or f32."""
+        return self.output.floating
+
+    @property
+    def error_lags(self) -> int:
+        """How many past samples of the error are needed."""
+        sums = [self.direct, self.inner.rest if self.inner else None]
+        return max(s.last for s in sums if s is not None)
+
+    @property
+    def filtered_lags(self) -> int:
+        """How many past samples of v are needed."""
+        return self.feedback.table.last if self.feedback else 0
