@@ -11,19 +11,19 @@ One step, at sample k (steps that a plan does not need are ``None`` and leave no
 3. ``inner`` (numerator terms of negative order): r_k = Σ_{j=0…} w_j e_{k−j}, where the trapezoid's h/2 is inside
    the weights; z = clamp(z + (r_k + r_{k−1})); p = p + shift(z, to_wide).
 4. ``feedback`` (denominators with dynamics; all weights divided by the coefficient of v_k):
-   S = Σ_{j=1…} w_j v_{k−j}, x = p − S + rest_{k−1}, v_k = shift(x, narrow), rest_k = x − v_k·2^narrow (before v_k is
-   saturated): what rounding drops is taken up by the next sample, so it cannot pile up in a slow recursion.
+   S = Σ_{j=1…} w_j v_{k−j}, x = p − S + carry_{k−1}, v_k = shift(x, narrow), carry_k = x − v_k·2^narrow (before v_k
+   is saturated): what rounding drops is taken up by the next sample, so it cannot pile up in a slow recursion.
    Floating: v_k = p − S. Without feedback v_k = shift(p, narrow) (floating: p).
 5. ``schedule``: g, linear between breakpoints, held beyond them. Without it g is ``constant_gain``.
 6. d_k = shift(g·v_k, gain_shift), in physical output units (per second, times h/2, where an integrator follows).
 7. ``integrator``: I = clamp(I + (d_k + d_{k−1})), u = shift(I, to_output). Floating: u = I.
-   Without an integrator u = clamp(d_k) to ``low`` … ``high`` of ``output``.
+   Without an integrator d is in counts of the output and u = clamp(d_k) to ``low`` … ``high`` of ``output``.
 
 Histories hold the past ``error_lags`` samples of e and the past ``filtered_lags`` samples of v.
 
 ``reset(ref, meas, u0)`` takes the error as having been constant for ever. Fixed point: ref and meas are clamped as
 in a step, u0 to the output limits. The history of e is filled with e; z = 0, r_{k−1} = r of that history. With
-feedback v = saturate(shift(steady·e, steady_shift)) fills the history of v and rest = 0; without, v is step 4's of
+feedback v = saturate(shift(steady·e, steady_shift)) fills the history of v and carry = 0; without, v is step 4's of
 that history. I = u0·2^to_output. The first step after it takes d_{k−1} = shift(g·v, gain_shift) with
 its own g (the schedule is not known before). ``init`` is the reset to ref = meas, u0 = 0, with u0 clamped alike.
 ``track(u)`` sets I = clamp(u·2^to_output) and touches nothing else.
@@ -53,9 +53,9 @@ d, I, z    int32, or int64 (see the formats)           int64
 u          int16                                       int32
 =========  ==========================================  ==========================================
 
-A history sum is split into blocks of taps, each with weights of its own scale. Each block's sum starts at 0 and is exact;
-total = Σ_blocks shift(block sum, align), so all blocks meet at the lsb of ``Sum.total``. The order does not matter, as
-a proof in ``proofs`` says for each of these nodes that it cannot overflow. Every narrowing (v, u) saturates to the ends of
+A history sum is split into blocks of taps, each with weights of its own scale. Each block's sum starts at 0 and is
+exact; total = Σ_blocks shift(block sum, align), so all blocks meet at the lsb of ``Sum.total``. A proof in
+``proofs`` says for each of these nodes that it cannot overflow, so the order does not matter. Every narrowing (v, u) saturates to the ends of
 its type all the same; the proofs say that in range it never has to.
 
 Floating point
