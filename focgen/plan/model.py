@@ -5,38 +5,39 @@ A plan describes one controller step in machine terms. Both the templates, which
 
 One step, at sample k (steps that a plan does not need are ``None`` and leave no code behind)
 --------------------------------------------------------------------------------------------
-1. Inputs. Fixed point: reference, measurement and schedule are clamped to ``low`` … ``high`` of their formats.
-   e_k = reference − measurement (counts of ``error``; exact, no rounding).
+1. Inputs. Fixed point: reference, measurement and schedule are clamped to ``low`` … ``high`` of their
+   formats. e_k = reference − measurement (counts of ``error``; exact, no rounding).
 2. ``direct``: p = Σ_{j=0…} w_j e_{k−j}, the numerator's terms of order ≥ 0 in one table.
-3. ``inner`` (numerator terms of negative order): r_k = Σ_{j=0…} w_j e_{k−j}, where the trapezoid's h/2 is inside
-   the weights; z = clamp(z + (r_k + r_{k−1})); p = p + shift(z, to_wide).
+3. ``inner`` (numerator terms of negative order): r_k = Σ_{j=0…} w_j e_{k−j}, where the trapezoid's h/2 is
+   inside the weights; z = clamp(z + (r_k + r_{k−1})); p = p + shift(z, to_wide).
 4. ``feedback`` (denominators with dynamics; all weights divided by the coefficient of v_k):
-   S = Σ_{j=1…} w_j v_{k−j}, x = p − S + carry_{k−1}, v_k = shift(x, narrow), carry_k = x − v_k·2^narrow (before v_k
-   is saturated): what rounding drops is taken up by the next sample, so it cannot pile up in a slow recursion.
-   Floating: v_k = p − S. Without feedback v_k = shift(p, narrow) (floating: p).
+   S = Σ_{j=1…} w_j v_{k−j}, x = p − S + carry_{k−1}, v_k = shift(x, narrow), carry_k = x − v_k·2^narrow
+   (before v_k is saturated): what rounding drops is taken up by the next sample, so it cannot pile up in a
+   slow recursion. Floating: v_k = p − S. Without feedback v_k = shift(p, narrow) (floating: p).
 5. ``schedule``: g, linear between breakpoints, held beyond them. Without it g is ``constant_gain``.
-6. d_k = shift(g·v_k, gain_shift), in physical output units (per second, times h/2, where an integrator follows).
+6. d_k = shift(g·v_k, gain_shift), in physical output units (per second, times h/2, where an integrator
+   follows).
 7. ``integrator``: I = clamp(I + (d_k + d_{k−1})), u = shift(I, to_output). Floating: u = I.
    Without an integrator d is in counts of the output and u = clamp(d_k) to ``low`` … ``high`` of ``output``.
 
 Histories hold the past ``error_lags`` samples of e and the past ``filtered_lags`` samples of v.
 
-``reset(ref, meas, u0)`` takes the error as having been constant for ever. Fixed point: ref and meas are clamped as
-in a step, u0 to the output limits. The history of e is filled with e; z = 0, r_{k−1} = r of that history. With
-feedback v = saturate(shift(steady·e, steady_shift)) fills the history of v and carry = 0; without, v is step 4's of
-that history. I = u0·2^to_output. The first step after it takes d_{k−1} = shift(g·v, gain_shift) with
-its own g (the schedule is not known before). ``init`` is the reset to ref = meas, u0 = 0, with u0 clamped alike.
-``track(u)`` sets I = clamp(u·2^to_output) and touches nothing else.
+``reset(ref, meas, u0)`` takes the error as having been constant for ever. Fixed point: ref and meas are
+clamped as in a step, u0 to the output limits. The history of e is filled with e; z = 0, r_{k−1} = r of that
+history. With feedback v = saturate(shift(steady·e, steady_shift)) fills the history of v and carry = 0;
+without, v is step 4's of that history. I = u0·2^to_output. The first step after it takes d_{k−1} = shift(g·v,
+gain_shift) with its own g (the schedule is not known before). ``init`` is the reset to ref = meas, u0 = 0,
+with u0 clamped alike. ``track(u)`` sets I = clamp(u·2^to_output) and touches nothing else.
 Without an integrator u0 is not looked at and track does nothing.
 
-Flags describe the latest step (0 after init and reset; track leaves them): bit 0: u is at its high limit; bit 1: u is
-at its low limit; bit 2: the (clamped) schedule is below the first or above the last breakpoint; bit 3: an input of
-the step was outside its range and has been clamped (fixed point only).
+Flags describe the latest step (0 after init and reset; track leaves them): bit 0: u is at its high limit; bit
+1: u is at its low limit; bit 2: the (clamped) schedule is below the first or above the last breakpoint; bit
+3: an input of the step was outside its range and has been clamped (fixed point only).
 
 Fixed point
 -----------
-An integer count x stands for the physical value x · lsb; every lsb is a power of two. shift(x, n) rounds half up:
-(x + 2^(n−1)) >> n for n > 0, x for n = 0; n is never negative. The types:
+An integer count x stands for the physical value x · lsb; every lsb is a power of two. shift(x, n) rounds half
+up: (x + 2^(n−1)) >> n for n > 0, x for n = 0; n is never negative. The types:
 
 =========  ==========================================  ==========================================
 node       q15                                         q31
@@ -53,16 +54,16 @@ d, I, z    int32, or int64 (see the formats)           int64
 u          int16                                       int32
 =========  ==========================================  ==========================================
 
-A history sum is split into blocks of taps, each with weights of its own scale. Each block's sum starts at 0 and is
-exact; total = Σ_blocks shift(block sum, align), so all blocks meet at the lsb of ``Sum.total``. A proof in
-``proofs`` says for each of these nodes that it cannot overflow, so the order does not matter. Every narrowing (v, u) saturates to the ends of
-its type all the same; the proofs say that in range it never has to.
+A history sum is split into blocks of taps, each with weights of its own scale. Each block's sum starts at 0
+and is exact; total = Σ_blocks shift(block sum, align), so all blocks meet at the lsb of ``Sum.total``. A
+proof in ``proofs`` says for each of these nodes that it cannot overflow, so the order does not matter. Every
+narrowing (v, u) saturates to the ends of its type all the same; the proofs say that in range it never has to.
 
 Floating point
 --------------
-The same structure with one block per sum, lsb 1.0 and no shifts: acc = 0; acc = acc + w·x, from the oldest sample to
-the newest, sample k last. Each operation is rounded to the type, none is contracted; brackets are as written above.
-g = gains[i] + slopes[i]·(s − breakpoints[i]).
+The same structure with one block per sum, lsb 1.0 and no shifts: acc = 0; acc = acc + w·x, from the oldest
+sample to the newest, sample k last. Each operation is rounded to the type, none is contracted; brackets are
+as written above. g = gains[i] + slopes[i]·(s − breakpoints[i]).
 """
 
 from __future__ import annotations
@@ -81,8 +82,8 @@ FLAG_HIGH, FLAG_LOW, FLAG_SCHEDULE, FLAG_INPUT = 1, 2, 4, 8
 class Format:
     """How one node is held.
 
-    ``ctype`` is a C type; ``lsb`` the physical value of one count (1.0 floating); ``low`` and ``high`` its proven
-    range in counts; ``unit`` for comments.
+    ``ctype`` is a C type; ``lsb`` the physical value of one count (1.0 floating); ``low`` and ``high`` its
+    proven range in counts; ``unit`` for comments.
     """
 
     ctype: str
@@ -106,8 +107,8 @@ class Format:
 class Block:
     """Taps ``first`` … ``last`` (lags, both included), which share one scale.
 
-    ``weights[i]`` belongs to lag ``first + i``; its real value is ``weights[i] * lsb``. ``sum`` holds the block's own
-    sum; shifted right by ``align``, rounding, it is in counts of the total.
+    ``weights[i]`` belongs to lag ``first + i``; its real value is ``weights[i] * lsb``. ``sum`` holds the
+    block's own sum; shifted right by ``align``, rounding, it is in counts of the total.
     """
 
     first: int
@@ -155,7 +156,8 @@ class Sum:
 
 @dataclass(frozen=True)
 class InnerIntegrator:
-    """z = clamp(z + (r + r_prev)) to ``low`` … ``high`` of ``state``; ``rest`` makes r, in counts of ``state`` too.
+    """z = clamp(z + (r + r_prev)) to ``low`` … ``high`` of ``state``; ``rest`` makes r, in counts of
+    ``state`` too.
 
     ``to_wide`` is the right shift, rounding, from z to ``Plan.wide``.
     """
@@ -176,10 +178,11 @@ class Feedback:
 
 @dataclass(frozen=True)
 class Schedule:
-    """g = gains[i] + shift(slopes[i] · (s − breakpoints[i]), slope_shifts[i]) for breakpoints[i] ≤ s < breakpoints[i+1].
+    """g = gains[i] + shift(slopes[i] · (s − breakpoints[i]), slope_shifts[i]) for breakpoints[i] ≤ s <
+    breakpoints[i+1].
 
-    All in counts; held at the first gain below and at the last gain from the last breakpoint on. ``slopes`` and
-    ``slope_shifts`` have one entry a segment, one fewer than ``gains``.
+    All in counts; held at the first gain below and at the last gain from the last breakpoint on. ``slopes``
+    and ``slope_shifts`` have one entry a segment, one fewer than ``gains``.
     """
 
     signal: Format
@@ -199,7 +202,8 @@ class Integrator:
 
 @dataclass(frozen=True)
 class Proof:
-    """Why one integer node cannot overflow: its worst magnitude in counts, its limit, and how it was proved."""
+    """Why one integer node cannot overflow: its worst magnitude in counts, its limit, and how it was
+    proved."""
 
     node: str
     worst: int
@@ -217,12 +221,12 @@ class Proof:
 class ErrorBound:
     """Proven bounds, for inputs anywhere in their ranges; None where no bound exists.
 
-    ``operator``: of d/(h/2) with an integrator and of d without one, i.e. of the signal ahead of the integrator, in
-    physical units, in any one sample. ``output_per_sample``: by which the output's error can grow each sample,
-    the output's own rounding included: n samples after a reset, an init or a track it is at most n times this.
-    ``truncation``: of the operator, against an infinite memory.
-    ``operator_per_sample``: with an inner integrator the error of its state adds up until its clamp ends it; n
-    samples after a reset the operator's error is at most n times this (and ``operator``). 0 elsewhere.
+    ``operator``: of d/(h/2) with an integrator and of d without one, i.e. of the signal ahead of the
+    integrator, in physical units, in any one sample. ``output_per_sample``: by which the output's error can
+    grow each sample, the output's own rounding included: n samples after a reset, an init or a track it is at
+    most n times this. ``truncation``: of the operator, against an infinite memory.
+    ``operator_per_sample``: with an inner integrator the error of its state adds up until its clamp ends it;
+    n samples after a reset the operator's error is at most n times this (and ``operator``). 0 elsewhere.
     ``parts`` splits ``operator`` by cause, for reports.
     """
 
@@ -237,9 +241,9 @@ class ErrorBound:
 class Plan:
     """A controller in machine terms; see the module's description for what one step does with it.
 
-    At least one of ``direct`` and ``inner`` is there. ``wide`` holds p and x, ``filtered`` holds v, ``product`` g·v
-    before its shift. ``constant_gain`` (counts of ``gain``) is used where there is no schedule. ``increment`` holds d.
-    ``output`` carries the output limits as its low and high.
+    At least one of ``direct`` and ``inner`` is there. ``wide`` holds p and x, ``filtered`` holds v,
+    ``product`` g·v before its shift. ``constant_gain`` (counts of ``gain``) is used where there is no
+    schedule. ``increment`` holds d. ``output`` carries the output limits as its low and high.
     """
 
     controller: Controller
