@@ -1,0 +1,125 @@
+"""A transfer function's step response as the sum of its modes and of a part that is smooth in log t."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.fractional.contour import INNERMOST, TOLERATED
+from focgen.fractional.modes import Chain, polar_part
+from focgen.fractional.poles import first_sheet_zeros
+from focgen.fractional.transfer import Polynomial, TransferFunction
+
+
+@dataclass(frozen=True)
+class StepImage:
+    """G(s)/s, the Laplace transform of a step response, split for its inversion.
+
+    ``chains`` are its poles; ``remainder(s)`` what is left, analytic off the negative real axis, or None
+    where nothing is; ``feedthrough`` the response at t = 0+.
+    """
+
+    chains: tuple[Chain, ...]
+    remainder: Callable | None
+    feedthrough: float
+
+
+def step_image(transfer: TransferFunction, horizon: float) -> StepImage:
+    """Split G(s)/s for times up to ``horizon`` (s).
+
+    Raises ValueError for an improper transfer function, which has no step response.
+    """
+    if not transfer.is_proper:
+        top, bottom = transfer.num[0].order, transfer.den[0].order
+        raise ValueError(
+            f"the transfer function is improper: its numerator has order {top:g}, its denominator {bottom:g}"
+        )
+    level = _feedthrough(transfer)
+    if not transfer.num:
+        return StepImage((), None, 0.0)
+    num, den = _reduced(transfer.num, transfer.den)
+    if all(t.order.is_integer() for t in num + den):
+        return StepImage(tuple(_rational(num, den, horizon)), None, level)
+    return _fractional(num, den, horizon, level)
+
+
+def _feedthrough(transfer: TransferFunction) -> float:
+    if not transfer.num or transfer.num[0].order < transfer.den[0].order:
+        return 0.0
+    return transfer.num[0].coefficient / transfer.den[0].coefficient
+
+
+def _reduced(num: Polynomial, den: Polynomial) -> tuple[Polynomial, Polynomial]:
+    """Return numerator and denominator of G/s without a common power of s."""
+    den = _shifted(den, 1.0)
+    lowest = min(num[-1].order, den[-1].order)
+    return _shifted(num, -lowest), _shifted(den, -lowest)
+
+
+def _shifted(terms: Polynomial, by: float) -> Polynomial:
+    return tuple(t._replace(order=t.order + by) for t in terms)
+
+
+def _values(terms: Polynomial, s: np.ndarray) -> np.ndarray:
+    log = np.log(s)
+    return sum(t.coefficient * (np.exp(t.order * log) if t.order else 1.0) for t in terms)
+
+
+def _slope(terms: Polynomial, s: complex) -> complex:
+    return sum(t.coefficient * t.order * s ** (t.order - 1.0) for t in terms)
+
+
+def _fractional(num: Polynomial, den: Polynomial, horizon: float, level: float) -> StepImage:
+    poles = first_sheet_zeros(den, math.pi - TOLERATED)
+    poles = poles[np.abs(poles) * horizon > INNERMOST]
+
+    def image(s):
+        return _values(num, s) / _values(den, s)
+
+    def isolated(p, _):
+        return _values(num, p) / _slope(den, p)
+
+    chains = tuple(polar_part(image, poles, 0.0, isolated, _to_the_cut))
+
+    def remainder(s):
+        return image(s) - sum(chain.image(s) for chain in chains)
+
+    return StepImage(chains, remainder if chains else image, level)
+
+
+def _to_the_cut(place: complex) -> float:
+    return abs(place.imag) if place.real < 0 else abs(place)
+
+
+def _rational(num: Polynomial, den: Polynomial, horizon: float) -> list[Chain]:
+    top, bottom = _dense(num), _dense(den)
+    poles = _roots(bottom)
+
+    def image(s):
+        return np.polyval(top, s) / (bottom[0] * np.prod(s - poles[:, None], axis=0))
+
+    def isolated(p, others):
+        return np.polyval(top, p) / (bottom[0] * np.prod(p - others))
+
+    return polar_part(image, poles, 2.0 / horizon, isolated, lambda _: math.inf)
+
+
+def _dense(terms: Polynomial) -> np.ndarray:
+    dense = np.zeros(int(terms[0].order) + 1)
+    dense[[int(terms[0].order - t.order) for t in terms]] = [t.coefficient for t in terms]
+    return dense
+
+
+def _roots(dense: np.ndarray) -> np.ndarray:
+    """Return the roots, simple ones polished by Newton's method; zero roots are exact."""
+    roots = np.roots(dense).astype(complex)
+    slope = np.polyder(dense)
+    for _ in range(2):
+        with np.errstate(all="ignore"):
+            step = np.polyval(dense, roots) / np.polyval(slope, roots)
+        small = np.isfinite(step) & (np.abs(step) < 1e-9 * np.abs(roots))
+        roots = np.where(small, roots - np.where(small, step, 0.0), roots)
+    return roots

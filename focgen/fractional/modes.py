@@ -1,0 +1,144 @@
+"""The share of a response that poles make, exactly: Σ of exponentials, poles that nearly coincide together.
+
+A cluster p₁ … p_m contributes Σ_k γ_k / Π_{i ≥ k} (s − p_i), a chain of first-order lags. Unlike residues
+its coefficients stay finite where the poles meet, and its time function is one triangular matrix exponential.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+_CIRCLE = 128
+_RELATIVE_GAP = 0.02
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Σ_k γ_k / Π_{i ≥ k} (s − p_i) for one cluster; ``weight`` 2 where its conjugate counts as well.
+
+    ``poles`` in rad/s, ``gammas`` γ_k, both of shape (m,).
+    """
+
+    poles: np.ndarray
+    gammas: np.ndarray
+    weight: float
+
+    def image(self, s: np.ndarray) -> np.ndarray:
+        """Return the Laplace transform at ``s``, the conjugate included."""
+        total = _chain_image(self.poles, self.gammas, s)
+        if self.weight == 2.0:
+            total = total + _chain_image(self.poles.conj(), self.gammas.conj(), s)
+        return total
+
+    def samples(self, step: float, count: int) -> np.ndarray:
+        """Return the time function at 0, ``step``, …, shape (count,)."""
+        return self._follow(self._start(), step, count)
+
+    def means(self, step: float, count: int) -> np.ndarray:
+        """Return its mean over each [(j−1) step, j step], j = 1 … count, shape (count,)."""
+        return self._follow(self._mean_state(step), step, count)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Return the time function at the times ``t`` ≥ 0 (s), shape of ``t``."""
+        if len(self.poles) == 1:
+            return self.weight * (self.gammas[0] * np.exp(self.poles[0] * t)).real
+        states = expm(self._matrix() * t[:, None, None]) @ self._start()
+        return self.weight * (states @ self._output()).real
+
+    # The states are scaled by the spread of the poles, so that the matrix has entries of one size.
+    def _spread(self) -> float:
+        return float(np.max(np.abs(self.poles - self.poles[0]))) or float(np.max(np.abs(self.poles))) or 1.0
+
+    def _matrix(self) -> np.ndarray:
+        return np.diag(self.poles) + self._spread() * np.eye(len(self.poles), k=1)
+
+    def _start(self) -> np.ndarray:
+        return np.eye(len(self.poles), dtype=complex)[-1]
+
+    def _output(self) -> np.ndarray:
+        return self.gammas / self._spread() ** np.arange(len(self.poles) - 1.0, -1.0, -1.0)
+
+    def _mean_state(self, step: float) -> np.ndarray:
+        if len(self.poles) == 1:
+            x = self.poles[0] * step
+            return np.array([np.expm1(x) / x if x else 1.0], complex)
+        m = len(self.poles)
+        augmented = np.zeros((m + 1, m + 1), complex)
+        augmented[:m, :m], augmented[:m, m] = self._matrix() * step, self._start()
+        return expm(augmented)[:m, m]
+
+    def _follow(self, state: np.ndarray, step: float, count: int) -> np.ndarray:
+        """Return the output at ``count`` samples from ``state`` on, each doubling by an exponential of its own."""
+        doublings = max(count - 1, 0).bit_length()
+        lengths = step * 2.0 ** np.arange(doublings)
+        states = state[:, None]
+        if len(self.poles) == 1:
+            for factor in np.exp(self.poles[0] * lengths):
+                states = np.concatenate([states, factor * states], axis=1)
+        else:
+            for factor in expm(self._matrix() * lengths[:, None, None]) if doublings else ():
+                states = np.concatenate([states, factor @ states], axis=1)
+        return self.weight * (self._output() @ states[:, :count]).real
+
+
+def _chain_image(poles: np.ndarray, gammas: np.ndarray, s: np.ndarray) -> np.ndarray:
+    total, lags = 0.0, 1.0
+    for pole, gamma in zip(poles[::-1], gammas[::-1]):
+        lags = lags / (s - pole)
+        total = total + gamma * lags
+    return total
+
+
+def polar_part(
+    image: Callable, poles: np.ndarray, gap: float, isolated: Callable, obstacle: Callable
+) -> list[Chain]:
+    """Return the polar part of ``image`` at ``poles`` (rad/s, closed under conjugation) as chains.
+
+    Poles closer than 2 % of their size, or than ``gap``, share a chain. ``isolated(p, others)`` is the
+    residue at a simple pole; ``obstacle(c)`` the distance from c to the nearest singularity of ``image``
+    that is not a pole in the list.
+    """
+    chains = []
+    for members in _clusters(poles, gap):
+        cluster, others = poles[members], np.delete(poles, members)
+        middle = cluster.mean()
+        if middle.imag < -1e-9 * abs(middle):
+            continue
+        weight = 2.0 if middle.imag > 1e-9 * abs(middle) else 1.0
+        if len(cluster) == 1:
+            gammas = np.atleast_1d(isolated(cluster[0], others))
+        else:
+            cluster, gammas = _chain(image, cluster, others, obstacle)
+        chains.append(Chain(cluster, gammas, weight))
+    return chains
+
+
+def _clusters(poles: np.ndarray, gap: float) -> list[np.ndarray]:
+    size = np.abs(poles)
+    close = np.abs(poles[:, None] - poles) <= np.maximum(gap, _RELATIVE_GAP * np.maximum(size[:, None], size))
+    for _ in range(len(poles).bit_length()):  # transitive closure
+        close = (close.astype(int) @ close.astype(int)) > 0
+    return [np.flatnonzero(row) for i, row in enumerate(close) if not row[:i].any()]
+
+
+def _chain(image, cluster, others, obstacle):
+    """Return the cluster's poles and its γ_k = (1/2πi) ∮ image(s) Π_{i > k} (s − p_i) ds."""
+    corners = [complex(end(cluster.real), end(cluster.imag)) for end in (np.min, np.max)]
+    middle = 0.5 * (corners[0] + corners[1])
+    inner = float(np.max(np.abs(cluster - middle)))
+    outer = min(float(np.min(np.abs(others - middle), initial=math.inf)), obstacle(middle))
+    if math.isinf(outer):
+        outer = 16.0 * inner or 1.0
+    radius = math.sqrt(max(inner, 0.05 * outer) * outer)
+    s = middle + radius * np.exp(2j * math.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE)
+    share = image(s) * (s - middle) / _CIRCLE
+    gammas = np.empty(len(cluster), complex)
+    for k in range(len(cluster) - 1, -1, -1):
+        gammas[k] = share.sum()
+        share = share * (s - cluster[k])
+    return cluster, gammas

@@ -1,0 +1,176 @@
+"""Simulators of sampled signals: eq. (10) as the paper writes it, and a convolution without its bias."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol
+
+import numpy as np
+from scipy import fft, signal
+
+from focgen.fractional.contour import inverse_laplace
+from focgen.fractional.decomposition import StepImage, step_image
+from focgen.fractional.loggrid import DIRECT, log_grid
+from focgen.fractional.transfer import Polynomial, TransferFunction
+from focgen.fractional.weights import gl_weights
+
+
+class Simulator(Protocol):
+    """What turns a sampled input into a sampled output, from rest."""
+
+    def run(self, u) -> np.ndarray:
+        """Return the output at the instants of the input samples ``u``, shape (n,) -> (n,)."""
+
+
+class Convolution:
+    """The exact response to a sampled input, O(n log n).
+
+    ``hold`` says what the input does between its samples: "zero" keeps the last one (zero-order hold),
+    "linear" joins them by straight lines. Before the first sample everything rests at 0; the input then
+    jumps to it. ``step`` is the sampling interval in s.
+    Raises ValueError for an improper transfer function (from ``run``), a step that is not positive, or an
+    unknown hold.
+    """
+
+    def __init__(self, transfer: TransferFunction, step: float, hold: Literal["zero", "linear"] = "zero"):
+        if not 0.0 < step < np.inf:
+            raise ValueError(f"the step is {step} s, it must be positive")
+        if hold not in ("zero", "linear"):
+            raise ValueError(f"the hold is {hold!r}, it must be 'zero' or 'linear'")
+        self.transfer, self.step, self.hold = transfer, step, hold
+        self._kernel = self._first = np.empty(0)
+
+    def run(self, u) -> np.ndarray:
+        u = np.asarray(u, dtype=float)
+        if len(u) > len(self._kernel):
+            self._prepare(len(u))
+        y = _product(self._kernel[: len(u)], u)
+        if self.hold == "linear" and len(u):
+            y += u[0] * self._first[: len(u)]
+        return y
+
+    def _prepare(self, count: int) -> None:
+        image = step_image(self.transfer, self.step * count)
+        if self.hold == "zero":
+            self._kernel = np.diff(_steps(image, self.step, count), prepend=0.0)
+            return
+        # means over [(j−1)h, jh]: a line between samples is a stack of ramps, which these differentiate
+        means = _means(image, self.step, count)
+        self._kernel = np.diff(means, prepend=0.0)
+        self._first = _steps(image, self.step, count) - means
+
+
+def _steps(image: StepImage, step: float, count: int) -> np.ndarray:
+    """Return the step response at 0, h, …, shape (count,)."""
+    out = np.zeros(count)
+    for chain in image.chains:
+        out += chain.samples(step, count)
+    if image.remainder is not None and count > 1:
+        grid = log_grid(count - 1)
+        places = np.concatenate([grid.head, grid.tail])
+        values = inverse_laplace(image.remainder, places * step)
+        out[1:] += grid.spread(values[: len(grid.head)], values[len(grid.head) :])
+    out[0] = image.feedthrough
+    return out
+
+
+def _means(image: StepImage, step: float, count: int) -> np.ndarray:
+    """Return the step response's means over [(j−1)h, jh], j = 1 … count, shape (count,)."""
+    out = np.zeros(count)
+    for chain in image.chains:
+        out += chain.means(step, count)
+    if image.remainder is not None:
+        grid = log_grid(count)
+        head = _head_means(image.remainder, step, len(grid.head))
+        out += grid.spread(head, _tail_means(image.remainder, step, grid.tail))
+    return out
+
+
+def _head_means(remainder, step: float, count: int) -> np.ndarray:
+    integrals = inverse_laplace(lambda s: remainder(s) / s, step * np.arange(1.0, count + 1.0))
+    return np.diff(integrals, prepend=0.0) / step
+
+
+def _tail_means(remainder, step: float, places: np.ndarray) -> np.ndarray:
+    # (1 − e^{−sh})/(sh) takes the mean; beyond the first samples the contour bears its growth
+    return inverse_laplace(lambda s: remainder(s) * -np.expm1(-s * step) / (s * step), places * step)
+
+
+def _product(kernel: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return the first len(u) values of their convolution."""
+    n = len(u)
+    size = fft.next_fast_len(2 * n, real=True)
+    return fft.irfft(fft.rfft(kernel, size) * fft.rfft(u, size), size)[:n] if n else u.copy()
+
+
+class GrunwaldLetnikov:
+    """Eq. (10): the transfer function with every power of s replaced by its Grünwald–Letnikov sum.
+
+    Each sum remembers the past samples j = 1 … ``length``, or all where it is None. ``step`` is h in s. The
+    first input sample counts in full, as the paper writes it. The result is biased by O(h) near jumps, and
+    at rest by the short memory (:func:`focgen.fractional.weights.short_memory_bias`).
+    Raises ValueError for an improper transfer function, a step that is not positive, a length below 1, or
+    where the sum of the leading coefficients A_i vanishes.
+    """
+
+    _PLAIN = 512  # weights up to which the plain recursion is quicker
+
+    def __init__(self, transfer: TransferFunction, step: float, length: int | None = None):
+        if not 0.0 < step < np.inf:
+            raise ValueError(f"the step is {step} s, it must be positive")
+        if length is not None and length < 1:
+            raise ValueError(f"the memory length is {length}, it must be at least 1")
+        if not transfer.is_proper:
+            raise ValueError("the transfer function is improper")
+        self.transfer, self.step, self.length = transfer, step, length
+
+    def coefficients(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return Σ B_i w_{j,i+n+1} and Σ A_i w_{j,i} for j = 0 … min(count, length), eq. (10)–(14)."""
+        count = count if self.length is None else min(count, self.length)
+        num, den = (gl_operator(terms, self.step, count) for terms in (self.transfer.num, self.transfer.den))
+        if den[0] == 0.0:
+            raise ValueError("the sum of the leading coefficients A_i is zero at this step")
+        return num, den
+
+    def run(self, u) -> np.ndarray:
+        u = np.asarray(u, dtype=float)
+        if not len(u):
+            return u.copy()
+        num, den = self.coefficients(len(u) - 1)
+        if len(den) <= self._PLAIN:
+            return signal.lfilter(num, den, u)
+        padded = np.zeros((2, len(u)))
+        padded[0, : len(num)], padded[1, : len(den)] = num, den
+        return _divided(_product(padded[0], u), padded[1])
+
+
+def gl_operator(terms: Polynomial, step: float, length: int) -> np.ndarray:
+    """Return the coefficients c_0 … c_L of Σ aᵢ s^αᵢ as one Grünwald–Letnikov sum, shape (length + 1,)."""
+    total = np.zeros(length + 1)
+    for term in terms:
+        total += term.coefficient * step**-term.order * gl_weights(term.order, length)
+    return total
+
+
+def _divided(right: np.ndarray, den: np.ndarray) -> np.ndarray:
+    """Solve Σ_j den_j y_{k−j} = right_k, the past entering by blocks of doubling size.
+
+    Unlike a power series inverse it amplifies rounding no more than the plain recursion does.
+    """
+    y, block = right.copy(), GrunwaldLetnikov._PLAIN
+    for start in range(0, len(y), block):
+        stop = min(start + block, len(y))
+        y[start:stop] = signal.lfilter([1.0], den[:block], y[start:stop])
+        done = stop // block
+        reach = block * (done & -done)  # the largest block that has just been completed
+        if stop < len(y):
+            y[stop : stop + reach] -= _carried(y[stop - reach : stop], den, len(y) - stop)
+    return y
+
+
+def _carried(past: np.ndarray, den: np.ndarray, remaining: int) -> np.ndarray:
+    """Return what the block ``past`` contributes to as many samples after it."""
+    reach = len(past)
+    ahead = min(reach, remaining)
+    size = fft.next_fast_len(2 * reach, real=True)
+    kernel = den[: 2 * reach]
+    return fft.irfft(fft.rfft(past, size) * fft.rfft(kernel, size), size)[reach : reach + ahead]
