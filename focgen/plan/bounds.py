@@ -1,0 +1,379 @@
+"""How far a plan can be from the same controller in exact arithmetic, and from infinite memory.
+
+Notation: B, R and A are the exact weight tables (direct, rest with h/2 inside, feedback), M ≥ ‖1/A‖₁, N ≥
+‖B/A‖₁ (1 and ‖B‖₁ without feedback), E, V the largest |e|, |v|. The machine's step is the exact one with something added at each
+rounding, so with δ the error of v,
+
+    A δ = (B̂ − B) ê + B (ê − e) + δz − (Â − A) v̂ + roundings,
+    |δ| ≤ N |ê − e| + M (‖B̂ − B‖₁ E + ‖Â − A‖₁ V + roundings + |δz|),
+
+for all time and from every reset, which takes the past as constant: its own rounding is one more constant
+addend. Rounding that is carried (ρ_{k−1} − ρ_k) meets (1 − 1/z)/A instead of 1/A. In floating arithmetic a
+sum of n products adds γ_n Σ|w x| (Higham 2002, §3.1), γ_n = n u / (1 − n u). The input's rounding, |ê − e|, is included: the bound
+holds against physical inputs, not only against those that are whole counts.
+
+The inner integral's error grows by 2 |δr| a sample until its clamp ends it, and clamps, which never lengthen a
+distance, add nothing but the rounding of their own limits; likewise the integrator's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.plan.canonical import Realisation, Table, Tables, folded, realise, tail_l1
+from focgen.plan.fixed import inner_limits
+from focgen.plan.formats import span
+from focgen.plan.model import ErrorBound, Plan, Sum
+from focgen.plan.proofs import at_rest, reset_error
+from focgen.plan.stability import Inverse, inverse
+
+_UNIT = {"f64": 2.0**-53, "f32": 2.0**-24}
+_DOUBLE = 2.0**-53
+_TINY = {"f64": 2.0**-1022, "f32": 2.0**-126}
+_SLACK = 1.0 + 1e-9  # over the rounding of these sums themselves
+
+
+def gamma(count: float, unit: float) -> float:
+    """γ_n = n u / (1 − n u)."""
+    return count * unit / (1.0 - count * unit)
+
+
+def error_bound(plan: Plan, tables: Tables) -> ErrorBound:
+    """The bounds of a plan; ``tables`` are the exact weights it was made from."""
+    account = _Floating(plan, tables) if plan.floating else _Fixed(plan, tables)
+    v = account.filtered()
+    g, gain_error = account.largest_gain, account.gain_error()
+    parts = {cause: g * value for cause, value in v.static.items()}
+    parts["gain"] = gain_error * (account.reach + v.total)
+    parts["product"] = account.product_error(g * account.reach)
+    static = sum(parts.values()) * _SLACK
+    growth, ceiling = g * v.growth * _SLACK, g * v.ceiling * _SLACK
+    operator = static + ceiling
+    return ErrorBound(
+        operator=operator,
+        output_per_sample=account.output(static, growth, operator),
+        truncation=truncation(plan, tables),
+        operator_per_sample=static + growth if growth else 0.0,
+        parts=tuple((cause, value) for cause, value in parts.items() if value)
+        + (("inner integral", ceiling),) * bool(ceiling),
+    )
+
+
+@dataclass(frozen=True)
+class FilteredError:
+    """The error of v: ``static`` by cause in any sample; ``growth`` a sample and ``ceiling`` of the inner
+    integral's."""
+
+    static: dict[str, float]
+    growth: float = 0.0
+    ceiling: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """All of it."""
+        return sum(self.static.values()) + self.ceiling
+
+
+class _Account:
+    """What the fixed and the floating account share. ``M``, ``N`` and ``reach`` (V) as in the module's
+    notation."""
+
+    def __init__(self, plan: Plan, tables: Tables):
+        self.plan, self.tables, controller = plan, tables, plan.controller
+        self.half_step = 0.5 * plan.sample_time if plan.integrator else 1.0
+        self.largest_gain = _largest_gain(plan)
+        self.E = self.input_error + _error_reach(plan)
+        self.own = inverse(tables.feedback.weights) if tables.feedback else None
+        self.M = self.own.norm if self.own else 1.0
+        self.N = self.norm_after(tables.direct)
+        clamp = [x / tables.normaliser for x in inner_limits(controller)] if tables.rest else [0.0]
+        self.Z, self.width = max(map(abs, clamp)), max(clamp) - min(clamp)
+        self.reach = self.N * self.E + self.M * self.Z
+
+    def norm_after(self, table: Table | None) -> float:
+        """‖table/A‖₁."""
+        if table is None:
+            return 0.0
+        return self.own.norm_after(table.weights) if self.own else table.l1
+
+    def weight_error(self, made: Sum | None, table: Table | None, first: int = 0) -> float:
+        """Σ |ŵ − w|, with what the exact weights themselves are uncertain by."""
+        if made is None:
+            return 0.0
+        exact, size = table.weights[first:], table.size[first:]
+        lags = np.arange(first, first + len(exact))
+        return float(np.abs(np.array(made.values) - exact).sum() + (self.recursion(lags) * size).sum())
+
+    def recursion(self, lags: np.ndarray) -> np.ndarray:
+        """Relative error of a double's weights by the recursion of eq. (11), the reference's, in 4 roundings
+        a lag."""
+        return (4.0 * lags + 20.0) * _DOUBLE
+
+    def inner(self) -> FilteredError:
+        """The inner integral alone, as if it were all there is of v."""
+        made = self.plan.inner
+        if made is None:
+            return FilteredError({})
+        each = (
+            self.tables.rest.l1 * self.input_error + self.weight_error(made.rest, self.tables.rest) * self.E
+        )
+        each += self.sum_error(made.rest, self.tables.rest, self.E)
+        edge = self.inner_edge()
+        growth = 2.0 * each + self.inner_rounding()
+        return FilteredError({"inner": edge}, self.M * growth, self.M * (self.width + edge))
+
+
+def _error_reach(plan: Plan) -> float:
+    """Largest |reference − measurement| in physical units, 0 included."""
+    (r0, r1), (m0, m1) = plan.controller.ranges.reference, plan.controller.ranges.measurement
+    return max(abs(r0 - m1), abs(r1 - m0))
+
+
+def _largest_gain(plan: Plan) -> float:
+    controller = plan.controller
+    return max(map(abs, controller.gain.gains)) if controller.scheduled else abs(controller.gain)
+
+
+class _Fixed(_Account):
+    """The account in integers: every rounding is at most half a count, and none where nothing is shifted
+    out."""
+
+    @property
+    def input_error(self) -> float:
+        return self.plan.error.lsb
+
+    def sum_error(self, made: Sum | None, table: Table | None, largest: float) -> float:
+        """The alignments' rounding."""
+        aligned = sum(1 for b in made.blocks if b.align) if made else 0
+        return 0.5 * aligned * made.total.lsb if made else 0.0
+
+    def inner_edge(self) -> float:
+        return 0.5 * self.plan.inner.state.lsb
+
+    def inner_rounding(self) -> float:
+        return 0.0
+
+    def filtered(self) -> FilteredError:
+        plan, tables = self.plan, self.tables
+        inner = self.inner()
+        half_wide = 0.5 * plan.wide.lsb * bool(plan.inner and plan.inner.to_wide)
+        rounding = self.M * (self.sum_error(plan.direct, tables.direct, 0.0) + half_wide)
+        static = {
+            "inputs": self.N * self.input_error,
+            "weights": self.M * self.weight_error(plan.direct, tables.direct) * self.E,
+            "inner": self.M * sum(inner.static.values()),
+        }
+        if plan.feedback is None:
+            static["rounding"] = rounding + 0.5 * plan.filtered.lsb * bool(plan.narrow)
+        else:
+            reach = (plan_reach(plan) + 1) * plan.filtered.lsb
+            static["weights"] += self.M * self.weight_error(plan.feedback.table, tables.feedback, 1) * reach
+            static["rounding"] = (
+                rounding + self.M * self.sum_error(plan.feedback.table, None, 0.0) + self.carried()
+            )
+        return FilteredError(static, inner.growth, inner.ceiling)
+
+    def carried(self) -> float:
+        """The rounding of v, which meets (1 − 1/z)/A, and that of a reset."""
+        lsb = self.plan.filtered.lsb
+        rounding = 0.5 * self.own.norm_after(np.array([1.0, -1.0])) * bool(self.plan.narrow)
+        return lsb * (rounding + reset_error(self.plan) * max(1.0, self.M * at_rest(self.plan)))
+
+    def gain_error(self) -> float:
+        """In physical units, the h/2 taken out again."""
+        plan, lsb = self.plan, self.plan.gain.lsb / self.half_step
+        if plan.schedule is None:
+            return abs(plan.constant_gain * lsb - plan.controller.gain)
+        steepest = _steepest(plan)
+        return _table_error(plan, lsb) + 0.5 * lsb + 0.5 * plan.schedule.signal.lsb * steepest
+
+    def product_error(self, reach: float) -> float:
+        return 0.5 * self.plan.increment.lsb / self.half_step * bool(self.plan.gain_shift)
+
+    def output(self, static: float, growth: float, operator: float) -> float:
+        """An output's own rounding and that of a limit or a reset's u0 are half a count each."""
+        if self.plan.integrator:
+            return self.plan.sample_time * operator + self.plan.output.lsb
+        return static + growth + self.plan.output.lsb
+
+
+def plan_reach(plan: Plan) -> float:
+    """Proven |v| in counts."""
+    return next(p.worst for p in plan.proofs if p.node == "v")
+
+
+class _Floating(_Account):
+    """The account in float or double, and of the double reference it is compared with."""
+
+    def __init__(self, plan: Plan, tables: Tables):
+        self.u, self.tiny = _UNIT[plan.arithmetic], _TINY[plan.arithmetic]
+        super().__init__(plan, tables)
+
+    @property
+    def input_error(self) -> float:
+        """Both inputs' rounding to the type and that of their difference, here and in the reference."""
+        ranges = self.plan.controller.ranges
+        largest = max(map(abs, ranges.reference)) + max(map(abs, ranges.measurement))
+        own = 0.0 if self.plan.arithmetic == "f64" else self.u * largest
+        return own + (self.u + _DOUBLE) * largest * 1.01
+
+    def sum_error(self, made: Sum | None, table: Table | None, largest: float) -> float:
+        """γ_{n+1} Σ|w x| here and in the reference; what is smaller than the smallest normal number on top."""
+        if made is None:
+            return 0.0
+        count = made.taps + 2
+        each = gamma(count, self.u) + gamma(count, _DOUBLE)
+        return each * 1.01 * table.l1 * largest + count * self.tiny * (1.0 + largest)
+
+    def inner_edge(self) -> float:
+        return (self.u + _DOUBLE) * self.Z
+
+    def inner_rounding(self) -> float:
+        """r + r_prev, z + that, each rounded, here and in the reference."""
+        r = 2.0 * self.tables.rest.l1 * self.E
+        return (self.u + _DOUBLE) * (self.Z + 2.0 * r) * 1.01 + 2.0 * self.tiny
+
+    def filtered(self) -> FilteredError:
+        plan, tables = self.plan, self.tables
+        inner = self.inner()
+        direct = self.sum_error(plan.direct, tables.direct, self.E)
+        rounding = direct + (self.u + _DOUBLE) * 1.01 * (self.Z + self.reach)
+        static = {
+            "inputs": self.N * self.input_error,
+            "weights": self.M * self.weight_error(plan.direct, tables.direct) * self.E,
+            "inner": self.M * sum(inner.static.values()),
+        }
+        if plan.feedback is None:
+            static["rounding"] = rounding if plan.inner else direct
+            return FilteredError(static, inner.growth, inner.ceiling)
+        return self.recursive(static, rounding, inner)
+
+    def recursive(self, static: dict[str, float], rounding: float, inner: FilteredError) -> FilteredError:
+        """With feedback the errors scale with the machine's own v: solved for it. A reset's v is rounded as
+        well."""
+        plan, tables = self.plan, self.tables
+        back = self.weight_error(plan.feedback.table, tables.feedback, 1)
+        back += self.sum_error(plan.feedback.table, tables.feedback, 1.0) + (self.u + _DOUBLE) * 4.0
+        at_reset = gamma(
+            tables.feedback.weights.size + (plan.error_lags if plan.direct else 0) + 8, self.u + _DOUBLE
+        )
+        if self.M * back >= 0.5:
+            return FilteredError({"rounding": np.inf})
+        reach = (self.reach + self.M * rounding) / (1.0 - self.M * back)
+        rest = max(1.0, self.M * abs(tables.feedback.total))
+        static["rounding"] = self.M * (rounding + back * reach) + at_reset * self.start(rest)
+        return FilteredError(static, inner.growth, inner.ceiling)
+
+    def start(self, rest: float) -> float:
+        """What a reset's rounding is relative to: v = e B(1)/A(1), both sums rounded."""
+        tables = self.tables
+        a = float(np.abs(tables.feedback.weights).sum()) / abs(tables.feedback.total)
+        b = tables.direct.l1 / abs(tables.feedback.total) if tables.direct else 0.0
+        return b * self.E * (1.0 + a) * rest
+
+    def gain_error(self) -> float:
+        plan, g = self.plan, self.largest_gain
+        if plan.schedule is None:
+            return 2.0 * (self.u + _DOUBLE) * g
+        steepest, reach = _steepest(plan), max(map(abs, plan.controller.ranges.schedule))
+        inputs = (2.0 * self.u + 2.0 * _DOUBLE) * steepest * reach
+        slopes = steepest * _longest_segment(plan)
+        return _table_error(plan, 1.0 / self.half_step) + inputs + 4.0 * (self.u + _DOUBLE) * (g + slopes)
+
+    def product_error(self, reach: float) -> float:
+        return 2.0 * (self.u + _DOUBLE) * reach + self.tiny / self.half_step
+
+    def output(self, static: float, growth: float, operator: float) -> float:
+        plan, u = self.plan, (self.u + _DOUBLE) * 1.01
+        edge = u * max(map(abs, plan.controller.ranges.output))
+        if not plan.integrator:
+            return static + growth + edge
+        d = 2.0 * self.half_step * self.largest_gain * self.reach + plan.sample_time * operator
+        return plan.sample_time * operator + u * (edge / u + 2.0 * d) + 2.0 * edge + 4.0 * self.tiny
+
+
+def _steepest(plan: Plan) -> float:
+    """Largest slope of the gain, physical."""
+    gain = plan.controller.gain
+    return float(np.max(np.abs(np.diff(gain.gains) / np.diff(gain.breakpoints))))
+
+
+def _longest_segment(plan: Plan) -> float:
+    return float(np.max(np.diff(plan.controller.gain.breakpoints)))
+
+
+def _table_error(plan: Plan, lsb: float) -> float:
+    """Largest difference of the machine's unrounded table and the schedule: at a breakpoint of either."""
+    schedule, ideal = plan.schedule, plan.controller.gain
+    unit = schedule.signal.lsb
+    low, high = plan.controller.ranges.schedule
+    points = np.array([b * unit for b in schedule.breakpoints])
+    places = np.concatenate([points, [b for b in ideal.breakpoints if low < b < high], [low, high]])
+    places = places[(places >= low) & (places <= high)]
+    worst = 0.0
+    for side in ("left", "right"):
+        worst = max(
+            worst, float(np.max(np.abs(_machine_gain(schedule, points, places, side) * lsb - ideal(places))))
+        )
+    return worst
+
+
+def _machine_gain(schedule, points: np.ndarray, places: np.ndarray, side: str) -> np.ndarray:
+    """The table's gain in counts at physical ``places``; at a breakpoint the segment before it or after
+    it."""
+    segment = np.searchsorted(points, places, side=side) - 1
+    inside = np.clip(segment, 0, len(points) - 2)
+    gains = np.array(schedule.gains, dtype=float)
+    slopes = (
+        np.array([s * 2.0**-n for s, n in zip(schedule.slopes, schedule.slope_shifts)]) / schedule.signal.lsb
+    )
+    linear = gains[inside] + slopes[inside] * (places - points[inside])
+    return np.where(segment < 0, gains[0], np.where(segment >= len(points) - 1, gains[-1], linear))
+
+
+# ------------------------------------------------------------------------------------------------ infinite memory
+
+
+def truncation(plan: Plan, tables: Tables) -> float | None:
+    """Bound on the operator's error against infinite memory, both in exact arithmetic; None where there is
+    none.
+
+    With feedback A δ = (B − B∞) e − (A − A∞) v∞ and |v∞| ≤ ‖B∞/A∞‖₁ E, for which ‖1/A∞‖₁ is bounded through a longer
+    table, ‖1/A∞‖₁ ≤ M' / (1 − M' t') with t' what that one still leaves out.
+    """
+    form, h, length = realise(plan.controller), plan.sample_time, plan.length
+    scale = abs(tables.normaliser)
+    e, gain = _error_reach(plan), _largest_gain(plan)
+    direct = tail_l1(form.direct, h, length) / scale
+    rest = 0.5 * h * tail_l1(form.rest, h, length) / scale
+    clamp = [x / tables.normaliser for x in inner_limits(plan.controller)] if form.rest else [0.0]
+    drift = (max(clamp) - min(clamp)) if rest else 0.0
+    if tables.feedback is None:
+        return gain * (direct * e + drift) * _SLACK
+    return _recursive_truncation(plan, tables, form, direct, drift, max(map(abs, clamp)))
+
+
+def _recursive_truncation(
+    plan, tables: Tables, form: Realisation, direct: float, drift: float, z: float
+) -> float | None:
+    h, scale = plan.sample_time, abs(tables.normaliser)
+    own = inverse(tables.feedback.weights)
+    endless = _endless_norm(plan, form, scale)
+    if own is None or endless is None:
+        return None
+    e, back = _error_reach(plan), tail_l1(form.den, h, plan.length) / scale
+    v = (own.norm_after(tables.direct.weights) if tables.direct else 0.0) * e + own.norm * z
+    return _largest_gain(plan) * (endless * (direct * e + back * v) + endless * drift) * _SLACK
+
+
+def _endless_norm(plan: Plan, form, scale: float) -> float | None:
+    """Bound on ‖1/A‖₁ with infinite memory."""
+    for length in sorted({plan.length, max(plan.length, 4096), max(plan.length, 65536)}):
+        table = folded(form.den, plan.sample_time, length).weights
+        own: Inverse | None = inverse(table / table[0])
+        left_out = tail_l1(form.den, plan.sample_time, length) / scale
+        if own is not None and own.norm * left_out < 1.0:
+            return own.norm / (1.0 - own.norm * left_out)
+    return None

@@ -1,0 +1,291 @@
+"""The bit-true reference: runs a plan sample for sample, in Python's own arithmetic.
+
+Written from the description in :mod:`focgen.plan.model`, not from the C: histories are whole signals, not rings; sums
+over e are taken tap by tap for all samples at once. Integers are int64, which the plan's proofs show to suffice;
+floating values are numpy's float32 and float64, whose every operation rounds once, in the plan's order.
+
+Several lanes run side by side, so that the steps that have to follow each other are array operations, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_LOW, FLAG_SCHEDULE, Format, Plan, Schedule, Sum
+from focgen.plan.scenario import Reset, Scenario, Trace
+
+
+def execute(plan: Plan, scenario: Scenario) -> Trace:
+    """Run a plan on raw inputs; returns raw u and d and the flags, shape (lanes, samples)."""
+    run = _Run(plan, scenario)
+    run.sums()
+    run.recursion()
+    run.gains()
+    u, d = run.output()
+    return Trace(u, d, run.flags(u))
+
+
+def _kind(format_: Format) -> type:
+    return {"float": np.float32, "double": np.float64}.get(format_.ctype, np.int64)
+
+
+def _shift(values: np.ndarray, by: int) -> np.ndarray:
+    """Right shift rounding half up."""
+    return (values + (1 << (by - 1))) >> by if by else values
+
+
+def _clamp(values: np.ndarray, format_: Format) -> np.ndarray:
+    kind = values.dtype.type
+    return np.minimum(np.maximum(values, kind(format_.low)), kind(format_.high))
+
+
+def _saturate(values: np.ndarray, bits: int) -> np.ndarray:
+    return np.minimum(np.maximum(values, -(1 << (bits - 1))), (1 << (bits - 1)) - 1)
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """Samples ``start`` to ``stop`` of a lane, before which e was ``constant`` for ever."""
+
+    lane: int
+    start: int
+    stop: int
+    constant: np.generic
+    u0: np.generic
+
+
+class _Run:
+    """One execution; attributes are signals of shape (lanes, samples)."""
+
+    def __init__(self, plan: Plan, scenario: Scenario):
+        self.plan, self.scenario = plan, scenario
+        self.kind = _kind(plan.error)
+        self.shape = scenario.ref.shape
+        self.ref, self.meas = (
+            self._input(scenario.ref, plan.reference),
+            self._input(scenario.meas, plan.measurement),
+        )
+        self.e = self.ref - self.meas
+        self.segments = self._segments()
+        self.starts = {(s.lane, s.start): s for s in self.segments}
+
+    def _input(self, values, format_: Format) -> np.ndarray:
+        values = np.asarray(values, dtype=self.kind)
+        return values if format_.floating else _clamp(values, format_)
+
+    def _segments(self) -> list[_Segment]:
+        """Cut every lane at its resets; a lane begins with init."""
+        lanes, samples = self.shape
+        cuts = {(lane, 0): Reset(lane, 0, 0, 0, 0) for lane in range(lanes)}
+        cuts.update({(r.lane, r.sample): r for r in self.scenario.resets})
+        order, found = sorted(cuts), []
+        for here, after in zip(order, order[1:] + [(-1, 0)]):
+            stop = after[1] if after[0] == here[0] else samples
+            found.append(self._segment(cuts[here], stop, here in self._reset_places()))
+        return found
+
+    def _reset_places(self) -> set[tuple[int, int]]:
+        return {(r.lane, r.sample) for r in self.scenario.resets}
+
+    def _segment(self, reset: Reset, stop: int, real: bool) -> _Segment:
+        """Init differs from reset(0, 0, 0): its error is 0 even where the ranges exclude it."""
+        ref, meas = (
+            self._input(x, f)
+            for x, f in ((reset.ref, self.plan.reference), (reset.meas, self.plan.measurement))
+        )
+        constant = self.kind(ref - meas) if real else self.kind(0)
+        u0 = _clamp(np.asarray(reset.u0, dtype=self.kind), self.plan.output)
+        return _Segment(reset.lane, reset.sample, stop, constant, u0)
+
+    # -------------------------------------------------------------------------------------- sums over the error
+
+    def sums(self) -> None:
+        """p, or its parts where more follows: ``direct``, and r with its value at rest before each segment."""
+        plan = self.plan
+        self.direct, self.direct_rest = self._over_error(plan.direct)
+        if plan.inner:
+            self.r, self.r_rest = self._over_error(plan.inner.rest)
+
+    def _over_error(self, table: Sum | None) -> tuple[np.ndarray, dict]:
+        """The sum at every sample, and at rest before each segment (key: lane, start)."""
+        if table is None:
+            zero = self.kind(0)
+            return np.zeros(self.shape, self.kind), dict.fromkeys(self.starts, zero)
+        lags, long, places = table.last, [], []
+        for s in self.segments:
+            places.append(sum(map(len, long)))
+            long.append(
+                np.concatenate([np.full(lags + 1, s.constant, self.kind), self.e[s.lane, s.start : s.stop]])
+            )
+        whole = self._filtered(table, np.concatenate(long))
+        total, rest = np.empty(self.shape, self.kind), {}
+        for s, place in zip(self.segments, places):
+            rest[s.lane, s.start] = whole[place + lags]
+            total[s.lane, s.start : s.stop] = whole[place + lags + 1 : place + lags + 1 + s.stop - s.start]
+        return total, rest
+
+    def _filtered(self, table: Sum, signal: np.ndarray) -> np.ndarray:
+        """Σ_j w_j x_{k−j} at every k ≥ ``table.last``; what stands before is not used."""
+        total = np.zeros_like(signal)
+        for block in table.blocks:
+            part = np.zeros_like(signal)
+            for lag in range(block.last, block.first - 1, -1):
+                weight = self.kind(block.weights[lag - block.first])
+                part[lag:] = part[lag:] + weight * signal[: len(signal) - lag]
+            total = part if signal.dtype.kind == "f" else total + _shift(part, block.align)
+        return total
+
+    # ------------------------------------------------------------------------------------------------- recursion
+
+    def recursion(self) -> None:
+        """v at every sample, and before each segment's first one."""
+        plan = self.plan
+        p = self.direct
+        if plan.inner:
+            p = p + self._inner() if plan.direct else self._inner()
+        self.v_rest = self._rest()
+        if plan.feedback is None:
+            self.v = p if plan.floating else _saturate(_shift(p, plan.narrow), plan.filtered.bits)
+        else:
+            self.v = self._fed_back(p)
+
+    def _rest(self) -> dict:
+        """v of the constant past; the inner integral is 0 then."""
+        plan = self.plan
+        if plan.feedback is None:
+            if plan.floating:
+                return self.direct_rest
+            narrow = {k: _shift(p, plan.narrow) for k, p in self.direct_rest.items()}
+            return {k: _saturate(v, plan.filtered.bits) for k, v in narrow.items()}
+        steady = self.kind(plan.feedback.steady)
+        if plan.floating:
+            return {k: steady * s.constant for k, s in self.starts.items()}
+        by, bits = plan.feedback.steady_shift, plan.filtered.bits
+        return {k: _saturate(_shift(steady * s.constant, by), bits) for k, s in self.starts.items()}
+
+    def _inner(self) -> np.ndarray:
+        """z, aligned to p."""
+        inner, out = self.plan.inner, np.empty(self.shape, self.kind)
+        z, before = np.zeros(self.shape[0], self.kind), np.zeros(self.shape[0], self.kind)
+        for k in range(self.shape[1]):
+            for lane in self._starting(k):
+                z[lane], before[lane] = 0, self.r_rest[lane, k]
+            now = self.r[:, k]
+            z = _clamp(z + (now + before), inner.state)
+            out[:, k], before = z, now.copy()
+        return out if self.plan.floating else _shift(out, inner.to_wide)
+
+    def _starting(self, k: int) -> list[int]:
+        """Lanes whose segment begins at sample k."""
+        if not hasattr(self, "_by_sample"):
+            self._by_sample: dict[int, list[int]] = {}
+            for lane, start in self.starts:
+                self._by_sample.setdefault(start, []).append(lane)
+        return self._by_sample.get(k, [])
+
+    def _fed_back(self, p: np.ndarray) -> np.ndarray:
+        """v_k from p_k and the past of v, whose columns are samples, ``lags`` of them ahead of the first."""
+        plan, (lanes, samples) = self.plan, self.shape
+        lags = plan.feedback.table.last
+        past = np.zeros((lanes, lags + samples), self.kind)
+        carry = np.zeros(lanes, self.kind)
+        table = _Recursion(plan.feedback.table, self.kind)
+        for k in range(samples):
+            for lane in self._starting(k):
+                past[lane, k : k + lags] = self.v_rest[lane, k]
+                carry[lane] = 0
+            x = p[:, k] - table(past[:, k : k + lags])
+            if not plan.floating:
+                x = x + carry
+                v = _shift(x, plan.narrow)
+                carry = x - (v << plan.narrow)
+                x = _saturate(v, plan.filtered.bits)
+            past[:, k + lags] = x
+        return past[:, lags:]
+
+    # ---------------------------------------------------------------------------------------------- gain, output
+
+    def gains(self) -> None:
+        """g at every sample."""
+        plan = self.plan
+        if plan.schedule is None:
+            self.g = np.full(self.shape, plan.constant_gain, self.kind)
+            return
+        self.s = self._input(self.scenario.sched, plan.schedule.signal)
+        self.g = _scheduled(plan.schedule, self.s, self.kind)
+
+    def output(self) -> tuple[np.ndarray, np.ndarray]:
+        """u and d."""
+        plan = self.plan
+        d = self._increment(self.g * self.v)
+        if plan.integrator is None:
+            return _clamp(d, plan.output), d
+        return self._integrated(d), d
+
+    def _increment(self, product: np.ndarray) -> np.ndarray:
+        return product if self.plan.floating else _shift(product, self.plan.gain_shift)
+
+    def _integrated(self, d: np.ndarray) -> np.ndarray:
+        plan, lanes = self.plan, self.shape[0]
+        state, out = plan.integrator.state, np.empty(self.shape, self.kind)
+        total, before = np.zeros(lanes, self.kind), np.zeros(lanes, self.kind)
+        tracks = {}
+        for t in self.scenario.tracks:
+            tracks.setdefault(t.sample, []).append(t)
+        for k in range(self.shape[1]):
+            for lane in self._starting(k):
+                total[lane] = self._wide(self.starts[lane, k].u0)
+                before[lane] = self._increment(self.g[lane, k] * self.v_rest[lane, k])
+            for t in tracks.get(k, ()):
+                total[t.lane] = self._wide(_clamp(np.asarray(t.u, dtype=self.kind), plan.output))
+            total = _clamp(total + (d[:, k] + before), state)
+            out[:, k], before = total, d[:, k]
+            before = before.copy()
+        return out if plan.floating else _saturate(_shift(out, plan.integrator.to_output), plan.output.bits)
+
+    def _wide(self, u):
+        """Output counts in counts of the integrator."""
+        return u if self.plan.floating else u << self.plan.integrator.to_output
+
+    def flags(self, u: np.ndarray) -> np.ndarray:
+        """The flags after each step."""
+        plan, scenario = self.plan, self.scenario
+        found = FLAG_HIGH * (u >= self.kind(plan.output.high)) + FLAG_LOW * (u <= self.kind(plan.output.low))
+        outside = np.zeros(self.shape, bool)
+        if not plan.floating:
+            outside |= (scenario.ref != self.ref) | (scenario.meas != self.meas)
+        if plan.schedule is not None:
+            first, last = (self.kind(plan.schedule.breakpoints[i]) for i in (0, -1))
+            found = found + FLAG_SCHEDULE * ((self.s < first) | (self.s > last))
+            outside |= False if plan.floating else np.asarray(scenario.sched) != self.s
+        return (found + FLAG_INPUT * outside).astype(np.uint8)
+
+
+class _Recursion:
+    """S of the past, shape (lanes, lags), oldest first."""
+
+    def __init__(self, table: Sum, kind: type):
+        self.kind, self.table = kind, table
+        self.weights = np.array(table.weights[::-1], dtype=kind)
+        self.last = table.last
+        self.blocks = [(table.last - b.last, table.last - b.first + 1, b.align) for b in table.blocks]
+
+    def __call__(self, past: np.ndarray) -> np.ndarray:
+        products = past * self.weights
+        if self.kind is not np.int64:
+            return np.add.accumulate(products, axis=1)[:, -1] + self.kind(0)
+        return sum(_shift(products[:, a:b].sum(axis=1), align) for a, b, align in self.blocks)
+
+
+def _scheduled(schedule: Schedule, s: np.ndarray, kind: type) -> np.ndarray:
+    points = np.array(schedule.breakpoints, dtype=kind)
+    gains, slopes = np.array(schedule.gains, dtype=kind), np.array(schedule.slopes, dtype=kind)
+    segment = np.searchsorted(points, s, side="right") - 1
+    inside = np.clip(segment, 0, len(slopes) - 1)
+    run = slopes[inside] * (s - points[inside])
+    if kind is np.int64:
+        by = np.array(schedule.slope_shifts, dtype=kind)[inside]
+        run = np.where(by > 0, (run + ((1 << by) >> 1)) >> by, run)
+    return np.where(segment < 0, gains[0], np.where(segment >= len(slopes), gains[-1], gains[inside] + run))

@@ -1,0 +1,326 @@
+"""A controller in integers: every format follows from the physical ranges by l1 norms of the quantised
+weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.errors import PlanError
+from focgen.plan.blocks import Draft, coarsest, finished, split
+from focgen.plan.canonical import Tables, realise
+from focgen.plan.formats import Interval, Word, exponent_for, integer, limit, nearest, span
+from focgen.plan.gains import Gain, fixed_gain, span_of
+from focgen.plan.model import Block, Feedback, Format, InnerIntegrator, Integrator, Sum
+from focgen.plan.stability import Inverse, inverse
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The formats of what comes in and goes out; ``exponent`` and ``output_exponent`` are log2 of their
+    lsb."""
+
+    reference: Format
+    measurement: Format
+    error: Format
+    exponent: int
+    output: Format
+    output_exponent: int
+
+
+@dataclass(frozen=True)
+class Filter:
+    """From e to v: the parts of a plan of the same names, and log2 of the lsb of v."""
+
+    direct: Sum | None
+    inner: InnerIntegrator | None
+    wide: Format
+    narrow: int
+    feedback: Feedback | None
+    filtered: Format
+    exponent: int
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """From v to u: the parts of a plan of the same names."""
+
+    gain: Gain
+    product: Format
+    gain_shift: int
+    increment: Format
+    integrator: Integrator | None
+
+
+def signals(controller: Controller, word: Word) -> Signals:
+    """Formats of the inputs, whose difference must fit as well, and of the output."""
+    where, ranges, unit = f"{controller.name} [ranges]", controller.ranges, controller.units.measurement
+    (r0, r1), (m0, m1) = ranges.reference, ranges.measurement
+    exponent = exponent_for(
+        max(map(abs, (r0, r1, m0, m1))), word.limit, where, "the reference or measurement"
+    )
+    while True:
+        ref = span_of(r0, r1, exponent, where, "reference")
+        meas = span_of(m0, m1, exponent, where, "measurement")
+        error = (ref - meas).hull(0)
+        if error.worst <= word.limit:
+            break
+        exponent += 1
+    low, high = ranges.output
+    output = exponent_for(max(abs(low), abs(high)), word.limit, where, "the output")
+    made = [_format(word.bits, exponent, x, unit) for x in (ref, meas, error)]
+    u = _format(word.bits, output, span_of(low, high, output, where, "output"), controller.units.output)
+    return Signals(*made, exponent, u, output)
+
+
+def _format(bits: int, exponent: int, reach: Interval, unit: str = "") -> Format:
+    return Format(integer(bits), 2.0**exponent, reach.low, reach.high, unit)
+
+
+def inner_limits(controller: Controller) -> tuple[float, float]:
+    """The clamp of the integral of the terms of negative order, in units of ``Realisation.den``'s output.
+
+    See :mod:`focgen.plan.canonical`: at rest the output is gain · z / (the denominator's constant).
+    """
+    gains = controller.gain.gains if controller.scheduled else (controller.gain,)
+    smallest = min((abs(g) for g in gains if g != 0.0), default=1.0)
+    low, high = controller.ranges.output
+    if controller.integrator:
+        reach = (high - low) / controller.sample_time
+        low, high = -reach, reach
+    constant = realise(controller).constant
+    largest = [x * constant / (g * smallest) for x in (low, high) for g in _signs(gains)]
+    return min(largest + [0.0]), max(largest + [0.0])
+
+
+def _signs(gains) -> set[float]:
+    return {float(np.sign(g)) for g in gains if g != 0.0} or {1.0}
+
+
+# ---------------------------------------------------------------------------------------------------- e to v
+
+
+def filter_of(controller: Controller, tables: Tables, inputs: Signals, word: Word) -> Filter:
+    """Formats and integer weights from e to v. Raises PlanError where the recursion is not stable or does not
+    fit."""
+    sample = _Sample(inputs.exponent, span(inputs.error), word)
+    direct = split(tables.direct.weights, 0, sample.each.worst, word) if tables.direct else None
+    inner = _inner(controller, tables, sample) if tables.rest else None
+    if tables.feedback is None:
+        return _without_feedback(direct, inner, sample, controller)
+    return _with_feedback(direct, inner, sample, controller, tables)
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """log2 of a history's lsb, the range of its counts, and the arithmetic."""
+
+    exponent: int
+    each: Interval
+    word: Word
+
+    def sum(self, name: str, history: str, drafts: list[Draft], total: int, unit: str = "") -> Sum:
+        blocks = finished(drafts, self.exponent, total, self.each, self.word, unit)
+        return Sum(name, history, blocks, _format(self.word.sum_bits, total, total_of(blocks), unit))
+
+
+def total_of(blocks: tuple[Block, ...]) -> Interval:
+    """The range of a sum: every block's, aligned, added."""
+    reach = Interval(0, 0)
+    for block in blocks:
+        reach = reach + span(block.sum).shifted(block.align)
+    return reach
+
+
+def _inner(controller: Controller, tables: Tables, sample: _Sample) -> InnerIntegrator:
+    """The clamped integral; ``to_wide`` is filled in once the wide format is known."""
+    drafts = split(tables.rest.weights, 0, sample.each.worst, sample.word)
+    low, high = (x / tables.normaliser for x in inner_limits(controller))
+    low, high = min(low, high), max(low, high)
+    exponent = sample.exponent + coarsest(drafts)
+    while True:
+        rest = sample.sum("rest", "error", drafts, exponent)
+        clamp = Interval(nearest(low * 2.0**-exponent), nearest(high * 2.0**-exponent))
+        worst = (clamp + span(rest.total) + span(rest.total)).worst
+        if span(rest.total).worst <= limit(sample.word.sum_bits) and worst <= limit(64):
+            break
+        exponent += 1
+    bits = 32 if sample.word.sum_bits == 32 and worst <= limit(32) else 64
+    return InnerIntegrator(rest, _format(bits, exponent, clamp), 0)
+
+
+def _floor(direct: list[Draft] | None, inner: InnerIntegrator | None, sample: _Sample) -> int:
+    """The finest exponent of the wide format: no shift to it goes left."""
+    finest = [sample.exponent + coarsest(direct)] if direct else []
+    return max(finest + ([_log2(inner.state.lsb)] if inner else []))
+
+
+def _log2(lsb: float) -> int:
+    return int(np.log2(lsb))
+
+
+def _combined(
+    direct, inner, sample: _Sample, exponent: int
+) -> tuple[Sum | None, InnerIntegrator | None, Interval]:
+    """Both parts of p aligned to 2^``exponent``, and the range of p."""
+    made = sample.sum("direct", "error", direct, exponent) if direct else None
+    reach = span(made.total) if made else Interval(0, 0)
+    if inner:
+        inner = InnerIntegrator(inner.rest, inner.state, exponent - _log2(inner.state.lsb))
+        reach = reach + span(inner.state).shifted(inner.to_wide)
+    return made, inner, reach
+
+
+def _without_feedback(direct, inner, sample: _Sample, controller: Controller) -> Filter:
+    word, exponent = sample.word, _floor(direct, inner, sample)
+    while True:
+        made, placed, reach = _combined(direct, inner, sample, exponent)
+        if reach.worst <= limit(word.sum_bits) - (1 << (word.sum_bits // 2)):
+            break
+        exponent += 1
+    narrow = max(0, reach.worst.bit_length() - 31)
+    while reach.shifted(narrow).worst > limit(32):
+        narrow += 1
+    wide = _format(word.sum_bits, exponent, reach)
+    v = _format(32, exponent + narrow, reach.shifted(narrow))
+    return Filter(made, placed, wide, narrow, None, v, exponent + narrow)
+
+
+def _with_feedback(direct, inner, sample: _Sample, controller: Controller, tables: Tables) -> Filter:
+    word = sample.word
+    back = split(tables.feedback.weights[1:], 1, word.limit + 1, word)
+    own, b = _quantised_inverse(back, controller, word), _values(direct) if direct else np.zeros(1)
+    reach = own.norm_after(b) * sample.each.worst * 2.0**sample.exponent
+    if inner:
+        reach += own.norm * span(inner.state).worst * inner.state.lsb
+    exponent = exponent_for(reach, word.limit, controller.name, "the filtered error")
+    while exponent < 150:
+        made = _recursion(direct, inner, sample, back, exponent, own, tables)
+        if made is not None and reach * 2.0**-exponent + _noise(made, own) <= word.limit:
+            return made
+        exponent += 1
+    what = f"the recursion multiplies rounding by up to {own.norm:.3g}, more than {word.bits} bits can hold"
+    raise PlanError(controller.name, what, "choose q31, f32 or f64, or a longer sample_time")
+
+
+def _values(drafts: list[Draft]) -> np.ndarray:
+    return np.concatenate([d.counts * 2.0**d.exponent for d in drafts])
+
+
+def _quantised_inverse(back: list[Draft], controller: Controller, word: Word) -> Inverse:
+    made = inverse(np.concatenate([[1.0], _values(back)]))
+    if made is None:
+        what = f"its recursion is stable, but not with weights of {word.bits} bits"
+        raise PlanError(controller.name, what, "choose q31, f32 or f64, or a longer sample_time")
+    return made
+
+
+def _noise(made: Filter, own: Inverse) -> float:
+    """What rounding can add to v, in counts of v."""
+    aligned = len(made.feedback.table.blocks) + (len(made.direct.blocks) if made.direct else 0) + 1
+    carried = own.norm_after(np.array([1.0, -1.0]))
+    at_reset = 2.0 * max(1.0, own.norm * (1.0 + float(np.sum(made.feedback.table.values))))
+    return 0.5 * carried + own.norm * (0.5 * aligned * 2.0**-made.narrow) + at_reset
+
+
+def _recursion(
+    direct, inner, sample: _Sample, back, exponent: int, own: Inverse, tables: Tables
+) -> Filter | None:
+    """The filter with v in counts of 2^``exponent``; None where the wide format cannot be finer than v."""
+    word = sample.word
+    whole = Interval(-word.limit - 1, word.limit)
+    past = _Sample(exponent, whole, word)
+    wide = max(_floor(direct, inner, sample), exponent + coarsest(back))
+    while wide <= exponent:
+        made, placed, p = _combined(direct, inner, sample, wide)
+        table = past.sum("feedback", "filtered", back, wide)
+        narrow = exponent - wide
+        half = (1 << narrow) >> 1
+        x = p - span(table.total) + Interval(-half, half)
+        if max(x.worst, p.worst, span(table.total).worst) + half <= limit(word.sum_bits):
+            steady, by = _steady(made, table, sample, exponent, word)
+            v = _format(word.bits, exponent, whole)
+            return Filter(
+                made,
+                placed,
+                _format(word.sum_bits, wide, x),
+                narrow,
+                Feedback(table, steady, by),
+                v,
+                exponent,
+            )
+        wide += 1
+    return None
+
+
+def _steady(direct: Sum | None, table: Sum, sample: _Sample, exponent: int, word: Word) -> tuple[int, int]:
+    """Constant e to constant v, as count and right shift."""
+    total = float(np.sum(direct.values)) if direct else 0.0
+    ratio = total / (1.0 + float(np.sum(table.values))) * 2.0 ** (sample.exponent - exponent)
+    by = 2 * word.bits - 2
+    while nearest(abs(ratio) * 2.0**by) > word.limit:
+        by -= 1
+    return nearest(ratio * 2.0**by), by
+
+
+# ---------------------------------------------------------------------------------------------------- v to u
+
+
+def actuation(controller: Controller, made: Filter, inputs: Signals, word: Word) -> Actuation:
+    """Gain, product, increment and integrator."""
+    factor = 0.5 * controller.sample_time if controller.integrator else 1.0
+    gain = fixed_gain(controller, factor, word)
+    exponent = made.exponent + _log2(gain.format.lsb)
+    reach = span(made.filtered) * span(gain.format)
+    product = _format(64, exponent, reach)
+    unit = controller.units.output
+    if not controller.integrator:
+        by = inputs.output_exponent - exponent
+        if by < 0:
+            raise _too_small(controller, by)
+        increment = _narrowed(reach, by, inputs.output_exponent, word.sum_bits, unit)
+        return Actuation(gain, product, by, increment, None)
+    return _integrated(controller, gain, product, exponent, inputs, word)
+
+
+def _too_small(controller: Controller, by: int) -> PlanError:
+    what = f"the output range is too small by 2^{-by} for what the transfer function can ask for"
+    return PlanError(
+        f"{controller.name} [ranges]", what, "narrow the input ranges, widen the output's, or choose q31"
+    )
+
+
+def _narrowed(reach: Interval, by: int, exponent: int, bits: int, unit: str) -> Format:
+    reach = reach.shifted(by)
+    return _format(bits if reach.worst <= limit(bits) else 64, exponent, reach, unit)
+
+
+def _integrated(
+    controller, gain: Gain, product: Format, exponent: int, inputs: Signals, word: Word
+) -> Actuation:
+    """The integrator is as fine as its width allows: 32 bits in q15 where no step of one count would be lost,
+    else 64."""
+    for bits in sorted({word.sum_bits, 64}):
+        fine = _finest(exponent, span(product), inputs, bits)
+        if fine is None:
+            continue
+        by = fine - exponent
+        d = span(product).shifted(by)
+        if bits == 64 or d.worst >= 1 << word.bits:
+            unit = controller.units.output
+            to_output = inputs.output_exponent - fine
+            state = _format(bits, fine, span(inputs.output) * Interval(1 << to_output, 1 << to_output), unit)
+            return Actuation(gain, product, by, _format(bits, fine, d, unit), Integrator(state, to_output))
+    raise _too_small(controller, inputs.output_exponent - exponent)
+
+
+def _finest(exponent: int, product: Interval, inputs: Signals, bits: int) -> int | None:
+    """log2 of the finest lsb at which I + d + d fits; None where the output's is finer still."""
+    for fine in range(max(exponent, inputs.output_exponent - bits), inputs.output_exponent + 1):
+        d = product.shifted(fine - exponent)
+        state = span(inputs.output).worst << (inputs.output_exponent - fine)
+        if state + 2 * d.worst + (1 << (inputs.output_exponent - fine)) <= limit(bits):
+            return fine
+    return None

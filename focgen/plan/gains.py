@@ -1,0 +1,126 @@
+"""The gain and its schedule in machine terms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.errors import PlanError
+from focgen.plan.formats import Interval, Word, exponent_for, integer, nearest
+from focgen.plan.model import Count, Format, Schedule
+
+_MARGIN = 3  # counts a rounded slope may overshoot the gains it connects
+_FEWEST = 16  # counts that a range must cover to be worth the name
+
+
+@dataclass(frozen=True)
+class Gain:
+    """The part of a plan that makes g: ``schedule`` or ``constant`` (counts of ``format``)."""
+
+    format: Format
+    constant: Count
+    schedule: Schedule | None
+
+
+def span_of(low: float, high: float, exponent: int, where: str, what: str) -> Interval:
+    """A physical range in counts of 2^``exponent``. Raises PlanError where hardly a count is left of it."""
+    counts = Interval(nearest(low * 2.0**-exponent), nearest(high * 2.0**-exponent))
+    if counts.high - counts.low < _FEWEST:
+        remedy = "subtract the offset from the signals, or choose a wider arithmetic"
+        raise PlanError(
+            where,
+            f"the {what} range [{low:g}, {high:g}] spans only {counts.high - counts.low} counts",
+            remedy,
+        )
+    return counts
+
+
+def fixed_gain(controller: Controller, factor: float, word: Word) -> Gain:
+    """The gain times ``factor`` (h/2 ahead of an integrator) in integers. Raises PlanError where it cannot be
+    held."""
+    where = f"{controller.name} [gain]"
+    if not controller.scheduled:
+        points, gains = (), (controller.gain * factor,)
+    else:
+        points, gains = _clipped(controller)
+        gains = tuple(g * factor for g in gains)
+    largest = max(abs(g) for g in gains)
+    if largest == 0.0:
+        raise PlanError(where, "is zero: the output would never move", "give a gain")
+    exponent = exponent_for(largest, word.limit - _MARGIN, where, "the gain")
+    counts = tuple(nearest(g * 2.0**-exponent) for g in gains)
+    form = Format(integer(word.bits), 2.0**exponent, min(counts) - bool(points), max(counts) + bool(points))
+    if not points:
+        return Gain(form, counts[0], None)
+    return Gain(form, 0, _schedule(controller, points, counts, word, where))
+
+
+def _clipped(controller: Controller) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Breakpoints and gains within the schedule's range: beyond it no value can come."""
+    low, high = controller.ranges.schedule
+    given = controller.gain.breakpoints
+    points = [b for b in given if low < b < high]
+    if given[0] <= low or not points:
+        points.insert(0, low)
+    if given[-1] >= high or len(points) == 1:
+        points.append(high)
+    return tuple(points), tuple(float(controller.gain(p)) for p in points)
+
+
+def _schedule(controller: Controller, points, gains: tuple[int, ...], word: Word, where: str) -> Schedule:
+    low, high = controller.ranges.schedule
+    place = f"{controller.name} [ranges]"
+    exponent = exponent_for(max(abs(low), abs(high), high - low), word.limit - 1, place, "the schedule")
+    reach = span_of(low, high, exponent, place, "schedule")
+    counts = tuple(nearest(p * 2.0**-exponent) for p in points)
+    segments = []
+    for i, run in enumerate(np.diff(counts).tolist()):
+        slope = _slope(gains[i + 1] - gains[i], run, word)
+        if slope is None:
+            near = f"between the breakpoints {points[i]:g} and {points[i + 1]:g}"
+            raise PlanError(
+                where, f"{near} the gain is too steep for {word.bits} bits", "move the breakpoints apart"
+            )
+        segments.append(slope)
+    unit = controller.units.schedule
+    signal = Format(integer(word.bits), 2.0**exponent, reach.low, reach.high, unit)
+    return Schedule(signal, counts, gains, tuple(s for s, _ in segments), tuple(n for _, n in segments))
+
+
+def _slope(rise: int, run: int, word: Word) -> tuple[int, int] | None:
+    """(count, right shift) of ``rise`` / ``run``, as fine as the word allows; None where there is none."""
+    if run <= 0 or abs(rise) > run * word.limit:
+        return None
+    if rise == 0:
+        return 0, 0
+    by = word.sum_bits - 2
+    while abs(nearest_fraction(Fraction(rise << by, run))) > word.limit:
+        by -= 1
+    return nearest_fraction(Fraction(rise << by, run)), by
+
+
+def nearest_fraction(value: Fraction) -> int:
+    """The nearest integer, halves upwards, exactly."""
+    return (2 * value.numerator + value.denominator) // (2 * value.denominator)
+
+
+def floating_gain(controller: Controller, factor: float, kind: type[np.floating], ctype: str) -> Gain:
+    """The gain times ``factor`` in float or double."""
+    if not controller.scheduled:
+        constant = float(kind(controller.gain * factor))
+        return Gain(Format(ctype, 1.0, constant, constant), constant, None)
+    points = tuple(float(kind(b)) for b in controller.gain.breakpoints)
+    gains = tuple(float(kind(g * factor)) for g in controller.gain.gains)
+    if any(b <= a for a, b in zip(points, points[1:])):
+        remedy = "move the breakpoints apart"
+        raise PlanError(f"{controller.name} [gain]", f"breakpoints coincide as {ctype}", remedy)
+    slopes = tuple(
+        float(kind((g1 - g0) / (b1 - b0))) for g0, g1, b0, b1 in zip(gains, gains[1:], points, points[1:])
+    )
+    low, high = (float(kind(x)) for x in controller.ranges.schedule)
+    signal = Format(ctype, 1.0, low, high, controller.units.schedule)
+    schedule = Schedule(signal, points, gains, slopes, (0,) * len(slopes))
+    return Gain(Format(ctype, 1.0, min(gains), max(gains)), 0.0, schedule)

@@ -1,0 +1,174 @@
+"""No integer node can overflow: recomputed from the plan alone, in exact integers.
+
+Nothing of how the formats were chosen is used here. Inputs are clamped to their ranges, v is saturated to its type,
+z and I are clamped to theirs; every other node is a sum, product or shift of these, so its range follows.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from focgen.errors import PlanError
+from focgen.plan.formats import Interval, limit, span, weighted
+from focgen.plan.model import Plan, Proof, Schedule, Sum
+from focgen.plan.stability import inverse
+
+
+def prove(plan: Plan) -> tuple[Proof, ...]:
+    """One proof for each integer node, in the order of a step; none for floating arithmetic.
+
+    Raises PlanError naming the node that cannot be proved.
+    """
+    if plan.floating:
+        return ()
+    ledger = _Ledger(plan)
+    ledger.inputs()
+    p = ledger.combined()
+    v = ledger.filtered(p)
+    ledger.actuation(v, ledger.gain())
+    return tuple(ledger.proofs)
+
+
+class _Ledger:
+    """Collects the proofs of one plan."""
+
+    def __init__(self, plan: Plan):
+        self.plan = plan
+        self.proofs: list[Proof] = []
+
+    def add(self, node: str, reach: Interval, ctype: str, how: str, spare: int = 0) -> Interval:
+        """Note a node that reaches ``reach`` and, for a rounding, ``spare`` above it."""
+        bound = limit(int(ctype.strip("u_int")))
+        worst = reach.worst + spare
+        if worst > bound:
+            what = f"the node {node} reaches {worst}, beyond {bound} of {ctype}"
+            raise PlanError(self.plan.name, what, "choose q31, f32 or f64, or narrower ranges")
+        self.proofs.append(Proof(node, worst, ctype, bound, how))
+        return reach
+
+    def inputs(self) -> None:
+        """e is the difference of two clamped inputs."""
+        plan = self.plan
+        reach = span(plan.reference) - span(plan.measurement)
+        self.add("error", reach, plan.error.ctype, "range")
+
+    def sum(self, table: Sum, each: Interval) -> Interval:
+        """Every block and every partial total of a history sum."""
+        total = Interval(0, 0)
+        for block in table.blocks:
+            node = f"{table.name}[{block.first}..{block.last}]"
+            half = (1 << block.align) >> 1
+            reach = self.add(node, weighted(block.weights, each), block.sum.ctype, "l1 norm", half)
+            total = total + reach.shifted(block.align)
+        return self.add(f"{table.name} total", total, table.total.ctype, "l1 norm")
+
+    def combined(self) -> Interval:
+        """p, with the inner integral where there is one."""
+        plan, each = self.plan, span(self.plan.error).hull(0)
+        p = self.sum(plan.direct, each) if plan.direct else Interval(0, 0)
+        if plan.inner:
+            state, r = plan.inner.state, self.sum(plan.inner.rest, each)
+            half = (1 << plan.inner.to_wide) >> 1
+            self.add("inner sum", span(state) + r + r, state.ctype, "clamp", half)
+            p = p + span(state).shifted(plan.inner.to_wide)
+        return self.add("p", p, plan.wide.ctype, "l1 norm")
+
+    def filtered(self, p: Interval) -> Interval:
+        """x and v."""
+        plan, half = self.plan, (1 << self.plan.narrow) >> 1
+        if plan.feedback is None:
+            return self.add("v", p.shifted(plan.narrow), plan.filtered.ctype, "l1 norm", 0)
+        whole = span(plan.filtered)
+        s = self.sum(plan.feedback.table, whole)
+        self.add("x", p - s + Interval(-half, half), plan.wide.ctype, "clamp", half)
+        self.add(
+            "steady product",
+            span(plan.error) * _both(plan.feedback.steady),
+            _double(plan),
+            "range",
+            (1 << plan.feedback.steady_shift) >> 1,
+        )
+        reach = math.ceil(filtered_reach(plan))
+        self.add("v", Interval(-reach, reach), plan.filtered.ctype, "l1 norm of the recursion")
+        return whole
+
+    def gain(self) -> Interval:
+        """g, over every segment of the schedule."""
+        plan = self.plan
+        if plan.schedule is None:
+            return Interval(int(plan.constant_gain), int(plan.constant_gain))
+        reach, product, spare = _schedule(plan.schedule)
+        self.add("slope product", product, _double(plan), "range", spare)
+        return self.add("gain", reach, plan.gain.ctype, "range")
+
+    def actuation(self, v: Interval, g: Interval) -> None:
+        """Product, increment, integrator and output."""
+        plan = self.plan
+        half = (1 << plan.gain_shift) >> 1
+        product = self.add("gain product", v * g, plan.product.ctype, "l1 norm", half)
+        d = self.add("increment", product.shifted(plan.gain_shift), plan.increment.ctype, "l1 norm")
+        if plan.integrator:
+            state = plan.integrator.state
+            half = (1 << plan.integrator.to_output) >> 1
+            self.add("integrator sum", span(state) + d + d, state.ctype, "clamp", half)
+        self.add("output", span(plan.output), plan.output.ctype, "clamp")
+
+
+def _both(count) -> Interval:
+    return Interval(-abs(int(count)), abs(int(count)))
+
+
+def _double(plan: Plan) -> str:
+    """The type of a product of two samples."""
+    return f"int{2 * plan.error.bits}_t"
+
+
+def _schedule(schedule: Schedule) -> tuple[Interval, Interval, int]:
+    """The ranges of g and of the slope product, and the largest rounding of the latter."""
+    reach, product, spare = Interval(min(schedule.gains), max(schedule.gains)), Interval(0, 0), 0
+    points = schedule.breakpoints
+    for i, (slope, by) in enumerate(zip(schedule.slopes, schedule.slope_shifts)):
+        last = slope * (points[i + 1] - 1 - points[i])
+        product = product.hull(last)
+        spare = max(spare, (1 << by) >> 1)
+        reach = reach.hull(schedule.gains[i] + Interval(last, last).shifted(by).low)
+    return reach, product, spare
+
+
+def filtered_reach(plan: Plan) -> float:
+    """Bound on |v| in counts: ‖B/A‖₁ of the integer weights times the range of e, and what rounding adds."""
+    table = plan.feedback.table
+    own = inverse(np.concatenate([[1.0], table.values]))
+    if own is None:
+        raise PlanError(plan.name, "the integer recursion cannot be proved stable", "choose q31, f32 or f64")
+    unit = plan.filtered.lsb
+    reach = 0.0
+    if plan.direct:
+        reach += own.norm_after(np.array(plan.direct.values)) * span(plan.error).worst * plan.error.lsb / unit
+    if plan.inner:
+        reach += own.norm * span(plan.inner.state).worst * plan.inner.state.lsb / unit
+    return reach + rounding_reach(plan, own)
+
+
+def rounding_reach(plan: Plan, own) -> float:
+    """What alignments, the carried rounding and the reset's rounding can add to v, in counts."""
+    unit = plan.wide.lsb / plan.filtered.lsb
+    rounded = [b for s in (plan.direct, plan.feedback.table) if s for b in s.blocks if b.align]
+    each = 0.5 * unit * (len(rounded) + bool(plan.inner))
+    carried = 0.5 * own.norm_after(np.array([1.0, -1.0]))
+    return own.norm * each + carried + reset_error(plan) * max(1.0, own.norm * at_rest(plan))
+
+
+def reset_error(plan: Plan) -> float:
+    """How far a reset's v can be from the integer recursion's own rest, in counts."""
+    feedback = plan.feedback
+    direct = float(np.sum(plan.direct.values)) if plan.direct else 0.0
+    exact = direct / at_rest(plan) * plan.error.lsb / plan.filtered.lsb
+    return 0.5 + abs(exact - feedback.steady * 2.0**-feedback.steady_shift) * span(plan.error).worst
+
+
+def at_rest(plan: Plan) -> float:
+    """A(1): positive for a stable recursion."""
+    return 1.0 + float(np.sum(plan.feedback.table.values))

@@ -1,0 +1,112 @@
+"""What a controller is fed with, and what it answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.plan.formats import nearest
+from focgen.plan.model import Format, Plan
+
+
+@dataclass(frozen=True)
+class Reset:
+    """``reset(ref, meas, u0)`` of one lane before sample ``sample``; the values like the scenario's."""
+
+    lane: int
+    sample: int
+    ref: float
+    meas: float
+    u0: float
+
+
+@dataclass(frozen=True)
+class Track:
+    """``track(u)`` of one lane before sample ``sample``; at the same sample it comes after a reset."""
+
+    lane: int
+    sample: int
+    u: float
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Inputs of several independent runs ("lanes"), shape (lanes, samples), each starting from init.
+
+    Raw: counts (integers) or the type's floating values, as the C takes them. Physical: the same in physical
+    units. ``sched`` is None where nothing is scheduled. At most one reset and one track a lane and sample.
+    """
+
+    ref: np.ndarray
+    meas: np.ndarray
+    sched: np.ndarray | None = None
+    resets: tuple[Reset, ...] = ()
+    tracks: tuple[Track, ...] = ()
+
+    @property
+    def lanes(self) -> int:
+        """How many runs there are."""
+        return self.ref.shape[0]
+
+    @property
+    def samples(self) -> int:
+        """How many samples each has."""
+        return self.ref.shape[1]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Answers to a scenario, shape (lanes, samples).
+
+    ``u`` the output and ``d`` the increment, raw counts or physical like the scenario; ``flags`` uint8 (None from
+    the ideal). Physical ``d`` is the signal ahead of the integrator: h/2 taken out.
+    """
+
+    u: np.ndarray
+    d: np.ndarray
+    flags: np.ndarray | None = None
+
+
+def to_raw(plan: Plan, physical: Scenario) -> Scenario:
+    """The raw inputs nearest to physical ones; halves away from zero."""
+
+    def each(values, form: Format):
+        if form.floating:
+            return np.asarray(values, dtype=np.float32 if form.ctype == "float" else np.float64)
+        scaled = np.asarray(values, dtype=float) / form.lsb
+        return np.copysign(np.floor(np.abs(scaled) + 0.5), scaled).astype(np.int64)
+
+    def one(value: float, form: Format):
+        return each(value, form)[()] if form.floating else nearest(value / form.lsb)
+
+    e, u = plan.error, plan.output
+    return Scenario(
+        each(physical.ref, e),
+        each(physical.meas, e),
+        None if plan.schedule is None else each(physical.sched, plan.schedule.signal),
+        tuple(Reset(r.lane, r.sample, one(r.ref, e), one(r.meas, e), one(r.u0, u)) for r in physical.resets),
+        tuple(Track(t.lane, t.sample, one(t.u, u)) for t in physical.tracks),
+    )
+
+
+def to_physical(plan: Plan, raw: Scenario) -> Scenario:
+    """The physical inputs that raw ones stand for, exactly."""
+    e, u = plan.error.lsb, plan.output.lsb
+    sched = None if plan.schedule is None else np.asarray(raw.sched, dtype=float) * plan.schedule.signal.lsb
+    return Scenario(
+        np.asarray(raw.ref, dtype=float) * e,
+        np.asarray(raw.meas, dtype=float) * e,
+        sched,
+        tuple(
+            Reset(r.lane, r.sample, float(r.ref) * e, float(r.meas) * e, float(r.u0) * u) for r in raw.resets
+        ),
+        tuple(Track(t.lane, t.sample, float(t.u) * u) for t in raw.tracks),
+    )
+
+
+def physical_trace(plan: Plan, trace: Trace) -> Trace:
+    """A raw trace in physical units, for comparison with the ideal one."""
+    half_step = 0.5 * plan.sample_time if plan.integrator else 1.0
+    d = np.asarray(trace.d, dtype=float) * (plan.increment.lsb / half_step)
+    return Trace(np.asarray(trace.u, dtype=float) * plan.output.lsb, d, trace.flags)
