@@ -1,19 +1,19 @@
 """How far a plan can be from the same controller in exact arithmetic, and from infinite memory.
 
 Notation: B, R and A are the exact weight tables (direct, rest with h/2 inside, feedback), M ≥ ‖1/A‖₁, N ≥
-‖B/A‖₁ (1 and ‖B‖₁ without feedback), E, V the largest |e|, |v|. The machine's step is the exact one with something added at each
-rounding, so with δ the error of v,
+‖B/A‖₁ (1 and ‖B‖₁ without feedback), E, V the largest |e|, |v|. The machine's step is the exact one with
+something added at each rounding, so with δ the error of v,
 
     A δ = (B̂ − B) ê + B (ê − e) + δz − (Â − A) v̂ + roundings,
     |δ| ≤ N |ê − e| + M (‖B̂ − B‖₁ E + ‖Â − A‖₁ V + roundings + |δz|),
 
 for all time and from every reset, which takes the past as constant: its own rounding is one more constant
 addend. Rounding that is carried (ρ_{k−1} − ρ_k) meets (1 − 1/z)/A instead of 1/A. In floating arithmetic a
-sum of n products adds γ_n Σ|w x| (Higham 2002, §3.1), γ_n = n u / (1 − n u). The input's rounding, |ê − e|, is included: the bound
-holds against physical inputs, not only against those that are whole counts.
+sum of n products adds γ_n Σ|w x| (Higham 2002, §3.1), γ_n = n u / (1 − n u). The input's rounding, |ê − e|,
+is included: the bound holds against physical inputs, not only against those that are whole counts.
 
-The inner integral's error grows by 2 |δr| a sample until its clamp ends it, and clamps, which never lengthen a
-distance, add nothing but the rounding of their own limits; likewise the integrator's.
+The inner integral's error grows by 2 |δr| a sample until its clamp ends it, and clamps, which never lengthen
+a distance, add nothing but the rounding of their own limits; likewise the integrator's.
 """
 
 from __future__ import annotations
@@ -22,9 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.plan.canonical import Realisation, Table, Tables, folded, realise, tail_l1
-from focgen.plan.fixed import inner_limits
-from focgen.plan.formats import span
+from focgen.plan.canonical import Realisation, Table, Tables, folded, inner_limits, realise, tail_l1
 from focgen.plan.model import ErrorBound, Plan, Sum
 from focgen.plan.proofs import at_rest, reset_error
 from focgen.plan.stability import Inverse, inverse
@@ -220,7 +218,7 @@ class _Floating(_Account):
         return own + (self.u + _DOUBLE) * largest * 1.01
 
     def sum_error(self, made: Sum | None, table: Table | None, largest: float) -> float:
-        """γ_{n+1} Σ|w x| here and in the reference; what is smaller than the smallest normal number on top."""
+        """γ_{n+1} Σ|w x| here and in the reference, and what underflow can take."""
         if made is None:
             return 0.0
         count = made.taps + 2
@@ -333,15 +331,15 @@ def _machine_gain(schedule, points: np.ndarray, places: np.ndarray, side: str) -
     return np.where(segment < 0, gains[0], np.where(segment >= len(points) - 1, gains[-1], linear))
 
 
-# ------------------------------------------------------------------------------------------------ infinite memory
+# --------------------------------------------------------------------------------------- infinite memory
 
 
 def truncation(plan: Plan, tables: Tables) -> float | None:
     """Bound on the operator's error against infinite memory, both in exact arithmetic; None where there is
     none.
 
-    With feedback A δ = (B − B∞) e − (A − A∞) v∞ and |v∞| ≤ ‖B∞/A∞‖₁ E, for which ‖1/A∞‖₁ is bounded through a longer
-    table, ‖1/A∞‖₁ ≤ M' / (1 − M' t') with t' what that one still leaves out.
+    With feedback A δ = (B − B∞) e − (A − A∞) v∞ and |v∞| ≤ ‖B∞/A∞‖₁ E, for which ‖1/A∞‖₁ is bounded through a
+    longer table, ‖1/A∞‖₁ ≤ M' / (1 − M' t') with t' what that one still leaves out.
     """
     form, h, length = realise(plan.controller), plan.sample_time, plan.length
     scale = abs(tables.normaliser)

@@ -20,10 +20,11 @@ _LONGEST = 1_000_000
 def build_plan(
     controller: Controller, arithmetic: str | None = None, length: int | None = None, name: str | None = None
 ) -> Plan:
-    """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with memory ``length``; both default to the controller's.
+    """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with memory ``length``; both default to the
+    controller's.
 
-    Raises PlanError where the transfer function cannot be realised, its truncated recursion is not stable, a range
-    cannot be represented, or a node cannot be proved; the remedy says what would work.
+    Raises PlanError where the transfer function cannot be realised, its truncated recursion is not stable, a
+    range cannot be represented, or a node cannot be proved; the remedy says what would work.
     """
     arithmetic, length = arithmetic or controller.arithmetic, controller.length if length is None else length
     _check(controller, arithmetic, length)

@@ -196,3 +196,23 @@ def memory_bias(controller: Controller, length: int) -> tuple[tuple[float, float
         (t.coefficient, t.order, t.coefficient * h**-t.order * short_memory_bias(t.order, length))
         for t in terms
     )
+
+
+def inner_limits(controller: Controller) -> tuple[float, float]:
+    """The clamp of the integral of the terms of negative order, in units of ``Realisation.den``'s output.
+
+    At rest the output is gain · z / (the denominator's constant); see the module's description.
+    """
+    gains = controller.gain.gains if controller.scheduled else (controller.gain,)
+    smallest = min((abs(g) for g in gains if g != 0.0), default=1.0)
+    low, high = controller.ranges.output
+    if controller.integrator:
+        reach = (high - low) / controller.sample_time
+        low, high = -reach, reach
+    constant = realise(controller).constant
+    largest = [x * constant / (g * smallest) for x in (low, high) for g in _signs(gains)]
+    return min(largest + [0.0]), max(largest + [0.0])
+
+
+def _signs(gains) -> set[float]:
+    return {float(np.sign(g)) for g in gains if g != 0.0} or {1.0}

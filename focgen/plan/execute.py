@@ -1,8 +1,9 @@
 """The bit-true reference: runs a plan sample for sample, in Python's own arithmetic.
 
-Written from the description in :mod:`focgen.plan.model`, not from the C: histories are whole signals, not rings; sums
-over e are taken tap by tap for all samples at once. Integers are int64, which the plan's proofs show to suffice;
-floating values are numpy's float32 and float64, whose every operation rounds once, in the plan's order.
+Written from the description in :mod:`focgen.plan.model`, not from the C: histories are whole signals, not
+rings; sums over e are taken tap by tap for all samples at once. Integers are int64, which the plan's proofs
+show to suffice; floating values are numpy's float32 and float64, whose every operation rounds once, in the
+plan's order.
 
 Several lanes run side by side, so that the steps that have to follow each other are array operations, too.
 """
@@ -99,10 +100,10 @@ class _Run:
         u0 = _clamp(np.asarray(reset.u0, dtype=self.kind), self.plan.output)
         return _Segment(reset.lane, reset.sample, stop, constant, u0)
 
-    # -------------------------------------------------------------------------------------- sums over the error
+    # ------------------------------------------------------------------------------- sums over the error
 
     def sums(self) -> None:
-        """p, or its parts where more follows: ``direct``, and r with its value at rest before each segment."""
+        """The sum that makes p, and r, each with its value at rest before each segment."""
         plan = self.plan
         self.direct, self.direct_rest = self._over_error(plan.direct)
         if plan.inner:
@@ -137,7 +138,7 @@ class _Run:
             total = part if signal.dtype.kind == "f" else total + _shift(part, block.align)
         return total
 
-    # ------------------------------------------------------------------------------------------------- recursion
+    # ----------------------------------------------------------------------------------------- recursion
 
     def recursion(self) -> None:
         """v at every sample, and before each segment's first one."""
@@ -205,7 +206,7 @@ class _Run:
             past[:, k + lags] = x
         return past[:, lags:]
 
-    # ---------------------------------------------------------------------------------------------- gain, output
+    # -------------------------------------------------------------------------------------- gain, output
 
     def gains(self) -> None:
         """g at every sample."""
@@ -277,6 +278,13 @@ class _Recursion:
         if self.kind is not np.int64:
             return np.add.accumulate(products, axis=1)[:, -1] + self.kind(0)
         return sum(_shift(products[:, a:b].sum(axis=1), align) for a, b, align in self.blocks)
+
+
+def scheduled_gain(plan: Plan, s: np.ndarray) -> np.ndarray:
+    """g in counts at raw values of the scheduling signal, any shape; ``plan`` has a schedule."""
+    kind = _kind(plan.error)
+    s = np.asarray(s, dtype=kind)
+    return _scheduled(plan.schedule, s if plan.floating else _clamp(s, plan.schedule.signal), kind)
 
 
 def _scheduled(schedule: Schedule, s: np.ndarray, kind: type) -> np.ndarray:

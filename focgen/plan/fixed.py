@@ -10,7 +10,7 @@ import numpy as np
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.plan.blocks import Draft, coarsest, finished, split
-from focgen.plan.canonical import Tables, realise
+from focgen.plan.canonical import Tables, inner_limits
 from focgen.plan.formats import Interval, Word, exponent_for, integer, limit, nearest, span
 from focgen.plan.gains import Gain, fixed_gain, span_of
 from focgen.plan.model import Block, Feedback, Format, InnerIntegrator, Integrator, Sum
@@ -77,26 +77,6 @@ def signals(controller: Controller, word: Word) -> Signals:
 
 def _format(bits: int, exponent: int, reach: Interval, unit: str = "") -> Format:
     return Format(integer(bits), 2.0**exponent, reach.low, reach.high, unit)
-
-
-def inner_limits(controller: Controller) -> tuple[float, float]:
-    """The clamp of the integral of the terms of negative order, in units of ``Realisation.den``'s output.
-
-    See :mod:`focgen.plan.canonical`: at rest the output is gain · z / (the denominator's constant).
-    """
-    gains = controller.gain.gains if controller.scheduled else (controller.gain,)
-    smallest = min((abs(g) for g in gains if g != 0.0), default=1.0)
-    low, high = controller.ranges.output
-    if controller.integrator:
-        reach = (high - low) / controller.sample_time
-        low, high = -reach, reach
-    constant = realise(controller).constant
-    largest = [x * constant / (g * smallest) for x in (low, high) for g in _signs(gains)]
-    return min(largest + [0.0]), max(largest + [0.0])
-
-
-def _signs(gains) -> set[float]:
-    return {float(np.sign(g)) for g in gains if g != 0.0} or {1.0}
 
 
 # ---------------------------------------------------------------------------------------------------- e to v

@@ -6,8 +6,8 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
-from focgen.plan.canonical import Table, Tables
-from focgen.plan.fixed import Actuation, Filter, inner_limits
+from focgen.plan.canonical import Table, Tables, inner_limits
+from focgen.plan.fixed import Actuation, Filter
 from focgen.plan.gains import floating_gain
 from focgen.plan.model import Block, Feedback, Format, InnerIntegrator, Integrator, Sum
 

@@ -39,7 +39,8 @@ def integer(bits: int) -> str:
 
 def nearest(value: float) -> int:
     """The nearest integer, halves away from zero."""
-    return int(math.copysign(math.floor(abs(value) + 0.5), value))
+    whole = math.floor(abs(value))
+    return int(math.copysign(whole + (abs(value) - whole >= 0.5), value))
 
 
 def exponent_for(largest: float, counts: int, where: str, what: str) -> int:

@@ -1,7 +1,8 @@
 """No integer node can overflow: recomputed from the plan alone, in exact integers.
 
-Nothing of how the formats were chosen is used here. Inputs are clamped to their ranges, v is saturated to its type,
-z and I are clamped to theirs; every other node is a sum, product or shift of these, so its range follows.
+Nothing of how the formats were chosen is used here. Inputs are clamped to their ranges, v is saturated to its
+type, z and I are clamped to theirs; every other node is a sum, product or shift of these, so its range
+follows.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.plan.formats import nearest
 from focgen.plan.model import Format, Plan
 
 
@@ -59,8 +58,8 @@ class Scenario:
 class Trace:
     """Answers to a scenario, shape (lanes, samples).
 
-    ``u`` the output and ``d`` the increment, raw counts or physical like the scenario; ``flags`` uint8 (None from
-    the ideal). Physical ``d`` is the signal ahead of the integrator: h/2 taken out.
+    ``u`` the output and ``d`` the increment, raw counts or physical like the scenario; ``flags`` uint8 (None
+    from the ideal). Physical ``d`` is the signal ahead of the integrator: h/2 taken out.
     """
 
     u: np.ndarray
@@ -68,23 +67,25 @@ class Trace:
     flags: np.ndarray | None = None
 
 
+def nearest_raw(values, form: Format) -> np.ndarray:
+    """Physical values as raw ones, any shape: the nearest count, halves away from zero, or the floating
+    value.
+    """
+    if form.floating:
+        return np.asarray(values, dtype=np.float32 if form.ctype == "float" else np.float64)
+    scaled = np.asarray(values, dtype=float) / form.lsb
+    whole = np.floor(np.abs(scaled))
+    return np.copysign(whole + (np.abs(scaled) - whole >= 0.5), scaled).astype(np.int64)
+
+
 def to_raw(plan: Plan, physical: Scenario) -> Scenario:
-    """The raw inputs nearest to physical ones; halves away from zero."""
-
-    def each(values, form: Format):
-        if form.floating:
-            return np.asarray(values, dtype=np.float32 if form.ctype == "float" else np.float64)
-        scaled = np.asarray(values, dtype=float) / form.lsb
-        return np.copysign(np.floor(np.abs(scaled) + 0.5), scaled).astype(np.int64)
-
-    def one(value: float, form: Format):
-        return each(value, form)[()] if form.floating else nearest(value / form.lsb)
-
+    """The raw inputs nearest to physical ones."""
     e, u = plan.error, plan.output
+    one = lambda value, form: nearest_raw(value, form)[()]  # noqa: E731
     return Scenario(
-        each(physical.ref, e),
-        each(physical.meas, e),
-        None if plan.schedule is None else each(physical.sched, plan.schedule.signal),
+        nearest_raw(physical.ref, e),
+        nearest_raw(physical.meas, e),
+        None if plan.schedule is None else nearest_raw(physical.sched, plan.schedule.signal),
         tuple(Reset(r.lane, r.sample, one(r.ref, e), one(r.meas, e), one(r.u0, u)) for r in physical.resets),
         tuple(Track(t.lane, t.sample, one(t.u, u)) for t in physical.tracks),
     )

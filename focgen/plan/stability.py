@@ -1,11 +1,12 @@
 """Stability and l1 norms of the truncated recursion v + Σ a_j v_{k−j} = p.
 
-With A(z) = 1 + Σ a_j z^−j and g the first N samples of 1/A, the residual A g − 1 has some l1 norm ρ. If ρ < 1 then
-1/A = g / (1 + residual) is absolutely summable (Wiener), the recursion is stable, and
+With A(z) = 1 + Σ a_j z^−j and g the first N samples of 1/A, the residual A g − 1 has some l1 norm ρ. If ρ < 1
+then 1/A = g / (1 + residual) is absolutely summable (Wiener), the recursion is stable, and
 
     ‖1/A‖₁ ≤ ‖g‖₁ / (1 − ρ),      ‖B/A‖₁ ≤ ‖B g‖₁ + ‖B‖₁ ‖1/A‖₁ ρ.
 
-These hold for every bounded input, from any bounded history, and they are what ranges and error bounds rest on.
+These hold for every bounded input, from any bounded history, and they are what ranges and error bounds rest
+on.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _SLACK = 1.0 + 1e-6  # over the rounding of the transforms
 
 @dataclass(frozen=True)
 class Inverse:
-    """A finite inverse of a stable recursion. ``response`` is g; ``residual`` is ρ; ``norm`` bounds ‖1/A‖₁."""
+    """A finite inverse of a stable recursion. ``response`` is g; ``residual`` is ρ; ``norm`` ≥ ‖1/A‖₁."""
 
     response: np.ndarray
     residual: float
@@ -40,7 +41,7 @@ class Inverse:
 
 
 def inverse(coefficients: np.ndarray) -> Inverse | None:
-    """Invert 1 + Σ a_j z^−j, given as (1, a_1, …); None where it is unstable or too near to it to be proved."""
+    """Invert 1 + Σ a_j z^−j, given as (1, a_1, …); None where it is unstable, or too near to it for a proof."""
     coefficients = np.asarray(coefficients, dtype=float)
     count, best = max(1024, _power_of_two(4 * len(coefficients))), None
     while count <= max(_LONGEST, 4 * len(coefficients)):

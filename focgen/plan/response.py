@@ -1,0 +1,55 @@
+"""Frequency response of a controller: as designed, and as it will run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.plan.execute import scheduled_gain
+from focgen.plan.model import Plan, Sum
+from focgen.plan.scenario import nearest_raw
+
+
+def designed_response(controller: Controller, omega, schedule_value: float | None = None) -> np.ndarray:
+    """C(jω) from error to output, continuous and exact; ``omega`` > 0 in rad/s, any shape."""
+    omega = np.asarray(omega, dtype=float)
+    response = controller.transfer.frequency_response(omega) * controller.gain_at(schedule_value)
+    return response / (1j * omega) if controller.integrator else response
+
+
+def running_response(plan: Plan, omega, schedule_value: float | None = None) -> np.ndarray:
+    """C(e^jωh) from error to output as the plan runs it: sampled, truncated, with its quantised weights and
+    gain.
+
+    ``omega`` in rad/s, up to π/h, any shape; ``schedule_value`` in physical units, needed where the gain is
+    scheduled. Physical units. Neither sample and hold nor computation delay is in it, nor rounding of
+    signals, nor clamps.
+    """
+    omega = np.asarray(omega, dtype=float)
+    back = np.exp(-1j * omega * plan.sample_time)
+    trapezoid = (1.0 + back) / (1.0 - back)
+    total = np.zeros(omega.shape, complex)
+    if plan.direct:
+        total = total + _response(plan.direct, back)
+    if plan.inner:
+        total = total + _response(plan.inner.rest, back) * trapezoid
+    if plan.feedback:
+        total = total / (1.0 + _response(plan.feedback.table, back))
+    total = total * running_gain(plan, schedule_value)
+    return total * trapezoid if plan.integrator else total
+
+
+def running_gain(plan: Plan, schedule_value: float | None = None) -> float:
+    """g at a value of the scheduling signal (physical), with h/2 inside where an integrator follows."""
+    if plan.schedule is None:
+        return plan.constant_gain * plan.gain.lsb
+    count = nearest_raw(schedule_value, plan.schedule.signal)
+    return float(scheduled_gain(plan, np.asarray(count))) * plan.gain.lsb
+
+
+def _response(table: Sum, back: np.ndarray) -> np.ndarray:
+    """Σ w_j z^−j by Horner's rule from the oldest weight on."""
+    total = np.zeros(back.shape, complex)
+    for weight in reversed(table.values):
+        total = total * back + weight
+    return total * back**table.first

@@ -1,0 +1,104 @@
+"""The inputs that drive a plan's nodes to their proved worst case."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from focgen.errors import PlanError
+from focgen.plan.execute import scheduled_gain
+from focgen.plan.model import Plan, Sum
+from focgen.plan.scenario import Reset, Scenario
+
+_SETTLED = 8  # memory lengths after which a recursion's response is taken to have died away
+
+
+def worst_case_input(plan: Plan, node: str) -> Scenario:
+    """Raw inputs whose last sample takes ``node`` (a name from ``plan.proofs``) to its worst case.
+
+    Two lanes: towards the highest value and towards the lowest. A sum over the error is reached exactly;
+    behind a recursion as far as a finite input can. Raises PlanError for a node the plan does not have.
+    """
+    if node not in {p.node for p in plan.proofs}:
+        known = ", ".join(p.node for p in plan.proofs)
+        raise PlanError(plan.name, f"has no node {node!r}", f"choose one of {known}")
+    response = _response(plan, node)
+    errors = np.where(response[::-1] > 0.0, plan.error.high, plan.error.low)
+    others = np.where(response[::-1] > 0.0, plan.error.low, plan.error.high)
+    signs = np.stack([errors, others]) > 0
+    ref = np.where(signs, plan.reference.high, plan.reference.low)
+    meas = np.where(signs, plan.measurement.low, plan.measurement.high)
+    return Scenario(ref, meas, _schedule(plan, node, ref.shape), _resets(plan, node))
+
+
+def _response(plan: Plan, node: str) -> np.ndarray:
+    """How the node answers a unit error, sample by sample."""
+    if node.startswith("rest") or node == "inner sum":
+        return _part(plan.inner.rest, node)
+    if node.startswith("direct"):
+        return _part(plan.direct, node)
+    v = _filtered(plan, node)
+    return np.convolve(v, [1.0, 1.0]) if node == "integrator sum" else v
+
+
+def _part(table: Sum, node: str) -> np.ndarray:
+    """The weights by lag, those of other blocks 0."""
+    weights = np.array(table.values)
+    for block in table.blocks:
+        if node == f"{table.name}[{block.first}..{block.last}]":
+            weights[: block.first] = 0.0
+            weights[block.last + 1 :] = 0.0
+    return weights
+
+
+def _filtered(plan: Plan, node: str) -> np.ndarray:
+    """e to v, or to a sum of past v."""
+    count = plan.error_lags + 1 + (_SETTLED * plan.filtered_lags if plan.feedback else 0)
+    unit = np.zeros(count)
+    unit[0] = 1.0
+    p = np.zeros(count)
+    if plan.direct:
+        p = p + lfilter(plan.direct.values, [1.0], unit)
+    if plan.inner:
+        p = p + lfilter([1.0, 1.0], [1.0, -1.0], lfilter(plan.inner.rest.values, [1.0], unit))
+    if plan.feedback is None:
+        return p
+    table = plan.feedback.table
+    v = lfilter([1.0], np.concatenate([[1.0], table.values]), p)
+    if not node.startswith("feedback"):
+        return v
+    return lfilter(np.concatenate([[0.0], _part_of_past(table, node)]), [1.0], v)
+
+
+def _part_of_past(table: Sum, node: str) -> np.ndarray:
+    weights = np.array(table.values)
+    for block in table.blocks:
+        if node == f"{table.name}[{block.first}..{block.last}]":
+            weights[: block.first - 1] = 0.0
+            weights[block.last :] = 0.0
+    return weights
+
+
+def _schedule(plan: Plan, node: str, shape: tuple[int, int]) -> np.ndarray | None:
+    """The schedule at its largest gain, or where its slope's product is largest."""
+    if plan.schedule is None:
+        return None
+    schedule = plan.schedule
+    ends = np.array(schedule.breakpoints)
+    places = np.clip(np.concatenate([ends, ends - 1]), schedule.signal.low, schedule.signal.high)
+    size = np.abs(scheduled_gain(plan, places))
+    if node == "slope product":
+        runs = ends[1:] - 1 - ends[:-1]
+        places, size = ends[1:] - 1, np.abs(np.array(schedule.slopes) * runs)
+    return np.full(shape, places[int(np.argmax(size))])
+
+
+def _resets(plan: Plan, node: str) -> tuple[Reset, ...]:
+    """The integrator starts at the limit it is driven against."""
+    if node != "integrator sum":
+        return ()
+    ref, meas, u = plan.reference, plan.measurement, plan.output
+    still = max(ref.low, meas.low), min(ref.high, meas.high)
+    level = still[0] if still[0] <= still[1] else None
+    same = (level, level) if level is not None else (ref.low, meas.low)
+    return tuple(Reset(lane, 0, *same, u0) for lane, u0 in enumerate((u.high, u.low)))
