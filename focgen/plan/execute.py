@@ -191,7 +191,7 @@ class _Run:
         plan, (lanes, samples) = self.plan, self.shape
         lags = plan.feedback.table.last
         past = np.zeros((lanes, lags + samples), self.kind)
-        carry = np.zeros(lanes, self.kind)
+        carry, out = np.zeros(lanes, self.kind), np.empty(self.shape, self.kind)
         table = _Recursion(plan.feedback.table, self.kind)
         for k in range(samples):
             for lane in self._starting(k):
@@ -203,8 +203,8 @@ class _Run:
                 v = _shift(x, plan.narrow)
                 carry = x - (v << plan.narrow)
                 x = _saturate(v, plan.filtered.bits)
-            past[:, k + lags] = x
-        return past[:, lags:]
+            past[:, k + lags] = out[:, k] = x
+        return out
 
     # -------------------------------------------------------------------------------------- gain, output
 

@@ -41,7 +41,7 @@ class Inverse:
 
 
 def inverse(coefficients: np.ndarray) -> Inverse | None:
-    """Invert 1 + Σ a_j z^−j, given as (1, a_1, …); None where it is unstable, or too near to it for a proof."""
+    """Invert 1 + Σ a_j z^−j, given as (1, a_1, …); None where it is not, or not provably, stable."""
     coefficients = np.asarray(coefficients, dtype=float)
     count, best = max(1024, _power_of_two(4 * len(coefficients))), None
     while count <= max(_LONGEST, 4 * len(coefficients)):
