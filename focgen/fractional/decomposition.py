@@ -26,6 +26,11 @@ class StepImage:
     remainder: Callable | None
     feedthrough: float
 
+    @property
+    def poles(self) -> np.ndarray:
+        """The poles that are in ``chains``, rad/s, one of each conjugate pair."""
+        return np.concatenate([chain.poles for chain in self.chains] or [np.empty(0)])
+
 
 def step_image(transfer: TransferFunction, horizon: float) -> StepImage:
     """Split G(s)/s for times up to ``horizon`` (s).
@@ -96,7 +101,7 @@ def _to_the_cut(place: complex) -> float:
 
 def _rational(num: Polynomial, den: Polynomial, horizon: float) -> list[Chain]:
     top, bottom = _dense(num), _dense(den)
-    poles = _roots(bottom)
+    poles = np.roots(bottom).astype(complex)  # not polished one by one: near poles are accurate as a set
 
     def image(s):
         return np.polyval(top, s) / (bottom[0] * np.prod(s - poles[:, None], axis=0))
@@ -111,15 +116,3 @@ def _dense(terms: Polynomial) -> np.ndarray:
     dense = np.zeros(int(terms[0].order) + 1)
     dense[[int(terms[0].order - t.order) for t in terms]] = [t.coefficient for t in terms]
     return dense
-
-
-def _roots(dense: np.ndarray) -> np.ndarray:
-    """Return the roots, simple ones polished by Newton's method; zero roots are exact."""
-    roots = np.roots(dense).astype(complex)
-    slope = np.polyder(dense)
-    for _ in range(2):
-        with np.errstate(all="ignore"):
-            step = np.polyval(dense, roots) / np.polyval(slope, roots)
-        small = np.isfinite(step) & (np.abs(step) < 1e-9 * np.abs(roots))
-        roots = np.where(small, roots - np.where(small, step, 0.0), roots)
-    return roots

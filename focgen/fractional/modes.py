@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
+
+from focgen.fractional.triangular import triangular_exponential
 
 _CIRCLE = 128
 _RELATIVE_GAP = 0.02
@@ -47,43 +48,41 @@ class Chain:
         """Return the time function at the times ``t`` ≥ 0 (s), shape of ``t``."""
         if len(self.poles) == 1:
             return self.weight * (self.gammas[0] * np.exp(self.poles[0] * t)).real
-        states = expm(self._matrix() * t[:, None, None]) @ self._start()
-        return self.weight * (states @ self._output()).real
-
-    # The states are scaled by the spread of the poles, so that the matrix has entries of one size.
-    def _spread(self) -> float:
-        return float(np.max(np.abs(self.poles - self.poles[0]))) or float(np.max(np.abs(self.poles))) or 1.0
-
-    def _matrix(self) -> np.ndarray:
-        return np.diag(self.poles) + self._spread() * np.eye(len(self.poles), k=1)
+        return self.weight * (self._propagators(t)[:, :, -1] @ self.gammas).real
 
     def _start(self) -> np.ndarray:
         return np.eye(len(self.poles), dtype=complex)[-1]
 
-    def _output(self) -> np.ndarray:
-        return self.gammas / self._spread() ** np.arange(len(self.poles) - 1.0, -1.0, -1.0)
+    def _propagators(self, t: np.ndarray) -> np.ndarray:
+        """Return e^{At} of the chain's lags (poles on the diagonal, ones above it), shape (n, m, m)."""
+        m = len(self.poles)
+        spread = np.max(np.abs(self.poles - self.poles[0]))
+        # a similarity gives the entries one size, so that each of them comes out accurate
+        size = np.maximum(spread, 1.0 / np.maximum(t, np.finfo(float).tiny))
+        scaled = (np.diag(self.poles) + size[:, None, None] * np.eye(m, k=1)) * t[:, None, None]
+        distance = np.arange(m) - np.arange(m)[:, None]
+        return triangular_exponential(scaled) * size[:, None, None] ** -np.maximum(distance, 0.0)
 
     def _mean_state(self, step: float) -> np.ndarray:
+        """Return the mean over the first step of the states that start as ``_start``."""
         if len(self.poles) == 1:
             x = self.poles[0] * step
             return np.array([np.expm1(x) / x if x else 1.0], complex)
-        m = len(self.poles)
-        augmented = np.zeros((m + 1, m + 1), complex)
-        augmented[:m, :m], augmented[:m, m] = self._matrix() * step, self._start()
-        return expm(augmented)[:m, m]
+        # one more pole, at 0, in front of the chain's first lag integrates it
+        integrating = Chain(np.append(self.poles, 0.0), np.append(self.gammas, 0.0), self.weight)
+        return integrating._propagators(np.array([step]))[0, :-1, -1] / step
 
     def _follow(self, state: np.ndarray, step: float, count: int) -> np.ndarray:
-        """Return the output at ``count`` samples from ``state`` on, each doubling by an exponential of its own."""
-        doublings = max(count - 1, 0).bit_length()
-        lengths = step * 2.0 ** np.arange(doublings)
+        """Return the output at ``count`` samples from ``state`` on, each doubling by a propagator of its own."""
+        lengths = step * 2.0 ** np.arange(max(count - 1, 0).bit_length())
         states = state[:, None]
         if len(self.poles) == 1:
             for factor in np.exp(self.poles[0] * lengths):
                 states = np.concatenate([states, factor * states], axis=1)
-        else:
-            for factor in expm(self._matrix() * lengths[:, None, None]) if doublings else ():
+        elif len(lengths):
+            for factor in self._propagators(lengths):
                 states = np.concatenate([states, factor @ states], axis=1)
-        return self.weight * (self._output() @ states[:, :count]).real
+        return self.weight * (self.gammas @ states[:, :count]).real
 
 
 def _chain_image(poles: np.ndarray, gammas: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -113,7 +112,7 @@ def polar_part(
         if len(cluster) == 1:
             gammas = np.atleast_1d(isolated(cluster[0], others))
         else:
-            cluster, gammas = _chain(image, cluster, others, obstacle)
+            cluster, gammas = _chain(image, cluster, others, obstacle, gap)
         chains.append(Chain(cluster, gammas, weight))
     return chains
 
@@ -126,15 +125,18 @@ def _clusters(poles: np.ndarray, gap: float) -> list[np.ndarray]:
     return [np.flatnonzero(row) for i, row in enumerate(close) if not row[:i].any()]
 
 
-def _chain(image, cluster, others, obstacle):
+def _chain(
+    image: Callable, cluster: np.ndarray, others: np.ndarray, obstacle: Callable, gap: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the cluster's poles and its γ_k = (1/2πi) ∮ image(s) Π_{i > k} (s − p_i) ds."""
     corners = [complex(end(cluster.real), end(cluster.imag)) for end in (np.min, np.max)]
     middle = 0.5 * (corners[0] + corners[1])
     inner = float(np.max(np.abs(cluster - middle)))
     outer = min(float(np.min(np.abs(others - middle), initial=math.inf)), obstacle(middle))
     if math.isinf(outer):
-        outer = 16.0 * inner or 1.0
-    radius = math.sqrt(max(inner, 0.05 * outer) * outer)
+        outer = max(16.0 * inner, 16.0 * gap) or 1.0
+    # a wide circle: rounding enters γ_k by the power of 1/radius
+    radius = max(math.sqrt(inner * outer), 0.5 * outer)
     s = middle + radius * np.exp(2j * math.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE)
     share = image(s) * (s - middle) / _CIRCLE
     gammas = np.empty(len(cluster), complex)

@@ -36,7 +36,7 @@ def _values(image: StepImage, t: np.ndarray) -> np.ndarray:
     total = np.zeros(t.shape)
     for chain in image.chains:
         total += chain.at(t)
-    return total if image.remainder is None else total + inverse_laplace(image.remainder, t)
+    return total if image.remainder is None else total + inverse_laplace(image.remainder, t, image.poles)
 
 
 def mittag_leffler(alpha: float, beta: float, z) -> np.ndarray:
@@ -62,7 +62,7 @@ def _mittag_leffler(alpha: float, beta: float, z: float) -> float:
         return s ** (alpha - beta) / (s**alpha - z) - polar
 
     exponentials = sum((r * cmath.exp(p)).real for p, r in zip(poles, residues))
-    return float(inverse_laplace(remainder, np.ones(1))[0] + exponentials)
+    return float(inverse_laplace(remainder, np.ones(1), np.array(poles))[0] + exponentials)
 
 
 def _mittag_leffler_poles(alpha: float, z: float) -> list[complex]:

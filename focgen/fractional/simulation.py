@@ -67,7 +67,7 @@ def _steps(image: StepImage, step: float, count: int) -> np.ndarray:
     if image.remainder is not None and count > 1:
         grid = log_grid(count - 1)
         places = np.concatenate([grid.head, grid.tail])
-        values = inverse_laplace(image.remainder, places * step)
+        values = inverse_laplace(image.remainder, places * step, image.poles)
         out[1:] += grid.spread(values[: len(grid.head)], values[len(grid.head) :])
     out[0] = image.feedthrough
     return out
@@ -80,19 +80,24 @@ def _means(image: StepImage, step: float, count: int) -> np.ndarray:
         out += chain.means(step, count)
     if image.remainder is not None:
         grid = log_grid(count)
-        head = _head_means(image.remainder, step, len(grid.head))
-        out += grid.spread(head, _tail_means(image.remainder, step, grid.tail))
+        head = _head_means(image, step, len(grid.head))
+        out += grid.spread(head, _tail_means(image, step, grid.tail))
     return out
 
 
-def _head_means(remainder, step: float, count: int) -> np.ndarray:
-    integrals = inverse_laplace(lambda s: remainder(s) / s, step * np.arange(1.0, count + 1.0))
+def _head_means(image: StepImage, step: float, count: int) -> np.ndarray:
+    def integral(s):
+        return image.remainder(s) / s
+
+    integrals = inverse_laplace(integral, step * np.arange(1.0, count + 1.0), image.poles)
     return np.diff(integrals, prepend=0.0) / step
 
 
-def _tail_means(remainder, step: float, places: np.ndarray) -> np.ndarray:
-    # (1 − e^{−sh})/(sh) takes the mean; beyond the first samples the contour bears its growth
-    return inverse_laplace(lambda s: remainder(s) * -np.expm1(-s * step) / (s * step), places * step)
+def _tail_means(image: StepImage, step: float, places: np.ndarray) -> np.ndarray:
+    def mean(s):  # (1 − e^{−sh})/(sh): beyond the first samples the contour bears its growth
+        return image.remainder(s) * -np.expm1(-s * step) / (s * step)
+
+    return inverse_laplace(mean, places * step, image.poles)
 
 
 def _product(kernel: np.ndarray, u: np.ndarray) -> np.ndarray:
