@@ -61,7 +61,9 @@ def _pid(rng, h):
 
 def _lead(rng, h):
     order, fast = rng.uniform(0.1, 1.0, 2), h ** rng.uniform(0.3, 0.9)
-    return TransferFunction([(fast * rng.uniform(2, 20), order[0]), (1.0, 0.0)], [(fast, order[1]), (1.0, 0.0)])
+    return TransferFunction(
+        [(fast * rng.uniform(2, 20), order[0]), (1.0, 0.0)], [(fast, order[1]), (1.0, 0.0)]
+    )
 
 
 def _half(rng, h):
@@ -70,7 +72,9 @@ def _half(rng, h):
 
 def _second_order(rng, h):
     a, b = h ** rng.uniform(0.4, 1.0, 2)
-    return TransferFunction([(1.0, 0.0)], [(a, rng.uniform(1.0, 1.9)), (b, rng.uniform(0.2, 0.9)), (1.0, 0.0)])
+    return TransferFunction(
+        [(1.0, 0.0)], [(a, rng.uniform(1.0, 1.9)), (b, rng.uniform(0.2, 0.9)), (1.0, 0.0)]
+    )
 
 
 def _lag(rng, h):
@@ -79,12 +83,16 @@ def _lag(rng, h):
 
 def _oscillator(rng, h):
     time = h * rng.uniform(2.0, 20.0)
-    return TransferFunction([(time, 1.0), (1.0, 0.0)], [(time**2, 2.0), (rng.uniform(0.3, 2.0) * time, 1.0), (1.0, 0.0)])
+    return TransferFunction(
+        [(time, 1.0), (1.0, 0.0)], [(time**2, 2.0), (rng.uniform(0.3, 2.0) * time, 1.0), (1.0, 0.0)]
+    )
 
 
 def _integrating(rng, h):
     low = rng.uniform(0.2, 1.0)
-    return TransferFunction([(1.0, 0.0), (h**0.3, 0.4)], [(h ** rng.uniform(0.3, 0.8), low + 0.7), (1.0, low)])
+    return TransferFunction(
+        [(1.0, 0.0), (h**0.3, 0.4)], [(h ** rng.uniform(0.3, 0.8), low + 0.7), (1.0, low)]
+    )
 
 
 _KINDS = (_model_inverse, _fopid, _fopd, _pid, _lead, _half, _second_order, _lag, _oscillator, _integrating)
@@ -104,13 +112,17 @@ def random_controller(seed: int, longest: int = 120) -> Controller:
         transfer=kind(rng, h),
         gain=gain,
         integrator=integrator,
-        ranges=ControllerRanges(*(_random_range(rng, unit) for _ in "rm"), _random_range(rng, force), schedule),
+        ranges=ControllerRanges(
+            *(_random_range(rng, unit) for _ in "rm"), _random_range(rng, force), schedule
+        ),
         length=int(rng.integers(1, longest + 1)),
     )
 
 
 def _random_range(rng, unit: float) -> tuple[float, float]:
-    low, high = {0: (0.0, 1.0), 1: (-1.0, 1.0), 2: (0.2, 1.0), 3: (-1.0, -0.1), 4: (-0.3, 1.0)}[int(rng.integers(5))]
+    low, high = {0: (0.0, 1.0), 1: (-1.0, 1.0), 2: (0.2, 1.0), 3: (-1.0, -0.1), 4: (-0.3, 1.0)}[
+        int(rng.integers(5))
+    ]
     size = unit * rng.uniform(0.5, 2.0)
     return low * size, high * size
 
@@ -129,13 +141,17 @@ def _random_gain(rng, size: float):
 # ------------------------------------------------------------------------------------------------ scenarios
 
 
-def random_scenario(controller: Controller, seed: int, lanes: int = 4, samples: int = 250, wild: bool = False) -> Scenario:
+def random_scenario(
+    controller: Controller, seed: int, lanes: int = 4, samples: int = 250, wild: bool = False
+) -> Scenario:
     """Steps, noise, ramps and rests, resets and tracks, in physical units; ``wild`` leaves the ranges at times."""
     rng = np.random.default_rng([seed, 11])
     ranges, shape = controller.ranges, (lanes, samples)
     sched = _signal(rng, ranges.schedule, shape, wild) if controller.scheduled else None
     resets = tuple(
-        Reset(lane, at, *(float(rng.uniform(*r)) for r in (ranges.reference, ranges.measurement, ranges.output)))
+        Reset(
+            lane, at, *(float(rng.uniform(*r)) for r in (ranges.reference, ranges.measurement, ranges.output))
+        )
         for lane in range(lanes)
         for at in sorted(rng.choice(samples, int(rng.integers(0, 3)), replace=False).tolist())
     )

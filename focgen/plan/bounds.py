@@ -8,9 +8,13 @@ something added at each rounding, so with δ the error of v,
     |δ| ≤ N |ê − e| + M (‖B̂ − B‖₁ E + ‖Â − A‖₁ V + roundings + |δz|),
 
 for all time and from every reset, which takes the past as constant: its own rounding is one more constant
-addend. Rounding that is carried (ρ_{k−1} − ρ_k) meets (1 − 1/z)/A instead of 1/A. In floating arithmetic a
-sum of n products adds γ_n Σ|w x| (Higham 2002, §3.1), γ_n = n u / (1 − n u). The input's rounding, |ê − e|,
-is included: the bound holds against physical inputs, not only against those that are whole counts.
+addend. Rounding that is carried (ρ_{k−1} − ρ_k) meets (1 − 1/z)/A instead of 1/A. In floating arithmetic
+every operation adds u times its result; in any order, a sum of n products adds at most γ_n Σ|w x|, γ_n = n u
+/ (1 − n u) (Higham, Accuracy and Stability of Numerical Algorithms, 2002, §3.1 and §4.2). The reference
+computes in double itself, and its rounding is counted, too.
+
+The inputs' rounding, |ê − e|, is included: the bound holds against physical inputs, not only against those
+that are whole counts.
 
 The inner integral's error grows by 2 |δr| a sample until its clamp ends it, and clamps, which never lengthen
 a distance, add nothing but the rounding of their own limits; likewise the integrator's.
@@ -22,14 +26,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.plan.canonical import Realisation, Table, Tables, folded, inner_limits, realise, tail_l1
+from focgen.errors import PlanError
+from focgen.plan.canonical import Table, Tables, inner_limits
+from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error
 from focgen.plan.model import ErrorBound, Plan, Sum
 from focgen.plan.proofs import at_rest, reset_error
-from focgen.plan.stability import Inverse, inverse
+from focgen.plan.stability import inverse
+from focgen.plan.truncation import largest_error, truncation
 
 _UNIT = {"f64": 2.0**-53, "f32": 2.0**-24}
 _DOUBLE = 2.0**-53
 _TINY = {"f64": 2.0**-1022, "f32": 2.0**-126}
+_MOST = 0.5  # of the signal that its own rounding may cost before a plan is refused
 _SLACK = 1.0 + 1e-9  # over the rounding of these sums themselves
 
 
@@ -49,6 +57,7 @@ def error_bound(plan: Plan, tables: Tables) -> ErrorBound:
     static = sum(parts.values()) * _SLACK
     growth, ceiling = g * v.growth * _SLACK, g * v.ceiling * _SLACK
     operator = static + ceiling
+    _refuse_meaningless(plan, parts, g * account.reach)
     return ErrorBound(
         operator=operator,
         output_per_sample=account.output(static, growth, operator),
@@ -57,6 +66,16 @@ def error_bound(plan: Plan, tables: Tables) -> ErrorBound:
         parts=tuple((cause, value) for cause, value in parts.items() if value)
         + (("inner integral", ceiling),) * bool(ceiling),
     )
+
+
+def _refuse_meaningless(plan: Plan, parts: dict[str, float], reach: float) -> None:
+    """Raise PlanError where the arithmetic itself may cost as much as the signal can be."""
+    own = parts.get("weights", 0.0) + parts.get("rounding", 0.0)
+    if not own <= _MOST * reach:
+        what = f"rounding in {plan.arithmetic} may cost {own:.3g} of a signal that reaches {reach:.3g}"
+        wider = {"q15": "q31, f32 or f64", "q31": "f64", "f32": "f64"}.get(plan.arithmetic)
+        remedy = f"choose {wider}" if wider else "the recursion is nearly unstable: lengthen the sample time"
+        raise PlanError(plan.name, what, remedy)
 
 
 @dataclass(frozen=True)
@@ -81,8 +100,8 @@ class _Account:
     def __init__(self, plan: Plan, tables: Tables):
         self.plan, self.tables, controller = plan, tables, plan.controller
         self.half_step = 0.5 * plan.sample_time if plan.integrator else 1.0
-        self.largest_gain = _largest_gain(plan)
-        self.E = self.input_error + _error_reach(plan)
+        self.largest_gain = largest_gain(controller)
+        self.E = self.input_error + largest_error(plan.controller)
         self.own = inverse(tables.feedback.weights) if tables.feedback else None
         self.M = self.own.norm if self.own else 1.0
         self.N = self.norm_after(tables.direct)
@@ -121,17 +140,6 @@ class _Account:
         edge = self.inner_edge()
         growth = 2.0 * each + self.inner_rounding()
         return FilteredError({"inner": edge}, self.M * growth, self.M * (self.width + edge))
-
-
-def _error_reach(plan: Plan) -> float:
-    """Largest |reference − measurement| in physical units, 0 included."""
-    (r0, r1), (m0, m1) = plan.controller.ranges.reference, plan.controller.ranges.measurement
-    return max(abs(r0 - m1), abs(r1 - m0))
-
-
-def _largest_gain(plan: Plan) -> float:
-    controller = plan.controller
-    return max(map(abs, controller.gain.gains)) if controller.scheduled else abs(controller.gain)
 
 
 class _Fixed(_Account):
@@ -184,8 +192,8 @@ class _Fixed(_Account):
         plan, lsb = self.plan, self.plan.gain.lsb / self.half_step
         if plan.schedule is None:
             return abs(plan.constant_gain * lsb - plan.controller.gain)
-        steepest = _steepest(plan)
-        return _table_error(plan, lsb) + 0.5 * lsb + 0.5 * plan.schedule.signal.lsb * steepest
+        inputs = 0.5 * plan.schedule.signal.lsb * steepest(plan.controller)
+        return table_error(plan, lsb) + 0.5 * lsb + inputs
 
     def product_error(self, reach: float) -> float:
         return 0.5 * self.plan.increment.lsb / self.half_step * bool(self.plan.gain_shift)
@@ -218,12 +226,14 @@ class _Floating(_Account):
         return own + (self.u + _DOUBLE) * largest * 1.01
 
     def sum_error(self, made: Sum | None, table: Table | None, largest: float) -> float:
-        """γ_{n+1} Σ|w x| here and in the reference, and what underflow can take."""
+        """Here u for each product and each partial sum, which the order keeps small until the newest samples;
+        in the reference, whose order is its own, γ_{n+1} Σ|w x|; and what underflow can take."""
         if made is None:
             return 0.0
-        count = made.taps + 2
-        each = gamma(count, self.u) + gamma(count, _DOUBLE)
-        return each * 1.01 * table.l1 * largest + count * self.tiny * (1.0 + largest)
+        count, partial = made.taps + 2, np.cumsum(np.abs(made.weights)[::-1])
+        here = self.u * (1.0 + gamma(count, self.u)) * float(partial.sum() + partial[-1])
+        there = gamma(count, _DOUBLE) * table.l1
+        return 1.01 * (here + there) * largest + count * self.tiny * (1.0 + largest)
 
     def inner_edge(self) -> float:
         return (self.u + _DOUBLE) * self.Z
@@ -275,10 +285,10 @@ class _Floating(_Account):
         plan, g = self.plan, self.largest_gain
         if plan.schedule is None:
             return 2.0 * (self.u + _DOUBLE) * g
-        steepest, reach = _steepest(plan), max(map(abs, plan.controller.ranges.schedule))
-        inputs = (2.0 * self.u + 2.0 * _DOUBLE) * steepest * reach
-        slopes = steepest * _longest_segment(plan)
-        return _table_error(plan, 1.0 / self.half_step) + inputs + 4.0 * (self.u + _DOUBLE) * (g + slopes)
+        slope, reach = steepest(plan.controller), max(map(abs, plan.controller.ranges.schedule))
+        inputs = (2.0 * self.u + 2.0 * _DOUBLE) * slope * reach
+        slopes = slope * longest_segment(plan.controller)
+        return table_error(plan, 1.0 / self.half_step) + inputs + 4.0 * (self.u + _DOUBLE) * (g + slopes)
 
     def product_error(self, reach: float) -> float:
         return 2.0 * (self.u + _DOUBLE) * reach + self.tiny / self.half_step
@@ -290,88 +300,3 @@ class _Floating(_Account):
             return static + growth + edge
         d = 2.0 * self.half_step * self.largest_gain * self.reach + plan.sample_time * operator
         return plan.sample_time * operator + u * (edge / u + 2.0 * d) + 2.0 * edge + 4.0 * self.tiny
-
-
-def _steepest(plan: Plan) -> float:
-    """Largest slope of the gain, physical."""
-    gain = plan.controller.gain
-    return float(np.max(np.abs(np.diff(gain.gains) / np.diff(gain.breakpoints))))
-
-
-def _longest_segment(plan: Plan) -> float:
-    return float(np.max(np.diff(plan.controller.gain.breakpoints)))
-
-
-def _table_error(plan: Plan, lsb: float) -> float:
-    """Largest difference of the machine's unrounded table and the schedule: at a breakpoint of either."""
-    schedule, ideal = plan.schedule, plan.controller.gain
-    unit = schedule.signal.lsb
-    low, high = plan.controller.ranges.schedule
-    points = np.array([b * unit for b in schedule.breakpoints])
-    places = np.concatenate([points, [b for b in ideal.breakpoints if low < b < high], [low, high]])
-    places = places[(places >= low) & (places <= high)]
-    worst = 0.0
-    for side in ("left", "right"):
-        worst = max(
-            worst, float(np.max(np.abs(_machine_gain(schedule, points, places, side) * lsb - ideal(places))))
-        )
-    return worst
-
-
-def _machine_gain(schedule, points: np.ndarray, places: np.ndarray, side: str) -> np.ndarray:
-    """The table's gain in counts at physical ``places``; at a breakpoint the segment before it or after
-    it."""
-    segment = np.searchsorted(points, places, side=side) - 1
-    inside = np.clip(segment, 0, len(points) - 2)
-    gains = np.array(schedule.gains, dtype=float)
-    slopes = (
-        np.array([s * 2.0**-n for s, n in zip(schedule.slopes, schedule.slope_shifts)]) / schedule.signal.lsb
-    )
-    linear = gains[inside] + slopes[inside] * (places - points[inside])
-    return np.where(segment < 0, gains[0], np.where(segment >= len(points) - 1, gains[-1], linear))
-
-
-# --------------------------------------------------------------------------------------- infinite memory
-
-
-def truncation(plan: Plan, tables: Tables) -> float | None:
-    """Bound on the operator's error against infinite memory, both in exact arithmetic; None where there is
-    none.
-
-    With feedback A δ = (B − B∞) e − (A − A∞) v∞ and |v∞| ≤ ‖B∞/A∞‖₁ E, for which ‖1/A∞‖₁ is bounded through a
-    longer table, ‖1/A∞‖₁ ≤ M' / (1 − M' t') with t' what that one still leaves out.
-    """
-    form, h, length = realise(plan.controller), plan.sample_time, plan.length
-    scale = abs(tables.normaliser)
-    e, gain = _error_reach(plan), _largest_gain(plan)
-    direct = tail_l1(form.direct, h, length) / scale
-    rest = 0.5 * h * tail_l1(form.rest, h, length) / scale
-    clamp = [x / tables.normaliser for x in inner_limits(plan.controller)] if form.rest else [0.0]
-    drift = (max(clamp) - min(clamp)) if rest else 0.0
-    if tables.feedback is None:
-        return gain * (direct * e + drift) * _SLACK
-    return _recursive_truncation(plan, tables, form, direct, drift, max(map(abs, clamp)))
-
-
-def _recursive_truncation(
-    plan, tables: Tables, form: Realisation, direct: float, drift: float, z: float
-) -> float | None:
-    h, scale = plan.sample_time, abs(tables.normaliser)
-    own = inverse(tables.feedback.weights)
-    endless = _endless_norm(plan, form, scale)
-    if own is None or endless is None:
-        return None
-    e, back = _error_reach(plan), tail_l1(form.den, h, plan.length) / scale
-    v = (own.norm_after(tables.direct.weights) if tables.direct else 0.0) * e + own.norm * z
-    return _largest_gain(plan) * (endless * (direct * e + back * v) + endless * drift) * _SLACK
-
-
-def _endless_norm(plan: Plan, form, scale: float) -> float | None:
-    """Bound on ‖1/A‖₁ with infinite memory."""
-    for length in sorted({plan.length, max(plan.length, 4096), max(plan.length, 65536)}):
-        table = folded(form.den, plan.sample_time, length).weights
-        own: Inverse | None = inverse(table / table[0])
-        left_out = tail_l1(form.den, plan.sample_time, length) / scale
-        if own is not None and own.norm * left_out < 1.0:
-            return own.norm / (1.0 - own.norm * left_out)
-    return None

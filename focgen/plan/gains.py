@@ -10,7 +10,7 @@ import numpy as np
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.plan.formats import Interval, Word, exponent_for, integer, nearest
-from focgen.plan.model import Count, Format, Schedule
+from focgen.plan.model import Count, Format, Plan, Schedule
 
 _MARGIN = 3  # counts a rounded slope may overshoot the gains it connects
 _FEWEST = 16  # counts that a range must cover to be worth the name
@@ -124,3 +124,47 @@ def floating_gain(controller: Controller, factor: float, kind: type[np.floating]
     signal = Format(ctype, 1.0, low, high, controller.units.schedule)
     schedule = Schedule(signal, points, gains, slopes, (0,) * len(slopes))
     return Gain(Format(ctype, 1.0, min(gains), max(gains)), 0.0, schedule)
+
+
+# ------------------------------------------------------------------------------------------- how exact it is
+
+
+def largest_gain(controller: Controller) -> float:
+    """Largest |gain|."""
+    return max(map(abs, controller.gain.gains)) if controller.scheduled else abs(controller.gain)
+
+
+def steepest(controller: Controller) -> float:
+    """Largest slope of the gain over the scheduling signal."""
+    gain = controller.gain
+    return float(np.max(np.abs(np.diff(gain.gains) / np.diff(gain.breakpoints))))
+
+
+def longest_segment(controller: Controller) -> float:
+    """Largest distance of two breakpoints."""
+    return float(np.max(np.diff(controller.gain.breakpoints)))
+
+
+def table_error(plan: Plan, lsb: float) -> float:
+    """Largest difference of a plan's schedule, not rounded further, from the controller's.
+
+    Both are straight between the breakpoints of either, so it is there. ``lsb`` is the physical size of a
+    gain count.
+    """
+    schedule, (low, high) = plan.schedule, plan.controller.ranges.schedule
+    points = np.array(schedule.breakpoints) * schedule.signal.lsb
+    places = np.concatenate([points, plan.controller.gain.breakpoints, [low, high]])
+    ideal = plan.controller.gain(np.clip(places, low, high))
+    inside = (places >= min(low, points[0])) & (places <= max(high, points[-1]))
+    sides = [_machine_gain(schedule, points, places, side) * lsb - ideal for side in ("left", "right")]
+    return float(np.max(np.abs(sides)[:, inside]))
+
+
+def _machine_gain(schedule: Schedule, points: np.ndarray, places: np.ndarray, side: str) -> np.ndarray:
+    """The table's gain in counts at physical ``places``; at a breakpoint that of the segment on one side."""
+    segment = np.searchsorted(points, places, side=side) - 1
+    inside = np.clip(segment, 0, len(points) - 2)
+    gains = np.array(schedule.gains, dtype=float)
+    slopes = np.array(schedule.slopes) * 2.0 ** -np.array(schedule.slope_shifts, dtype=float)
+    linear = gains[inside] + slopes[inside] * (places - points[inside]) / schedule.signal.lsb
+    return np.where(segment < 0, gains[0], np.where(segment >= len(points) - 1, gains[-1], linear))
