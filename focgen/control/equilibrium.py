@@ -1,0 +1,145 @@
+"""Where the rig can stand still: the rest, and the pressure and command that hold a given output."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.errors import DesignError
+from focgen.rig.model import UNITY, Actuator, LinearActuator, Ranges, Rig
+
+_COMMAND = (0.0, 10.0)  # V, where the rig does not say
+_GRID = 2001
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A state the rig can rest in: ``command``, ``pressure``, ``output``, each in its own unit."""
+
+    command: float
+    pressure: float
+    output: float
+
+
+def actuator_of(rig: Rig) -> Actuator | LinearActuator:
+    """The rig's actuator; a stage that is absent is 1."""
+    return rig.actuator if rig.actuator is not None else LinearActuator(UNITY)
+
+
+def derived_ranges(rig: Rig) -> tuple[Ranges, tuple[str, ...]]:
+    """Return the rig's ranges with what is absent derived, and a sentence for each derived one.
+
+    The command's is 0–10 V (the pressure's, where nothing stands between), the pressure's and the output's
+    follow through the stages' static gains. Raises DesignError where a stage has no finite static gain.
+    """
+    given, notes = rig.ranges, []
+    command = given.command
+    if command is None:
+        merged = rig.regulator == UNITY and rig.signals.command is None
+        command = given.pressure if merged and given.pressure else _COMMAND
+        notes.append(f"the command's range is not given: {_span(command)}")
+    pressure = given.pressure
+    if pressure is None:
+        pressure = _scaled(command, _static_gain(rig, "regulator"))
+        notes.append(f"the pressure's range is not given: {_span(pressure)}, the command's through the regulator")
+    output = given.output
+    if output is None:
+        output = _output_range(rig, pressure)
+        notes.append(f"the output's range is not given: {_span(output)}, the pressure's through actuator and sensor")
+    return Ranges(command, pressure, output), tuple(notes)
+
+
+def _span(span: tuple[float, float]) -> str:
+    return f"{span[0]:.4g} … {span[1]:.4g}"
+
+
+def _scaled(span: tuple[float, float], factor: float) -> tuple[float, float]:
+    ends = sorted((span[0] * factor, span[1] * factor))
+    return ends[0], ends[1]
+
+
+def _static_gain(rig: Rig, stage: str) -> float:
+    transfer = actuator_of(rig).dynamics if stage == "actuator" else getattr(rig, stage)
+    gain = transfer.dc_gain
+    if not (math.isfinite(gain) and gain != 0.0):
+        raise DesignError(f"{rig.name} [{stage}]", f"has the static gain {gain:g}, so no range follows through it",
+                          "give [ranges] for command, pressure and output")
+    return gain
+
+
+def _output_range(rig: Rig, pressure: tuple[float, float]) -> tuple[float, float]:
+    values = static_output(rig, np.linspace(*pressure, _GRID))
+    low, high = float(np.min(values)), float(np.max(values))
+    if not low < high:
+        raise DesignError(f"{rig.name} [actuator]", "does not move its output over the pressure's range",
+                          "check gain and [ranges]")
+    return low, high
+
+
+def static_output(rig: Rig, pressure):
+    """What the sensor reads at rest at ``pressure``, any shape."""
+    actuator = actuator_of(rig)
+    curvature = actuator.drive(pressure) * _static_gain(rig, "actuator") + actuator.offset
+    return curvature * _static_gain(rig, "sensor")
+
+
+def rest(rig: Rig, command: tuple[float, float]) -> Equilibrium:
+    """Return the rig's rest: no command, or what the ``command`` range has nearest to none."""
+    actuator = actuator_of(rig)
+    idle = min(max(0.0, command[0]), command[1])
+    pressure = idle * rig.regulator.dc_gain if idle else 0.0
+    drive = float(actuator.drive(pressure))
+    settled = drive * actuator.dynamics.dc_gain if drive else 0.0
+    level = settled + actuator.offset
+    output = level * rig.sensor.dc_gain if level else 0.0
+    if not math.isfinite(output):
+        raise DesignError(rig.name, f"never rests at the command {idle:g}", "give a command range that holds 0")
+    return Equilibrium(idle, pressure, output)
+
+
+def holding(rig: Rig, output: float, ranges: Ranges) -> Equilibrium:
+    """Return the equilibrium at ``output``. Raises DesignError where the ranges do not reach it."""
+    actuator = actuator_of(rig)
+    if math.isinf(actuator.dynamics.dc_gain):  # it integrates: it rests at any output, without pressure
+        return Equilibrium(0.0, 0.0, output)
+    level = output / _static_gain(rig, "sensor") - actuator.offset
+    pressure = _pressure_for(rig, level / _static_gain(rig, "actuator"), output, ranges)
+    command = pressure / _static_gain(rig, "regulator")
+    slack = 1e-9 * (ranges.command[1] - ranges.command[0])
+    if not ranges.command[0] - slack <= command <= ranges.command[1] + slack:
+        raise _unreachable(rig, output, f"needs the command {command:.4g}", f"[{_span(ranges.command)}]")
+    return Equilibrium(command, pressure, output)
+
+
+def _pressure_for(rig: Rig, drive: float, output: float, ranges: Ranges) -> float:
+    """Return the pressure nearest to rest at which K(p) p is ``drive``, within what the command can hold."""
+    actuator = actuator_of(rig)
+    if isinstance(actuator, LinearActuator):
+        return drive
+    start = rest(rig, ranges.command).pressure
+    reach = _scaled(ranges.command, _static_gain(rig, "regulator"))
+    for end in (reach[1], reach[0]):
+        pressure = np.linspace(start, end, _GRID)
+        off = actuator.drive(pressure) - drive
+        hit = np.flatnonzero((off[1:] == 0.0) | (np.sign(off[1:]) * np.sign(off[:-1]) < 0))
+        if len(hit):
+            return _root(actuator, drive, pressure[hit[0]], pressure[hit[0] + 1])
+    if actuator.drive(start) == drive:
+        return start
+    top = static_output(rig, np.linspace(*reach, _GRID))
+    raise _unreachable(rig, output, "is out of reach", f"{_span((float(top.min()), float(top.max())))}")
+
+
+def _root(actuator: Actuator, drive: float, low: float, high: float) -> float:
+    from scipy.optimize import brentq
+
+    if actuator.drive(high) == drive:
+        return float(high)
+    return float(brentq(lambda p: actuator.drive(p) - drive, low, high, xtol=1e-15, rtol=1e-14))
+
+
+def _unreachable(rig: Rig, output: float, what: str, within: str) -> DesignError:
+    return DesignError(rig.name, f"the output {output:.4g} {what}; reachable is {within}",
+                       "give set points, or [ranges] output, within the rig's reach")

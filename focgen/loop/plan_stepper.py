@@ -1,0 +1,125 @@
+"""A plan run in a simulated loop: bit for bit what the C computes, one sample at a time, many loops side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.plan.execute import scheduled_gain
+from focgen.plan.model import Format, Plan, Sum
+from focgen.plan.scenario import nearest_raw
+
+
+class PlanStepper:
+    """The controller as it will run. Takes and gives physical values; inside they are the plan's counts.
+
+    Starts at rest with error 0 at the output ``start``, for ``columns`` loops. Measurement and set point are
+    rounded to the nearest count and, in fixed point, clamped to their ranges, as a caller of the C does.
+    """
+
+    def __init__(self, plan: Plan, columns: int, start: float = 0.0):
+        self.plan = plan
+        self.kind = {"float": np.float32, "double": np.float64}.get(plan.error.ctype, np.int64)
+        self.direct = _Window(plan.direct, self.kind, columns)
+        self.rest = _Window(plan.inner.rest if plan.inner else None, self.kind, columns)
+        self.feedback = _Window(plan.feedback.table if plan.feedback else None, self.kind, columns)
+        zero = np.zeros(columns, self.kind)
+        self.z, self.r, self.carry, self.d = zero, zero, zero, zero
+        u0 = np.full(columns, _clamped(nearest_raw(start, plan.output), plan.output))
+        self.total = u0.astype(self.kind)
+        if plan.integrator and not plan.floating:
+            self.total = self.total << plan.integrator.to_output
+
+    def step(self, reference, measurement, schedule):
+        plan = self.plan
+        e = self._input(reference, plan.reference) - self._input(measurement, plan.measurement)
+        v = self._filtered(e)
+        g = self.kind(plan.constant_gain)
+        if plan.schedule is not None:
+            g = scheduled_gain(plan, nearest_raw(schedule, plan.schedule.signal))
+        d = self._shift(g * v, plan.gain_shift)
+        return self._output(d).astype(float) * plan.output.lsb
+
+    def _input(self, values, form: Format) -> np.ndarray:
+        raw = np.asarray(nearest_raw(values, form), dtype=self.kind)
+        return raw if form.floating else _clamped(raw, form)
+
+    def _shift(self, values: np.ndarray, by: int) -> np.ndarray:
+        """Right shift rounding half up; nothing where floating."""
+        return values if self.plan.floating or by == 0 else (values + (1 << (by - 1))) >> by
+
+    def _filtered(self, e: np.ndarray) -> np.ndarray:
+        """v: the sums over e, the inner integral, the recursion."""
+        plan = self.plan
+        p = self.direct(e)
+        if plan.inner:
+            inner = self._shift(self._inner(self.rest(e)), plan.inner.to_wide)
+            p = p + inner if plan.direct else inner
+        if plan.feedback is None:
+            return p if plan.floating else _saturated(self._shift(p, plan.narrow), plan.filtered.bits)
+        x = p - self.feedback.past()
+        if plan.floating:
+            v = x
+        else:
+            x = x + self.carry
+            v = self._shift(x, plan.narrow)
+            self.carry = x - (v << plan.narrow)
+            v = _saturated(v, plan.filtered.bits)
+        self.feedback.push(v)
+        return v
+
+    def _inner(self, r: np.ndarray) -> np.ndarray:
+        self.z = _clamped(self.z + (r + self.r), self.plan.inner.state)
+        self.r = r
+        return self.z
+
+    def _output(self, d: np.ndarray) -> np.ndarray:
+        plan = self.plan
+        if plan.integrator is None:
+            return _clamped(d, plan.output)
+        self.total = _clamped(self.total + (d + self.d), plan.integrator.state)
+        self.d = d
+        return self._shift(self.total, plan.integrator.to_output)
+
+
+class _Window:
+    """One history sum: the samples it needs, shape (lags, columns), oldest first."""
+
+    def __init__(self, table: Sum | None, kind: type, columns: int):
+        self.table, self.kind, self.columns = table, kind, columns
+        if table is None:
+            return
+        self.weights = np.array(table.weights[::-1], dtype=kind)[:, None]
+        self.samples = np.zeros((table.last - table.first + 1, columns), kind)
+        self.blocks = [(table.last - b.last, table.last - b.first + 1, b.align) for b in table.blocks]
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Take in x_k and return the sum, x_k in it."""
+        self.push(x)
+        return self.past()
+
+    def push(self, x: np.ndarray) -> None:
+        """Take in x_k."""
+        if self.table is not None:
+            self.samples = np.concatenate([self.samples[1:], x[None]])
+
+    def past(self) -> np.ndarray:
+        """Return the sum over what has been taken in."""
+        if self.table is None:
+            return np.zeros(self.columns, self.kind)
+        products = self.weights * self.samples
+        if self.kind is not np.int64:  # accumulate adds in order, as the C does; sum would not
+            return np.add.accumulate(products, axis=0)[-1] + self.kind(0)
+        total = np.zeros(self.columns, np.int64)
+        for start, stop, align in self.blocks:
+            part = products[start:stop].sum(axis=0)
+            total = total + (part if align == 0 else (part + (1 << (align - 1))) >> align)
+        return total
+
+
+def _clamped(values, form: Format):
+    kind = np.asarray(values).dtype.type
+    return np.minimum(np.maximum(values, kind(form.low)), kind(form.high))
+
+
+def _saturated(values: np.ndarray, bits: int) -> np.ndarray:
+    return np.minimum(np.maximum(values, -(1 << (bits - 1))), (1 << (bits - 1)) - 1)

@@ -1,0 +1,72 @@
+"""Controllers that run in a simulated loop, one sample at a time, many loops side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.loop.online import OnlineConvolution
+from focgen.plan.canonical import Tables, inner_limits, tables
+
+
+class Stepper(Protocol):
+    """What the loop asks of a controller: one sample of every column, arrays of shape (columns,)."""
+
+    def step(self, reference: np.ndarray, measurement: np.ndarray, schedule: np.ndarray) -> np.ndarray:
+        """Return the output u, physical."""
+
+
+class FloatStepper:
+    """The controller in float64: Grünwald–Letnikov sums of memory ``length`` (None: infinite), no rounding planned.
+
+    Starts at rest with error 0 at the output ``start``, for up to ``samples`` samples of ``columns`` loops.
+    ``gain`` replaces the controller's gain: it takes the scheduling signal (columns,) and returns gains.
+    Raises PlanError where the transfer function cannot be realised.
+    """
+
+    def __init__(self, controller: Controller, samples: int, columns: int, start: float = 0.0,
+                 length: int | None = None, gain: Callable | None = None):
+        memory = samples if length is None else min(length, samples)
+        self._sums = _Sums(tables(controller, max(1, memory)), columns, samples, inner_limits(controller))
+        self._gain = gain or controller.gain_at
+        self._limits = controller.ranges.output
+        self._half = 0.5 * controller.sample_time if controller.integrator else None
+        self._integral = np.full(columns, float(start))
+        self._previous = np.zeros(columns)
+
+    def step(self, reference, measurement, schedule):
+        filtered = self._sums.step(reference - measurement)
+        if self._half is None:
+            return np.clip(self._gain(schedule) * filtered, *self._limits)
+        increment = self._half * self._gain(schedule) * filtered
+        self._integral = np.clip(self._integral + increment + self._previous, *self._limits)
+        self._previous = increment
+        return self._integral
+
+
+class _Sums:
+    """The transfer function: direct and inner sums of the error, and the recursion of the filtered signal."""
+
+    def __init__(self, parts: Tables, columns: int, samples: int, limits: tuple[float, float]):
+        def convolution(table):
+            return None if table is None else OnlineConvolution(table.weights[:, None, None], columns, samples)
+
+        self._direct, self._rest = convolution(parts.direct), convolution(parts.rest)
+        self._feedback = convolution(parts.feedback)
+        self._limits = sorted(limit / parts.normaliser for limit in limits)  # the tables are divided by it
+        self._inner, self._previous = np.zeros(columns), np.zeros(columns)
+
+    def step(self, error: np.ndarray) -> np.ndarray:
+        total = np.zeros_like(error) if self._direct is None else self._direct.step(error[None])[0]
+        if self._rest is not None:
+            increment = self._rest.step(error[None])[0]
+            self._inner = np.clip(self._inner + increment + self._previous, *self._limits)
+            self._previous = increment
+            total = total + self._inner
+        if self._feedback is not None:
+            total = total - self._feedback.past()[0]
+            self._feedback.push(total[None])
+        return total

@@ -1,0 +1,279 @@
+"""K_o(p) found in simulation: the line with which steps from rest to the operating points meet the wish.
+
+A step to a high set point passes through all lower pressures, so its response depends on the whole line, and
+the line is sought as a whole: its level c and its ratio ρ = K_o(highest)/K_o(lowest operating point). Of all lines
+that meet the wish the one is taken whose operating points settle most alike.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.control.controller import Controller, ControllerRanges
+from focgen.control.equilibrium import Equilibrium
+from focgen.control.inversion import Inversion, invert
+from focgen.control.measures import StepMeasures, measure_step
+from focgen.control.schedule import Line
+from focgen.errors import DesignError
+from focgen.loop.chain import chain
+from focgen.loop.run import run_loop
+from focgen.loop.stepper import FloatStepper
+from focgen.rig.model import Rig
+
+OVERSHOOT = 5.0  # %, where nothing is wished
+HORIZON = 5.0  # wished settling times that a step is followed for
+_SAMPLES = 150  # samples in a wished settling time: finer sampling is searched at this
+_LEVELS = np.geomspace(0.05, 6.0, 18)  # of K_o, 1 where the loop with frozen gain settles in the time aimed at
+_COARSE_RATIOS = (0.6, 1.0, 1.7)
+_RATIOS = (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0)
+_CLOSE = 1.1
+_ATTEMPTS = 9
+_PARTS = 2  # substeps where only the search runs coarse
+_MOST_SAMPLES = 60_000
+_MARGIN = 0.98  # of the wish that is aimed at, so that the fitted line keeps it
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What the loop shall do: ``settling`` the mean settling time (5 %) over the operating points in s, None for as
+    fast as possible; ``overshoot`` the largest overshoot at any of them, %."""
+
+    settling: float | None
+    overshoot: float
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Steps from rest to the operating points: the rig, where it rests, the set points, and how the loop runs."""
+
+    rig: Rig
+    start: Equilibrium
+    points: tuple[Equilibrium, ...]
+    ranges: ControllerRanges
+    lowest: float
+    delay: int
+    pressure_known: bool
+
+    @property
+    def references(self) -> np.ndarray:
+        """The set points, shape (points,)."""
+        return np.array([point.output for point in self.points])
+
+    @property
+    def pressures(self) -> np.ndarray:
+        """Their pressures, shape (points,)."""
+        return np.array([point.pressure for point in self.points])
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """The line found, its inversion, and what the steps do with it (infinite memory, float64)."""
+
+    line: Line
+    inversion: Inversion
+    measures: tuple[StepMeasures, ...]
+
+    @property
+    def mean_settling(self) -> float:
+        """Mean settling time over the operating points, s; infinite where one does not settle."""
+        mean = float(np.mean([m.settling_s for m in self.measures]))
+        return mean if math.isfinite(mean) else math.inf
+
+    @property
+    def overshoot(self) -> float:
+        """The largest overshoot, %."""
+        return max(m.overshoot_pct for m in self.measures)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trials:
+    """Results of many lines, arrays of shape (lines,) but ``lines`` (lines, 2): level and ratio."""
+
+    lines: np.ndarray
+    mean: np.ndarray
+    spread: np.ndarray
+    overshoot: np.ndarray
+
+
+class _Search:
+    """Simulates lines at the sampling interval ``step`` (s); by default it resolves ``scale``, the time aimed at (s)."""
+
+    def __init__(self, bench: Bench, scale: float, step: float | None = None):
+        own = bench.rig.sample_time
+        self.bench, self.scale = bench, scale
+        self.step = step or max(own, scale / _SAMPLES)
+        self.samples = max(20, math.ceil(HORIZON * scale / self.step))
+        if self.samples > _MOST_SAMPLES:
+            raise DesignError(bench.rig.name, f"a settling time of {scale:.3g} s is {scale / self.step:.0f} samples",
+                              f"wish for a faster loop, or raise the rig's sample_time ({own:g} s)")
+        self.chain = chain(bench.rig, self.step, self.samples, parts=None if self.step == own else _PARTS)
+        self.inversion = invert(bench.rig, 3.0 / scale)
+        static = bench.rig.regulator.dc_gain * bench.rig.sensor.dc_gain
+        self.unit = 3.0 / (scale * static)
+
+    def at(self, step: float) -> _Search:
+        """The same search at another sampling interval."""
+        return _Search(self.bench, self.scale, step)
+
+    def line(self, level: float, ratio: float) -> Line:
+        low, high = self.bench.pressures[0], self.bench.pressures[-1]
+        first = level * self.unit
+        slope = first * (ratio - 1.0) / (high - low) if ratio != 1.0 else 0.0
+        return Line(first - slope * low, slope)
+
+    def measures(self, lines: list[Line]) -> list[tuple[StepMeasures, ...]]:
+        """Return what each line makes of each operating point."""
+        return simulate_lines(self.bench, self.inversion, lines, self.chain)
+
+    def trials(self, levels, ratios) -> _Trials:
+        pairs = np.array([(level, ratio) for ratio in ratios for level in levels])
+        found = self.measures([self.line(*pair) for pair in pairs])
+        times = np.array([[m.settling_s for m in each] for each in found])
+        times = np.where(np.isfinite(times), times, np.inf)
+        overshoot = np.array([max(m.overshoot_pct for m in each) for each in found])
+        with np.errstate(invalid="ignore"):
+            spread = times.max(axis=1) - times.min(axis=1)
+        return _Trials(pairs, times.mean(axis=1), np.nan_to_num(spread, nan=np.inf), overshoot)
+
+
+def simulate_lines(bench: Bench, inversion: Inversion, lines: list[Line], prepared) -> list[tuple[StepMeasures, ...]]:
+    """Step the loop from rest to every operating point with every line, all at once."""
+    count, samples, h = len(bench.points), prepared.samples, prepared.sample_time
+    level = np.repeat([line.intercept for line in lines], count)
+    slope = np.repeat([line.slope for line in lines], count)
+    low, high = bench.lowest, _highest(bench)
+
+    def gain(pressure):
+        held = np.clip(pressure, low, high)
+        return (level + slope * held) / inversion.K(held)
+
+    controller = Controller("search", h, inversion.transfer, 1.0, inversion.integrator, bench.ranges)
+    stepper = FloatStepper(controller, samples, count * len(lines), bench.start.command, gain=gain)
+    reference = np.tile(np.tile(bench.references, len(lines)), (samples, 1))
+    run = run_loop(prepared, stepper, reference, bench.start, bench.delay, bench.pressure_known, curvature=False)
+    found = [measure_step(run.output[:, i], h, bench.start.output, reference[0, i]) for i in range(reference.shape[1])]
+    return [tuple(found[i : i + count]) for i in range(0, len(found), count)]
+
+
+def _highest(bench: Bench) -> float:
+    return bench.ranges.schedule[1] if bench.ranges.schedule else bench.pressures[-1]
+
+
+def tune(bench: Bench, wish: Wish) -> Tuned:
+    """Return the line that meets ``wish``. Raises DesignError naming what is feasible."""
+    if wish.settling is None:
+        return _fastest(bench, wish)
+    search = _Search(bench, wish.settling)
+    pair = _matching(search, wish)
+    found = None if pair is None else _at_own_rate(bench, search, pair, wish)
+    if found is None:
+        found = _fastest(bench, wish)
+    if found.mean_settling > wish.settling:
+        raise DesignError(
+            bench.rig.name, f"no K_o(p) settles in {wish.settling:g} s on average with at most {wish.overshoot:g} % "
+            f"overshoot; feasible is {found.mean_settling:.3g} s",
+            f"wish for --settling {_upward(found.mean_settling):g} or more, or allow more --overshoot")
+    return found
+
+
+def _upward(value: float) -> float:
+    """Round up to two digits."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / unit) * unit
+
+
+def _at_own_rate(bench: Bench, search: _Search, pair: tuple[float, float, float], wish: Wish) -> Tuned | None:
+    """Return the line at the rig's own sample time, its level corrected where the search ran at a coarser one."""
+    own = search if search.step == bench.rig.sample_time else search.at(bench.rig.sample_time)
+    level, ratio, safe = pair
+    factors = (1.0,) if own is search else (1.0, 1.03, 0.97, 1.07, 0.93)
+    levels = [between * factor for factor in factors for between in (level, math.sqrt(level * safe), safe)]
+    lines = [own.line(each, ratio) for each in levels]
+    for line, measures in zip(lines, own.measures(lines)):
+        tuned = Tuned(line, own.inversion, measures)
+        if tuned.mean_settling <= (wish.settling or math.inf) and tuned.overshoot <= wish.overshoot:
+            return tuned
+    return None
+
+
+def _fastest(bench: Bench, wish: Wish) -> Tuned:
+    """Return the line with the shortest mean settling time that keeps the overshoot."""
+    scale = _guess(bench)
+    for _ in range(_ATTEMPTS):
+        search = _Search(bench, scale)
+        ratios = _RATIOS if search.inversion.scheduled else np.ones(1)
+        trials = search.trials(np.geomspace(0.1, 3.0, 30), ratios)
+        mean = np.where(trials.overshoot <= _MARGIN * wish.overshoot, trials.mean, np.inf)
+        best = int(mean.argmin())
+        if math.isinf(mean[best]):
+            scale *= 3.0
+        elif not scale / 3.0 <= mean[best] <= 1.5 * scale:
+            scale = mean[best]
+        else:
+            found = _at_own_rate(bench, search, (*trials.lines[best], trials.lines[best][0]), replace(wish, settling=None))
+            if found is not None:
+                return found
+            scale = 1.2 * mean[best]
+    raise DesignError(bench.rig.name, f"no K_o(p) was found that settles with at most {wish.overshoot:g} % overshoot",
+                      "allow more --overshoot, or check the rig and its sample_time")
+
+
+def _guess(bench: Bench) -> float:
+    """Return a settling time (s) that regulator, sensor, sampling and delay should allow: 45° of lag at crossover."""
+    h = bench.rig.sample_time
+    omega = np.geomspace(1e-6, math.pi, 4000) / h
+    around = bench.rig.regulator * bench.rig.sensor
+    lag = -np.unwrap(np.angle(around.frequency_response(omega) / around.dc_gain)) + omega * h * (0.5 + bench.delay)
+    late = np.flatnonzero(lag > 0.25 * math.pi)
+    return 3.0 / float(omega[late[0] if len(late) else -1])
+
+
+def _matching(search: _Search, wish: Wish) -> tuple[float, float, float] | None:
+    """Return level and ratio whose mean settling time is the wish's, with the smallest spread, and a level tried nearby.
+
+    None where there is none.
+    """
+    scheduled = search.inversion.scheduled
+    levels = _promising(search.trials(_LEVELS, _COARSE_RATIOS if scheduled else np.ones(1)), wish)
+    if levels is None:
+        return None
+    pairs = _crossings(search.trials(levels, _RATIOS if scheduled else np.ones(1)), wish, len(levels))
+    if not pairs or not scheduled:
+        return pairs[0] if pairs else None
+    level, ratio, _ = pairs[0]
+    near = ratio * np.linspace(0.88, 1.12, 7)
+    fine = search.trials(level * np.geomspace(0.85, 1.2, 10), near)
+    return (_crossings(fine, wish, 10) or pairs)[0]
+
+
+def _promising(trials: _Trials, wish: Wish) -> np.ndarray | None:
+    """Return levels to look at closely: around those that come near to the wish."""
+    near = (trials.mean <= 1.6 * wish.settling) & (trials.overshoot <= 3.0 * wish.overshoot + 5.0)
+    if not near.any():
+        return None
+    step = _LEVELS[1] / _LEVELS[0]
+    low, high = trials.lines[near, 0].min() / step, trials.lines[near, 0].max() * step
+    return np.geomspace(low, high, max(8, math.ceil(math.log(high / low) / math.log(_CLOSE))))
+
+
+def _crossings(trials: _Trials, wish: Wish, levels: int) -> list[tuple[float, float, float]]:
+    """Return, for each ratio, the lowest level at which the mean settling time falls to the wish, best spread first.
+
+    Level between those tried, ratio, and the tried level that meets the wish.
+    """
+    target, found = _MARGIN * wish.settling, []
+    for start in range(0, len(trials.mean), levels):
+        mean = trials.mean[start : start + levels]
+        fits = (mean <= target) & (trials.overshoot[start : start + levels] <= wish.overshoot)
+        if not fits.any():
+            continue
+        i = start + int(fits.argmax())
+        level = safe = trials.lines[i, 0]
+        if i > start and math.isfinite(trials.mean[i - 1]) and trials.mean[i - 1] > target:
+            share = (trials.mean[i - 1] - target) / (trials.mean[i - 1] - trials.mean[i])
+            level = trials.lines[i - 1, 0] * (level / trials.lines[i - 1, 0]) ** share
+        found.append((trials.spread[i], level, trials.lines[i, 1], safe))
+    return [found_one[1:] for found_one in sorted(found)]
