@@ -1,0 +1,105 @@
+"""Levenberg–Marquardt on simulated output, prewhitened, with numeric Jacobian and bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.diagnosis.noise import whiten
+from focgen.diagnosis.problem import Problem
+
+_STEP = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted hypothesis: ``vector``, ``innovations`` (all experiments, one after the other), their ``sse``, and the
+    normal matrix ``information`` (J^T J of the innovations)."""
+
+    problem: Problem
+    vector: np.ndarray
+    innovations: np.ndarray
+    sse: float
+    information: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """How many parameters the clues have."""
+        return len(self.vector) - self.problem.head
+
+    def residual(self) -> list[np.ndarray]:
+        """Measured less simulated, by experiment, as a share of the output's level."""
+        segment = self.problem.segment
+        return segment.parts(self.problem.residual(self.vector) / segment.level_out)
+
+
+@dataclass(frozen=True, eq=False)
+class Weighing:
+    """How residuals are weighed: means of ``coarse`` samples at a time, whitened by ``ar``."""
+
+    ar: np.ndarray
+    coarse: int = 1
+
+    def __call__(self, parts) -> np.ndarray:
+        """The innovations of the parts of a residual, joined."""
+        return np.concatenate([whiten(means(part, self.coarse), self.ar) for part in parts])
+
+
+def means(part: np.ndarray, coarse: int) -> np.ndarray:
+    """Means of ``coarse`` neighbours; what does not fill the last one is left out."""
+    count = len(part) // coarse
+    return part if coarse == 1 else part[: count * coarse].reshape(count, coarse).mean(axis=1)
+
+
+def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing) -> np.ndarray:
+    """The weighed residual, as a share of the output's level."""
+    segment = problem.segment
+    found = weighing(segment.parts(problem.residual(vector) / segment.level_out))
+    return np.where(np.isfinite(found), np.clip(found, -1e3, 1e3), 1e3)
+
+
+def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int = 12, tolerance: float = 1e-4) -> Fit:
+    """Least squares from ``start`` within the problem's bounds; stops when the gain is below ``tolerance`` nats."""
+    low, high = problem.bounds()
+    vector = np.clip(start, low, high)
+    now = innovations(problem, vector, weighing)
+    sse, damping = float(now @ now), 1e-3
+    normal = np.eye(len(vector))
+    for _ in range(iterations):
+        jacobian = _jacobian(problem, vector, now, weighing, low, high)
+        normal, slope = jacobian.T @ jacobian, jacobian.T @ now
+        gained, before = False, sse
+        for _ in range(6):
+            trial = np.clip(vector - _step(normal, slope, damping, vector, low, high), low, high)
+            then = innovations(problem, trial, weighing)
+            if then @ then < sse:
+                vector, now, sse, gained = trial, then, float(then @ then), True
+                damping = max(damping * 0.2, 1e-9)
+                break
+            damping *= 6.0
+        if not gained or 0.5 * len(now) * np.log(before / max(sse, 1e-300)) < tolerance:
+            break
+    return Fit(problem, vector, now, sse, normal)
+
+
+def _jacobian(problem, vector, now, weighing, low, high) -> np.ndarray:
+    columns = []
+    for i in range(len(vector)):
+        step = _STEP if vector[i] + _STEP <= high[i] else -_STEP
+        moved = vector.copy()
+        moved[i] += step
+        columns.append((innovations(problem, moved, weighing) - now) / step)
+    return np.stack(columns, axis=1)
+
+
+def _step(normal, slope, damping, vector, low, high) -> np.ndarray:
+    """The damped step, with parameters held that stand at a bound and push beyond it."""
+    held = ((vector <= low) & (slope > 0)) | ((vector >= high) & (slope < 0))
+    free = ~held
+    step = np.zeros_like(vector)
+    if free.any():
+        scale = np.diag(normal)[free]
+        matrix = normal[np.ix_(free, free)] + damping * np.diag(scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12)
+        step[free] = np.linalg.lstsq(matrix, slope[free], rcond=1e-12)[0]
+    return np.clip(step, -1.0, 1.0)

@@ -1,0 +1,78 @@
+"""The rig's own parameters, which a refit may move, as numbers of order one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig.model import Actuator, LinearActuator, Rig
+
+
+@dataclass(frozen=True)
+class Own:
+    """Turns the own parameters of ``stage`` into a vector and back; levels are the segment's largest magnitudes."""
+
+    rig: Rig
+    stage: str | None
+    level_in: float
+    level_out: float
+
+    def start(self) -> np.ndarray:
+        """The vector of the rig as given."""
+        if self.stage is None:
+            return np.zeros(0)
+        if self.stage != "actuator":
+            return self._from_transfer(getattr(self.rig, self.stage))
+        a = self.rig.actuator
+        if isinstance(a, Actuator):
+            gains = [g * self.level_in ** (i + 1) / self.level_out for i, g in enumerate(a.gain)]
+            return np.array([np.log(a.T), a.alpha, *gains, a.offset / self.level_out])
+        if isinstance(a, LinearActuator):
+            return np.r_[self._from_transfer(a.dynamics), a.offset / self.level_out]
+        return np.zeros(0)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the vector."""
+        start = self.start()
+        low, high = start - 50.0, start + 50.0
+        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
+            low[0], high[0] = start[0] - 5.0, start[0] + 5.0
+            low[1], high[1] = 0.08, 1.9
+        elif self.stage is not None:
+            count = len(self._logs(self._transfer_of()))
+            low[:count], high[:count] = start[:count] - 8.0, start[:count] + 8.0
+        return low, high
+
+    def rig_with(self, vector: np.ndarray) -> Rig:
+        """The rig with its own parameters taken from ``vector``."""
+        if self.stage is None or not len(vector):
+            return self.rig
+        if self.stage != "actuator":
+            return replace(self.rig, **{self.stage: self._to_transfer(getattr(self.rig, self.stage), vector)})
+        a, v = self.rig.actuator, [float(value) for value in vector]
+        if isinstance(a, Actuator):
+            gains = tuple(g * self.level_out / self.level_in ** (i + 1) for i, g in enumerate(v[2:-1]))
+            return replace(self.rig, actuator=Actuator(float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out))
+        dynamics = self._to_transfer(a.dynamics, vector[:-1])
+        return replace(self.rig, actuator=LinearActuator(dynamics, v[-1] * self.level_out))
+
+    def _transfer_of(self) -> TransferFunction:
+        found = getattr(self.rig, self.stage)
+        return found.dynamics if self.stage == "actuator" else found
+
+    @staticmethod
+    def _logs(transfer: TransferFunction) -> list[float]:
+        """Coefficients but the denominator's last, which only scales the others."""
+        return [t.coefficient for t in (*transfer.num, *transfer.den[:-1])]
+
+    def _from_transfer(self, transfer: TransferFunction) -> np.ndarray:
+        return np.log(np.abs(self._logs(transfer)))
+
+    def _to_transfer(self, transfer: TransferFunction, vector: np.ndarray) -> TransferFunction:
+        moved = [np.sign(c) * np.exp(v) for c, v in zip(self._logs(transfer), vector)]
+        count = len(transfer.num)
+        num = [(float(c), t.order) for c, t in zip(moved, transfer.num)]
+        den = [(float(c), t.order) for c, t in zip(moved[count:], transfer.den)]
+        return TransferFunction(num, [*den, tuple(transfer.den[-1])])

@@ -1,0 +1,137 @@
+"""One segment and one hypothesis about it: a vector of parameters, the simulation, the residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from focgen.diagnosis.own import Own
+from focgen.diagnosis.segments import Segment
+from focgen.rig.effects import Form
+from focgen.rig.engine import Chain, Placed, slot_in
+from focgen.rig.model import Rig
+
+
+@dataclass(frozen=True)
+class Clue:
+    """An effect to be fitted: family, form, and the stage it is put in."""
+
+    effect: str
+    form: Form
+    stage: str
+
+    @property
+    def name(self) -> str:
+        """Family and form."""
+        return f"{self.effect}/{self.form.name}"
+
+
+@dataclass(frozen=True)
+class References:
+    """What multiples are taken of: a level by slot, and the clocks in s."""
+
+    levels: dict[str, float]
+    clocks: dict[str, float]
+
+    def scale(self, parameter, slot: str) -> float:
+        """The physical size of 1 in units of this parameter."""
+        return self.levels[slot] ** parameter.level * self.clocks[parameter.clock] ** parameter.time
+
+
+@dataclass(eq=False)
+class Problem:
+    """Residuals of a segment under the rig with ``clues``.
+
+    The vector: the rig's own parameters, the nuisances (half a sample of alignment of input and output, and where nothing
+    of the segment has an offset of its own, one), then every clue's parameters, all of order one.
+    """
+
+    segment: Segment
+    own: Own
+    references: References
+    clues: tuple[Clue, ...] = ()
+    memory: dict = field(default_factory=dict)
+
+    def __post_init__(self):
+        self.own_start = self.own.start()
+        self.has_offset = self.own.stage == "actuator" and len(self.own_start) > 0
+        self.nuisances = 1 if self.has_offset else 2
+
+    def with_clues(self, clues: Sequence[Clue]) -> Problem:
+        """The same segment under other effects."""
+        return Problem(self.segment, self.own, self.references, tuple(clues), self.memory)
+
+    @property
+    def head(self) -> int:
+        """How many entries precede the clues'."""
+        return len(self.own_start) + self.nuisances
+
+    def nominal(self) -> np.ndarray:
+        """The vector of the rig as given, without the clues' entries."""
+        return np.r_[self.own_start, np.zeros(self.nuisances)]
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds."""
+        low, high = self.own.bounds()
+        nuisance = [0.75] if self.has_offset else [0.75, 0.03]
+        low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
+        for clue in self.clues:
+            for p in clue.form.parameters:
+                low.append(np.log(p.lower) if p.log else p.lower)
+                high.append(np.log(p.upper) if p.log else p.upper)
+        return np.array(low, float), np.array(high, float)
+
+    def starts(self, clue: Clue) -> list[np.ndarray]:
+        """Start values of one clue's entries."""
+        parameters = clue.form.parameters
+        most = max(len(p.starts) for p in parameters)
+        rows = [[p.starts[min(i, len(p.starts) - 1)] for p in parameters] for i in range(most)]
+        return [np.array([np.log(v) if p.log else v for p, v in zip(parameters, row)]) for row in rows]
+
+    def values(self, vector: np.ndarray) -> list[tuple[float, ...]]:
+        """The clues' parameters in the log's units."""
+        found, place = [], self.head
+        for clue in self.clues:
+            slot, row = slot_in(clue.form, clue.stage), []
+            for p in clue.form.parameters:
+                value = np.exp(vector[place]) if p.log else vector[place]
+                row.append(float(value) * self.references.scale(p, slot))
+                place += 1
+            found.append(tuple(row))
+        return found
+
+    def rig(self, vector: np.ndarray) -> Rig:
+        """The rig with the vector's own parameters."""
+        return self.own.rig_with(vector[: len(self.own_start)])
+
+    def placed(self, vector: np.ndarray) -> tuple[Placed, ...]:
+        """The clues as effects of a chain."""
+        return tuple(Placed(c.effect, c.form, c.stage, v) for c, v in zip(self.clues, self.values(vector)))
+
+    def simulate(self, vector: np.ndarray) -> np.ndarray:
+        """The segment's output (n,), in the log's units."""
+        chain = Chain(self.rig(vector), self.placed(vector), self.memory)
+        own, segment = len(self.own_start), self.segment
+        zero = 0.0 if self.has_offset else vector[own + 1] * self.references.levels["reading"]
+        x = self._aligned(float(vector[own]))
+        return chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held) + zero
+
+    def _aligned(self, shift: float) -> np.ndarray:
+        x = self.segment.x
+        if shift == 0.0:
+            return x
+        kept = self.memory.setdefault("shifted", [])
+        for old, y in kept:
+            if old == shift:
+                return y
+        side = np.where(self.segment.run.rest, x, np.roll(x, 1)) if shift > 0 else np.roll(x, -1)
+        y = x + abs(shift) * (side - x)
+        kept.insert(0, (shift, y))
+        del kept[2:]
+        return y
+
+    def residual(self, vector: np.ndarray) -> np.ndarray:
+        """Measured less simulated (n,), in the log's units."""
+        return self.segment.y - self.simulate(vector)

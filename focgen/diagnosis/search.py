@@ -1,0 +1,97 @@
+"""Which effects a segment needs: every form of every family fitted on top of what was found, the best one kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.diagnosis.fit import Fit, Weighing, fit, means
+from focgen.diagnosis.noise import fit_ar
+from focgen.diagnosis.problem import Clue, Problem
+
+_COARSE = 5000  # samples of the first, coarse pass
+_DEEP = 8  # how many forms are fitted to the end
+_HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """``base`` and what each family adds to it, all under the same noise model ``ar``; ``best`` by family, likeliest first.
+
+    ``gain`` are nats of evidence over ``base``: half the log-likelihood ratio's worth less half k ln n.
+    """
+
+    base: Fit
+    ar: np.ndarray
+    best: dict[str, Fit]
+    gain: dict[str, float]
+
+    @property
+    def winner(self) -> str | None:
+        """The family of highest evidence."""
+        return next(iter(self.best), None)
+
+
+def evidence(of: Fit, against: Fit) -> float:
+    """Nats of evidence of one fit over another on the same innovations (Schwarz's approximation)."""
+    n = len(of.innovations)
+    gain = 0.5 * n * np.log(max(against.sse, 1e-300) / max(of.sse, 1e-300))
+    return float(gain - 0.5 * (of.size - against.size) * np.log(n))
+
+
+def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue], ar: np.ndarray | None = None) -> Ranking:
+    """Fit every clue on top of ``base`` (a vector of ``problem``), first coarsely, then with the colour of the noise."""
+    coarse = max(1, len(problem.segment.y) // _COARSE)
+    rough = Weighing(np.ones(1), coarse)
+    ground = fit(problem, base, rough)
+    tried = [t for clue in clues if (t := best_start(problem, ground.vector, clue, rough)) is not None]
+    leader = min([ground, *tried], key=lambda t: t.sse)
+    rough = Weighing(fit_ar([means(p, coarse) for p in leader.residual()]), coarse)
+    ground = fit(problem, ground.vector, rough, 6)
+    tried = sorted((fit(t.problem, t.vector, rough, 6) for t in tried), key=lambda t: -evidence(t, ground))
+    return finish(ground, _chosen(tried))
+
+
+def _chosen(tried: Sequence[Fit]) -> list[Fit]:
+    """The best form of every family, and the best forms altogether."""
+    seen: set[str] = set()
+    first = [t for t in tried if not (family(t) in seen or seen.add(family(t)))]
+    return first + [t for t in tried[:_DEEP] if t not in first]
+
+
+def finish(ground: Fit, tried: Sequence[Fit]) -> Ranking:
+    """Fit on every sample, in the colour of what the best one leaves."""
+    leader = min([ground, *tried], key=lambda t: t.sse)
+    for iterations in (3, 6):
+        weighing = Weighing(fit_ar(leader.residual()))
+        ground = fit(ground.problem, ground.vector, weighing, iterations)
+        tried = [fit(t.problem, t.vector, weighing, iterations) for t in tried]
+        tried = sorted(tried, key=lambda t: t.sse)
+        leader = min([ground, *tried], key=lambda t: t.sse)
+        tried = [t for t in tried if t.sse < leader.sse * _HOPELESS or t is leader] or tried[:1]
+    return _ranking(ground, weighing.ar, tried)
+
+
+def _ranking(ground: Fit, ar: np.ndarray, tried: Sequence[Fit]) -> Ranking:
+    families: dict[str, Fit] = {}
+    for one in sorted(tried, key=lambda t: -evidence(t, ground)):
+        families.setdefault(family(one), one)
+    return Ranking(ground, ar, families, {name: evidence(f, ground) for name, f in families.items()})
+
+
+def family(of: Fit) -> str:
+    """The family added last."""
+    return of.problem.clues[-1].effect
+
+
+def best_start(problem: Problem, base: np.ndarray, clue: Clue, weighing: Weighing) -> Fit | None:
+    """The best of the fits from the clue's start values, a few iterations each."""
+    extended = problem.with_clues([*problem.clues, clue])
+    fits = []
+    for start in extended.starts(clue):
+        found = fit(extended, np.r_[base, start], weighing, 4, tolerance=0.1)
+        if np.isfinite(found.sse):
+            fits.append(found)
+    return min(fits, key=lambda f: f.sse, default=None)

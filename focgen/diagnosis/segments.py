@@ -1,0 +1,92 @@
+"""Cutting the chain at the signals that were logged: each segment is diagnosed on its own measured input."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run
+from focgen.rig.model import UNITY, Rig
+
+_ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
+_LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
+_ORDER = ("command", "pressure", "curvature", "output")
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """The stages between two logged signals: input ``x`` and output ``y`` (n,), experiments one after the other as in
+    ``run``. ``held``: the input is a staircase (a command). ``names`` of the experiments."""
+
+    entry: str
+    exit: str
+    stages: tuple[str, ...]
+    x: np.ndarray
+    y: np.ndarray
+    run: Run
+    held: bool
+    names: tuple[str, ...]
+
+    @property
+    def level_in(self) -> float:
+        """The largest magnitude of the input, in its unit."""
+        return float(np.max(np.abs(self.x))) or 1.0
+
+    @property
+    def level_out(self) -> float:
+        """The largest magnitude of the output, in its unit."""
+        return float(np.max(np.abs(self.y))) or 1.0
+
+    def parts(self, signal: np.ndarray) -> list[np.ndarray]:
+        """``signal`` (n, …) by experiment."""
+        return [signal[first:last] for first, last in self.run.spans]
+
+
+def stages_of(rig: Rig) -> tuple[str, ...]:
+    """The stages that the rig file gives; the others are 1."""
+    given = {"regulator": rig.regulator != UNITY, "actuator": rig.actuator is not None, "sensor": rig.sensor != UNITY}
+    return tuple(stage for stage, there in given.items() if there)
+
+
+def cuts(logs: Sequence[Experiment]) -> tuple[str, ...]:
+    """The roles logged in every experiment, in the order of the chain."""
+    return tuple(role for role in _ORDER if all(role in log for log in logs))
+
+
+def between(entry: str, exit: str) -> tuple[str, ...]:
+    """The stages between two signals."""
+    order = ("regulator", "actuator", "sensor")
+    return order[order.index(_ENTERS[entry]): order.index(_LEAVES[exit]) + 1]
+
+
+def session(logs: Sequence[Experiment]) -> Run:
+    """The run that the logs are."""
+    return Run.of([len(log) for log in logs], [log.start for log in logs], logs[0].sample_time)
+
+
+def joined(logs: Sequence[Experiment], role: str) -> np.ndarray:
+    """A signal of all experiments, one after the other."""
+    return np.concatenate([np.asarray(log[role], float) for log in logs])
+
+
+def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None = None) -> Segment:
+    """The segment from ``entry`` to ``exit``, with the input as logged or as given."""
+    x = joined(logs, entry) if x is None else x
+    names = tuple(log.name for log in logs)
+    return Segment(entry, exit, between(entry, exit), x, joined(logs, exit), session(logs), entry == "command", names)
+
+
+def is_single(rig: Rig) -> bool:
+    """Whether the rig has one stage only: then every effect sits in it."""
+    return len(stages_of(rig)) <= 1
+
+
+def owner(rig: Rig) -> str | None:
+    """The stage whose parameters are the rig's own."""
+    given = stages_of(rig)
+    return "actuator" if "actuator" in given or not given else given[0] if len(given) == 1 else None
+
+

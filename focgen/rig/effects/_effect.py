@@ -1,0 +1,136 @@
+"""What an effect is: a family of forms, each nested in the nominal chain.
+
+A file of this package that defines ``EFFECT`` adds a family to the library; nothing else needs to know its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+STAGES = ("regulator", "actuator", "sensor")
+SLOTS = {
+    "regulator": ("command", "supply"),
+    "actuator": ("load", "drive", "dynamics", "response"),
+    "sensor": ("strain", "reading"),
+}
+"""Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the pressure
+entering the actuator; ``drive``: K(p) p; ``dynamics``: the rates of the actuator; ``response``: what leaves it; ``strain``:
+into the sensor; ``reading``: what leaves it."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a form.
+
+    Its unit is level^``level`` · time^``time``; ``lower``, ``upper`` and ``starts`` are in multiples of references taken
+    from the data: the largest magnitude at the slot, and the time ``clock``: the rig's "response" time, the
+    "sample" time or the "record" (one experiment; "session": all). ``zero`` is the value that gives the nominal chain,
+    None where another parameter's zero does. ``log``: searched on a logarithmic scale.
+    """
+
+    name: str
+    level: int = 0
+    time: int = 0
+    lower: float = -np.inf
+    upper: float = np.inf
+    starts: tuple[float, ...] = (0.1,)
+    clock: str = "response"
+    zero: float | None = None
+    log: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A session being simulated, its experiments one after the other in every array of shape (n,).
+
+    ``h`` in s; ``rest`` (n,) is true at each experiment's first sample; ``clock`` (n,) is the session's time in s;
+    ``duration`` of the longest experiment in s; ``carried``: what outlived the rests before this session.
+    """
+
+    h: float
+    rest: np.ndarray
+    clock: np.ndarray
+    duration: float
+    carried: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def spans(self) -> list[tuple[int, int]]:
+        """First sample and the one after the last, by experiment."""
+        firsts = np.flatnonzero(self.rest).tolist()
+        return list(zip(firsts, [*firsts[1:], len(self.rest)]))
+
+    @classmethod
+    def of(cls, lengths: Sequence[int], starts: Sequence[float], h: float, carried: Mapping[str, float] | None = None):
+        """The run of experiments of ``lengths`` samples beginning at ``starts`` s on the session's clock."""
+        rest = np.zeros(sum(lengths), np.uint8)
+        rest[np.cumsum([0, *lengths[:-1]])] = 1
+        clock = np.concatenate([s + h * np.arange(n) for n, s in zip(lengths, starts)])
+        return cls(h, rest, clock, max(lengths) * h, dict(carried or {}))
+
+
+Act = Callable[[np.ndarray, tuple[float, ...], Run], Any]
+
+
+@dataclass(frozen=True)
+class Form:
+    """One formula: ``act(x, values, run)`` maps what passes its ``slot``, shape (n,), to what leaves it.
+
+    In the slot ``dynamics`` it returns the factor by which all rates are multiplied when unloading.
+    ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of a later session.
+    """
+
+    name: str
+    slot: str
+    parameters: tuple[Parameter, ...]
+    act: Act
+    leaves: Callable[[np.ndarray, tuple[float, ...], Run], dict[str, float]] | None = None
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What a set of experiments does to the rig, as an identifiability check sees it.
+
+    ``levels``: how many distinct levels (a tenth of the range apart) were held or passed; ``lowest`` of the range visited
+    above zero; ``unloads``, ``reversals``: how often the input falls by a tenth of the range, turns round above zero;
+    ``hold``: the longest constant input in response times; ``fastest``: the fastest tenth-of-range change in response
+    times; ``experiments``; ``repeats``: of a level after a higher one; ``duration`` in response times; ``samples`` per
+    response time.
+    """
+
+    levels: int
+    lowest: float
+    unloads: int
+    reversals: int
+    hold: float
+    fastest: float
+    experiments: int
+    repeats: int
+    duration: float
+    samples: float
+
+
+Check = Callable[[Excitation], str | None]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A family. ``stage`` is the usual one, ``also`` others it may sit in. ``single``: nature has one form only.
+
+    ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
+    ``penalty`` in nats is what the family pays for being able to imitate others.
+    """
+
+    name: str
+    stage: str
+    meaning: str
+    reveals: str
+    confused_with: tuple[str, ...]
+    needs: Check
+    forms: Sequence[Form]
+    also: tuple[str, ...] = ()
+    single: bool = False
+    controller: bool = False

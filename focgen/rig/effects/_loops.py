@@ -1,0 +1,42 @@
+"""Rate-independent memory, shared by the families that have it."""
+
+from focgen.rig import kernels
+from focgen.rig.effects._effect import Form, Parameter
+
+_SHARE = Parameter("share", lower=-0.5, upper=0.9, starts=(0.2, 0.2), zero=0.0)
+_WIDTH = Parameter("width", level=1, lower=2e-3, upper=1.0, starts=(0.05, 0.2), log=True)
+
+
+def _prandtl_ishlinskii(x, values, run):
+    share, width = values
+    loops = sum(kernels.play(x, run.rest, width * f) for f in (0.5, 1.0, 1.5)) / 3.0
+    return x + share * (loops - x)
+
+
+def _play(x, values, run):
+    return kernels.play(x, run.rest, values[0])
+
+
+def _bouc_wen(x, values, run):
+    size, width = values
+    return x - size * kernels.bouc_wen(x, run.rest, width)
+
+
+def _wide(x, values, run):
+    narrow, broad, width = values
+    return x + narrow * (kernels.play(x, run.rest, width) - x) + broad * (kernels.play(x, run.rest, 4.0 * width) - x)
+
+
+def forms(slot):
+    """The forms of a hysteresis at ``slot``."""
+    return [
+        Form("prandtl_ishlinskii", slot, (_SHARE, _WIDTH), _prandtl_ishlinskii),
+        Form("play", slot, (Parameter("width", level=1, lower=0.0, upper=0.6, starts=(0.02, 0.1), zero=0.0),), _play),
+        Form("bouc_wen", slot, (
+            Parameter("size", level=1, lower=-20.0, upper=1.0, starts=(0.05, 0.05), zero=0.0), _WIDTH,
+        ), _bouc_wen),
+        Form("two_plays", slot, (
+            Parameter("narrow", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0),
+            Parameter("broad", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0), _WIDTH,
+        ), _wide),
+    ]

@@ -1,0 +1,39 @@
+"""Slow functions of the session's time, shared by the families that drift."""
+
+import numpy as np
+
+from focgen.rig.effects._effect import Form, Parameter
+
+
+def _linear(x, values, run):
+    return values[0] * run.clock
+
+
+def _settling(x, values, run):
+    size, tau = values
+    return -size * np.expm1(-run.clock / tau)
+
+
+def _bending(x, values, run):
+    first, second = values
+    t = run.clock
+    return t * (first + second * t)
+
+
+def forms(slot, level, onto):
+    """The forms of a trend; ``onto(x, trend)`` applies it, ``level`` is the power of the level in its unit."""
+    def act(trend):
+        return lambda x, values, run: onto(x, trend(x, values, run))
+
+    size = dict(level=level, lower=-2.0, upper=2.0, zero=0.0, clock="session")
+    return [
+        Form("linear", slot, (Parameter("rate", time=-1, starts=(0.1,), **size),), act(_linear)),
+        Form("settling", slot, (
+            Parameter("size", starts=(0.1, 0.1), **size),
+            Parameter("time", time=1, clock="session", lower=0.02, upper=5.0, starts=(0.1, 0.5), log=True),
+        ), act(_settling)),
+        Form("bending", slot, (
+            Parameter("rate", time=-1, starts=(0.1,), **size),
+            Parameter("acceleration", time=-2, starts=(0.05,), **size),
+        ), act(_bending)),
+    ]

@@ -1,0 +1,42 @@
+"""Stiffer beyond a curvature: an obstacle, a wall, the finger's own other side."""
+
+import numpy as np
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+_PLACE = Parameter("curvature", level=1, lower=0.1, upper=1.3, starts=(0.8, 0.5), zero=1.3)
+
+
+def _knee(x, values, run):
+    place, slope = values
+    return np.minimum(x, place) + slope * np.maximum(x - place, 0.0)
+
+
+def _gradual(x, values, run):
+    place, stiffness = values
+    beyond = np.maximum(x - place, 0.0) * stiffness
+    return np.minimum(x, place) + np.log1p(beyond) / stiffness
+
+
+def _hertz(x, values, run):
+    place, stiffness = values
+    beyond = np.maximum(x - place, 0.0)
+    return x - beyond + beyond / (1.0 + np.sqrt(stiffness * beyond))
+
+
+_STIFFNESS = Parameter("stiffness", level=-1, lower=0.1, upper=1e3, starts=(5.0, 5.0), log=True)
+
+EFFECT = Effect(
+    name="contact",
+    stage="actuator",
+    meaning="stiffer beyond a curvature: an obstacle",
+    reveals="levels on both sides of the obstacle, fast and slow: a knee at a fixed curvature",
+    confused_with=("gain_nonlinearity", "sensor_saturation", "sensor_nonlinearity", "supply_saturation"),
+    needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
+    forms=[
+        Form("knee", "response", (
+            _PLACE, Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
+        ), _knee),
+        Form("gradual", "response", (_PLACE, _STIFFNESS), _gradual),
+        Form("hertz", "response", (_PLACE, _STIFFNESS), _hertz),
+    ],
+)

@@ -1,0 +1,33 @@
+"""Nothing moves below a threshold: slack, a seal, static friction overcome only once."""
+
+import numpy as np
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+_LEVEL = Parameter("threshold", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.25), zero=0.0)
+
+
+def _hard(x, values, run):
+    return np.sign(x) * np.maximum(np.abs(x) - values[0], 0.0)
+
+
+def _soft(x, values, run):
+    threshold, width = values
+    size = width * (np.logaddexp(0.0, (np.abs(x) - threshold) / width) - np.logaddexp(0.0, -threshold / width))
+    return np.sign(x) * size
+
+
+EFFECT = Effect(
+    name="dead_zone",
+    stage="actuator",
+    meaning="nothing moves below a threshold",
+    reveals="slow ramps from zero, low levels",
+    confused_with=("gain_nonlinearity", "hysteresis", "valve_stiction"),
+    needs=lambda e: None if e.lowest < 0.35 else "no level below a third of the range was visited",
+    also=("regulator",),
+    forms=[
+        Form("hard", "load", (_LEVEL,), _hard),
+        Form("soft", "load", (
+            _LEVEL, Parameter("width", level=1, lower=3e-3, upper=0.2, starts=(0.02, 0.05), log=True),
+        ), _soft),
+    ],
+)

@@ -1,0 +1,52 @@
+"""A static gain that departs smoothly from the line K(p): stiffening, ballooning."""
+
+import numpy as np
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+
+def _cubic(x, values, run):
+    size, scale = values
+    return x * (1.0 + size * (x / scale) ** 2)
+
+
+def _gent(x, values, run):
+    return x / (1.0 + np.maximum(values[0] * np.abs(x), -0.95) * np.abs(values[0] * x))
+
+
+def _exponential(x, values, run):
+    bend = values[0]
+    y = np.clip(bend * x, -30.0, 30.0)
+    return x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
+
+
+def _spline(x, values, run):
+    *sizes, scale = values
+    place = np.abs(x) / scale
+    bumps = sum(s * np.sin(np.pi * np.minimum(place, 1.0) * (i + 2)) for i, s in enumerate(sizes))
+    return x + np.sign(x) * scale * bumps
+
+
+_ONE = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
+
+
+EFFECT = Effect(
+    name="gain_nonlinearity",
+    stage="actuator",
+    meaning="the static gain departs smoothly from the line K(p): stiffening, ballooning",
+    reveals="six or more levels, up and down, in mixed order: the residual depends on level only",
+    confused_with=("dead_zone", "contact", "softening", "sensor_nonlinearity", "supply_saturation"),
+    needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
+    forms=[
+        Form("cubic", "drive", (Parameter("size", lower=-0.9, upper=5.0, starts=(0.1, -0.1), zero=0.0), _ONE), _cubic),
+        Form("exponential", "drive", (
+            Parameter("bend", level=-1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0),
+        ), _exponential),
+        Form("locking", "drive", (
+            Parameter("bend", level=-1, lower=-0.97, upper=3.0, starts=(0.3, -0.3), zero=0.0),
+        ), _gent),
+        Form("curve", "drive", (
+            Parameter("first", lower=-0.5, upper=0.5, starts=(0.02,), zero=0.0),
+            Parameter("second", lower=-0.5, upper=0.5, starts=(0.02,), zero=0.0), _ONE,
+        ), _spline),
+    ],
+)

@@ -1,0 +1,38 @@
+"""A leak behind the regulator: the chamber stays below the regulated pressure, the more the higher it is."""
+
+import numpy as np
+
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+
+def _laminar(x, values, run):
+    return x * (1.0 - values[0])
+
+
+def _turbulent(x, values, run):
+    return x - np.sign(x) * values[0] * (np.sqrt(np.abs(x) + values[0] ** 2 / 4) - values[0] / 2)
+
+
+def _growing(x, values, run):
+    share, scale = values
+    return x * (1.0 - share * np.minimum(np.abs(x) / scale, 1.0))
+
+
+EFFECT = Effect(
+    name="leak",
+    stage="regulator",
+    meaning="chamber pressure stays below the regulated one by an amount that grows with it",
+    reveals="holds at several levels, with the pressure logged",
+    confused_with=("supply_saturation", "gain_nonlinearity", "gain_drift"),
+    needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
+    forms=[
+        Form("laminar", "supply", (Parameter("share", lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),), _laminar),
+        Form("turbulent", "supply", (
+            Parameter("loss", level=0.5, lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),
+        ), _turbulent),
+        Form("growing", "supply", (
+            Parameter("share", lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),
+            Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
+        ), _growing),
+    ],
+)

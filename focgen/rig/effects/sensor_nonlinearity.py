@@ -1,0 +1,42 @@
+"""A bent calibration curve."""
+
+import numpy as np
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+
+def _quadratic(x, values, run):
+    return x * (1.0 + values[0] * x)
+
+
+def _exponential(x, values, run):
+    y = np.clip(values[0] * x, -30.0, 30.0)
+    return x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
+
+
+def _cubic(x, values, run):
+    first, second = values
+    return x * (1.0 + first * x + second * x * x)
+
+
+def _even(x, values, run):
+    return x + values[0] * (np.abs(x) - x)
+
+
+def _bend(name, level, *starts):
+    return Parameter(name, level=level, lower=-2.0, upper=2.0, starts=starts, zero=0.0)
+
+
+EFFECT = Effect(
+    name="sensor_nonlinearity",
+    stage="sensor",
+    meaning="the static calibration curve is bent",
+    reveals="six or more levels with the curvature logged beside the reading",
+    confused_with=("gain_nonlinearity", "contact", "sensor_saturation"),
+    needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
+    forms=[
+        Form("quadratic", "strain", (_bend("bend", -1, 0.1),), _quadratic),
+        Form("exponential", "strain", (_bend("bend", -1, 0.1, -0.3),), _exponential),
+        Form("cubic", "strain", (_bend("bend", -1, 0.1), _bend("twist", -2, 0.05)), _cubic),
+        Form("even", "strain", (Parameter("share", lower=0.0, upper=1.0, starts=(0.5,), zero=0.0),), _even),
+    ],
+)

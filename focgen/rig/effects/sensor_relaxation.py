@@ -1,0 +1,32 @@
+"""A reading that overshoots with the rate of strain, then relaxes."""
+
+from focgen.rig import kernels
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+_SHARE = Parameter("share", lower=-0.9, upper=3.0, starts=(0.1, 0.1, 0.1), zero=0.0)
+_TIME = Parameter("time", time=1, lower=0.02, upper=100.0, starts=(0.3, 2.0, 10.0), log=True)
+
+
+def _one(x, values, run):
+    share, tau = values
+    return x + share * (x - kernels.lag(x, run.rest, run.h, tau, tau))
+
+
+def _spread(x, values, run):
+    share, tau = values
+    slow = sum(kernels.lag(x, run.rest, run.h, t, t) for t in (tau / 4, tau, 4 * tau)) / 3.0
+    return x + share * (x - slow)
+
+
+EFFECT = Effect(
+    name="sensor_relaxation",
+    stage="sensor",
+    meaning="the reading overshoots with strain rate, then relaxes",
+    reveals="a step and a hold with the curvature logged: the reading falls while the curvature rests",
+    confused_with=("creep", "sensor_lag", "sensor_drift", "sensor_hysteresis"),
+    needs=lambda e: None if e.hold > 3 else "no hold is long beside the rig's response",
+    forms=[
+        Form("one_time", "strain", (_SHARE, _TIME), _one),
+        Form("spread", "strain", (_SHARE, _TIME), _spread),
+    ],
+)

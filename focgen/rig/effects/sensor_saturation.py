@@ -1,0 +1,31 @@
+"""A reading that stops at a limit."""
+
+import numpy as np
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+_LIMIT = Parameter("limit", level=1, lower=0.1, upper=1.3, starts=(0.9, 0.6), zero=1.3)
+
+
+def _hard(x, values, run):
+    return np.minimum(x, values[0])
+
+
+def _soft(x, values, run):
+    limit, width = values
+    return x - width * np.logaddexp(0.0, (x - limit) / width) + width * np.logaddexp(0.0, -limit / width)
+
+
+EFFECT = Effect(
+    name="sensor_saturation",
+    stage="sensor",
+    meaning="the reading stops at a limit",
+    reveals="levels on both sides of the limit with the curvature logged: a flat top",
+    confused_with=("contact", "sensor_nonlinearity", "supply_saturation"),
+    needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
+    forms=[
+        Form("hard", "reading", (_LIMIT,), _hard),
+        Form("soft", "reading", (
+            _LIMIT, Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.02, 0.05), log=True),
+        ), _soft),
+    ],
+)

@@ -1,0 +1,58 @@
+"""A gain that grows with the largest load seen, or with the work done (Mullins)."""
+
+import numpy as np
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+_GROWTH = Parameter("growth", lower=-0.5, upper=3.0, starts=(0.1, 0.1), zero=0.0)
+
+
+def _scale(*starts):
+    return Parameter("scale", level=1, lower=0.05, upper=20.0, starts=starts, log=True)
+
+
+def _peak(x, run):
+    return np.maximum(np.maximum.accumulate(np.abs(x)), run.carried.get("largest", 0.0))
+
+
+def _done(x, run):
+    rises = np.where(run.rest, np.abs(x), np.maximum(np.diff(np.abs(x), prepend=0.0), 0.0))
+    return run.carried.get("work", 0.0) + np.cumsum(rises)
+
+
+def _largest(x, values, run):
+    growth, scale = values
+    return x * (1.0 + growth * _peak(x, run) / scale)
+
+
+def _saturating(x, values, run):
+    growth, scale = values
+    return x * (1.0 - growth * np.expm1(-_peak(x, run) / scale))
+
+
+def _work(x, values, run):
+    growth, scale = values
+    return x * (1.0 - growth * np.expm1(-_done(x, run) / scale))
+
+
+def _leaves_peak(x, values, run):
+    return {"largest": float(_peak(x, run)[-1])}
+
+
+def _leaves_work(x, values, run):
+    return {"work": float(_done(x, run)[-1])}
+
+
+EFFECT = Effect(
+    name="softening",
+    stage="actuator",
+    meaning="gain grows with the largest load seen or the work done (Mullins)",
+    reveals="a level repeated after a higher one, steps in mixed order",
+    confused_with=("gain_nonlinearity", "gain_drift", "creep"),
+    needs=lambda e: None if e.repeats else "no level is repeated after a higher one",
+    forms=[
+        Form("largest", "drive", (_GROWTH, Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))),
+             _largest, _leaves_peak),
+        Form("saturating", "drive", (_GROWTH, _scale(0.3, 1.0)), _saturating, _leaves_peak),
+        Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, _leaves_work),
+    ],
+)

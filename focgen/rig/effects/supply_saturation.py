@@ -1,0 +1,32 @@
+"""A pressure that cannot pass a ceiling: an exhausted supply, a relief valve."""
+
+import numpy as np
+
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+_CEILING = Parameter("ceiling", level=1, lower=0.1, upper=1.3, starts=(0.95, 0.75), zero=1.3)
+
+
+def _hard(x, values, run):
+    return np.minimum(x, values[0])
+
+
+def _soft(x, values, run):
+    ceiling, width = values
+    return x - width * np.logaddexp(0.0, (x - ceiling) / width) + width * np.logaddexp(0.0, -ceiling / width)
+
+
+EFFECT = Effect(
+    name="supply_saturation",
+    stage="regulator",
+    meaning="pressure cannot pass a ceiling",
+    reveals="levels above and below the ceiling, with the pressure logged: a flat top",
+    confused_with=("gain_nonlinearity", "leak", "contact", "sensor_saturation"),
+    needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
+    forms=[
+        Form("hard", "supply", (_CEILING,), _hard),
+        Form("soft", "supply", (
+            _CEILING, Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.03, 0.05), log=True),
+        ), _soft),
+    ],
+)

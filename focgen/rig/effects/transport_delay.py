@@ -1,0 +1,29 @@
+"""The response starts later by a fixed time: tubing, a bus, a slow converter."""
+
+import numpy as np
+
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+
+def _shift(x, values, run):
+    back = values[0] / run.h
+    whole, part = int(back), back % 1.0
+    nearer, further = np.zeros_like(x), np.zeros_like(x)
+    for first, last in run.spans:
+        nearer[first + whole:last] = x[first:max(last - whole, first)]
+        further[first + whole + 1:last] = x[first:max(last - whole - 1, first)]
+    return (1.0 - part) * nearer + part * further
+
+
+EFFECT = Effect(
+    name="transport_delay",
+    stage="regulator",
+    meaning="the response starts later by a fixed time",
+    reveals="steps and fast sines: a phase that falls in proportion to frequency, with no loss of amplitude",
+    confused_with=("slow_regulator", "sensor_lag", "valve_asymmetry"),
+    needs=lambda e: None if e.fastest < 0.5 else "no change of the input is fast beside the rig's response",
+    single=True,
+    forms=[Form("delay", "supply", (
+        Parameter("delay", time=1, lower=0.0, upper=5.0, starts=(0.01, 0.05, 0.3), zero=0.0),
+    ), _shift)],
+)

@@ -1,0 +1,31 @@
+"""Dynamics that are faster or slower when unloading."""
+
+from focgen.rig import kernels
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+
+def _speed(x, values, run):
+    return values[0]
+
+
+def _lag(x, values, run):
+    up, down = max(-values[0], 0.0), max(values[0], 0.0)
+    return kernels.lag(x, run.rest, run.h, up, down)
+
+
+EFFECT = Effect(
+    name="unloading_asymmetry",
+    stage="actuator",
+    meaning="the dynamics are faster or slower when unloading",
+    reveals="steps up and down between the same pressures, sines: a mean shift that grows with frequency",
+    confused_with=("valve_asymmetry", "hysteresis", "gain_nonlinearity"),
+    needs=lambda e: None if e.unloads else "the input never falls: release it as well",
+    forms=[
+        Form("speed", "dynamics", (
+            Parameter("unloading_speed", lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True),
+        ), _speed),
+        Form("lag", "response", (
+            Parameter("lag", time=1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0),
+        ), _lag),
+    ],
+)

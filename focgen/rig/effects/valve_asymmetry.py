@@ -1,0 +1,34 @@
+"""A valve that vents more slowly, or faster, than it fills."""
+
+from focgen.rig import kernels
+from focgen.rig.effects._effect import Effect, Form, Parameter
+
+
+def _time(name, *starts):
+    return Parameter(name, time=1, lower=0.0, upper=20.0, starts=starts, zero=0.0)
+
+
+def _lags(x, values, run):
+    return kernels.lag(x, run.rest, run.h, *values)
+
+
+def _orifice(x, values, run):
+    fill, vent, scale = values
+    return kernels.orifice(x, run.rest, run.h, fill, vent, scale)
+
+
+EFFECT = Effect(
+    name="valve_asymmetry",
+    stage="regulator",
+    meaning="vents more slowly (or faster) than it fills",
+    reveals="steps up and down between the same levels, with the pressure logged",
+    confused_with=("slow_regulator", "flow_limit", "unloading_asymmetry", "transport_delay"),
+    needs=lambda e: None if e.unloads else "the input never falls: release it as well",
+    forms=[
+        Form("two_lags", "supply", (_time("fill", 0.02, 0.02), _time("vent", 0.2, 1.0)), _lags),
+        Form("orifice", "supply", (
+            _time("fill", 0.02, 0.1), _time("vent", 0.2, 0.5),
+            Parameter("scale", level=1, lower=0.02, upper=50.0, starts=(1.0, 0.5), log=True),
+        ), _orifice),
+    ],
+)

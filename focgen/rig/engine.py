@@ -1,0 +1,143 @@
+"""The chain as a list of steps that signals pass through: nominal stages and effects, each at its slot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.rig import linear
+from focgen.rig.effects import SLOTS, Form, Run
+from focgen.rig.model import UNITY, Actuator, LinearActuator, Rig
+from focgen.rig.modes import respond
+
+STAGES = ("regulator", "actuator", "sensor")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An effect in a chain: family ``effect``, its form, where, and its parameters in the log's units."""
+
+    effect: str
+    form: Form
+    stage: str
+    values: tuple[float, ...]
+
+    @property
+    def slot(self) -> str:
+        """Where it acts: the form's slot, or the like one of the stage it was moved to."""
+        return slot_in(self.form, self.stage)
+
+
+def slot_in(form: Form, stage: str) -> str:
+    """The slot of ``form`` in ``stage``: its own, or where it is not at home the one before or after the dynamics."""
+    if form.slot in SLOTS[stage]:
+        return form.slot
+    before = form.slot in ("command", "load", "drive", "strain")
+    return {"regulator": "command" if before else "supply", "actuator": "drive" if before else "response",
+            "sensor": "strain" if before else "reading"}[stage]
+
+
+Step = tuple[tuple, Callable[[np.ndarray, Run], np.ndarray], Placed | None]
+
+
+@dataclass
+class Chain:
+    """A rig with effects, made to be run again and again with few things changed.
+
+    What a step did last is remembered by its input and parameters, so that only what comes after a changed one is run.
+    """
+
+    rig: Rig
+    placed: tuple[Placed, ...] = ()
+    remember: dict | None = None
+
+    def run(self, x: np.ndarray, first: str, last: str, run: Run, held: bool = False,
+            tap: dict[str, np.ndarray] | None = None, left: dict[str, dict] | None = None) -> np.ndarray:
+        """What leaves stage ``last`` when ``x`` (n,) enters stage ``first``.
+
+        ``held``: the input is a staircase. ``tap`` receives what leaves each stage, ``left`` what outlives the session,
+        by effect.
+        """
+        begin, end = STAGES.index(first), STAGES.index(last)
+        for stage in STAGES[begin:end + 1]:
+            for number, (key, act, placed) in enumerate(self.steps(stage, held and stage == first)):
+                if left is not None and placed is not None and placed.form.leaves:
+                    left[placed.effect] = placed.form.leaves(x, placed.values, run)
+                x = self._once((stage, number), key, x, act, run)
+            if tap is not None:
+                tap[stage] = x
+        return x
+
+    def _once(self, place, key, x, act, run: Run) -> np.ndarray:
+        if self.remember is None:
+            return act(x, run)
+        kept = self.remember.setdefault(place, [])
+        for old_key, old_x, y in kept:
+            if old_x is x and old_key == key:
+                return y
+        y = act(x, run)
+        kept.insert(0, (key, x, y))
+        del kept[2:]
+        return y
+
+    def steps(self, stage: str, held: bool) -> list[Step]:
+        """What a signal passes in a stage, in order."""
+        early, late = ("command", "load", "strain"), ("supply", "response", "reading")
+        here = [p for p in self.placed if p.stage == stage]
+        steps = [_effect(p) for p in here if p.slot in early]
+        steps += self._core(stage, here, held)
+        steps += [_effect(p) for p in here if p.slot in late]
+        if stage == "actuator" and self.rig.actuator is not None and self.rig.actuator.offset:
+            offset = self.rig.actuator.offset
+            steps.append((("offset", offset), lambda x, run: x + offset, None))
+        return steps
+
+    def _core(self, stage: str, here: Sequence[Placed], held: bool) -> list[Step]:
+        if stage == "actuator":
+            return _actuator(self.rig.actuator, here, held)
+        transfer = getattr(self.rig, stage)
+        return [] if transfer == UNITY else [_transfer(transfer, held)]
+
+
+def _effect(placed: Placed) -> Step:
+    return ((placed.effect, placed.form.name, placed.values),
+            lambda x, run: placed.form.act(x, placed.values, run), placed)
+
+
+def _transfer(transfer, held: bool) -> Step:
+    return ((transfer, held),
+            lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, held), None)
+
+
+def _actuator(actuator, here: Sequence[Placed], held: bool) -> list[Step]:
+    drive = [_effect(p) for p in here if p.slot == "drive"]
+    if actuator is None:
+        return drive
+    speed = 1.0
+    for p in here:
+        if p.slot == "dynamics":
+            speed *= p.form.act(None, p.values, None)
+    if isinstance(actuator, LinearActuator):
+        return [*drive, *_linear(actuator, speed, held)]
+    line = (actuator.gain, lambda x, run: actuator.drive(x), None)
+    lag = ((actuator.T, actuator.alpha, speed), lambda x, run: respond(
+        x, run.rest, run.h, actuator.T, actuator.alpha, run.duration, speed), None)
+    return [line, *drive, lag]
+
+
+def _linear(actuator: LinearActuator, speed: float, held: bool) -> list[Step]:
+    if speed == 1.0:
+        return [_transfer(actuator.dynamics, held)]
+    gain, T, alpha = linear.single_lag(actuator.dynamics)
+    return [((actuator.dynamics, speed), lambda x, run: respond(
+        gain * x, run.rest, run.h, T, alpha, run.duration, speed), None)]
+
+
+def fits_in(form: Form, stage: str, rig: Rig) -> bool:
+    """Whether a form can act in a stage of this rig: rates can be changed only of a single lag."""
+    if form.slot != "dynamics":
+        return True
+    linear_one = isinstance(rig.actuator, LinearActuator) and linear.single_lag(rig.actuator.dynamics)
+    return stage == "actuator" and (isinstance(rig.actuator, Actuator) or bool(linear_one))

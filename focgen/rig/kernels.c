@@ -1,0 +1,142 @@
+/* The loops of the chain simulator that Python would be too slow for: a session, sample by sample.
+ * `n` samples of `x` give `n` samples of `y`. rest[k] is not 0 where an experiment begins: there a loop starts at rest.
+ */
+#include <math.h>
+
+/* Sum of first-order modes, input linear between samples (first-order hold), and one complex mode pair.
+ * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
+ * Coefficients come twice, for loading (first m) and unloading (next m): unloading is x[k] < y[k-1] where x > 0.
+ * pair[s] = {a_re, a_im, b0_re, b0_im, b1_re, b1_im} for s = 0, 1. */
+void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0, const double *b1,
+                  const double *pair, double through, int switching, double *z)
+{
+    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) {
+            for (int i = 0; i < m; i++) z[i] = 0.0;
+            zr = zi = past = last = 0.0;
+        }
+        double now = x[k], sum = 0.0;
+        int down = switching && fabs(now) < fabs(last);
+        const double *A = a + down * m, *B0 = b0 + down * m, *B1 = b1 + down * m, *P = pair + 6 * down;
+        for (int i = 0; i < m; i++) {
+            z[i] = A[i] * z[i] + B0[i] * past + B1[i] * now;
+            sum += z[i];
+        }
+        double re = P[0] * zr - P[1] * zi + P[2] * past + P[4] * now;
+        zi = P[0] * zi + P[1] * zr + P[3] * past + P[5] * now;
+        zr = re;
+        past = now;
+        last = y[k] = through * now + sum + zr;
+    }
+}
+
+/* First-order lag whose factor differs up and down: y += (1 - a) (x - y); the mean of x over the step drives it. */
+void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, double keep_up, double keep_down)
+{
+    double now = 0.0, past = 0.0;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) now = past = 0.0;
+        double to = 0.5 * (past + x[k]);
+        now = to + (now - to) * (to > now ? keep_up : keep_down);
+        past = x[k];
+        y[k] = now;
+    }
+}
+
+/* Chamber behind a valve: fills with the lag `tau` towards x; vents with the flow of an orifice,
+ * y' = -speed sqrt((y - x) scale) limited to the same lag close to x; `sub` steps a sample. */
+void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau, double vent, double scale, int sub)
+{
+    double now = 0.0, past = 0.0, step = h / sub;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) now = past = 0.0;
+        for (int j = 0; j < sub; j++) {
+            double to = past + (x[k] - past) * (j + 0.5) / sub, gap = to - now;
+            double root = sqrt(fabs(gap) * scale), share;
+            double time = (gap > 0.0 ? tau : vent) * (root / scale + 0.02);
+            share = time > 0.0 ? -expm1(-step / time) : 1.0;
+            now += share * gap;
+        }
+        past = x[k];
+        y[k] = now;
+    }
+}
+
+/* Rate limit: y follows x through a lag `tau` with |y'| <= rate; soft > 0.5 takes rate tanh(.). */
+void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, double h, double rate, double tau, int soft, int sub)
+{
+    double now = 0.0, past = 0.0, step = h / sub, most = rate * step;
+    double keep = tau > 0.0 ? -expm1(-step / tau) : 1.0;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) now = past = 0.0;
+        for (int j = 0; j < sub; j++) {
+            double to = past + (x[k] - past) * (j + 1.0) / sub, move = keep * (to - now);
+            if (soft) move = most * tanh(move / most);
+            now += move > most ? most : move < -most ? -most : move;
+        }
+        past = x[k];
+        y[k] = now;
+    }
+}
+
+/* Play (backlash) of half width `width`, starting in the middle of its slack at `start`. */
+void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double start)
+{
+    double now = start;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) now = start;
+        if (now < x[k] - width) now = x[k] - width;
+        if (now > x[k] + width) now = x[k] + width;
+        y[k] = now;
+    }
+}
+
+/* Stick-slip: held until x has left the band around it, then jumps to x less `left` of the band. */
+void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double left)
+{
+    double now = 0.0;
+    int moving = 0;
+    double past = 0.0;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) now = past = 0.0, moving = 0;
+        double gap = x[k] - now, dir = x[k] - past;
+        if (fabs(gap) > band) moving = 1;
+        else if (dir == 0.0 || dir * gap < 0.0) moving = 0;
+        if (moving) now = x[k] - left * (gap > 0.0 ? 1.0 : -1.0);
+        past = x[k];
+        y[k] = now;
+    }
+}
+
+/* Bouc-Wen hysteretic variable, |z| <= 1: dz = dx/width (1 - |z|^power (beta sign(z dx) + 1 - beta)). */
+void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width, double power, double beta)
+{
+    double z = 0.0, past = 0.0;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) z = past = 0.0;
+        double d = (x[k] - past) / width;
+        int sub = 1 + (int)(fabs(d) * 10.0);
+        if (sub > 400) sub = 400;
+        d /= sub;
+        for (int j = 0; j < sub; j++) {
+            z += d * (1.0 - pow(fabs(z), power) * ((z * d > 0.0 ? beta : -beta) + 1.0 - beta));
+            if (z > 1.0) z = 1.0;
+            if (z < -1.0) z = -1.0;
+        }
+        past = x[k];
+        y[k] = z;
+    }
+}
+
+/* Rational filter of order `m` in direct form: y = sum b_i x[k-i] - sum a_i y[k-i], a_0 = 1; w holds the delays. */
+void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *a,
+                   double *w)
+{
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) for (int i = 0; i <= m; i++) w[i] = 0.0;
+        double out = b[0] * x[k] + w[0];
+        for (int i = 1; i <= m; i++) w[i - 1] = b[i] * x[k] - a[i] * out + (i < m ? w[i] : 0.0);
+        y[k] = out;
+    }
+}

@@ -1,0 +1,120 @@
+"""Transfer functions run over samples, from rest: whole orders exactly, real orders as a sum of modes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.signal import cont2discrete
+
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig import kernels
+from focgen.rig.modes import respond
+
+_SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
+
+
+def run(transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: float, duration: float,
+        held: bool = False) -> np.ndarray:
+    """The response to ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is true, every ``duration`` s or sooner.
+
+    ``held``: the input is a staircase, not linear between samples.
+    """
+    if transfer.den == ((1.0, 0.0),) and transfer.num == ((1.0, 0.0),):
+        return x
+    if transfer.is_integer:
+        return kernels.rational(x, rest, *_discrete(transfer, h, held))
+    lag = single_lag(transfer)
+    if lag:
+        gain, T, alpha = lag
+        return gain * respond(x, rest, h, T, alpha, duration)
+    tables = _fractional(transfer, h, 2.0 ** np.ceil(np.log2(duration)))
+    return kernels.modes(x, rest, *tables, switching=False)
+
+
+def single_lag(transfer: TransferFunction) -> tuple[float, float, float] | None:
+    """(gain, T, alpha) where the transfer function is gain/(T s^alpha + 1) with 0 < alpha < 2."""
+    if len(transfer.num) != 1 or transfer.num[0].order != 0 or len(transfer.den) != 2:
+        return None
+    high, low = transfer.den
+    T = high.coefficient / low.coefficient
+    if low.order != 0 or not 0 < high.order < 2 or T <= 0:
+        return None
+    return transfer.num[0].coefficient / low.coefficient, T, high.order
+
+
+@lru_cache(maxsize=512)
+def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndarray, np.ndarray]:
+    num, den = _coefficients(transfer.num), _coefficients(transfer.den)
+    if len(den) == 1:
+        return num / den[0], np.ones(1)
+    scale = abs(den[-1] / den[0]) ** (1 / (len(den) - 1)) or 1.0  # time in units of 1/scale: well conditioned
+    powers = scale ** np.arange(len(den) - 1, -1, -1.0)
+    num, den = num * powers[-len(num):], den * powers
+    b, a, _ = cont2discrete((num / den[0], den / den[0]), h * scale, "zoh" if held else "foh")
+    return np.atleast_2d(b)[0], a
+
+
+def _coefficients(terms) -> np.ndarray:
+    dense = np.zeros(int(terms[0].order) + 1 if terms else 1)
+    for term in terms:
+        dense[-1 - int(term.order)] = term.coefficient
+    return dense
+
+
+@lru_cache(maxsize=64)
+def _fractional(transfer: TransferFunction, h: float, duration: float):
+    """Mode tables: the branch cut by the trapezoidal rule in ln ξ, the poles of the principal sheet by residues."""
+    x = np.arange(np.log(1e-3 / duration), np.log(30.0 / h), _SPACING)
+    xi = np.exp(x)
+    cut = transfer(xi * np.exp(1j * np.pi))
+    weights = -np.imag(cut) / np.pi * xi * _SPACING
+    poles = _poles(transfer, 1e-3 / duration, 30.0 / h)
+    residues = np.array([_residue(transfer, p) for p in poles])
+    a = np.exp(-xi * h)
+    mean = -np.expm1(-xi * h) / (xi * h)
+    gain = weights / xi
+    rows = [np.r_[a], np.r_[gain * (mean - a)], np.r_[gain * (1 - mean)]]
+    fast = float(np.real(transfer(np.array([30.0 / h * np.exp(0.0)]))[0]))
+    through = fast - float(np.sum(weights / (xi + 30.0 / h)))
+    pair = np.zeros(6)
+    for pole, residue in zip(poles, residues):
+        through -= float(np.real(residue / (30.0 / h - pole))) * (1 if pole.imag == 0 else 2)
+        if pole.imag == 0:
+            q = pole.real * h
+            m = np.expm1(q) / q
+            scale = -residue.real / pole.real
+            new = [np.exp(q), scale * (m - np.exp(q)), scale * (1 - m)]
+            rows = [np.r_[row, value] for row, value in zip(rows, new)]
+        else:
+            q = pole * h
+            m, scale = (np.exp(q) - 1) / q, -2 * residue / pole
+            pair = np.array([[c.real, c.imag] for c in (np.exp(q), scale * (m - np.exp(q)), scale * (1 - m))]).ravel()
+    return *(np.stack([row, row]) for row in rows), np.stack([pair, pair]), through
+
+
+def _residue(transfer: TransferFunction, pole: complex) -> complex:
+    num = sum(t.coefficient * pole**t.order for t in transfer.num)
+    slope = sum(t.coefficient * t.order * pole ** (t.order - 1) for t in transfer.den if t.order)
+    return num / slope
+
+
+def _poles(transfer: TransferFunction, low: float, high: float) -> list[complex]:
+    """Zeros of the denominator on the principal sheet, upper half plane and negative-free axis, by Newton's rule."""
+    radius, angle = np.meshgrid(np.geomspace(low, high, 60), np.linspace(0.0, 0.999 * np.pi, 24))
+    s = (radius * np.exp(1j * angle)).ravel()
+    with np.errstate(all="ignore"):
+        for _ in range(60):
+            value = sum(t.coefficient * s**t.order for t in transfer.den)
+            slope = sum(t.coefficient * t.order * s ** (t.order - 1) for t in transfer.den if t.order)
+            step = value / slope
+            step = step * np.minimum(1.0, 0.5 * np.abs(s) / np.maximum(np.abs(step), 1e-300))
+            s = s - step
+        size = sum(abs(t.coefficient) * np.abs(s) ** t.order for t in transfer.den)
+        good = np.isfinite(s) & (np.abs(value) < 1e-9 * size) & (np.abs(np.angle(s)) < np.pi * (1 - 1e-6))
+    found: list[complex] = []
+    for p in s[good]:
+        p = complex(p.real, abs(p.imag)) if abs(p.imag) > 1e-9 * abs(p) else complex(p.real, 0.0)
+        if all(abs(p - q) > 1e-6 * abs(p) for q in found):
+            found.append(p)
+    return found
