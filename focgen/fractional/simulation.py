@@ -40,7 +40,7 @@ class Convolution:
         self._kernel = self._first = np.empty(0)
 
     def run(self, u) -> np.ndarray:
-        u = np.asarray(u, dtype=float)
+        u = _signal(u)
         if len(u) > len(self._kernel):
             self._prepare(len(u))
         y = _product(self._kernel[: len(u)], u)
@@ -57,6 +57,13 @@ class Convolution:
         means = _means(image, self.step, count)
         self._kernel = np.diff(means, prepend=0.0)
         self._first = _steps(image, self.step, count) - means
+
+
+def _signal(u) -> np.ndarray:
+    u = np.asarray(u, dtype=float)
+    if u.ndim != 1:
+        raise ValueError(f"the input has {u.ndim} dimensions, it must be one row of samples")
+    return u
 
 
 def _steps(image: StepImage, step: float, count: int) -> np.ndarray:
@@ -137,7 +144,7 @@ class GrunwaldLetnikov:
         return num, den
 
     def run(self, u) -> np.ndarray:
-        u = np.asarray(u, dtype=float)
+        u = _signal(u)
         if not len(u):
             return u.copy()
         num, den = self.coefficients(len(u) - 1)
