@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import fftconvolve
+from scipy.signal import fftconvolve, lfilter
 
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
@@ -23,6 +23,8 @@ from focgen.plan.canonical import tables as fold
 
 _LONGEST = 1 << 18
 _WANTED = 1e-6  # residual at which a longer inverse gains nothing
+_BY_RECURSION = 40_000_000  # products
+_GROWN = 1e9
 _SLACK = 1.0 + 1e-6  # over the rounding of the transforms
 
 
@@ -69,18 +71,29 @@ def _attempt(coefficients: np.ndarray, count: int) -> Inverse | None:
 
 
 def _series_inverse(coefficients: np.ndarray, count: int) -> np.ndarray | None:
-    """The first ``count`` samples of 1/A by Newton's iteration; None where they grow beyond reason."""
-    inverse_ = np.array([1.0 / coefficients[0]])
-    while len(inverse_) < count:
-        size = min(2 * len(inverse_), count)
-        error = fftconvolve(coefficients[:size], inverse_)[:size]
-        error[0] -= 1.0
-        inverse_ = (
-            np.concatenate([inverse_, np.zeros(size - len(inverse_))]) - fftconvolve(inverse_, error)[:size]
-        )
-        if not np.abs(inverse_).max() < 1e9:
+    """The first ``count`` samples of 1/A; None where they grow beyond reason."""
+    if len(coefficients) * count <= _BY_RECURSION:
+        with np.errstate(over="ignore", invalid="ignore"):
+            response = lfilter([1.0], coefficients, np.eye(1, count)[0])
+        return response if np.abs(response).max() < _GROWN else None
+    return _newton(coefficients, count)
+
+
+def _newton(coefficients: np.ndarray, count: int) -> np.ndarray | None:
+    """Newton's iteration for a power series, which doubles the samples that are right."""
+    response = np.array([1.0 / coefficients[0]])
+    while len(response) < count:
+        known, size = len(response), min(2 * len(response), count)
+        error = fftconvolve(coefficients[:size], response)[:size]
+        error = np.pad(error, (0, size - len(error)))
+        error[:known] = 0.0
+        response = np.concatenate([response, -fftconvolve(response, error)[known:size]])
+        if not np.abs(response).max() < _GROWN:
             return None
-    return inverse_
+    return response
+
+
+_OTHERWISE = "no other length was found to help: check the signs in den, or change sample_time"
 
 
 def check_stable(controller: Controller, tables: Tables, length: int) -> None:
@@ -88,12 +101,8 @@ def check_stable(controller: Controller, tables: Tables, length: int) -> None:
     if tables.feedback is None or inverse(tables.feedback.weights) is not None:
         return
     works = next((n for n in _longer(length) if _stable_at(controller, n)), None)
-    remedy = (
-        f"use a length of {works}"
-        if works
-        else "check the signs of den: no longer memory was found to be stable"
-    )
-    raise PlanError(controller.name, f"the recursion cut off at length {length} is unstable", remedy)
+    what = f"the recursion cut off at length {length} is unstable, or too near to it for a bound"
+    raise PlanError(controller.name, what, f"use a length of {works}" if works else _OTHERWISE)
 
 
 def _longer(length: int):
