@@ -14,13 +14,14 @@ _SETTLED = 8  # memory lengths after which a recursion's response is taken to ha
 
 
 def worst_case_input(plan: Plan, node: str) -> Scenario:
-    """Raw inputs whose last sample takes ``node`` (a name from ``plan.proofs``) to its worst case.
+    """Raw inputs whose last sample takes ``node`` (a name from ``plan.proofs``; floating: v) to its worst case.
 
     Two lanes: towards the highest value and towards the lowest. A sum over the error is reached exactly;
     behind a recursion as far as a finite input can. Raises PlanError for a node the plan does not have.
     """
-    if node not in {p.node for p in plan.proofs}:
-        known = ", ".join(p.node for p in plan.proofs)
+    nodes = ["v"] if plan.floating else [p.node for p in plan.proofs]
+    if node not in nodes:
+        known = ", ".join(nodes)
         raise PlanError(plan.name, f"has no node {node!r}", f"choose one of {known}")
     response = _response(plan, node)
     errors = np.where(response[::-1] > 0.0, plan.error.high, plan.error.low)
@@ -85,11 +86,12 @@ def _schedule(plan: Plan, node: str, shape: tuple[int, int]) -> np.ndarray | Non
         return None
     schedule = plan.schedule
     ends = np.array(schedule.breakpoints)
-    places = np.clip(np.concatenate([ends, ends - 1]), schedule.signal.low, schedule.signal.high)
+    ends = ends if plan.floating else np.concatenate([ends, ends - 1])
+    places = np.clip(ends, schedule.signal.low, schedule.signal.high)
     size = np.abs(scheduled_gain(plan, places))
     if node == "slope product":
-        runs = ends[1:] - 1 - ends[:-1]
-        places, size = ends[1:] - 1, np.abs(np.array(schedule.slopes) * runs)
+        points = np.array(schedule.breakpoints)
+        places, size = points[1:] - 1, np.abs(np.array(schedule.slopes) * (np.diff(points) - 1))
     return np.full(shape, places[int(np.argmax(size))])
 
 

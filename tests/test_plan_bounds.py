@@ -1,0 +1,161 @@
+"""The manifest's error bounds: never exceeded, and not so loose as to say nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from focgen.errors import PlanError
+from focgen.fractional.transfer import TransferFunction
+from focgen.plan.build import build_plan
+from focgen.plan.execute import execute
+from focgen.plan.ideal import ideal
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Reset, Scenario, physical_trace, to_physical, to_raw
+from focgen.plan.worst import worst_case_input
+from tests.controllers import random_controller, random_scenario, seed_controller, simple
+
+ARITHMETICS = ("f64", "f32", "q31", "q15")
+
+
+def samples_since_reset(scenario: Scenario) -> np.ndarray:
+    """1 at the first sample after init or a reset, and so on; shape (lanes, samples)."""
+    count = np.tile(np.arange(1, scenario.samples + 1), (scenario.lanes, 1))
+    for r in sorted(scenario.resets, key=lambda r: r.sample):
+        count[r.lane, r.sample :] = np.arange(1, scenario.samples - r.sample + 1)
+    return count
+
+
+def shares(plan: Plan, physical: Scenario, raw: Scenario, reference) -> tuple[float, float]:
+    """The largest errors of operator and output, as shares of their bounds."""
+    trace, bound, count = (
+        physical_trace(plan, execute(plan, raw)),
+        plan.error_bound,
+        samples_since_reset(physical),
+    )
+    allowed = np.full(count.shape, bound.operator)
+    if bound.operator_per_sample:
+        allowed = np.minimum(allowed, count * bound.operator_per_sample)
+    operator = np.abs(trace.d - reference.d) / allowed
+    output = np.abs(trace.u - reference.u) / (count * bound.output_per_sample)
+    return float(operator.max()), float(output.max())
+
+
+@pytest.mark.parametrize("seed", range(80))
+def test_bounds_hold_for_physical_inputs_anywhere_in_their_ranges(seed):
+    """Inputs, u0 and tracked outputs between the counts; every arithmetic against the same float64 run."""
+    controller = random_controller(seed)
+    physical = random_scenario(controller, seed, lanes=3, samples=160)
+    reference = None
+    for arithmetic in ARITHMETICS:
+        try:
+            plan = build_plan(controller, arithmetic)
+        except PlanError:
+            continue
+        reference = reference or ideal(controller, physical, controller.length)
+        operator, output = shares(plan, physical, to_raw(plan, physical), reference)
+        assert operator <= 1.0 and output <= 1.0, arithmetic
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_bounds_hold_at_the_worst_input_and_are_not_far_above_it(arithmetic):
+    """The input that makes the largest sum makes large errors too: the bound is within a small factor of them."""
+    controller = seed_controller(300)
+    plan, found = build_plan(controller, arithmetic), 0.0
+    rng = np.random.default_rng(3)
+    for node in ("v",) if plan.floating else ("direct total", "gain product"):
+        worst = to_physical(plan, worst_case_input(plan, node))
+        for _ in range(6):
+            physical = replace(worst, sched=rng.uniform(0.0, 0.25, worst.ref.shape))
+            operator, output = shares(
+                plan, physical, to_raw(plan, physical), ideal(controller, physical, 300)
+            )
+            assert operator <= 1.0 and output <= 1.0
+            found = max(found, operator)
+    assert found > {"q15": 0.1, "q31": 0.1, "f32": 0.01, "f64": 1e-3}[arithmetic]
+
+
+@pytest.mark.parametrize("arithmetic", ("q15", "q31"))
+def test_the_weights_share_is_what_an_adversary_can_make_of_their_errors(arithmetic):
+    """Σ|ŵ − w| E is reached by e = ±E with the signs of the errors; the bound's part for it is that, and no more."""
+    controller = simple(TransferFunction([(1.0, 0.6)]), length=200)
+    plan = build_plan(controller, arithmetic)
+    exact = _gl(0.6, 200) * 0.01**-0.6
+    reached = float(np.abs(np.array(plan.direct.values) - exact).sum()) * 2.0
+    part = dict(plan.error_bound.parts)["weights"]
+    assert reached <= part <= 1.01 * reached + 1e-9
+
+
+def _gl(order: float, count: int) -> np.ndarray:
+    weights = [1.0]
+    for j in range(1, count + 1):
+        weights.append(weights[-1] * (j - 1 - order) / j)
+    return np.array(weights)
+
+
+@pytest.mark.parametrize("seed", range(0, 80, 2))
+def test_truncation_bound_holds_against_infinite_memory(seed):
+    controller = random_controller(seed)
+    try:
+        plan = build_plan(controller, "f64")
+    except PlanError as reason:
+        pytest.skip(str(reason))
+    physical = random_scenario(controller, seed, lanes=3, samples=400)
+    same, endless = ideal(controller, physical, plan.length), ideal(controller, physical)
+    assert plan.error_bound.truncation is not None
+    error = float(np.abs(same.d - endless.d).max())
+    assert error <= plan.error_bound.truncation * (1.0 + 1e-9) + plan.error_bound.operator
+
+
+def test_truncation_bound_is_reached_by_a_constant_that_began_long_ago():
+    """e at one end for ever, then at the other: all that the memory misses has one sign."""
+    controller = simple(TransferFunction([(1.0, 0.6)]), length=50)
+    plan = build_plan(controller, "f64")
+    ref = np.concatenate([np.full((1, 1), -1.0), np.full((1, 200_000), 1.0), np.full((1, 1), -1.0)], axis=1)
+    physical = Scenario(ref, -ref, None, (Reset(0, 0, -1.0, 1.0, 0.0),))
+    error = np.abs(ideal(controller, physical, 50).d - ideal(controller, physical).d)[0]
+    assert 0.98 * plan.error_bound.truncation < error.max() <= plan.error_bound.truncation
+
+
+def test_whole_orders_leave_nothing_out():
+    pid = simple(TransferFunction([(2.0, 0.0), (0.5, -1.0), (0.1, 1.0)]), length=30)
+    assert build_plan(pid, "f64").error_bound.truncation == 0.0
+
+
+def test_with_an_inner_integral_the_error_grows_and_its_clamp_ends_it():
+    controller = simple(TransferFunction([(1.0, 0.0), (3.0, -0.9)]), length=100)
+    bound = build_plan(controller, "q15").error_bound
+    assert 0.0 < bound.operator_per_sample < 0.01 * bound.operator
+    assert bound.operator > 20.0, "the clamp's width, which is the output's"
+    assert build_plan(simple(TransferFunction([(1.0, 0.5)])), "q15").error_bound.operator_per_sample == 0.0
+
+
+def test_finer_arithmetic_has_smaller_bounds():
+    bounds = {a: build_plan(seed_controller(1000), a).error_bound for a in ARITHMETICS}
+    order = sorted(bounds, key=lambda a: bounds[a].operator)
+    assert order == ["f64", "q31", "f32", "q15"]
+    assert len({b.truncation for b in bounds.values()}) == 1
+    for bound in bounds.values():
+        assert sum(value for _, value in bound.parts) == pytest.approx(bound.operator, rel=1e-6)
+
+
+@pytest.mark.parametrize("arithmetic", ("q15", "q31"))
+def test_a_bound_that_counts_one_rounding_less_is_exceeded(arithmetic):
+    """The bound is needed: with inputs' and gain's shares left out, some run exceeds what is left of it."""
+    exceeded = 0
+    for seed in range(20):
+        controller = random_controller(seed, longest=40)
+        try:
+            plan = build_plan(controller, arithmetic)
+        except PlanError:
+            continue
+        if plan.error_bound.operator_per_sample:
+            continue
+        parts = dict(plan.error_bound.parts)
+        less = parts.get("product", 0.0) + parts.get("rounding", 0.0) + parts.get("weights", 0.0)
+        physical = random_scenario(controller, seed, lanes=2, samples=160)
+        trace = physical_trace(plan, execute(plan, to_raw(plan, physical)))
+        exceeded += float(np.abs(trace.d - ideal(controller, physical, plan.length).d).max()) > less
+    assert exceeded > 3
