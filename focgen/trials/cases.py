@@ -1,0 +1,163 @@
+"""One sealed case: what is drawn, and what becomes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.rig.model import Ranges, Rig
+from focgen.trials import excitation
+from focgen.trials.designs import Design, draw_design
+from focgen.trials.forms import Spans, draw_form
+from focgen.trials.machine import Machine, Session, Setting
+from focgen.trials.plan import Assignment
+from focgen.trials.recording import MEASURED, Recorder, draw_recorder, sample
+from focgen.trials.rigs import draw_chain, draw_linear, in_time_unit, nominal_of
+from focgen.trials.severity import SEVERITIES, VISIBLE, Trial, calibrate, rms, surviving
+
+_COARSE, _FINE = 0.01, 0.0025     # s: steps of the calibration and of the logs
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A finished case: the nominal ``rig``, logs as (name, columns by role), and the label of what is true."""
+
+    rig: Rig
+    logs: list[tuple[str, dict]]
+    unseen: list[tuple[str, dict]]
+    recorder: Recorder
+    label: dict
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What a case is played on: the true rig, its spans, the experiments and their clocks."""
+
+    rig: Rig
+    full: float
+    seen: list[excitation.Experiment]
+    unseen: list[excitation.Experiment]
+    clocks: list[float]
+    spans: Spans
+    coarse: Trial
+
+    def commands(self, experiments: Sequence[excitation.Experiment], h: float) -> list[np.ndarray]:
+        """The experiments' commands on the grid of step ``h``."""
+        repeat = round(self.rig.sample_time / h)
+        return [np.repeat(e.levels * self.full, repeat) for e in experiments]
+
+
+def make_case(assignment: Assignment, signals: str, suite: str, rng: np.random.Generator) -> Case:
+    """Draw and simulate one case. A design that cannot show its effect is drawn again, up to 12 times."""
+    for _ in range(12):
+        case = _draw_case(assignment, signals, suite, rng)
+        if not assignment.must_show or all(t["visible"] for t in case.label["truth"]):
+            break
+    return case
+
+
+def _draw_case(assignment: Assignment, signals: str, suite: str, rng: np.random.Generator) -> Case:
+    design = draw_design(signals, rng) if assignment.kind == "unidentifiable" else None
+    stage = _set_up(assignment, signals, suite, design, rng)
+    spans = {name: getattr(stage.spans, name) for name in MEASURED}
+    recorder = draw_recorder(rng, spans, stage.rig.sample_time)
+    effects = design.effects(rng) if design else assignment.effects
+    truth = [_draw_effect(effect, assignment.severity, stage, rng) for effect in effects]
+    settings = [setting for setting, _ in truth]
+    label = {
+        "kind": assignment.kind, "signals": signals, "suite": suite,
+        "truth": _visibility([facts for _, facts in truth], settings, stage, recorder),
+        "design": design.facts() if design else None,
+        "floor": recorder.noise["output"], "noise": recorder.noise,
+    }
+    return _play(stage, settings, recorder, _believed(assignment, stage.rig, rng), label, rng)
+
+
+def _set_up(assignment, signals, suite, design: Design | None, rng) -> Stage:
+    Ts = float(rng.choice((0.02, 0.05)))
+    rig, full = draw_linear(rng, Ts) if assignment.linear else draw_chain(rng, signals, Ts)
+    seen = design.experiments(rng, Ts) if design else excitation.SUITES[suite](rng, Ts)
+    unseen = excitation.unseen(rng, Ts)
+    clocks = _clocks([*seen, *unseen], Ts, rng)
+    bare = Stage(rig, full, seen, unseen, clocks, None, None)
+    coarse = Trial(bare.commands(seen, _COARSE), clocks[: len(seen)], _COARSE)
+    spans = _spans(rig, full, coarse, clocks[-1])
+    return replace(bare, spans=spans, coarse=coarse)
+
+
+def _clocks(experiments, Ts: float, rng) -> list[float]:
+    """When each experiment begins: after the one before and a rest of 10 to 30 s; whole samples."""
+    clocks, now = [], 0.0
+    for experiment in experiments:
+        clocks.append(now)
+        now += round((len(experiment.levels) * Ts + rng.uniform(10.0, 30.0)) / Ts) * Ts
+    return clocks
+
+
+def _spans(rig: Rig, full: float, trial: Trial, session: float) -> Spans:
+    found = {name: float(np.ptp(values)) for name, values in trial.signals(rig).items()}
+    top = full * rig.regulator.dc_gain
+    drive = rig.actuator.drive(top) if rig.actuator else top
+    return Spans(full, found["pressure"], abs(float(drive)), found["curvature"], found["output"],
+                 _atmosphere(rig, found["pressure"]), session)
+
+
+def _atmosphere(rig: Rig, span: float) -> float:
+    """1.013 bar in the rig's unit of pressure; five spans where it has none."""
+    for suffix, bar in (("_bar", 1.0), ("_kPa", 100.0), ("_MPa", 0.1)):
+        if (rig.signals.pressure or "").endswith(suffix):
+            return 1.013 * bar
+    return 5.0 * span
+
+
+def _draw_effect(effect: str, severity: str, stage: Stage, rng) -> tuple[Setting, dict]:
+    drawn = draw_form(effect, rng, stage.spans)
+    setting, gap = calibrate(drawn, stage.rig, stage.coarse, SEVERITIES[severity])
+    facts = {"effect": effect, "stage": drawn.stage, "form": drawn.form.name, "severity": severity,
+             "parameters": list(setting.parameters), "memory": list(setting.memory or ()), "gap": gap}
+    return setting, facts
+
+
+def _visibility(truth: list[dict], settings: list[Setting], stage: Stage, recorder: Recorder) -> list[dict]:
+    """Add to each effect how much of it the logs can show, beside the others."""
+    logged = [name for name in MEASURED if name in stage.rig.signals.columns()]
+    if not truth:
+        return []
+    noise = {name: recorder.noise[name] for name in logged}
+    whole = stage.coarse.signals(stage.rig, settings)
+    marked = []
+    for i, facts in enumerate(truth):
+        without = stage.coarse.signals(stage.rig, settings[:i] + settings[i + 1 :])
+        left = surviving(stage.rig, stage.coarse, {n: whole[n] - without[n] for n in logged}, noise)
+        marked.append({**facts, "survives": left, "visible": max(left.values()) >= VISIBLE})
+    return marked
+
+
+def _believed(assignment: Assignment, rig: Rig, rng) -> Rig:
+    scatter = {"none": (0.0, 0.0), "parameters": (0.08, 0.2)}.get(assignment.kind, (0.06, 0.15))
+    return nominal_of(rig, rng, scatter)
+
+
+def _play(stage: Stage, settings, recorder: Recorder, nominal: Rig, label: dict, rng) -> Case:
+    Ts = stage.rig.sample_time
+    session = Session(Machine(stage.rig, tuple(settings)), _FINE)
+    played = []
+    experiments = [*stage.seen, *stage.unseen]
+    for experiment, command, clock in zip(experiments, stage.commands(experiments, _FINE), stage.clocks):
+        trace = session.run(command, clock)
+        played.append((experiment.name, sample(trace, Ts, recorder, session, rng)))
+    unit = float(rng.choice((0.001, 0.1, 1.0, 60.0))) if label["kind"] == "linear" else 1.0
+    rig = in_time_unit(nominal, unit)
+    if recorder.one_file:
+        rig = replace(rig, signals=replace(rig.signals, run="run"))
+    rig = replace(rig, ranges=_ranges(stage) if rng.random() < 0.7 else Ranges())
+    count = len(stage.seen)
+    return Case(rig, played[:count], played[count:], replace(recorder, time_unit=unit), label)
+
+
+def _ranges(stage: Stage) -> Ranges:
+    spans = stage.spans
+    pressure = (0.0, 1.2 * spans.pressure) if stage.rig.signals.pressure else None
+    return Ranges((0.0, 1.2 * spans.command), pressure, (0.0, 1.3 * spans.output))

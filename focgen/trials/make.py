@@ -1,0 +1,101 @@
+"""``focgen trial make``: a folder of sealed cases.
+
+    DIR/trial.json                    what was made, and each case's commitment
+    DIR/cases/0001/rig.toml           the nominal rig
+    DIR/cases/0001/logs/*.csv         one session of the real one
+    DIR/cases/0001/controller.toml    closed-loop suites only
+    DIR/cases/0001/commitment.txt     SHA-256 of salt and label
+    DIR/sealed/0001/label.json        salt and label
+    DIR/sealed/0001/unseen/*.csv      logs that score the promise
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tomlkit
+
+import focgen
+from focgen.errors import InputError
+from focgen.output import write_file, write_files
+from focgen.progress import track
+from focgen.rig.files import rig_table
+from focgen.trials.cases import Case, make_case
+from focgen.trials.excitation import SUITES
+from focgen.trials.plan import KINDS, assignments
+from focgen.trials.recording import as_csv
+from focgen.trials.sealing import commitment, sealed
+
+DEFAULT_KINDS = tuple(k for k in KINDS if k != "linear")
+
+
+@dataclass(frozen=True)
+class Made:
+    """What ``trial make`` wrote: the folder, how many cases, and the commitment of each by its number."""
+
+    folder: str
+    suite: str
+    signals: str
+    seed: int
+    cases: int
+    commitments: dict[str, str]
+
+
+def make(folder: str | Path, *, cases: int = 200, seed: int = 0, signals: str = "C", suite: str = "full",
+         kinds: tuple[str, ...] | None = None) -> Made:
+    """Make sealed cases; the same arguments give the same bytes. Raises InputError for arguments that make no sense."""
+    folder = Path(folder)
+    _check(folder, cases, seed, signals, suite)
+    root = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite)])
+    plan = assignments(cases, kinds or DEFAULT_KINDS, signals, root)
+    commitments = {}
+    for index, assignment in enumerate(track(plan, "trial make"), start=1):
+        rng = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite), index])
+        number = f"{index:04d}"
+        case = make_case(assignment, signals, suite, rng)
+        commitments[number] = _write(folder, number, case, _salt(rng))
+    made = Made(str(folder), suite, signals, seed, len(plan), commitments)
+    facts = {"focgen": focgen.__version__, "suite": suite, "signals": signals, "seed": seed, "commitments": commitments}
+    write_file(folder / "trial.json", json.dumps(facts, indent=1) + "\n")
+    return made
+
+
+def _check(folder: Path, cases: int, seed: int, signals: str, suite: str) -> None:
+    if (folder / "trial.json").exists():
+        raise InputError(str(folder), "already holds a trial", "choose another folder")
+    if cases < 1 or seed < 0:
+        raise InputError("trial make", f"cannot make {cases} cases from seed {seed}", "give positive numbers")
+    if signals not in ("C", "B", "A"):
+        raise InputError("--signals", f"is {signals!r}", "choose C, B or A")
+    if suite not in SUITES:
+        raise InputError("--suite", f"is {suite!r}", f"choose one of {', '.join(SUITES)}")
+
+
+def _salt(rng: np.random.Generator) -> str:
+    return hashlib.sha256(rng.bytes(32)).hexdigest()
+
+
+def _write(folder: Path, number: str, case: Case, salt: str) -> str:
+    logs, unseen = _files(case, case.logs), _files(case, case.unseen)
+    digests = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in unseen.items()}
+    label = json.loads(json.dumps({**case.label, "unseen": digests}))
+    committed = commitment(salt, label)
+    rig = tomlkit.dumps(rig_table(case.rig))
+    write_files(folder / "cases" / number, {"rig.toml": rig, "commitment.txt": committed + "\n",
+                                            **{f"logs/{name}": text for name, text in logs.items()}})
+    write_files(folder / "sealed" / number, {"label.json": sealed(salt, label),
+                                             **{f"unseen/{name}": text for name, text in unseen.items()}})
+    return committed
+
+
+def _files(case: Case, experiments: list[tuple[str, dict]]) -> dict[str, str]:
+    """File name → CSV; the names keep the order of the session."""
+    signals, unit = case.rig.signals, case.recorder.time_unit
+    if case.recorder.one_file:
+        return {"session.csv": as_csv(experiments, signals, unit, True)}
+    return {f"{i:02d}_{name}.csv": as_csv([(name, columns)], signals, unit, False)
+            for i, (name, columns) in enumerate(experiments, start=1)}

@@ -1,0 +1,102 @@
+"""Which kinds of cases a trial has, and in what shares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.errors import InputError
+from focgen.trials.forms import OUTSIDE, VOCABULARY
+
+KINDS = ("single", "pair", "none", "parameters", "outside", "unidentifiable", "linear")
+_SHARES = {"single": 0.62, "pair": 0.11, "none": 0.05, "parameters": 0.07, "outside": 0.09,
+           "unidentifiable": 0.06}
+
+# What two effects do alike: together they are one to any log.
+_ALIKE = (
+    {"transport_delay", "slow_regulator"}, {"valve_asymmetry", "flow_limit"}, {"valve_asymmetry", "slow_regulator"},
+    {"supply_saturation", "leak"}, {"flow_limit", "slow_regulator"},
+    {"gain_nonlinearity", "dead_zone"}, {"gain_nonlinearity", "contact"}, {"softening", "gain_drift"},
+    {"contact", "dead_zone"}, {"softening", "hysteresis"}, {"hysteresis", "unloading_asymmetry"},
+    {"sensor_nonlinearity", "sensor_saturation"}, {"sensor_relaxation", "sensor_lag"},
+    {"contact", "sensor_saturation"}, {"contact", "sensor_nonlinearity"}, {"hysteresis", "sensor_hysteresis"},
+    {"gain_nonlinearity", "sensor_nonlinearity"}, {"creep", "sensor_lag"}, {"creep", "sensor_relaxation"},
+    {"creep", "sensor_drift"}, {"gain_drift", "sensor_drift"},
+)
+
+# With a command and a response alone, these have a meaning of their own.
+_LINEAR = ("transport_delay", "valve_asymmetry", "flow_limit", "valve_stiction", "hysteresis", "gain_nonlinearity",
+           "dead_zone", "sensor_quantization", "sensor_saturation", "resonance")
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """What a case is to be."""
+
+    kind: str
+    effects: tuple[str, ...] = ()
+    severity: str = "mid"
+
+    @property
+    def linear(self) -> bool:
+        """Whether the rig is one stage in foreign units."""
+        return self.kind == "linear"
+
+    @property
+    def must_show(self) -> bool:
+        """Whether the case has no meaning where its effects stay below the noise."""
+        return self.kind in ("pair", "outside", "unidentifiable")
+
+
+def assignments(count: int, kinds: tuple[str, ...], signals: str, rng: np.random.Generator) -> list[Assignment]:
+    """``count`` cases of the given kinds, in the usual shares, shuffled; every effect as often as any other."""
+    unknown = sorted(set(kinds) - set(KINDS))
+    if unknown:
+        raise InputError("--kinds", f"has the unknown kind {unknown[0]!r}", f"choose from {', '.join(KINDS)}")
+    shares = {kind: _SHARES.get(kind, 0.08) for kind in kinds}
+    whole = sum(shares.values())
+    quota = {kind: max(1, round(count * share / whole)) for kind, share in shares.items()}
+    quota[max(quota, key=quota.get)] += count - sum(quota.values())
+    found = [a for kind, n in quota.items() for a in _of_kind(kind, max(n, 0), signals, rng)]
+    rng.shuffle(found)
+    return found[:count]
+
+
+def _of_kind(kind: str, count: int, signals: str, rng) -> list[Assignment]:
+    if kind == "single":
+        return _dealt(tuple(VOCABULARY), ("low", "mid", "high"), kind, count, rng)
+    if kind == "linear":
+        return _dealt(_LINEAR, ("mid", "high"), kind, count, rng)
+    if kind == "outside":
+        return _dealt(_outside(signals), ("mid", "high"), kind, count, rng)
+    if kind == "pair":
+        return [Assignment(kind, _pair(rng), str(rng.choice(("mid", "high")))) for _ in range(count)]
+    return [Assignment(kind, (), "high") for _ in range(count)]
+
+
+def _dealt(effects, severities, kind, count, rng) -> list[Assignment]:
+    """Deal (effect, severity) like cards: no effect twice more often than another."""
+    cards: list[Assignment] = []
+    while len(cards) < count:
+        for severity in rng.permutation(severities):
+            deck = list(effects)
+            rng.shuffle(deck)
+            cards += [Assignment(kind, (effect,), str(severity)) for effect in deck]
+    return cards[:count]
+
+
+def _outside(signals: str) -> tuple[str, ...]:
+    """A baseline's swing is a sensor drift to logs without curvature, a folded curve an odd calibration."""
+    return tuple(name for name in OUTSIDE if signals == "C" or name != "room_swing")
+
+
+def _pair(rng) -> tuple[str, ...]:
+    """Two effects, in half of the cases of one stage, that are not alike."""
+    names = list(VOCABULARY)
+    same = rng.random() < 0.4
+    while True:
+        pair = tuple(rng.choice(names, 2, replace=False))
+        stages = [VOCABULARY[e][0] for e in pair]
+        if (stages[0] == stages[1]) == same and set(pair) not in _ALIKE:
+            return tuple(str(e) for e in pair)

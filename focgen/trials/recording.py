@@ -1,0 +1,89 @@
+"""From what happened to what is logged: sampling, noise, quantisation, and the files."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from focgen.rig.model import Signals
+from focgen.trials.machine import Session, Trace
+
+MEASURED = ("pressure", "curvature", "output")
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """How this rig's logs are taken.
+
+    ``noise`` rms and ``lsb`` by signal, in its units; ``skew`` s by which the measured columns are taken after
+    their time stamp; ``jitter`` largest deviation of a sample from its instant, s; ``absolute``: whether the time stamps
+    run through the session; ``one_file``: whether a column separates the experiments; ``time_unit``: s of
+    the log for each s of the generator.
+    """
+
+    noise: dict[str, float]
+    lsb: dict[str, float]
+    skew: float
+    jitter: float
+    absolute: bool
+    one_file: bool
+    time_unit: float = 1.0
+
+
+def draw_recorder(rng: np.random.Generator, spans: dict[str, float], Ts: float) -> Recorder:
+    """Noise 0.4 to 2 % of each span, 11 to 16 bits, and in half of the cases each a jitter and a skew."""
+    noise = {name: span * 10.0 ** rng.uniform(np.log10(0.004), np.log10(0.02)) for name, span in spans.items()}
+    if "pressure" in noise:
+        noise["pressure"] *= 0.6
+    lsb = {name: 1.3 * span / 2 ** rng.integers(11, 17) for name, span in spans.items()}
+    jitter = rng.uniform(0.005, 0.04) * Ts if rng.random() < 0.5 else 0.0
+    skew = rng.uniform(-0.5, 0.5) * Ts if rng.random() < 0.5 else 0.0
+    return Recorder(noise, lsb, skew, jitter, bool(rng.random() < 0.5), bool(rng.random() < 0.3))
+
+
+def coloured(rng: np.random.Generator, count: int, level: float) -> np.ndarray:
+    """Noise of rms ``level``: half of its power white, half with a pole at 0.9; shape (count,)."""
+    white, other = rng.normal(size=(2, count + 100))
+    slow = lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], other)
+    return level * np.sqrt(0.5) * (white + slow)[100:]
+
+
+def quantised(values: np.ndarray, lsb: float) -> np.ndarray:
+    """Rounded to the converter's steps."""
+    return lsb * np.round(values / lsb)
+
+
+def sample(trace: Trace, Ts: float, recorder: Recorder, session: Session, rng: np.random.Generator) -> dict:
+    """The log of one experiment by role, ``time`` included: arrays (n,)."""
+    count = int(round(len(trace.command) * trace.h / Ts))
+    instants = np.arange(count) * Ts
+    if recorder.jitter:
+        instants = np.abs(instants + rng.uniform(-recorder.jitter, recorder.jitter, count))
+    held = np.minimum((instants / trace.h + 1e-6).astype(int), len(trace.command) - 1)
+    columns = {"time": instants + (trace.clock if recorder.absolute else 0.0), "command": trace.command[held]}
+    for name in MEASURED:
+        clean = np.interp(instants + recorder.skew, trace.time, getattr(trace, name))
+        noisy = clean + coloured(rng, count, recorder.noise[name])
+        if name == "output":
+            noisy = session.read(noisy)
+        columns[name] = quantised(noisy, recorder.lsb[name])
+    return columns
+
+
+def as_csv(rows: Sequence[tuple[str, dict]], signals: Signals, time_unit: float, runs: bool) -> str:
+    """One CSV of one or more experiments (name, columns by role)."""
+    roles = ["time", *signals.columns()]
+    names = [signals.time, *signals.columns().values()]
+    out = io.StringIO()
+    out.write(",".join(([signals.run] if runs else []) + names) + "\n")
+    for name, columns in rows:
+        lead = f"{name}," if runs else ""
+        table = np.stack([columns["time"] * time_unit, *(columns[role] for role in roles[1:])], axis=1)
+        body = io.StringIO()
+        np.savetxt(body, table, fmt="%.7g", delimiter=",")
+        out.write("".join(lead + line + "\n" for line in body.getvalue().splitlines()))
+    return out.getvalue()

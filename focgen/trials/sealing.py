@@ -1,0 +1,44 @@
+"""Sealing a label: the case carries only the hash of it, committed to before any diagnosis."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+from focgen.errors import InputError
+
+
+def canonical(label: dict) -> bytes:
+    """The bytes a label is hashed as."""
+    return json.dumps(label, sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode("ascii")
+
+
+def commitment(salt: str, label: dict) -> str:
+    """SHA-256 of salt and label, hexadecimal."""
+    return hashlib.sha256(salt.encode("ascii") + canonical(label)).hexdigest()
+
+
+def sealed(salt: str, label: dict) -> str:
+    """The text of a sealed label's file."""
+    return json.dumps({"salt": salt, "label": label}, indent=1, sort_keys=True) + "\n"
+
+
+def unseal(path: Path, committed: str, unseen: Path) -> dict:
+    """The label, once it and the unseen logs prove to be what was committed to. Raises InputError where not."""
+    content = json.loads(path.read_text(encoding="utf-8"))
+    label = content["label"]
+    if commitment(content["salt"], label) != committed:
+        raise InputError(str(path), "is not the label that was committed to", "make the cases anew")
+    for name, digest in label["unseen"].items():
+        if file_hash(unseen / name) != digest:
+            raise InputError(str(unseen / name), "is not the log that was committed to", "make the cases anew")
+    return label
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal. Raises InputError where it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as reason:
+        raise InputError(str(path), f"cannot be read ({reason.strerror})", "make the cases anew") from None

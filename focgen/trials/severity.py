@@ -1,0 +1,117 @@
+"""How strong an effect is, and whether these logs can show it.
+
+*Gap*: root mean square over all samples of the session, at the output of the effect's own stage and without
+noise, of the rig with the effect minus the same rig without it, as a share of that signal's span. The amplitude
+is found by bisection so that the gap is the severity's: low 3 %, mid 8 %, high 20 %, or the form's largest.
+
+*Surviving gap*: what is left of it, in the logged signals, once the own parameters of the rig (T, alpha, gain or num and
+den, offset) have been refitted: the projection off their sensitivities. Each signal is weighted by its noise.
+*Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more, both root mean square.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig.model import Actuator, LinearActuator, Rig
+from focgen.trials.forms import Drawn
+from focgen.trials.machine import Machine, Session, Setting
+
+SEVERITIES = {"low": 0.03, "mid": 0.08, "high": 0.20}
+VISIBLE = 0.3
+_SIGNAL_OF = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What the rig goes through: commands on the fine grid of step ``h`` s, and the session's clock at each."""
+
+    commands: Sequence[np.ndarray]
+    clocks: Sequence[float]
+    h: float
+
+    def signals(self, rig: Rig, settings: Sequence[Setting] = ()) -> dict[str, np.ndarray]:
+        """Noise-free pressure, curvature and output (N,) of all experiments, one after the other."""
+        session = Session(Machine(rig, tuple(settings)), self.h)
+        traces = [session.run(command, clock) for command, clock in zip(self.commands, self.clocks)]
+        found = {name: np.concatenate([getattr(t, name) for t in traces])
+                 for name in ("pressure", "curvature", "output")}
+        found["output"] = session.read(found["output"])
+        return found
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def calibrate(drawn: Drawn, rig: Rig, trial: Trial, target: float) -> tuple[Setting, float]:
+    """The setting whose gap is ``target`` (a share of the span), or the form's largest; and the gap it has."""
+    name = _SIGNAL_OF[drawn.stage]
+    without = trial.signals(rig)[name]
+    span = float(np.ptp(without))
+
+    def gap(a: float) -> float:
+        return rms(trial.signals(rig, [drawn.at(a)])[name] - without) / span
+
+    low, high = np.log(drawn.form.low), np.log(drawn.form.high)
+    reached = gap(drawn.form.high)
+    if reached <= target:
+        return drawn.at(drawn.form.high), reached
+    for _ in range(14):
+        middle = 0.5 * (low + high)
+        now = gap(float(np.exp(middle)))
+        low, high = (middle, high) if now < target else (low, middle)
+        if abs(now / target - 1.0) < 0.02:
+            break
+    return drawn.at(float(np.exp(middle))), now
+
+
+def surviving(rig: Rig, trial: Trial, gap: dict[str, np.ndarray], noise: dict[str, float]) -> dict[str, float]:
+    """Root mean square of what a refit of the own parameters leaves of ``gap``, signal by signal, over its noise.
+
+    ``gap`` and ``noise`` (rms) carry the logged signals only.
+    """
+    base = trial.signals(rig)
+    columns = [_stacked({n: (trial.signals(moved)[n] - base[n]) / step for n in gap}, noise)
+               for moved, step in _moved(rig)]
+    wish = _stacked(gap, noise)
+    matrix = np.stack(columns, axis=1)
+    matrix /= np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+    rest = wish - matrix @ np.linalg.lstsq(matrix, wish, rcond=1e-10)[0]
+    return {name: rms(part) for name, part in zip(gap, np.split(rest, len(gap)))}
+
+
+def _stacked(signals: dict[str, np.ndarray], noise: dict[str, float]) -> np.ndarray:
+    return np.concatenate([signals[name] / noise[name] for name in signals])
+
+
+def _moved(rig: Rig):
+    """The rig with each of its own parameters moved a little, and by how much."""
+    actuator, small = rig.actuator, 1e-3
+    if isinstance(actuator, Actuator):
+        yield replace(rig, actuator=replace(actuator, T=actuator.T * (1 + small))), small
+        yield replace(rig, actuator=replace(actuator, alpha=actuator.alpha + small)), small
+        for i, g in enumerate(actuator.gain):
+            gain = [*actuator.gain[:i], g * (1 + small), *actuator.gain[i + 1 :]]
+            yield replace(rig, actuator=replace(actuator, gain=tuple(gain))), small
+    else:
+        for moved in _moved_linear(actuator, small):
+            yield replace(rig, actuator=moved), small
+    yield replace(rig, actuator=replace(actuator, offset=actuator.offset + 1.0)), 1.0
+
+
+def _moved_linear(actuator: LinearActuator, small: float):
+    transfer = actuator.dynamics
+    for part in ("num", "den"):
+        terms = getattr(transfer, part)
+        for i, t in enumerate(terms):
+            if part == "den" and t.order == 0.0:
+                continue
+            changed = [*terms[:i], (t.coefficient * (1 + small), t.order), *terms[i + 1 :]]
+            sides = {"num": transfer.num, "den": transfer.den, part: changed}
+            yield replace(actuator, dynamics=TransferFunction(sides["num"], sides["den"]))
