@@ -18,12 +18,13 @@ from scipy.signal import fftconvolve, lfilter
 
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
-from focgen.plan.canonical import Tables
-from focgen.plan.canonical import tables as fold
+from focgen.fractional.discrete import UnprovenStability, poles_outside, shortest_stable_length
+from focgen.fractional.transfer import TransferFunction
+from focgen.plan.canonical import Tables, realise
 
 _LONGEST = 1 << 18
 _WANTED = 1e-6  # residual at which a longer inverse gains nothing
-_BY_RECURSION = 40_000_000  # products
+_BY_RECURSION = 300_000_000  # products
 _GROWN = 1e9
 _SLACK = 1.0 + 1e-6  # over the rounding of the transforms
 
@@ -93,23 +94,22 @@ def _newton(coefficients: np.ndarray, count: int) -> np.ndarray | None:
     return response
 
 
-_OTHERWISE = "no other length was found to help: check the signs in den, or change sample_time"
-
-
 def check_stable(controller: Controller, tables: Tables, length: int) -> None:
     """Raise PlanError where the truncated recursion is unstable, naming a memory length that works."""
     if tables.feedback is None or inverse(tables.feedback.weights) is not None:
         return
-    works = next((n for n in _longer(length) if _stable_at(controller, n)), None)
-    what = f"the recursion cut off at length {length} is unstable, or too near to it for a bound"
-    raise PlanError(controller.name, what, f"use a length of {works}" if works else _OTHERWISE)
+    try:
+        outside = poles_outside(tables.feedback.weights)
+    except UnprovenStability:
+        outside = 0
+    if not outside:
+        what = "the recursion is so near to instability that nothing bounds it"
+        raise PlanError(controller.name, what, "check the signs in den, or lengthen sample_time")
+    what = f"the recursion cut off at length {length} is unstable ({outside} poles outside the unit circle)"
+    raise PlanError(controller.name, what, _remedy(controller, length))
 
 
-def _longer(length: int):
-    """Lengths to try: up in octaves, then down."""
-    up = [length << n for n in range(1, 12) if length << n <= 1 << 16]
-    return up + [length >> n for n in range(1, 12) if length >> n >= 1]
-
-
-def _stable_at(controller: Controller, length: int) -> bool:
-    return inverse(fold(controller, length).feedback.weights) is not None
+def _remedy(controller: Controller, length: int) -> str:
+    den = TransferFunction(((1.0, 0.0),), realise(controller).den)
+    works = shortest_stable_length(den, controller.sample_time, length)
+    return f"use a length of {works}" if works else "check the signs in den: no longer memory helps"
