@@ -6,7 +6,12 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from focgen.fractional.weights import gl_weights, gl_weights_at, short_memory_bias, short_memory_bias_asymptote
+from focgen.fractional.weights import (
+    gl_weights,
+    gl_weights_at,
+    short_memory_bias,
+    short_memory_bias_asymptote,
+)
 
 ORDERS = [0.6, 0.1, 1e-8, 0.5, 1 - 1e-12, 1 + 1e-9, 0.999, 1.2, 1.99, 2.7, 3.5, 17.3]
 NEGATIVE = [-0.4, -0.6, -1.0, -2.3, -1e-6, -9.7]

@@ -1,46 +1,42 @@
 """Pure mathematics of fractional order: transfer functions, weights, exact responses, simulators."""
 
-from focgen.fractional.convert import from_control, from_scipy, to_control, to_scipy
-from focgen.fractional.discrete import (
-    UnprovenStability,
-    UnstableRecursion,
-    gl_frequency_response,
-    inverse_l1_bound,
-    poles_outside,
-    shortest_stable_length,
-)
-from focgen.fractional.responses import mittag_leffler, ramp_response, step_response
-from focgen.fractional.simulation import Convolution, GrunwaldLetnikov, Simulator, gl_operator
-from focgen.fractional.transfer import Term, TransferFunction
-from focgen.fractional.weights import (
-    gl_weights,
-    gl_weights_at,
-    short_memory_bias,
-    short_memory_bias_asymptote,
-)
+from importlib import import_module
 
-__all__ = [
-    "Convolution",
-    "GrunwaldLetnikov",
-    "Simulator",
-    "Term",
-    "TransferFunction",
-    "UnprovenStability",
-    "UnstableRecursion",
-    "from_control",
-    "from_scipy",
-    "gl_frequency_response",
-    "gl_operator",
-    "gl_weights",
-    "gl_weights_at",
-    "inverse_l1_bound",
-    "mittag_leffler",
-    "poles_outside",
-    "ramp_response",
-    "short_memory_bias",
-    "short_memory_bias_asymptote",
-    "shortest_stable_length",
-    "step_response",
-    "to_control",
-    "to_scipy",
-]
+# Where each public name lives; imported on first use, since scipy takes its time.
+_NAMES = {
+    "Convolution": "simulation",
+    "GrunwaldLetnikov": "simulation",
+    "Simulator": "simulation",
+    "Term": "transfer",
+    "TransferFunction": "transfer",
+    "UnprovenStability": "discrete",
+    "UnstableRecursion": "discrete",
+    "from_control": "convert",
+    "from_scipy": "convert",
+    "gl_frequency_response": "discrete",
+    "gl_operator": "simulation",
+    "gl_weights": "weights",
+    "gl_weights_at": "weights",
+    "inverse_l1_bound": "discrete",
+    "mittag_leffler": "responses",
+    "poles_outside": "discrete",
+    "ramp_response": "responses",
+    "short_memory_bias": "weights",
+    "short_memory_bias_asymptote": "weights",
+    "shortest_stable_length": "discrete",
+    "step_response": "responses",
+    "to_control": "convert",
+    "to_scipy": "convert",
+}
+
+__all__ = sorted(_NAMES)
+
+
+def __getattr__(name: str):
+    if name not in _NAMES:
+        raise AttributeError(f"module 'focgen.fractional' has no attribute {name!r}")
+    return getattr(import_module(f"focgen.fractional.{_NAMES[name]}"), name)
+
+
+def __dir__():
+    return __all__

@@ -73,7 +73,7 @@ class Chain:
         return integrating._propagators(np.array([step]))[0, :-1, -1] / step
 
     def _follow(self, state: np.ndarray, step: float, count: int) -> np.ndarray:
-        """Return the output at ``count`` samples from ``state`` on, each doubling by a propagator of its own."""
+        """Return the output at ``count`` samples from ``state`` on, doubling them by one propagator each."""
         lengths = step * 2.0 ** np.arange(max(count - 1, 0).bit_length())
         states = state[:, None]
         if len(self.poles) == 1:

@@ -147,7 +147,7 @@ class _Sector:
         return np.concatenate(found) if found else centres
 
     def _cluster(self, centre: complex, radius: float) -> np.ndarray:
-        """Return the zeros within a circle from the power sums (1/2πi) ∮ (x − c)^k D'/D dx (Delves, Lyness)."""
+        """Return the zeros in a circle, from power sums (1/2πi) ∮ (x − c)^k D'/D dx (Delves and Lyness)."""
         offset = radius * np.exp(2j * math.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE)
         density = self.slope(centre + offset) / self.value(centre + offset) * offset / _CIRCLE
         multiplicity = round(density.sum().real)
