@@ -29,9 +29,12 @@ def from_scipy(system) -> TransferFunction:
     """
     if getattr(system, "dt", None) is not None:
         raise ValueError(f"the system is discrete, with dt = {system.dt}; a continuous one is needed")
-    if isinstance(system, signal.StateSpace) and system.D.shape != (1, 1):
+    if isinstance(system, signal.StateSpace):
         outputs, inputs = system.D.shape
-        raise ValueError(f"the system has {inputs} inputs and {outputs} outputs; one of each is needed")
+        if (inputs, outputs) != (1, 1):
+            raise ValueError(f"the system has {inputs} inputs and {outputs} outputs; one of each is needed")
+        num, den = signal.ss2tf(system.A, system.B, system.C, system.D)
+        return TransferFunction(_terms(num[0]), _terms(den))
     form = system.to_tf()
     if np.ndim(form.num) > 1:
         raise ValueError(f"the system has {len(form.num)} outputs; one is needed")

@@ -103,7 +103,7 @@ def inverse_l1_bound(coefficients) -> float:
         total = math.fsum(np.abs(inverse)) * (1 + 2 * _UNIT)
         residual = _residual(a, inverse)
         if residual < 0.5:
-            bound = min(bound, total / (1.0 - residual) * (1 + 8 * _UNIT))
+            bound = min(bound, float(total / (1.0 - residual) * (1 + 8 * _UNIT)))
         if residual <= _SETTLED:
             break
         size *= 2

@@ -1,0 +1,76 @@
+"""To and from scipy.signal and python-control."""
+
+import sys
+
+import control
+import numpy as np
+import pytest
+from scipy import signal
+
+from focgen.errors import MissingExtra
+from focgen.fractional.convert import from_control, from_scipy, to_control, to_scipy
+from focgen.fractional.transfer import TransferFunction
+
+WHOLE = TransferFunction([(2, 1), (0.5, 0)], [(1, 3), (53.39, 1), (1528, 0)])
+FRACTIONAL = TransferFunction([(1, 0)], [(1.32, 0.6), (1, 0)])
+OMEGA = np.geomspace(0.01, 100, 9)
+
+
+def test_there_and_back():
+    assert from_control(to_control(WHOLE)) == WHOLE
+    assert from_scipy(to_scipy(WHOLE)) == WHOLE
+    scaled = WHOLE * TransferFunction([(1, 0)], [(4, 0)])
+    assert from_control(to_control(scaled)) == scaled
+
+
+def test_they_respond_alike():
+    truth = WHOLE.frequency_response(OMEGA)
+    assert signal.freqresp(to_scipy(WHOLE), OMEGA)[1] == pytest.approx(truth, rel=1e-12)
+    assert to_control(WHOLE)(1j * OMEGA) == pytest.approx(truth, rel=1e-12)
+
+
+@pytest.mark.parametrize("transfer", [TransferFunction([(3, 0)], [(1, 1)]), TransferFunction([(3, -1)])])
+def test_an_integrator_however_written(transfer):
+    assert to_control(transfer)(2j) == pytest.approx(3 / 2j)
+    assert from_scipy(to_scipy(transfer)) == TransferFunction([(3, 0)], [(1, 1)])
+
+
+def test_zero_and_constants():
+    assert from_scipy(to_scipy(TransferFunction([(2.5, 0)]))) == TransferFunction([(2.5, 0)])
+    assert from_control(to_control(TransferFunction([]))).num == ()
+
+
+@pytest.mark.parametrize("form", ["to_tf", "to_zpk", "to_ss"])
+def test_every_form_of_scipy(form):
+    system = getattr(signal.lti([1.0, 2.0], [1.0, 3.0, 4.0]), form)()
+    truth = TransferFunction([(1, 1), (2, 0)], [(1, 2), (3, 1), (4, 0)]).frequency_response(OMEGA)
+    assert from_scipy(system).frequency_response(OMEGA) == pytest.approx(truth, rel=1e-12)
+
+
+def test_state_space_of_control():
+    system = control.ss([[-2.0]], [[1.0]], [[3.0]], [[0.5]])
+    assert from_control(system)(1j) == pytest.approx(3 / (1j + 2) + 0.5)
+
+
+@pytest.mark.parametrize("convert", [to_scipy, to_control])
+def test_the_fractional_order_is_named(convert):
+    with pytest.raises(ValueError, match="order 0.6 is not a whole number"):
+        convert(FRACTIONAL)
+
+
+def test_what_is_not_one_continuous_channel_is_refused():
+    two = [[1.0], [2.0]]
+    with pytest.raises(ValueError, match="discrete"):
+        from_scipy(signal.dlti([1.0], [1.0, 0.5]))
+    with pytest.raises(ValueError, match="discrete"):
+        from_control(control.tf([1.0], [1.0, 0.5], 0.1))
+    with pytest.raises(ValueError, match="2 outputs"):
+        from_scipy(signal.lti([[-1.0]], [[1.0]], two, [[0.0], [0.0]]))
+    with pytest.raises(ValueError, match="2 outputs"):
+        from_control(control.ss([[-1.0]], [[1.0]], two, [[0.0], [0.0]]))
+
+
+def test_without_python_control(monkeypatch):
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(MissingExtra, match=r"pip install 'focgen\[control\]'"):
+        to_control(WHOLE)
