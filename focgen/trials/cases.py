@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.control.controller import Controller
 from focgen.rig.model import Ranges, Rig
 from focgen.trials import excitation
 from focgen.trials.designs import Design, draw_design
@@ -22,13 +23,15 @@ _COARSE, _FINE = 0.01, 0.0025     # s: steps of the calibration and of the logs
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A finished case: the nominal ``rig``, logs as (name, columns by role), and the label of what is true."""
+    """A finished case: the nominal ``rig``, logs as (name, columns by role), the label of
+    what is true, and in closed loop the ideal controller."""
 
     rig: Rig
     logs: list[tuple[str, dict]]
     unseen: list[tuple[str, dict]]
     recorder: Recorder
     label: dict
+    controller: Controller | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +67,15 @@ def _draw_case(assignment: Assignment, signals: str, suite: str, rng: np.random.
     spans = {name: getattr(stage.spans, name) for name in MEASURED}
     recorder = draw_recorder(rng, spans, stage.rig.sample_time)
     effects = design.effects(rng) if design else assignment.effects
-    truth = [_draw_effect(effect, assignment.severity, stage, rng) for effect in effects]
+    truth = [draw_effect(effect, assignment.severity, stage, rng) for effect in effects]
     settings = [setting for setting, _ in truth]
     label = {
         "kind": assignment.kind, "signals": signals, "suite": suite,
-        "truth": _visibility([facts for _, facts in truth], settings, stage, recorder),
+        "truth": visibility([facts for _, facts in truth], settings, stage, recorder),
         "design": design.facts() if design else None,
         "floor": recorder.noise["output"], "noise": recorder.noise,
     }
-    return _play(stage, settings, recorder, _believed(assignment, stage.rig, rng), label, rng)
+    return _play(stage, settings, recorder, believed(assignment, stage.rig, rng), label, rng)
 
 
 def _set_up(assignment, signals, suite, design: Design | None, rng) -> Stage:
@@ -80,14 +83,14 @@ def _set_up(assignment, signals, suite, design: Design | None, rng) -> Stage:
     rig, full = draw_linear(rng, Ts) if assignment.linear else draw_chain(rng, signals, Ts)
     seen = design.experiments(rng, Ts) if design else excitation.SUITES[suite](rng, Ts)
     unseen = excitation.unseen(rng, Ts)
-    clocks = _clocks([*seen, *unseen], Ts, rng)
+    clocks = clocks_of([*seen, *unseen], Ts, rng)
     bare = Stage(rig, full, seen, unseen, clocks, None, None)
     coarse = Trial(bare.commands(seen, _COARSE), clocks[: len(seen)], _COARSE)
     spans = _spans(rig, full, coarse, clocks[-1])
     return replace(bare, spans=spans, coarse=coarse)
 
 
-def _clocks(experiments, Ts: float, rng) -> list[float]:
+def clocks_of(experiments: Sequence[excitation.Experiment], Ts: float, rng: np.random.Generator) -> list[float]:
     """When each experiment begins: after the one before and a rest of 10 to 30 s; whole samples."""
     clocks, now = [], 0.0
     for experiment in experiments:
@@ -112,7 +115,8 @@ def _atmosphere(rig: Rig, span: float) -> float:
     return 5.0 * span
 
 
-def _draw_effect(effect: str, severity: str, stage: Stage, rng) -> tuple[Setting, dict]:
+def draw_effect(effect: str, severity: str, stage: Stage, rng: np.random.Generator) -> tuple[Setting, dict]:
+    """One of the effect's forms, calibrated, and what the label says of it."""
     drawn = draw_form(effect, rng, stage.spans)
     setting, gap = calibrate(drawn, stage.rig, stage.coarse, SEVERITIES[severity])
     facts = {"effect": effect, "stage": drawn.stage, "form": drawn.form.name, "severity": severity,
@@ -120,7 +124,7 @@ def _draw_effect(effect: str, severity: str, stage: Stage, rng) -> tuple[Setting
     return setting, facts
 
 
-def _visibility(truth: list[dict], settings: list[Setting], stage: Stage, recorder: Recorder) -> list[dict]:
+def visibility(truth: list[dict], settings: list[Setting], stage: Stage, recorder: Recorder) -> list[dict]:
     """Add to each effect how much of it the logs can show, beside the others."""
     logged = [name for name in MEASURED if name in stage.rig.signals.columns()]
     if not truth:
@@ -135,7 +139,8 @@ def _visibility(truth: list[dict], settings: list[Setting], stage: Stage, record
     return marked
 
 
-def _believed(assignment: Assignment, rig: Rig, rng) -> Rig:
+def believed(assignment: Assignment, rig: Rig, rng: np.random.Generator) -> Rig:
+    """The nominal rig that the case is given."""
     scatter = {"none": (0.0, 0.0), "parameters": (0.08, 0.2)}.get(assignment.kind, (0.06, 0.15))
     return nominal_of(rig, rng, scatter)
 

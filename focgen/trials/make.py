@@ -20,17 +20,20 @@ import numpy as np
 import tomlkit
 
 import focgen
+from focgen.control.files import controller_text
 from focgen.errors import InputError
 from focgen.output import write_file, write_files
 from focgen.progress import track
 from focgen.rig.files import rig_table
 from focgen.trials.cases import Case, make_case
+from focgen.trials.closed_cases import make_closed_case
 from focgen.trials.excitation import SUITES
-from focgen.trials.plan import KINDS, assignments
+from focgen.trials.plan import CLOSED_KINDS, KINDS, assignments
 from focgen.trials.recording import as_csv
 from focgen.trials.sealing import commitment, sealed
 
-DEFAULT_KINDS = tuple(k for k in KINDS if k != "linear")
+_OPEN = tuple(k for k in KINDS if k != "linear")
+DEFAULT_KINDS = {"full": _OPEN, "short": _OPEN, "closed": CLOSED_KINDS}
 
 
 @dataclass(frozen=True)
@@ -51,12 +54,13 @@ def make(folder: str | Path, *, cases: int = 200, seed: int = 0, signals: str = 
     folder = Path(folder)
     _check(folder, cases, seed, signals, suite)
     root = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite)])
-    plan = assignments(cases, kinds or DEFAULT_KINDS, signals, root)
+    plan = assignments(cases, kinds or DEFAULT_KINDS[suite], signals, suite, root)
     commitments = {}
     for index, assignment in enumerate(track(plan, "trial make"), start=1):
         rng = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite), index])
         number = f"{index:04d}"
-        case = make_case(assignment, signals, suite, rng)
+        closed = suite == "closed"
+        case = make_closed_case(assignment, signals, rng) if closed else make_case(assignment, signals, suite, rng)
         commitments[number] = _write(folder, number, case, _salt(rng))
     made = Made(str(folder), suite, signals, seed, len(plan), commitments)
     facts = {"focgen": focgen.__version__, "suite": suite, "signals": signals, "seed": seed, "commitments": commitments}
@@ -84,9 +88,11 @@ def _write(folder: Path, number: str, case: Case, salt: str) -> str:
     digests = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in unseen.items()}
     label = json.loads(json.dumps({**case.label, "unseen": digests}))
     committed = commitment(salt, label)
-    rig = tomlkit.dumps(rig_table(case.rig))
-    write_files(folder / "cases" / number, {"rig.toml": rig, "commitment.txt": committed + "\n",
-                                            **{f"logs/{name}": text for name, text in logs.items()}})
+    given = {"rig.toml": tomlkit.dumps(rig_table(case.rig)), "commitment.txt": committed + "\n",
+             **{f"logs/{name}": text for name, text in logs.items()}}
+    if case.controller:
+        given["controller.toml"] = controller_text(case.controller)
+    write_files(folder / "cases" / number, given)
     write_files(folder / "sealed" / number, {"label.json": sealed(salt, label),
                                              **{f"unseen/{name}": text for name, text in unseen.items()}})
     return committed

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.errors import InputError
+from focgen.trials.closed import CONTROLLER_EFFECTS
 from focgen.trials.forms import OUTSIDE, VOCABULARY
 
 KINDS = ("single", "pair", "none", "parameters", "outside", "unidentifiable", "linear")
+CLOSED_KINDS = ("single", "none", "parameters", "outside")
 _SHARES = {"single": 0.62, "pair": 0.11, "none": 0.05, "parameters": 0.07, "outside": 0.09,
            "unidentifiable": 0.06}
 
@@ -49,23 +51,26 @@ class Assignment:
         return self.kind in ("pair", "outside", "unidentifiable")
 
 
-def assignments(count: int, kinds: tuple[str, ...], signals: str, rng: np.random.Generator) -> list[Assignment]:
+def assignments(count: int, kinds: tuple[str, ...], signals: str, suite: str,
+                rng: np.random.Generator) -> list[Assignment]:
     """``count`` cases of the given kinds, in the usual shares, shuffled; every effect as often as any other."""
-    unknown = sorted(set(kinds) - set(KINDS))
+    allowed = CLOSED_KINDS if suite == "closed" else KINDS
+    unknown = sorted(set(kinds) - set(allowed))
     if unknown:
-        raise InputError("--kinds", f"has the unknown kind {unknown[0]!r}", f"choose from {', '.join(KINDS)}")
+        raise InputError("--kinds", f"has the unknown kind {unknown[0]!r}", f"choose from {', '.join(allowed)}")
     shares = {kind: _SHARES.get(kind, 0.08) for kind in kinds}
     whole = sum(shares.values())
     quota = {kind: max(1, round(count * share / whole)) for kind, share in shares.items()}
     quota[max(quota, key=quota.get)] += count - sum(quota.values())
-    found = [a for kind, n in quota.items() for a in _of_kind(kind, max(n, 0), signals, rng)]
+    found = [a for kind, n in quota.items() for a in _of_kind(kind, max(n, 0), signals, suite, rng)]
     rng.shuffle(found)
     return found[:count]
 
 
-def _of_kind(kind: str, count: int, signals: str, rng) -> list[Assignment]:
+def _of_kind(kind: str, count: int, signals: str, suite: str, rng) -> list[Assignment]:
     if kind == "single":
-        return _dealt(tuple(VOCABULARY), ("low", "mid", "high"), kind, count, rng)
+        effects = tuple(VOCABULARY) + (3 * CONTROLLER_EFFECTS if suite == "closed" else ())
+        return _dealt(effects, ("low", "mid", "high"), kind, count, rng)
     if kind == "linear":
         return _dealt(_LINEAR, ("mid", "high"), kind, count, rng)
     if kind == "outside":

@@ -182,3 +182,8 @@ void close_loop(chain *c, controller *k, int64_t first, int64_t stop, const doub
         }
     }
 }
+
+/* The controller alone on what it saw: errors and pressures (count) give outputs. */
+void run_controller(controller *k, const double *error, const double *p, double *u, int64_t count) {
+    for (int64_t n = 0; n < count; n++) u[n] = control(k, error[n], p[n]);
+}

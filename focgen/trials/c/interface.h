@@ -60,3 +60,4 @@ void read_samples(chain *c, double *y, int64_t count);
 void close_loop(chain *c, controller *k, int64_t first, int64_t stop, const double *ref, const uint8_t *tick,
                 const double *noise_y, const double *noise_p, double *u, double *p, double *z, double *y,
                 double *seen_y, double *seen_p);
+void run_controller(controller *k, const double *error, const double *p, double *u, int64_t count);
