@@ -39,7 +39,7 @@ def simple(transfer: TransferFunction, **changes) -> Controller:
     return Controller(**{**given, **changes})
 
 
-# ---------------------------------------------------------------------------------------- random controllers
+# ---------------------------------------------------------------------------------- random controllers
 
 
 def _model_inverse(rng, h):
@@ -83,9 +83,8 @@ def _lag(rng, h):
 
 def _oscillator(rng, h):
     time = h * rng.uniform(2.0, 20.0)
-    return TransferFunction(
-        [(time, 1.0), (1.0, 0.0)], [(time**2, 2.0), (rng.uniform(0.3, 2.0) * time, 1.0), (1.0, 0.0)]
-    )
+    den = [(time**2, 2.0), (rng.uniform(0.3, 2.0) * time, 1.0), (1.0, 0.0)]
+    return TransferFunction([(time, 1.0), (1.0, 0.0)], den)
 
 
 def _integrating(rng, h):
@@ -138,13 +137,15 @@ def _random_gain(rng, size: float):
     return GainSchedule(tuple(points.tolist()), tuple(gains.tolist())), (low, high)
 
 
-# ------------------------------------------------------------------------------------------------ scenarios
+# ------------------------------------------------------------------------------------------- scenarios
 
 
 def random_scenario(
     controller: Controller, seed: int, lanes: int = 4, samples: int = 250, wild: bool = False
 ) -> Scenario:
-    """Steps, noise, ramps and rests, resets and tracks, in physical units; ``wild`` leaves the ranges at times."""
+    """Steps, noise, ramps and rests, resets and tracks, in physical units; ``wild`` leaves the ranges at
+    times.
+    """
     rng = np.random.default_rng([seed, 11])
     ranges, shape = controller.ranges, (lanes, samples)
     sched = _signal(rng, ranges.schedule, shape, wild) if controller.scheduled else None

@@ -61,7 +61,9 @@ def test_bounds_hold_for_physical_inputs_anywhere_in_their_ranges(seed):
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_bounds_hold_at_the_worst_input_and_are_not_far_above_it(arithmetic):
-    """The input that makes the largest sum makes large errors too: the bound is within a small factor of them."""
+    """The input that makes the largest sum makes large errors too: the bound is within a small factor of
+    them.
+    """
     controller = seed_controller(300)
     plan, found = build_plan(controller, arithmetic), 0.0
     rng = np.random.default_rng(3)
@@ -79,7 +81,9 @@ def test_bounds_hold_at_the_worst_input_and_are_not_far_above_it(arithmetic):
 
 @pytest.mark.parametrize("arithmetic", ("q15", "q31"))
 def test_the_weights_share_is_what_an_adversary_can_make_of_their_errors(arithmetic):
-    """Σ|ŵ − w| E is reached by e = ±E with the signs of the errors; the bound's part for it is that, and no more."""
+    """Σ|ŵ − w| E is reached by e = ±E with the signs of the errors; the bound's part for it is that, and no
+    more.
+    """
     controller = simple(TransferFunction([(1.0, 0.6)]), length=200)
     plan = build_plan(controller, arithmetic)
     exact = _gl(0.6, 200) * 0.01**-0.6

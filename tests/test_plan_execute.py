@@ -1,7 +1,8 @@
 """The bit-true reference against an interpreter that reads the model's description line by line.
 
 The interpreter steps one sample at a time in Python's unbounded integers (or numpy scalars, one rounding an
-operation), keeps its histories as lists, and checks at every node that the value lies in the range that was proved.
+operation), keeps its histories as lists, and checks at every node that the value lies in the range that was
+proved.
 """
 
 from __future__ import annotations
@@ -197,7 +198,9 @@ def test_reference_equals_the_description(seed, arithmetic):
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_order_one_equals_the_recursion_written_by_hand(arithmetic):
-    """(T s + 1)/s by hand: d_k = c0 e_k + c1 e_{k−1}, u integrates it; in the plan's own numbers, bit for bit."""
+    """(T s + 1)/s by hand: d_k = c0 e_k + c1 e_{k−1}, u integrates it; in the plan's own numbers, bit for
+    bit.
+    """
     controller = seed_controller(transfer=TransferFunction([(1.32, 1.0), (1.0, 0.0)]), gain=40.0)
     plan = build_plan(controller, arithmetic)
     assert plan.error_lags == 1 and plan.direct.taps == 2
@@ -249,7 +252,9 @@ def test_a_zero_and_an_integrator_that_cancel_are_the_average_of_two_samples():
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_reset_is_bumpless(arithmetic):
-    """After reset(r, m, u0) a constant error moves the output at the rate of its steady gain, from u0 on, at once."""
+    """After reset(r, m, u0) a constant error moves the output at the rate of its steady gain, from u0 on, at
+    once.
+    """
     controller = seed_controller(length=50)
     plan = build_plan(controller, arithmetic)
     samples, at = 40, 20

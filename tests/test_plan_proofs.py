@@ -37,7 +37,7 @@ def sums(plan: Plan) -> list[Sum]:
     return [s for s in found if s]
 
 
-# ---------------------------------------------------------------------------------------------------- weights
+# --------------------------------------------------------------------------------------------- weights
 
 
 def test_block_scaling_keeps_the_weights_that_one_scale_loses():
@@ -83,7 +83,7 @@ def test_blocks_far_below_the_total_are_made_coarser_rather_than_shifted_out_of_
     assert all(0 <= b.align <= word.sum_bits - 4 for b in blocks)
 
 
-# ---------------------------------------------------------------------------------------------------- formats
+# --------------------------------------------------------------------------------------------- formats
 
 
 @pytest.mark.parametrize("arithmetic", FIXED)
@@ -147,7 +147,7 @@ def test_a_steady_error_of_one_count_still_moves_the_integrator():
         assert d[-1] * plan.increment.lsb == pytest.approx(gain * plan.error.lsb * 0.005, rel=1e-2)
 
 
-# ------------------------------------------------------------------------------------------------ worst cases
+# ----------------------------------------------------------------------------------------- worst cases
 
 
 def exact_sum(table: Sum, past: np.ndarray, block=None) -> int:
@@ -182,7 +182,7 @@ def test_sums_over_the_error_reach_their_proved_worst_case_and_no_more(seed, ari
 @pytest.mark.parametrize("arithmetic", FIXED)
 @pytest.mark.parametrize("seed", range(10))
 def test_adversarial_runs_stay_within_the_proofs(seed, arithmetic):
-    """Every node's worst input, run: what can be seen from outside is within the proof, and near it for sums."""
+    """Every node's worst input, run: what is seen from outside is within the proof, and near it for sums."""
     plan = planned(seed, arithmetic)
     proofs = {p.node: p.worst for p in plan.proofs}
     recursive_or_drifting = plan.feedback or plan.inner
@@ -204,7 +204,7 @@ def test_the_recursion_comes_near_its_proved_reach():
     assert 0.99 * proved * plan.filtered.lsb <= reached <= proved * plan.filtered.lsb
 
 
-# ---------------------------------------------------------------------------------------------------- refusals
+# -------------------------------------------------------------------------------------------- refusals
 
 
 @pytest.mark.parametrize(

@@ -79,8 +79,8 @@ def _exponent(weights: np.ndarray, largest: int, word: Word) -> int:
     """The finest scale at which every weight and the block's sum fit."""
     magnitude = np.abs(weights)
     room = limit(word.sum_bits) - (1 << (word.sum_bits - _SPARE))
-    by_weight = exponent_for(float(magnitude.max()), word.limit, "weights", "a weight")
-    by_sum = exponent_for(float(magnitude.sum()) * largest, room, "weights", "a sum")
+    by_weight = exponent_for(float(magnitude.max()), word.limit, "[transfer]", "a weight")
+    by_sum = exponent_for(float(magnitude.sum()) * largest, room, "[transfer]", "a sum of weights")
     exponent = max(by_weight, by_sum)
     while int(np.abs(np.rint(weights * 2.0**-exponent)).sum()) * largest > room:
         exponent += 1

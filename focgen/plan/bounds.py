@@ -202,7 +202,7 @@ class _Fixed(_Account):
         """An output's own rounding and that of a limit or a reset's u0 are half a count each."""
         if self.plan.integrator:
             return self.plan.sample_time * operator + self.plan.output.lsb
-        return static + growth + self.plan.output.lsb
+        return max(static + growth, 0.5 * self.plan.output.lsb)
 
 
 def plan_reach(plan: Plan) -> float:

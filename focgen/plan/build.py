@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from focgen.control.controller import ARITHMETICS, Controller
@@ -46,8 +47,19 @@ def _check(controller: Controller, arithmetic: str, length: int) -> None:
         raise PlanError(where, f"the memory length is {length!r}", f"give 1 to {_LONGEST} past samples")
     if controller.memory != "short":
         raise PlanError(where, f"the memory form {controller.memory!r} has no plan", 'set memory = "short"')
+    if not all(map(math.isfinite, _numbers(controller))) or controller.sample_time <= 0.0:
+        raise PlanError(
+            where, "has a number that is not finite, or a sample_time that is not positive", "correct it"
+        )
     if controller.scheduled and controller.ranges.schedule is None:
         raise PlanError(where, "the scheduling signal has no range", "give ranges.schedule")
+
+
+def _numbers(controller: Controller) -> list[float]:
+    ranges, gain = controller.ranges, controller.gain
+    spans = [s for s in (ranges.reference, ranges.measurement, ranges.output, ranges.schedule) if s]
+    gains = [*gain.breakpoints, *gain.gains] if controller.scheduled else [gain]
+    return [controller.sample_time, *gains, *(x for span in spans for x in span)]
 
 
 _NOTHING_YET = ErrorBound(float("inf"), float("inf"), None)

@@ -58,6 +58,7 @@ A history sum is split into blocks of taps, each with weights of its own scale. 
 and is exact; total = Σ_blocks shift(block sum, align), so all blocks meet at the lsb of ``Sum.total``. A
 proof in ``proofs`` says for each of these nodes that it cannot overflow, so the order does not matter. Every
 narrowing (v, u) saturates to the ends of its type all the same; the proofs say that in range it never has to.
+Additions to an integral (z, I) are made in the type of its state, r and d widened to it.
 
 Floating point
 --------------

@@ -113,7 +113,7 @@ class _Ledger:
         if plan.integrator:
             state = plan.integrator.state
             half = (1 << plan.integrator.to_output) >> 1
-            self.add("integrator sum", span(state) + d + d, state.ctype, "clamp", half)
+            self.add("integrator sum", span(state).hull(0) + d + d, state.ctype, "clamp", half)
         self.add("output", span(plan.output), plan.output.ctype, "clamp")
 
 

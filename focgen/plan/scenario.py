@@ -68,14 +68,15 @@ class Trace:
 
 
 def nearest_raw(values, form: Format) -> np.ndarray:
-    """Physical values as raw ones, any shape: the nearest count, halves away from zero, or the floating
-    value.
+    """Physical values as raw ones, any shape: the nearest count of the type, halves away from zero, or the
+    floating value.
     """
     if form.floating:
         return np.asarray(values, dtype=np.float32 if form.ctype == "float" else np.float64)
     scaled = np.asarray(values, dtype=float) / form.lsb
-    whole = np.floor(np.abs(scaled))
-    return np.copysign(whole + (np.abs(scaled) - whole >= 0.5), scaled).astype(np.int64)
+    whole, top = np.floor(np.abs(scaled)), 1 << (form.bits - 1)
+    nearest = np.copysign(whole + (np.abs(scaled) - whole >= 0.5), scaled)
+    return np.clip(nearest, -top, top - 1).astype(np.int64)
 
 
 def to_raw(plan: Plan, physical: Scenario) -> Scenario:

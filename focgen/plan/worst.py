@@ -14,7 +14,7 @@ _SETTLED = 8  # memory lengths after which a recursion's response is taken to ha
 
 
 def worst_case_input(plan: Plan, node: str) -> Scenario:
-    """Raw inputs whose last sample takes ``node`` (a name from ``plan.proofs``; floating: v) to its worst case.
+    """Raw inputs whose last sample takes ``node`` (one of ``plan.proofs``; floating: v) to its worst case.
 
     Two lanes: towards the highest value and towards the lowest. A sum over the error is reached exactly;
     behind a recursion as far as a finite input can. Raises PlanError for a node the plan does not have.
