@@ -75,7 +75,7 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
         low, high = self.own.bounds()
-        nuisance = [0.75] if self.has_offset else [0.75, 0.03]
+        nuisance = [1.0] if self.has_offset else [1.0, 0.03]
         low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
         for clue in self.clues:
             for p in clue.form.parameters:
@@ -114,7 +114,7 @@ class Problem:
         """The segment's output (n,), in the log's units."""
         chain = Chain(self.rig(vector), self.placed(vector), self.memory)
         own, segment = len(self.own_start), self.segment
-        zero = 0.0 if self.has_offset else vector[own + 1] * self.references.levels["reading"]
+        zero = 0.0 if self.has_offset else vector[own + 1] * segment.level_out
         x = self._aligned(float(vector[own]))
         return chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held) + zero
 

@@ -1,0 +1,29 @@
+"""From separations to probabilities, by a map fitted on cases whose cause was known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from focgen.diagnosis.explain import Rival
+
+SET_WITHIN = 2.0  # separations below this leave a rival in the set
+CLOSE = 0.5  # and it must reach this part of the best one's evidence,
+NEAR = 8.0  # or fall short of it by no more than these nats
+TEMPER = 1.0  # weight of a rival: exp(-TEMPER · max(z, 0)^POWER)
+POWER = 1.0
+ELSEWHERE = 0.03  # probability that the cause is none of the candidates
+
+
+def tied(rivals: Sequence[Rival]) -> tuple[Rival, ...]:
+    """The rivals that the data cannot tell from the best, the best first."""
+    best = rivals[0].gain
+    return tuple(r for r in rivals if r.separation < SET_WITHIN and (r.gain > CLOSE * best or best - r.gain < NEAR))
+
+
+def confidences(rivals: Sequence[Rival]) -> np.ndarray:
+    """The probability of every rival; they sum to less than 1."""
+    z = np.array([max(r.separation, 0.0) for r in rivals])
+    weight = np.exp(-TEMPER * z**POWER)
+    return (1.0 - ELSEWHERE) * weight / weight.sum()

@@ -1,0 +1,70 @@
+"""Where the gap between a rig and its model lies, which effect causes it, and how far it shrinks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from focgen.diagnosis import compose, verdict
+from focgen.diagnosis.explain import Explanation, explain
+from focgen.diagnosis.model import Diagnosis
+from focgen.diagnosis.segments import cuts, make
+from focgen.diagnosis.smooth import freed
+from focgen.errors import LogError
+from focgen.logs.experiment import Experiment
+from focgen.progress import say
+from focgen.rig.files import read_rig
+from focgen.rig.model import Rig
+from focgen.rig.replay import experiments
+
+THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
+
+
+def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out: str | Path | None = None,
+             controller: str | Path | None = None, first: float | None = None, last: float | None = None,
+             bootstrap: int = 0) -> Diagnosis:
+    """Diagnose the gap between the nominal rig and its logs, one session of one rig.
+
+    ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures; ``controller``: of
+    closed-loop logs, whose own departures are then looked for too; ``first``, ``last``: s within each experiment;
+    ``bootstrap``: sessions simulated from the nominal rig to set the threshold of evidence by (0: the built-in one).
+    Raises RigError, LogError, ControllerError for files that cannot be used.
+    """
+    rig = rig if isinstance(rig, Rig) else read_rig(rig)
+    logs = _usable(experiments(rig, logs, first, last))
+    explanations = explain_all(rig, logs, THRESHOLD)
+    rigs = compose.compose(rig, explanations)
+    diagnosis, evidence = verdict.reach(rig, logs, rigs, explanations)
+    if out is not None:
+        from focgen.diagnosis.write import write
+
+        write(out, diagnosis, evidence, rigs, logs)
+    return diagnosis
+
+
+def _usable(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    for log in logs:
+        if "output" not in log:
+            raise LogError(log.name, "has no output", "name its column in [signals]")
+        if not any(role in log for role in ("command", "pressure")):
+            raise LogError(log.name, "has neither command nor pressure", "name the column of the input in [signals]")
+        bad = [role for role, values in log.signals.items() if not np.all(np.isfinite(values))]
+        if bad and bad[0] != "reference":
+            raise LogError(log.name, f"has gaps in {bad[0]}", "cut them out with --from and --to")
+    if sum(map(len, logs)) < 40:
+        raise LogError(logs[0].name, "has too few samples to diagnose", "record at least 40 samples")
+    return tuple(logs)
+
+
+def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float) -> tuple[Explanation, ...]:
+    """Explain segment after segment, each on what the one before it gives freed of noise."""
+    roles, x, found = cuts(logs), None, []
+    for entry, exit in zip(roles, roles[1:]):
+        segment = make(logs, entry, exit, x)
+        say(f"{entry} to {exit}")
+        found.append(explain(rig, segment, logs, threshold))
+        best = found[-1].best
+        x = freed(segment, best.problem.simulate(best.vector), best.problem.references.clocks["response"])
+    return tuple(found)

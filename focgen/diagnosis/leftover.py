@@ -1,0 +1,79 @@
+"""Whether what a model leaves depends on what was done to the rig, and on what of it.
+
+Noise cannot be foretold from the input. A flexible regression on level, rate, direction, history and time, fitted on some
+stretches and scored on others, can foretell only what a model should have explained.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.diagnosis.segments import Segment
+from focgen.rig import kernels
+
+_POINTS = 6000
+_FOLDS = 8
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """``share``: the part of the residual's mean square that inputs foretell, 0 … 1; ``depends``: that part by the group
+    of regressors (level, rate, direction, history, time)."""
+
+    share: float
+    depends: dict[str, float]
+
+
+def _groups(segment: Segment, response: float) -> dict[str, np.ndarray]:
+    """Regressors (n, k) by what they stand for, of order one."""
+    x, run = segment.x / segment.level_in, segment.run
+    lags = [kernels.lag(x, run.rest, run.h, tau, tau) for tau in response * np.array([0.05, 0.2, 1.0, 4.0, 16.0])]
+    slow, quick = lags[2], lags[0]
+    rate = (x - lags[1]) * 3
+    direction = np.tanh(20 * (lags[0] - lags[1]))
+    play = [kernels.play(x, run.rest, w) - x for w in (0.03, 0.1, 0.25)]
+    most = np.maximum.accumulate(np.abs(x))
+    clock = (run.clock - run.clock[0]) / max(run.clock[-1] - run.clock[0], run.h)
+    knots = [np.maximum(slow - k, 0.0) for k in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)]
+    quick_knots = [np.maximum(quick - k, 0.0) for k in (0.25, 0.5, 0.75)]
+    edges = [np.maximum(rate, 0.0), np.minimum(rate, 0.0), np.abs(rate) * rate, rate * slow]
+    return {
+        "level": np.stack([slow, slow**2, quick, *knots, *quick_knots], axis=1),
+        "rate": np.stack([x - a for a in lags] + edges, axis=1),
+        "direction": np.stack([direction, direction * slow, *play], axis=1),
+        "history": np.stack([lags[3], lags[4], most, most * slow, lags[4] * slow], axis=1),
+        "time": np.stack([clock, clock**2, clock**3, clock * slow, clock**2 * slow], axis=1),
+    }
+
+
+def leftover(segment: Segment, residual: np.ndarray, response: float) -> Leftover:
+    """What of ``residual`` (n,) the segment's input foretells; ``response`` in s."""
+    thin = max(1, len(residual) // _POINTS)
+    groups = {k: _thinned(v, thin) for k, v in _groups(segment, response).items()}
+    target = _thinned(residual[:, None], thin)[:, 0]
+    columns = [np.ones((len(target), 1)), *groups.values()]
+    share = _foretold(np.hstack(columns), target)
+    depends = {name: max(0.0, _foretold(np.hstack([columns[0], v]), target)) for name, v in groups.items()}
+    return Leftover(max(share, *depends.values(), 0.0), depends)
+
+
+def _thinned(values: np.ndarray, thin: int) -> np.ndarray:
+    count = len(values) // thin
+    return values[: count * thin].reshape(count, thin, -1).mean(axis=1)
+
+
+def _foretold(matrix: np.ndarray, target: np.ndarray) -> float:
+    """1 − (error on stretches not fitted)/(mean square), stretches interleaved so that each fold sees the whole session."""
+    stretch = max(8, len(target) // (12 * _FOLDS))
+    fold = (np.arange(len(target)) // stretch) % _FOLDS
+    scale = np.sqrt(np.mean(matrix**2, axis=0)) + 1e-12
+    matrix, error = matrix / scale, np.zeros(len(target))
+    normal, slope = matrix.T @ matrix, matrix.T @ target
+    for f in range(_FOLDS):
+        out = fold == f
+        part, right = matrix[out], target[out]
+        left = normal - part.T @ part + 1e-3 * len(target) * np.eye(len(slope)) * 0.1
+        error[out] = right - part @ np.linalg.solve(left, slope - part.T @ right)
+    return float(1.0 - np.mean(error**2) / max(np.mean(target**2), 1e-300))

@@ -1,0 +1,97 @@
+"""What a diagnosis says, as it stands in ``diagnosis.json``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter with its 95 % interval, in ``unit``."""
+
+    value: float
+    ci95: Interval
+    unit: str
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that may be the cause. ``confidence``: probability; ``separation``: standard deviations behind the best."""
+
+    effect: str
+    confidence: float
+    form: str
+    parameters: dict[str, Estimate]
+    separation: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """One effect found, in ``stage``: its candidates, likeliest first; ``shrink``: the share lost when it is left out."""
+
+    stage: str
+    candidates: tuple[Candidate, ...]
+    shrink: float
+    shrink_interval: Interval
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Root-mean-square errors of the output, experiments counted alike, in ``unit``; ``gof`` the same as eq. (4)."""
+
+    as_given: float
+    refitted: float
+    explained: float
+    floor: float
+    unit: str
+    gof: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Where:
+    """``stage``: the one that carries the gap, or None; ``inferred``: without its own signals; ``share`` by stage."""
+
+    stage: str | None
+    inferred: bool
+    share: dict[str, float]
+    regimes: dict[str, object]
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """What would tell the rivals apart; ``expected_separation`` in standard deviations."""
+
+    why: str
+    what: str
+    expected_separation: float
+    inputs: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer to where, which and how far. Files are named relative to ``--out``."""
+
+    verdict: str
+    where: Where
+    causes: tuple[Found, ...]
+    gap: Gap
+    shrink: float | None
+    shrink_interval: Interval | None
+    refitted_rig: str
+    augmented_rig: str
+    next_experiment: NextExperiment | None
+    unexplained: dict[str, object]
+    tied: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the pictures are drawn from: signals by experiment (as given, refitted, explained), explanations by segment."""
+
+    simulated: dict[str, list[dict[str, np.ndarray]]]
+    explanations: tuple

@@ -1,0 +1,20 @@
+"""A measured signal freed of its noise, to be the next stage's input.
+
+Noise in an input looks like a lag of the stage behind it. What the stage before is simulated to give is free of noise; what
+it lacks is added back, smoothed by the colour of the noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from focgen.diagnosis.segments import Segment
+
+
+def freed(segment: Segment, simulated: np.ndarray, response: float) -> np.ndarray:
+    """The segment's output: as simulated, plus the residual below the pace of the rig; ``response`` in s."""
+    width = max(4.0, 0.15 * response / segment.run.h)
+    residual = segment.parts(segment.y - simulated)
+    slow = [gaussian_filter1d(part, min(width, len(part) / 6), mode="nearest") for part in residual]
+    return simulated + np.concatenate(slow)

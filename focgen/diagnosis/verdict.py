@@ -1,0 +1,166 @@
+"""The verdict: what the explanations of all segments amount to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from focgen.diagnosis import compose
+from focgen.diagnosis.confidence import confidences, tied
+from focgen.diagnosis.explain import Cause, Explanation, problem_residual
+from focgen.diagnosis.fit import Weighing, fit
+from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, Where
+from focgen.diagnosis.search import evidence as nats
+from focgen.diagnosis.shrink import Shrink, predict
+from focgen.diagnosis.where import locate, stage_shares
+from focgen.logs.experiment import Experiment
+from focgen.rig.engine import slot_in
+from focgen.rig.model import Rig
+from focgen.rig.replay import goodness
+
+UNEXPLAINED = 0.5  # of what could be explained: beyond it no effect of the library is the cause
+LEFT = 0.04  # of a residual's mean square foretold by inputs: beyond it something is there
+_PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
+
+
+def reach(rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs,
+          explanations: Sequence[Explanation]) -> tuple[Diagnosis, Evidence]:
+    """The diagnosis and what its pictures need."""
+    causes = [(e, c) for e in explanations for c in e.causes]
+    unknown = [e for e in explanations if is_unknown(e)]
+    if unknown:
+        rigs = _without(rigs, causes, unknown)
+        causes = [(e, c) for e, c in causes if e not in unknown]
+    made = {"as given": compose.simulated(rig, (), logs), "refitted": compose.simulated(rigs.refitted, (), logs),
+            "explained": compose.simulated(rigs.fitted, rigs.placed, logs)}
+    floor = _floor(explanations[-1])
+    squares = {name: compose.squares(logs, m) for name, m in made.items()}
+    floor = min(floor, float(np.mean(squares["explained"])))
+    total = predict(squares["refitted"], squares["explained"], floor) if causes else None
+    found = _ordered([_found(e, c, rigs, logs, squares, floor) for e, c in causes])
+    word = _word(found, unknown, explanations)
+    shares = stage_shares(found, unknown, word)
+    diagnosis = Diagnosis(
+        word, locate(explanations, shares, found, unknown, word), found, _gap(rig, logs, made, squares, floor),
+        total.value if total else None, total.interval if total else None, "refitted.toml", "augmented.toml", None,
+        _description(unknown), (), tuple(note for log in logs for note in log.notes))
+    return diagnosis, Evidence(made, tuple(explanations))
+
+
+def is_unknown(e: Explanation) -> bool:
+    """Whether most of what inputs foretell of the nominal residual is still there after the effects."""
+    if e.left.share < LEFT:
+        return False
+    noise = np.mean(problem_residual(e.best) ** 2) * (1 - e.left.share)
+    could = np.mean(problem_residual(e.nominal) ** 2) - noise
+    return bool(np.mean(problem_residual(e.best) ** 2) - noise > UNEXPLAINED * could)
+
+
+def _without(rigs: compose.Rigs, causes, unknown) -> compose.Rigs:
+    lost = {(c.rivals[0].effect, c.rivals[0].stage) for e, c in causes if e in unknown}
+    kept = tuple(p for p in rigs.placed if (p.effect, p.stage) not in lost)
+    return compose.Rigs(rigs.refitted, rigs.fitted if kept else rigs.refitted, kept)
+
+
+def _floor(last: Explanation) -> float:
+    """The noise's mean square at the output: what is left there, less what inputs foretell of it."""
+    parts = last.segment.parts(problem_residual(last.best))
+    return float(np.mean([np.mean(p**2) for p in parts]) * (1 - last.left.share))
+
+
+def _word(found, unknown, explanations) -> str:
+    if found:
+        return "named" if all(len(f.candidates) == 1 for f in found) else "set"
+    if unknown:
+        return "unknown"
+    return "parameters" if any(_moved(e) for e in explanations) else "none"
+
+
+def _moved(e: Explanation) -> bool:
+    """Whether refitting the own parameters closed a gap beyond the noise."""
+    own = len(e.nominal.problem.own_start)
+    if not own:
+        return False
+    weighing = Weighing(e.ar)
+    given = fit(e.nominal.problem, e.given, weighing, 0)
+    visible = np.mean(problem_residual(given) ** 2) > 1.01 * np.mean(problem_residual(e.nominal) ** 2)
+    return bool(visible and nats(e.nominal, given) - 0.5 * own * np.log(len(given.innovations)) > _PARAMETERS)
+
+
+def _found(e: Explanation, cause: Cause, rigs: compose.Rigs, logs, squares, floor: float) -> Found:
+    kept = tied(cause.rivals)
+    sure = confidences(cause.rivals)[: len(kept)]
+    name = cause.rivals[0].effect
+    others = tuple(p for p in rigs.placed if not (p.effect == name and p.stage == cause.rivals[0].stage))
+    share = _share_lost(e, cause, rigs, others, logs, squares, floor)
+    candidates = tuple(_candidate(r, float(p)) for r, p in zip(kept, sure))
+    return Found(cause.rivals[0].stage, candidates, share.value, share.interval)
+
+
+def _share_lost(e, cause, rigs, others, logs, squares, floor) -> Shrink:
+    """The total shrink times the cause's share of its segment's."""
+    total = predict(squares["refitted"], squares["explained"], floor) or Shrink(0.0, (0.0, 0.0))
+    if not others:
+        return total
+    without = compose.squares(logs, compose.simulated(rigs.fitted, others, logs))
+    lost = predict(np.maximum(squares["refitted"], 0), np.maximum(squares["explained"], 0), floor)
+    could = max(float(np.mean(squares["refitted"])) - floor, 1e-300)
+    value = float(np.clip((np.mean(np.minimum(without, squares["refitted"])) - np.mean(squares["explained"])) / could, 0, 1))
+    wide = (lost.interval[1] - lost.interval[0]) / 2 if lost else 0.1
+    return Shrink(value, (max(value - wide, -1.0), min(value + wide, 1.0)))
+
+
+def _candidate(rival, confidence: float) -> Candidate:
+    problem, clue = rival.fit.problem, rival.fit.problem.clues
+    places = [i for i, c in enumerate(clue) if c.effect == rival.effect]
+    parameters = {}
+    for i in places:
+        prefix = "" if i == places[0] else f"{clue[i].form.name}."
+        parameters |= {prefix + k: v for k, v in estimates(rival.fit, i).items()}
+    return Candidate(rival.effect, confidence, clue[places[0]].form.name, parameters, float(rival.separation))
+
+
+def estimates(of, which: int) -> dict[str, Estimate]:
+    """A clue's parameters with 95 % intervals from the fit's information, in the log's units."""
+    problem, clue = of.problem, of.problem.clues[which]
+    place = problem.head + sum(len(c.form.parameters) for c in problem.clues[:which])
+    sigma = of.sse / max(len(of.innovations) - len(of.vector), 1)
+    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(of.information)) * sigma, 0.0))
+    found = {}
+    for i, parameter in enumerate(clue.form.parameters):
+        v, s = of.vector[place + i], 1.96 * spread[place + i]
+        scale = problem.references.scale(parameter, slot_in(clue.form, clue.stage))
+        ends = [float(scale * (np.exp(np.clip(e, -60, 60)) if parameter.log else e)) for e in (v - s, v, v + s)]
+        found[parameter.name] = Estimate(ends[1], (ends[0], ends[2]), _unit(parameter, slot_in(clue.form, clue.stage)))
+    return found
+
+
+def _unit(parameter, slot: str) -> str:
+    level = {"command": "command", "supply": "pressure", "load": "pressure", "reading": "output"}.get(slot, "curvature")
+    words = [f"{level} unit^{parameter.level:g}" if parameter.level not in (0, 1) else f"{level} unit" * parameter.level,
+             f"s^{parameter.time:g}" if parameter.time not in (0, 1) else "s" * parameter.time]
+    return " ".join(w for w in words if w)
+
+
+def _ordered(found: Sequence[Found]) -> tuple[Found, ...]:
+    return tuple(sorted(found, key=lambda f: -f.shrink))
+
+
+def _gap(rig: Rig, logs, made, squares, floor: float) -> Gap:
+    rms = {name: float(np.sqrt(np.mean(v))) for name, v in squares.items()}
+    gof = {name: float(np.mean([goodness(log["output"], m["output"]) for log, m in zip(logs, parts)]))
+           for name, parts in made.items()}
+    spread = [np.std(log["output"]) for log in logs]
+    gof["possible"] = float(np.mean([1 - np.sqrt(floor) / s for s in spread if s > 0] or [0.0]))
+    return Gap(rms["as given"], rms["refitted"], rms["explained"], float(np.sqrt(floor)), rig.signals.output, gof)
+
+
+def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
+    """What the residual that no effect explains depends on."""
+    found = {}
+    for e in unknown:
+        parts = {k: v for k, v in e.left_nominal.depends.items() if v > 0.02}
+        found[f"{e.segment.entry} to {e.segment.exit}"] = {
+            "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"], "share": e.left_nominal.share}
+    return found

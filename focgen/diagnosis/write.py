@@ -1,0 +1,31 @@
+"""``diagnosis.json``, the two rigs, and the pictures where matplotlib is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+import tomlkit
+
+from focgen.diagnosis.compose import Rigs
+from focgen.diagnosis.model import Diagnosis, Evidence
+from focgen.logs.experiment import Experiment
+from focgen.output import write_files
+from focgen.rig.files import rig_table
+
+
+def write(out: str | Path, diagnosis: Diagnosis, evidence: Evidence, rigs: Rigs, logs: Sequence[Experiment]) -> None:
+    """Write all files into ``out``, or none."""
+    from focgen.cli.outcome import to_json
+
+    files: dict[str, str | bytes] = {
+        "diagnosis.json": to_json(diagnosis),
+        diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
+        diagnosis.augmented_rig: tomlkit.dumps(rig_table(rigs.augmented(logs))),
+    }
+    if find_spec("matplotlib"):
+        from focgen.report.diagnosis import pictures
+
+        files |= pictures(diagnosis, evidence, logs)
+    write_files(out, files)

@@ -1,0 +1,129 @@
+"""A rig, effects included, run on logged inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from focgen.errors import LogError, RigError
+from focgen.logs.experiment import Experiment
+from focgen.logs.read import read_logs
+from focgen.rig.effects import Run, library
+from focgen.rig.engine import STAGES, Chain, Placed
+from focgen.rig.files import read_rig
+from focgen.rig.model import Rig
+
+_LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
+_BESIDES = ("name", "form", "stage", "clock", "carried")
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """One experiment: ``gof`` of the output, eq. (4) of the paper; ``rmse`` of the output and of every signal simulated
+    and logged, in their units."""
+
+    gof: float
+    rmse: float
+    rmse_by_signal: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Replay:
+    """``logs``: every experiment by its name. ``simulated``: its signals, shape (n,), by role."""
+
+    logs: dict[str, Replayed]
+    simulated: dict[str, dict[str, np.ndarray]]
+
+
+def replay(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], first: float | None = None,
+           last: float | None = None) -> Replay:
+    """Run the rig on each experiment's ``command`` where it is logged, else on its ``pressure``.
+
+    The experiments are one session and follow the one the rig's effects were found in. ``first``, ``last``: s within
+    each experiment. Raises RigError for effects unknown, LogError for logs that cannot be used.
+    """
+    rig = rig if isinstance(rig, Rig) else read_rig(rig)
+    logs = experiments(rig, logs, first, last)
+    simulated = simulate_session(rig, logs)
+    results = {log.name: _compared(log, made) for log, made in zip(logs, simulated)}
+    return Replay(results, {log.name: made for log, made in zip(logs, simulated)})
+
+
+def experiments(rig: Rig, logs: Sequence[Experiment | str | Path], first=None, last=None) -> tuple[Experiment, ...]:
+    """The logs read, and cut to ``first`` … ``last`` s."""
+    if logs and all(isinstance(log, Experiment) for log in logs):
+        return tuple(log.between(first, last) for log in logs)
+    return read_logs(logs, rig.signals, rig.sample_time, first, last)
+
+
+def simulate_session(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] | None = None,
+                     continues: bool = True) -> list[dict[str, np.ndarray]]:
+    """The signals that each experiment should show, by role; ``continues``: after the session the rig's effects left."""
+    entry = "command" if all("command" in log for log in logs) else "pressure"
+    if not all(entry in log for log in logs):
+        raise LogError(logs[0].name, "has neither command nor pressure throughout", "name an input in [signals]")
+    clock = _clock(rig) if continues else 0.0
+    begin = min(log.start for log in logs)
+    ahead = clock if begin < clock else 0.0
+    run = Run.of([len(log) for log in logs], [log.start + ahead for log in logs], logs[0].sample_time,
+                 _carried(rig) if continues else {})
+    tap: dict[str, np.ndarray] = {}
+    x = np.concatenate([np.asarray(log[entry], float) for log in logs])
+    first = "regulator" if entry == "command" else "actuator"
+    Chain(rig, tuple(placed_in(rig) if placed is None else placed)).run(x, first, "sensor", run, entry == "command", tap)
+    return [{_LEAVES[stage]: y[a:b] for stage, y in tap.items()} for a, b in run.spans]
+
+
+def placed_in(rig: Rig) -> tuple[Placed, ...]:
+    """The rig's ``[[effects]]``. Raises RigError where one is unknown or lacks a parameter."""
+    return tuple(_placed(rig, table) for table in rig.effects)
+
+
+def _placed(rig: Rig, table) -> Placed:
+    effect = library().get(table["name"])
+    if effect is None:
+        raise RigError(f"{rig.name} [[effects]]", f"names the unknown effect {table['name']!r}",
+                       f"known: {', '.join(library())}")
+    form = next((f for f in effect.forms if f.name == table.get("form", f.name)
+                 and all(p.name in table for p in f.parameters)), None)
+    if form is None:
+        known = "; ".join(f"{f.name}: {', '.join(p.name for p in f.parameters)}" for f in effect.forms)
+        raise RigError(f"{rig.name} [[effects]] {effect.name}", "has no form with these parameters", f"give one of {known}")
+    stage = table.get("stage", effect.stage)
+    strange = set(table) - {p.name for p in form.parameters} - set(_BESIDES)
+    if stage not in STAGES or strange:
+        what = f"has the stage {stage!r}" if stage not in STAGES else f"has the unknown key {sorted(strange)[0]!r}"
+        raise RigError(f"{rig.name} [[effects]] {effect.name}", what, f"stages are {', '.join(STAGES)}")
+    return Placed(effect.name, form, stage, tuple(float(table[p.name]) for p in form.parameters))
+
+
+def _clock(rig: Rig) -> float:
+    return max((float(table.get("clock", 0.0)) for table in rig.effects), default=0.0)
+
+
+def _carried(rig: Rig) -> dict[str, float]:
+    return {k: float(v) for table in rig.effects for k, v in table.get("carried", {}).items()}
+
+
+def effect_tables(placed: Sequence[Placed], left: dict[str, dict], clock: float) -> tuple[dict, ...]:
+    """Effects as ``[[effects]]`` tables, with what outlives the session: ``left`` by effect, its ``clock`` in s."""
+    tables = []
+    for p in placed:
+        table = {"name": p.effect, "form": p.form.name, "stage": p.stage,
+                 **{q.name: float(v) for q, v in zip(p.form.parameters, p.values)}, "clock": float(clock)}
+        tables.append(table | ({"carried": left[p.effect]} if left.get(p.effect) else {}))
+    return tuple(tables)
+
+
+def goodness(measured: np.ndarray, simulated: np.ndarray) -> float:
+    """1 − |measured − simulated| / |measured − mean|, eq. (4) of the paper; −inf where nothing varies."""
+    spread = float(np.linalg.norm(measured - np.mean(measured)))
+    return 1.0 - float(np.linalg.norm(measured - simulated)) / spread if spread else -np.inf
+
+
+def _compared(log: Experiment, made: dict[str, np.ndarray]) -> Replayed:
+    rmse = {role: float(np.sqrt(np.mean((log[role] - y) ** 2))) for role, y in made.items() if role in log}
+    return Replayed(goodness(log["output"], made["output"]), rmse["output"], rmse)
