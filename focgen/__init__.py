@@ -12,10 +12,12 @@ __version__ = "0.1.0"
 # Where each function lives; imported on first use, so that `import focgen` is quick.
 _FUNCTIONS = {
     "identify": "focgen.identification.identify",
-    "design": "focgen.control.design",
-    "simulate": "focgen.control.simulate",
+    "design": "focgen.loop.design",
+    "simulate": "focgen.loop.simulate",
     "generate": "focgen.codegen.generate",
     "verify": "focgen.verification.verify",
+    "diagnose": "focgen.diagnosis.diagnose",
+    "replay": "focgen.rig.replay",
     "demo": "focgen.demo",
     "read_logs": "focgen.logs.read",
     "read_rig": "focgen.rig.files",
