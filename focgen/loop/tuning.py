@@ -47,13 +47,18 @@ class Wish:
 
 @dataclass(frozen=True)
 class Bench:
-    """Steps from rest to the operating points: the rig, where it rests, the set points, and how the loop runs."""
+    """Steps from rest to the operating points, and how the loop runs.
+
+    ``start``: where the rig rests; ``points``: nearest first; ``ranges``: the controller's; ``span``: the pressures
+    between which the gain is scheduled, held beyond; ``delay``: of the computation, samples; ``pressure_known``:
+    whether the rig measures the pressure.
+    """
 
     rig: Rig
     start: Equilibrium
     points: tuple[Equilibrium, ...]
     ranges: ControllerRanges
-    lowest: float
+    span: tuple[float, float]
     delay: int
     pressure_known: bool
 
@@ -144,10 +149,9 @@ def simulate_lines(bench: Bench, inversion: Inversion, lines: list[Line], prepar
     count, samples, h = len(bench.points), prepared.samples, prepared.sample_time
     level = np.repeat([line.intercept for line in lines], count)
     slope = np.repeat([line.slope for line in lines], count)
-    low, high = bench.lowest, _highest(bench)
 
     def gain(pressure):
-        held = np.clip(pressure, low, high)
+        held = np.clip(pressure, *bench.span)
         return (level + slope * held) / inversion.K(held)
 
     controller = Controller("search", h, inversion.transfer, 1.0, inversion.integrator, bench.ranges)
@@ -156,10 +160,6 @@ def simulate_lines(bench: Bench, inversion: Inversion, lines: list[Line], prepar
     run = run_loop(prepared, stepper, reference, bench.start, bench.delay, bench.pressure_known, curvature=False)
     found = [measure_step(run.output[:, i], h, bench.start.output, reference[0, i]) for i in range(reference.shape[1])]
     return [tuple(found[i : i + count]) for i in range(0, len(found), count)]
-
-
-def _highest(bench: Bench) -> float:
-    return bench.ranges.schedule[1] if bench.ranges.schedule else bench.pressures[-1]
 
 
 def tune(bench: Bench, wish: Wish) -> Tuned:

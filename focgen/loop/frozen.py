@@ -1,0 +1,66 @@
+"""The frozen linear loop: K held at an operating point, continuous, unlimited; its response is exact."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.control.equilibrium import actuator_of
+from focgen.control.margins import Margins, curve, margins
+from focgen.fractional.responses import step_response
+from focgen.fractional.transfer import Polynomial, TransferFunction
+from focgen.rig.model import Actuator, Rig
+
+_INTEGRATOR = TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])
+_SAME = 1e-12  # relative difference of coefficients that cancel
+
+
+def frozen_loop(rig: Rig, controller: Controller, pressure: float) -> TransferFunction:
+    """Return the open loop C(s) R(s) G(s) H(s) with K = K(p) and the controller's gain at ``pressure``.
+
+    Factors that cancel exactly, as the inverse and the model do, are gone.
+    """
+    actuator = actuator_of(rig)
+    still = float(actuator.K(pressure)) if isinstance(actuator, Actuator) else 1.0
+    gain = float(controller.gain_at(pressure)) * still
+    parts = [controller.transfer, rig.regulator, actuator.dynamics, rig.sensor]
+    return _series(parts + [_INTEGRATOR] * controller.integrator) * gain
+
+
+def frozen_step(loop: TransferFunction, t) -> np.ndarray:
+    """Return the closed loop's unit step response at the times ``t`` (s), shape of ``t``."""
+    closed = TransferFunction(loop.num, loop.den + loop.num)
+    return step_response(closed, t)
+
+
+def frozen_margins(loop: TransferFunction, sample_time: float) -> Margins:
+    """Return the margins of the open loop, looked at from 1e-6 to 1e3 times the sampling frequency."""
+    unit = 2.0 * math.pi / sample_time
+    return margins(curve(loop.frequency_response, 1e-6 * unit, 1e3 * unit))
+
+
+def _series(parts: list[TransferFunction]) -> TransferFunction:
+    nums, dens = [part.num for part in parts], [part.den for part in parts]
+    factor = 1.0
+    for num in list(nums):
+        match = next((den for den in dens if len(num) > 1 and _ratio(num, den)), None)
+        if match is not None:
+            factor *= _ratio(num, match)
+            nums.remove(num)
+            dens.remove(match)
+    total = TransferFunction([(factor, 0.0)])
+    for num in nums:
+        total = total * TransferFunction(num)
+    for den in dens:
+        total = total * TransferFunction([(1.0, 0.0)], den)
+    return total
+
+
+def _ratio(num: Polynomial, den: Polynomial) -> float:
+    """num/den where it is a constant, else 0."""
+    if [t.order for t in num] != [t.order for t in den]:
+        return 0.0
+    ratios = [a.coefficient / b.coefficient for a, b in zip(num, den)]
+    return ratios[0] if all(math.isclose(r, ratios[0], rel_tol=_SAME) for r in ratios) else 0.0

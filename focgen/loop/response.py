@@ -1,0 +1,161 @@
+"""Frequency responses of the loop: continuous and exact, or sampled with hold, delay and memory as it will run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.control.equilibrium import actuator_of
+from focgen.control.margins import Curve, Margins, curve, margins
+from focgen.fractional.transfer import TransferFunction
+from focgen.plan.canonical import realise, tables
+from focgen.plan.model import Plan
+from focgen.plan.response import designed_response, running_gain, running_response
+from focgen.rig.model import Actuator, Rig
+
+_ALIASES = 40  # pairs of side bands; what they leave out is below 1e-4 near the crossover
+_LOW = 1e-5  # of the sampling frequency: where the curves begin
+_HIGH = 1e3  # of the same: where the continuous ones end
+
+
+def chain_transfer(rig: Rig) -> TransferFunction:
+    """Regulator, actuator (its dynamics only) and sensor in series."""
+    return rig.regulator * actuator_of(rig).dynamics * rig.sensor
+
+
+def slope_at(rig: Rig, pressure: float) -> float:
+    """d(K(p) p)/dp: the gain that small movements about ``pressure`` meet; 1 for a linear actuator."""
+    actuator = actuator_of(rig)
+    if not isinstance(actuator, Actuator):
+        return 1.0
+    drive = np.polynomial.Polynomial((0.0, *actuator.gain))
+    return float(drive.deriv()(pressure))
+
+
+def held_response(transfer: TransferFunction, sample_time: float, omega) -> np.ndarray:
+    """The response of hold, ``transfer`` and sampling, at ``omega`` ≤ π/h rad/s: all side bands added up.
+
+    The sample is taken before the hold moves on, so what passes at once arrives one sample late.
+    """
+    h, omega = sample_time, np.asarray(omega, dtype=float)
+    back = np.exp(-1j * omega * h)
+    bands = omega + 2.0 * math.pi / h * np.arange(-_ALIASES, _ALIASES + 1)[:, None]
+    total = (transfer.frequency_response(bands) / (1j * bands)).sum(axis=0)
+    at_once = 0.0
+    if transfer.num and transfer.num[0].order == transfer.den[0].order:
+        at_once = transfer.num[0].coefficient / transfer.den[0].coefficient
+    return (1.0 - back) * (total / h - 0.5 * at_once)
+
+
+def sampled_response(controller: Controller, omega, length: int | None = None) -> np.ndarray:
+    """C(e^jωh) without its gain, in exact arithmetic; memory ``length``, or infinite where None."""
+    h, omega = controller.sample_time, np.asarray(omega, dtype=float)
+    back = np.exp(-1j * omega * h)
+    trapezoid = 0.5 * h * (1.0 + back) / (1.0 - back)
+    direct, rest, den = _endless(controller, back) if length is None else _truncated(controller, back, length)
+    total = (direct + rest * trapezoid) / den
+    return total * trapezoid if controller.integrator else total
+
+
+def _endless(controller: Controller, back):
+    difference = (1.0 - back) / controller.sample_time
+    form = realise(controller)
+    return [sum((t.coefficient * difference**t.order for t in terms), np.zeros(back.shape, complex))
+            for terms in (form.direct, form.rest, form.den)]
+
+
+def _truncated(controller: Controller, back, length: int):
+    parts = tables(controller, length)
+    half = 0.5 * controller.sample_time  # inside the table, but in the trapezoid here
+    direct, rest = (_summed(table, back) for table in (parts.direct, parts.rest))
+    den = np.ones(back.shape) if parts.feedback is None else _summed(parts.feedback, back)
+    return direct, rest / half, den
+
+
+def _summed(table, back) -> np.ndarray:
+    """Σ w_j z^−j."""
+    total = np.zeros(back.shape, complex)
+    for weight in () if table is None else table.weights[::-1]:
+        total = total * back + weight
+    return total
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Open loops but for the gain: what multiplies controller gain · slope of K(p)p.
+
+    ``ideal``: continuous. ``sampled``: sampled, held, delayed, infinite memory. ``truncated``: that with the
+    memory length. ``running``: that with the plan's weights; its gain is the plan's, h/2 inside.
+    """
+
+    ideal: Curve
+    sampled: Curve
+    truncated: Curve
+    running: Curve
+
+
+def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
+    """Sample the four loops, from 1e-5 of the sampling frequency up."""
+    h, transfer = controller.sample_time, chain_transfer(rig)
+    low, nyquist = _LOW * 2.0 * math.pi / h, math.pi / h
+    unit = running_gain(plan, _any_schedule(controller))
+
+    def held(omega):
+        return held_response(transfer, h, omega) * np.exp(-1j * omega * h * delay)
+
+    def ideal(omega):
+        part = controller.transfer.frequency_response(omega) * transfer.frequency_response(omega)
+        return part / (1j * omega) if controller.integrator else part
+
+    def sampled(length):
+        return curve(lambda omega: sampled_response(controller, omega, length) * held(omega), low, nyquist)
+
+    def running(omega):
+        return running_response(plan, omega, _any_schedule(controller)) / unit * held(omega)
+
+    return Shapes(curve(ideal, low, _HIGH * nyquist), sampled(None), sampled(controller.length),
+                  curve(running, low, nyquist))
+
+
+def _any_schedule(controller: Controller) -> float | None:
+    return controller.gain.breakpoints[0] if controller.scheduled else None
+
+
+@dataclass(frozen=True)
+class PointMargins:
+    """Margins at one operating point of ``pressure``.
+
+    ``frozen``: the ideal loop with K held constant, so that it cancels (the paper's). The others meet the slope
+    of K(p)p as small movements do. ``ideal``: continuous; ``sampled``: with sampling, hold and computation
+    delay; ``truncated``: with the memory length too; ``running``: with the quantised weights and gains too.
+    """
+
+    pressure: float
+    frozen: Margins
+    ideal: Margins
+    sampled: Margins
+    truncated: Margins
+    running: Margins
+
+
+def margins_at(rig: Rig, controller: Controller, plan: Plan, loops: Shapes, pressure: float) -> PointMargins:
+    """Return the margins at ``pressure`` from the prepared ``loops``."""
+    gain, slope = float(controller.gain_at(pressure)), slope_at(rig, pressure)
+    actuator = actuator_of(rig)
+    still = float(actuator.K(pressure)) if isinstance(actuator, Actuator) else 1.0
+    run = running_gain(plan, pressure if controller.scheduled else None)
+    return PointMargins(
+        pressure,
+        frozen=margins(loops.ideal.times(gain * still)),
+        ideal=margins(loops.ideal.times(gain * slope)),
+        sampled=margins(loops.sampled.times(gain * slope)),
+        truncated=margins(loops.truncated.times(gain * slope)),
+        running=margins(loops.running.times(run * slope)),
+    )
+
+
+__all__ = ["PointMargins", "Shapes", "chain_transfer", "designed_response", "held_response", "margins_at",
+           "sampled_response", "shapes", "slope_at"]

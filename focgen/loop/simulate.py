@@ -1,0 +1,239 @@
+"""``simulate``: the closed loop of Fig. 9 at set points as in Fig. 10, as it will run and as it should."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest
+from focgen.control.files import read_controller
+from focgen.control.measures import StepMeasures, measure_step
+from focgen.control.setpoints import default_setpoints
+from focgen.errors import ControllerError, DesignError
+from focgen.loop.chain import chain
+from focgen.loop.frozen import frozen_loop, frozen_margins, frozen_step
+from focgen.loop.plan_stepper import PlanStepper
+from focgen.loop.run import LoopRun, run_loop
+from focgen.loop.stepper import FloatStepper
+from focgen.plan.build import build_plan
+from focgen.rig.files import read_rig
+from focgen.rig.model import Rig
+
+_SETTLINGS = 8.0  # time constants of the slowest frozen loop that a step is followed for
+_FEWEST, _MOST, _UNKNOWN = 200, 60_000, 1000  # samples; the last where no loop gain reaches 1
+_UNITS = 30.0  # ratio of two ranges of the same signal from which on their units must differ
+_SWING = 0.1  # of the step: movement in the last quarter that is called oscillation
+_KEPT = 0.7  # of the movement in the quarter before
+
+
+@dataclass(frozen=True)
+class SetpointResult:
+    """What one set point did. ``settling_s``, ``overshoot_pct``, ``steady_error`` are of the controller as it runs.
+
+    ``start``: the set point before; ``ideal``: the controller with infinite memory in float64; ``frozen``: the
+    continuous linear loop with K held at the set point's ``pressure``, None where that is unstable.
+    ``verdict``: "settles", "oscillates", or "does not settle" within the time simulated.
+    """
+
+    reference: float
+    start: float
+    pressure: float
+    settling_s: float
+    overshoot_pct: float
+    steady_error: float
+    peak_pressure: float
+    verdict: str
+    ideal: StepMeasures
+    frozen: StepMeasures | None
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """The set points' results and the signals behind them.
+
+    ``running`` and ``ideal``: one column a set point, or one column in all where they are ``consecutive``; each
+    set point lasts ``duration`` s. ``frozen`` (n, set points), None where unstable. ``holds``: all settle.
+    """
+
+    rig: Rig
+    controller: Controller
+    arithmetic: str
+    length: int
+    delay: int
+    consecutive: bool
+    duration: float
+    setpoints: tuple[SetpointResult, ...]
+    running: LoopRun
+    ideal: LoopRun
+    frozen: tuple[np.ndarray | None, ...]
+    holds: bool
+    notes: tuple[str, ...]
+
+
+def simulate(
+    rig: Rig | str | Path,
+    controller: Controller | str | Path,
+    setpoints: Sequence[float] | None = None,
+    *,
+    consecutive: bool = False,
+    duration: float | None = None,
+    delay: int = 1,
+    arithmetic: str | None = None,
+    length: int | None = None,
+) -> Simulation:
+    """Close the loop and step it to each of ``setpoints``, from rest, or one after the other (``consecutive``).
+
+    ``setpoints``: outputs (default: tenths 1 … 7 of the output range, Fig. 10). ``duration``: s a set point
+    (default: 8 time constants of the slowest frozen loop). ``delay``: computation delay, 0 or 1 sample.
+    ``arithmetic`` and ``length`` override the controller's.
+
+    Raises DesignError where a set point cannot be reached, ControllerError where rig and controller do not fit
+    together, PlanError where the controller cannot be realised, RigError and ControllerError for their files.
+    """
+    model = rig if isinstance(rig, Rig) else read_rig(rig)
+    which = controller if isinstance(controller, Controller) else read_controller(controller)
+    _check_options(duration, delay)
+    ranges, notes = derived_ranges(model)
+    _check_fit(model, which)
+    notes = [*notes, *_said(model, which, None if isinstance(rig, Rig) else Path(rig))]
+    plan = build_plan(which, arithmetic, length)
+    start = rest(model, which.ranges.output)
+    targets = _targets(model, which, setpoints, start, consecutive)
+    points = [holding(model, target, ranges) for target in targets]
+    return _Trial(model, which, plan, start, points, consecutive, delay).result(duration, tuple(notes))
+
+
+def _check_options(duration: float | None, delay: int) -> None:
+    if duration is not None and not (math.isfinite(duration) and duration > 0.0):
+        raise DesignError("--duration", f"is {duration:g}", "give a time above 0 s")
+    if delay not in (0, 1):
+        raise DesignError("--delay", f"is {delay}", "give 0 or 1 sample")
+
+
+def _check_fit(rig: Rig, controller: Controller) -> None:
+    """Refuse ranges of the same signal that are orders of magnitude apart."""
+    theirs, ours = rig.ranges, controller.ranges
+    pairs = [("output", theirs.output, "measurement", ours.measurement), ("command", theirs.command, "output", ours.output)]
+    pairs += [("pressure", theirs.pressure, "schedule", ours.schedule)]
+    for signal, given, role, planned in pairs:
+        if given is None or planned is None:
+            continue
+        ratio = max(map(abs, planned)) / max(map(abs, given))
+        if not 1.0 / _UNITS < ratio < _UNITS:
+            raise ControllerError(
+                f"{controller.name} [ranges] {role}", f"is {list(planned)}, the rig's {signal} {list(given)}: a factor of {ratio:.3g}",
+                "give both in the same unit")
+
+
+def _said(rig: Rig, controller: Controller, path: Path | None) -> list[str]:
+    notes = []
+    if controller.sample_time != rig.sample_time:
+        notes.append(f"the controller runs at {controller.sample_time:g} s, the rig says {rig.sample_time:g} s")
+    source = controller.designed_from
+    if source is not None and path is not None and hashlib.sha256(path.read_bytes()).hexdigest() != source.sha256:
+        notes.append(f"the controller was designed from another state of the rig ({source.file})")
+    if rig.effects:
+        notes.append("the rig's effects are left aside: this is the nominal chain")
+    if controller.scheduled and rig.signals.pressure is None:
+        notes.append("the rig logs no pressure: the schedule's signal is the command times the regulator's static gain")
+    return notes
+
+
+def _targets(rig: Rig, controller: Controller, setpoints, start: Equilibrium, consecutive: bool) -> tuple[float, ...]:
+    low, high = controller.ranges.reference
+    if setpoints is None:
+        return default_setpoints(start.output, rig.ranges.output or (low, high))
+    targets = tuple(map(float, setpoints))
+    if not targets or not all(map(math.isfinite, targets)):
+        raise DesignError("--setpoints", "are not finite numbers", "give outputs in the rig's unit")
+    outside = [t for t in targets if not low <= t <= high]
+    if outside:
+        raise DesignError("--setpoints", f"{outside[0]:g} is outside the controller's reference range [{low:g}, {high:g}]",
+                          "give set points within it")
+    before = (start.output, *targets[:-1]) if consecutive else (start.output,) * len(targets)
+    still = [t for t, b in zip(targets, before) if t == b]
+    if still:
+        raise DesignError("--setpoints", f"{still[0]:g} is where the step starts", "give set points that move the output")
+    return targets
+
+
+class _Trial:
+    """One simulation: the same steps for the running, the ideal and the frozen loop."""
+
+    def __init__(self, rig, controller, plan, start, points, consecutive, delay):
+        self.rig, self.controller, self.plan, self.start = rig, controller, plan, start
+        self.points, self.consecutive, self.delay = points, consecutive, delay
+        self.loops = [frozen_loop(rig, controller, point.pressure) for point in points]
+        self.margins = [frozen_margins(loop, controller.sample_time) for loop in self.loops]
+
+    def samples(self, duration: float | None) -> int:
+        """Samples a set point."""
+        h = self.controller.sample_time
+        if duration is not None:
+            if not 2 * h <= duration <= _MOST * h:
+                raise DesignError("--duration", f"is {duration:g} s", f"give {2 * h:g} … {_MOST * h:g} s")
+            return math.ceil(duration / h)
+        speeds = [m.crossover_rad_s for m in self.margins if math.isfinite(m.crossover_rad_s)]
+        return min(max(math.ceil(_SETTLINGS / min(speeds) / h), _FEWEST), _MOST) if speeds else _UNKNOWN
+
+    def result(self, duration: float | None, notes: tuple[str, ...]) -> Simulation:
+        count = self.samples(duration)
+        reference = self._reference(count)
+        total, columns = reference.shape
+        prepared = chain(self.rig, self.controller.sample_time, total)
+        known = self.rig.signals.pressure is not None
+        running, ideal = (
+            run_loop(prepared, stepper, reference, self.start, self.delay, known)
+            for stepper in (PlanStepper(self.plan, columns, self.start.command),
+                            FloatStepper(self.controller, total, columns, self.start.command)))
+        frozen = tuple(self._frozen(i, count) for i in range(len(self.points)))
+        results = tuple(self._judged(i, count, running, ideal, frozen[i]) for i in range(len(self.points)))
+        return Simulation(self.rig, self.controller, self.plan.arithmetic, self.plan.length, self.delay,
+                          self.consecutive, count * self.controller.sample_time, results, running, ideal, frozen,
+                          all(r.verdict == "settles" for r in results), notes)
+
+    def _reference(self, count: int) -> np.ndarray:
+        targets = np.array([point.output for point in self.points])
+        return np.repeat(targets, count)[:, None] if self.consecutive else np.tile(targets, (count, 1))
+
+    def _from(self, index: int) -> float:
+        return self.points[index - 1].output if self.consecutive and index else self.start.output
+
+    def _frozen(self, index: int, count: int) -> np.ndarray | None:
+        if not self.margins[index].stable:
+            return None
+        begin = self._from(index)
+        step = frozen_step(self.loops[index], np.arange(count) * self.controller.sample_time)
+        return begin + step * (self.points[index].output - begin)
+
+    def _part(self, run: LoopRun, index: int, count: int) -> np.ndarray:
+        return run.output[index * count : (index + 1) * count, 0] if self.consecutive else run.output[:, index]
+
+    def _judged(self, index: int, count: int, running: LoopRun, ideal: LoopRun, frozen) -> SetpointResult:
+        begin, target, h = self._from(index), self.points[index].output, self.controller.sample_time
+        part = self._part(running, index, count)
+        found = measure_step(part, h, begin, target)
+        peak = running.peak_pressure[0 if self.consecutive else index]
+        return SetpointResult(
+            target, begin, self.points[index].pressure, found.settling_s, found.overshoot_pct, found.steady_error,
+            float(peak), _verdict(found, part, target - begin),
+            measure_step(self._part(ideal, index, count), h, begin, target),
+            None if frozen is None else measure_step(frozen, h, begin, target),
+        )
+
+
+def _verdict(found: StepMeasures, output: np.ndarray, step: float) -> str:
+    quarter = max(1, len(output) // 4)
+    late, before = np.ptp(output[-quarter:]), np.ptp(output[-2 * quarter : -quarter])
+    if late > _SWING * abs(step) and late > _KEPT * before:
+        return "oscillates"
+    return "settles" if found.settled else "does not settle"
+
+
+__all__ = ["SetpointResult", "Simulation", "simulate"]

@@ -1,0 +1,142 @@
+"""Pictures of a design and of a simulated closed loop."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from focgen.control.measures import BAND
+from focgen.loop.design import Design
+from focgen.loop.response import shapes
+from focgen.loop.simulate import Simulation
+from focgen.plan.build import build_plan
+from focgen.report.style import COLOURS, CYCLE, GREY, figure, png
+from focgen.rig.model import Rig
+
+
+def simulation_pictures(simulation: Simulation) -> dict[str, bytes]:
+    """Return ``setpoints.png``, like Fig. 10: output and command at every set point."""
+    with figure(2, 1, size=(7.0, 6.2), sharex=True, height_ratios=(1.5, 1.0)) as (fig, (top, bottom)):
+        draw = _draw_consecutive if simulation.consecutive else _draw_from_rest
+        draw(top, bottom, simulation)
+        units = simulation.controller.units
+        top.set_ylabel(_label("output", units.measurement))
+        bottom.set_ylabel(_label("command", units.output))
+        bottom.set_xlabel("time (s)")
+        top.set_title(f"Closed loop as it will run ({simulation.arithmetic}, memory {simulation.length})")
+        low, high = simulation.controller.ranges.output
+        for limit in (low, high):
+            if _near(limit, simulation.running.command):
+                bottom.axhline(limit, color=COLOURS["limit"], lw=0.8, ls=":")
+        return {"setpoints.png": png(fig)}
+
+
+def _near(limit: float, command: np.ndarray) -> bool:
+    return bool(np.abs(command - limit).min() <= 0.05 * (np.ptp(command) or 1.0))
+
+
+def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
+    run = simulation.running
+    for i, result in enumerate(simulation.setpoints):
+        colour = CYCLE[i % len(CYCLE)]
+        _reference(top, run.time[[0, -1]], result.start, result.reference, colour)
+        top.plot(run.time, run.output[:, i], color=colour)
+        bottom.step(run.time, run.command[:, i], where="post", color=colour, label=f"{result.reference:.4g}")
+        _settling(top, run.time, run.output[:, i], result.settling_s, colour)
+    top.set_xlim(0.0, _interesting(simulation))
+    bottom.legend(title=_label("set point", simulation.controller.units.measurement), ncols=4, loc="best")
+
+
+def _interesting(simulation: Simulation) -> float:
+    times = [r.settling_s for r in simulation.setpoints]
+    return min(simulation.duration, 2.5 * max(times)) if all(map(math.isfinite, times)) else simulation.duration
+
+
+def _draw_consecutive(top, bottom, simulation: Simulation) -> None:
+    run, colour = simulation.running, COLOURS["output"]
+    for i, result in enumerate(simulation.setpoints):
+        begin, end = i * simulation.duration, (i + 1) * simulation.duration
+        _reference(top, (begin, end), result.start, result.reference, GREY)
+        _settling(top, run.time, run.output[:, 0], begin + result.settling_s, colour)
+    top.plot(run.time, run.output[:, 0], color=colour)
+    bottom.step(run.time, run.command[:, 0], where="post", color=COLOURS["command"])
+
+
+def _reference(axes, span, start: float, reference: float, colour) -> None:
+    """The set point, dashed, in its ±5 % band."""
+    half = BAND * abs(reference - start)
+    axes.fill_between(span, reference - half, reference + half, color=colour, alpha=0.15, lw=0)
+    axes.plot(span, [reference] * 2, color=colour, ls="--", lw=0.8)
+
+
+def _settling(axes, time, output, settling: float, colour) -> None:
+    if math.isfinite(settling):
+        axes.plot(settling, np.interp(settling, time, output), "o", color=colour, mec="white", mew=0.8, zorder=5)
+
+
+def design_pictures(design: Design, rig: Rig) -> dict[str, bytes]:
+    """Return ``margins.png`` (Bode plot of the open loops) and, where the gain is scheduled, ``schedule.png``."""
+    found = {"margins.png": _margins_picture(design, rig)}
+    if design.schedule.breakpoints:
+        found["schedule.png"] = _schedule_picture(design, rig)
+    return found
+
+
+def _schedule_picture(design: Design, rig: Rig) -> bytes:
+    schedule, unit = design.schedule, design.controller.units.schedule
+    first, last = schedule.breakpoints[0], schedule.breakpoints[-1]
+    p = np.linspace(first, last, 400)
+    formula = (schedule.intercept + schedule.slope * p) / rig.actuator.K(p)
+    beyond = np.linspace(first - 0.3 * (last - first), last + 0.1 * (last - first), 400)
+    with figure(2, 1, size=(7.0, 5.6), sharex=True) as (fig, (top, bottom)):
+        top.plot(p, formula, color=COLOURS["ideal"], lw=0.9, label="K_o(p)/K(p)")
+        top.plot(beyond, design.controller.gain_at(beyond), color=COLOURS["running"], label="schedule table")
+        top.plot(schedule.breakpoints, schedule.gains, "o", color=COLOURS["running"])
+        top.axvline(schedule.lower_limit, color=GREY, lw=0.8, ls=":")
+        top.annotate("held below", (schedule.lower_limit, 0.05), xycoords=("data", "axes fraction"), ha="right",
+                     xytext=(-4, 0), textcoords="offset points", fontsize=8, color=GREY)
+        top.set_ylabel("gain")
+        top.set_title("The gain schedule is the controller")
+        top.legend()
+        bottom.plot(p, schedule.intercept + schedule.slope * p, color=COLOURS["controller"], label="K_o(p)")
+        places = [point.pressure for point in design.points]
+        bottom.plot(places, [point.K_o for point in design.points], "o", color=COLOURS["controller"],
+                    label="operating points")
+        bottom.set_ylim(0.0, None) if schedule.intercept + schedule.slope * last > 0 else None
+        bottom.set_ylabel("K_o")
+        bottom.set_xlabel(_label("pressure", unit))
+        bottom.legend(loc="lower right")
+        return png(fig)
+
+
+def _margins_picture(design: Design, rig: Rig) -> bytes:
+    plan = build_plan(design.controller)
+    loops = shapes(rig, design.controller, plan, design.delay)
+    worst = min(design.margins, key=lambda point: point.running.phase_deg)
+    with figure(2, 1, size=(7.0, 5.6), sharex=True) as (fig, (top, bottom)):
+        for name, loop, colour in (("ideal", loops.ideal, COLOURS["ideal"]), ("as it will run", loops.running, COLOURS["running"])):
+            wanted = getattr(worst, "ideal" if name == "ideal" else "running")
+            unit = np.interp(wanted.crossover_rad_s, loop.omega, np.abs(loop.values))
+            phase = np.degrees(np.unwrap(np.angle(loop.values)))
+            label = f"{name}: {wanted.phase_deg:.1f}°, {wanted.gain_db:.1f} dB, {wanted.delay_s:.2g} s"
+            top.loglog(loop.omega, np.abs(loop.values) / unit, color=colour, label=label)
+            bottom.semilogx(loop.omega, phase, color=colour)
+            bottom.plot(wanted.crossover_rad_s, -180.0 + wanted.phase_deg, "o", color=colour)
+        cross = worst.running.crossover_rad_s
+        top.axhline(1.0, color=GREY, lw=0.8)
+        bottom.axhline(-180.0, color=GREY, lw=0.8)
+        top.set_xlim(cross / 300.0, loops.running.omega[-1] * 3.0)
+        top.set_ylim(1e-5, 1e3)
+        bottom.set_ylim(-400.0, 0.0)
+        bottom.set_yticks(range(-360, 1, 90))
+        top.set_ylabel("|L|")
+        bottom.set_ylabel("phase (°)")
+        bottom.set_xlabel("frequency (rad/s)")
+        top.set_title(_label("Open loop at", "").strip() + f" p = {worst.pressure:.4g} {design.controller.units.schedule}".rstrip())
+        top.legend()
+        return png(fig)
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{name} ({unit})" if unit else name
