@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from focgen.fractional import discrete
 from focgen.fractional.discrete import (
     UnprovenStability,
     UnstableRecursion,
@@ -74,6 +75,20 @@ def test_bound_is_never_below_the_closed_form(seed):
     truth = 1 / sum(Fraction(float(c)) for c in a)
     bound = inverse_l1_bound(a)
     assert Fraction(bound) >= truth * (1 - Fraction(1, 10**15) * len(a)) and bound <= float(truth) * 1.002
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_residual_is_never_below_the_exact_one(seed):
+    """‖A H − 1‖₁ in rational numbers, for an H that is a little off, so that rounding goes either way."""
+    rng = np.random.default_rng(seed)
+    a = np.append(1.0, rng.uniform(-1, 1, 6) / 16)
+    inverse = discrete._power_series_inverse(a, 512) + 1e-6 * rng.standard_normal(512)
+    product = [Fraction(0)] * (len(a) + 511)
+    for i, x in enumerate(a):
+        for j, h in enumerate(inverse):
+            product[i + j] += Fraction(float(x)) * Fraction(float(h))
+    product[0] -= 1
+    assert Fraction(discrete._residual(a, inverse)) >= sum(map(abs, product))
 
 
 def test_scaled_coefficients_scale_the_bound():

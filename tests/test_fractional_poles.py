@@ -71,5 +71,17 @@ def test_two_terms(order, sign):
     assert len(found) == np.sum(np.abs(angles) <= SECTOR)
 
 
+@pytest.mark.parametrize("side", [-0.035, 0.035])
+@pytest.mark.parametrize("size", [1e-5, 1.0, 1e7])
+def test_poles_next_to_the_edge_of_the_sector(side, size):
+    """A fractional term nine decades away makes the edge long, the poles next to it make it turn sharply."""
+    angle = SECTOR + side
+    pair = TransferFunction([(1, 0)], [(1, 2), (-2 * size * math.cos(angle), 1), (size**2, 0)])
+    far = TransferFunction([(1, 0)], [((1e9 * size) ** -0.3, 0.3), (1, 0)])
+    found = first_sheet_zeros((pair * pair * far).den, SECTOR)
+    expected = size * np.exp(1j * angle * np.array([1, 1, -1, -1])) if side < 0 else []
+    assert distance(found, expected) < 1e-6  # a double pole is known to the root of rounding
+
+
 def test_a_power_of_s_has_no_zeros():
     assert len(first_sheet_zeros(TransferFunction([(1, 0)], [(3, 1.7)]).den, SECTOR)) == 0

@@ -6,6 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from focgen.fractional import contour
 from focgen.fractional.decomposition import step_image
 from focgen.fractional.responses import mittag_leffler, ramp_response, step_response
 from focgen.fractional.transfer import TransferFunction
@@ -122,13 +123,27 @@ def test_improper_is_refused():
         step_response(TransferFunction([(1, 1.2)], [(1, 0.6), (1, 0)]), [1.0])
 
 
+@pytest.mark.parametrize("node", [0, 3, 8, 12])
+@pytest.mark.parametrize("nodes", [contour._MIDDLE, contour._SHIFTED])
+def test_a_removed_pole_on_the_contour_does_no_harm(nodes, node):
+    """What is left of 1/(s − p)² + 1/(s + 1) without its double pole, p·t next to a point of the contour."""
+    pole = nodes[0][node] * (1 + 1e-6j)
+    removed = np.array([pole, pole.conjugate()])
+
+    def double(s):
+        return 1 / (s - pole) ** 2 + 1 / (s - pole.conjugate()) ** 2
+
+    left = contour.inverse_laplace(lambda s: (double(s) + 1 / (s + 1)) - double(s), np.ones(1), removed)
+    assert left[0] == pytest.approx(math.exp(-1), abs=2e-12)
+
+
 def test_poles_that_meet_share_a_chain():
     chains = step_image(DAMPED * DAMPED, 20.0).chains
     assert [len(chain.poles) for chain in chains] == [2]
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-10, 1e-6, 1e-2, 0.5])
-@pytest.mark.parametrize("t", [0.1, 3.0, 40.0])
+@pytest.mark.parametrize("gap", [0.0, 1e-10, 1e-6, 1e-2, 0.5, 2.0])
+@pytest.mark.parametrize("t", [0.1, 0.3, 3.0, 40.0])
 def test_triangular_exponential_where_eigenvalues_nearly_meet(gap, t):
     poles = np.array([-0.77 + 2.759j, -0.77 + 2.759j + gap * (-1 + 0.5j), -0.77 + 2.759j])
     matrix = (np.diag(poles) + np.eye(3, k=1)) * t
