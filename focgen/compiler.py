@@ -1,0 +1,48 @@
+"""The C compiler of this machine, or the pip-installable one where there is none."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from focgen.errors import BuildError
+
+_USUAL = ("cc", "gcc", "clang")
+_REMEDY = "install gcc or clang, or pip install 'focgen[targets]'"
+
+
+def find_compiler() -> list[str]:
+    """The command of a C compiler: $CC, cc, gcc, clang, or Zig's. Raises BuildError where there is none."""
+    chosen = shlex.split(os.environ.get("CC", ""))
+    if chosen:
+        if shutil.which(chosen[0]) is None:
+            raise BuildError("the compiler", f"$CC names {chosen[0]!r}, which is not there", "unset CC or correct it")
+        return chosen
+    for name in _USUAL:
+        if shutil.which(name):
+            return [name]
+    if find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc"]
+    raise BuildError("the compiler", "no C compiler was found", _REMEDY)
+
+
+def compile_shared(sources: Sequence[str | Path], target: str | Path, flags: Sequence[str] = (),
+                   include: Sequence[str | Path] = ()) -> None:
+    """Compile C files into the shared library ``target``. Raises BuildError with the compiler's first complaint."""
+    folders = [part for folder in include for part in ("-I", str(folder))]
+    command = [*find_compiler(), *flags, "-shared", "-fPIC", *folders, *map(str, sources), "-o", str(target)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise BuildError(str(sources[0]), f"does not compile: {_first_complaint(done.stderr)}",
+                         "generate the folder again, or set CC to another compiler")
+
+
+def _first_complaint(text: str) -> str:
+    lines = [line.strip() for line in text.splitlines() if "error" in line.lower()]
+    return (lines or text.splitlines() or ["it says nothing"])[0]
