@@ -17,6 +17,7 @@ _FUNCTIONS = {
     "generate": "focgen.codegen.generate",
     "verify": "focgen.verification.verify",
     "diagnose": "focgen.diagnosis.diagnose",
+    "trial": "focgen.trials.trial",
     "replay": "focgen.rig.replay",
     "demo": "focgen.demo",
     "read_logs": "focgen.logs.read",

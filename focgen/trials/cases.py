@@ -14,7 +14,7 @@ from focgen.trials.designs import Design, draw_design
 from focgen.trials.forms import Spans, draw_form
 from focgen.trials.machine import Machine, Session, Setting
 from focgen.trials.plan import Assignment
-from focgen.trials.recording import MEASURED, Recorder, draw_recorder, sample
+from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of, sample
 from focgen.trials.rigs import draw_chain, draw_linear, in_time_unit, nominal_of
 from focgen.trials.severity import SEVERITIES, VISIBLE, Trial, calibrate, rms, surviving
 
@@ -73,7 +73,7 @@ def _draw_case(assignment: Assignment, signals: str, suite: str, rng: np.random.
         "kind": assignment.kind, "signals": signals, "suite": suite,
         "truth": visibility([facts for _, facts in truth], settings, stage, recorder),
         "design": design.facts() if design else None,
-        "floor": recorder.noise["output"], "noise": recorder.noise,
+        "noise": recorder.noise,
     }
     return _play(stage, settings, recorder, believed(assignment, stage.rig, rng), label, rng)
 
@@ -159,6 +159,7 @@ def _play(stage: Stage, settings, recorder: Recorder, nominal: Rig, label: dict,
         rig = replace(rig, signals=replace(rig.signals, run="run"))
     rig = replace(rig, ranges=_ranges(stage) if rng.random() < 0.7 else Ranges())
     count = len(stage.seen)
+    label = {**label, "floor": floor_of(played[count:])}
     return Case(rig, played[:count], played[count:], replace(recorder, time_unit=unit), label)
 
 

@@ -128,7 +128,8 @@ class Loop:
         return k, (weights, errors)
 
     def run(self, reference: np.ndarray, every: int, clock: float, recorder: Recorder, rng):
-        """One experiment: the trace on the fine grid, the flags (n,), and what the controller saw of output and pressure."""
+        """One experiment: the trace on the fine grid, the flags, the output's noise, and what the controller
+        saw of output and pressure, all (n,)."""
         count, session = len(reference), self.session
         flags = ticks(count, every, self.fault, rng)
         noise = [_at(flags, coloured(rng, int(flags.sum()), recorder.noise.get(n, 0.0))) for n in ("output", "pressure")]
@@ -137,7 +138,7 @@ class Loop:
         ports = [session.pointer(a) for a in (reference, flags, *noise, *out)]
         session.blocks(count, clock, lambda first, stop: session.lib.close_loop(session.chain, k, first, stop, *ports))
         u, p, z, y, seen_y, seen_p = out
-        return Trace(session.h, clock, u, p, z, y), flags, seen_y, seen_p
+        return Trace(session.h, clock, u, p, z, y), flags, noise[0], seen_y, seen_p
 
     def ideal_output(self, error: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """What the ideal controller gives for what was seen, sample by sample."""
@@ -166,14 +167,14 @@ def _at(flags: np.ndarray, values: np.ndarray) -> np.ndarray:
     return spread
 
 
-def logged(trace: Trace, flags, seen_y, seen_p, reference, recorder: Recorder, rng) -> dict:
+def logged(trace: Trace, flags, noise_y, seen_y, seen_p, reference, recorder: Recorder, rng) -> dict:
     """The log of one closed-loop experiment by role: one row for each sample that the controller took."""
     at = np.flatnonzero(flags)
     curvature = trace.curvature[at] + coloured(rng, len(at), recorder.noise["curvature"])
     return {
         "time": at * trace.h + (trace.clock if recorder.absolute else 0.0),
         "command": trace.command[at], "reference": reference[at],
-        "pressure": seen_p[at], "curvature": quantised(curvature, recorder.lsb["curvature"]), "output": seen_y[at],
+        "pressure": seen_p[at], "curvature": quantised(curvature, recorder.lsb["curvature"]), "output": seen_y[at], "noise": noise_y[at],
     }
 
 

@@ -21,7 +21,7 @@ from focgen.trials.closed import (
 from focgen.trials.forms import Spans
 from focgen.trials.machine import Machine, Session
 from focgen.trials.plan import Assignment
-from focgen.trials.recording import MEASURED, draw_recorder
+from focgen.trials.recording import MEASURED, draw_recorder, floor_of
 from focgen.trials.rigs import draw_chain
 from focgen.trials.severity import Trial, rms
 
@@ -53,7 +53,7 @@ def make_closed_case(assignment: Assignment, signals: str, rng: np.random.Genera
     if fault.effect:
         truth.append(_facts(fault, assignment.severity, Loop(session, controller, fault, stage.spans), logs[:count]))
     label = {"kind": assignment.kind, "signals": signals, "suite": "closed", "truth": truth, "design": None,
-             "floor": recorder.noise["output"], "noise": recorder.noise}
+             "floor": floor_of(logs[count:]), "noise": recorder.noise}
     rig = believed(assignment, stage.rig, rng)
     if recorder.one_file:
         rig = replace(rig, signals=replace(rig.signals, run="run"))

@@ -81,13 +81,13 @@ def _of_kind(kind: str, count: int, signals: str, suite: str, rng) -> list[Assig
 
 
 def _dealt(effects, severities, kind, count, rng) -> list[Assignment]:
-    """Deal (effect, severity) like cards: no effect twice more often than another."""
+    """Deal effects like cards, no one twice more often than another, each time with its next severity."""
+    first = rng.integers(len(severities), size=len(effects))
     cards: list[Assignment] = []
-    while len(cards) < count:
-        for severity in rng.permutation(severities):
-            deck = list(effects)
-            rng.shuffle(deck)
-            cards += [Assignment(kind, (effect,), str(severity)) for effect in deck]
+    for deal in range(-(-count // len(effects))):
+        for i in rng.permutation(len(effects)):
+            severity = severities[(first[i] + deal) % len(severities)]
+            cards.append(Assignment(kind, (effects[i],), severity))
     return cards[:count]
 
 

@@ -58,7 +58,7 @@ def quantised(values: np.ndarray, lsb: float) -> np.ndarray:
 
 
 def sample(trace: Trace, Ts: float, recorder: Recorder, session: Session, rng: np.random.Generator) -> dict:
-    """The log of one experiment by role, ``time`` included: arrays (n,)."""
+    """The log of one experiment by role, ``time`` included: arrays (n,); ``noise`` is that of the output."""
     count = int(round(len(trace.command) * trace.h / Ts))
     instants = np.arange(count) * Ts
     if recorder.jitter:
@@ -67,11 +67,17 @@ def sample(trace: Trace, Ts: float, recorder: Recorder, session: Session, rng: n
     columns = {"time": instants + (trace.clock if recorder.absolute else 0.0), "command": trace.command[held]}
     for name in MEASURED:
         clean = np.interp(instants + recorder.skew, trace.time, getattr(trace, name))
-        noisy = clean + coloured(rng, count, recorder.noise[name])
+        noise = coloured(rng, count, recorder.noise[name])
+        noisy = clean + noise
         if name == "output":
-            noisy = session.read(noisy)
+            noisy, columns["noise"] = session.read(noisy), noise
         columns[name] = quantised(noisy, recorder.lsb[name])
     return columns
+
+
+def floor_of(logs: Sequence[tuple[str, dict]]) -> float:
+    """The rms of the output's noise over the experiments, each counted alike."""
+    return float(np.sqrt(np.mean([np.mean(np.square(columns["noise"])) for _, columns in logs])))
 
 
 def as_csv(rows: Sequence[tuple[str, dict]], signals: Signals, time_unit: float, runs: bool) -> str:

@@ -11,7 +11,7 @@ den, offset) have been refitted: the projection off their sensitivities. Each si
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,7 +78,7 @@ def surviving(rig: Rig, trial: Trial, gap: dict[str, np.ndarray], noise: dict[st
     """
     base = trial.signals(rig)
     columns = [_stacked({n: (trial.signals(moved)[n] - base[n]) / step for n in gap}, noise)
-               for moved, step in _moved(rig)]
+               for moved, step in moved_rigs(rig)]
     wish = _stacked(gap, noise)
     matrix = np.stack(columns, axis=1)
     matrix /= np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
@@ -90,9 +90,11 @@ def _stacked(signals: dict[str, np.ndarray], noise: dict[str, float]) -> np.ndar
     return np.concatenate([signals[name] / noise[name] for name in signals])
 
 
-def _moved(rig: Rig):
+def moved_rigs(rig: Rig) -> Iterator[tuple[Rig, float]]:
     """The rig with each of its own parameters moved a little, and by how much."""
     actuator, small = rig.actuator, 1e-3
+    if actuator is None:
+        return
     if isinstance(actuator, Actuator):
         yield replace(rig, actuator=replace(actuator, T=actuator.T * (1 + small))), small
         yield replace(rig, actuator=replace(actuator, alpha=actuator.alpha + small)), small

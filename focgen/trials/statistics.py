@@ -1,0 +1,40 @@
+"""Intervals and calibration of the scores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+
+def interval(values: Sequence[float], figure: Callable = np.mean, draws: int = 2000, seed: int = 0) -> tuple[float, float]:
+    """90 % percentile bootstrap interval of ``figure`` of the values; NaN where there are none."""
+    values = np.asarray(values, float)
+    if len(values) == 0:
+        return float("nan"), float("nan")
+    rng = np.random.default_rng(seed)
+    picks = rng.integers(0, len(values), (draws, len(values)))
+    low, high = np.quantile([figure(values[p]) for p in picks], (0.05, 0.95))
+    return float(low), float(high)
+
+
+def calibration_error(confidence: np.ndarray, right: np.ndarray, bins: int = 10) -> float:
+    """Mean distance of confidence and hit rate over bins of equal count, weighted by their size."""
+    order = np.argsort(confidence, kind="stable")
+    groups = np.array_split(order, min(bins, len(order)))
+    return float(sum(len(g) * abs(confidence[g].mean() - right[g].mean()) for g in groups) / len(order))
+
+
+def reliability(confidence: Sequence[float], right: Sequence[bool], draws: int = 4000, seed: int = 0) -> dict:
+    """Calibration error, what a perfectly calibrated tool would score on as many cases, and the bootstrap p-value.
+
+    ``p``: how often outcomes drawn with the stated confidences give an error as large or larger.
+    """
+    c, r = np.clip(np.asarray(confidence, float), 0.0, 1.0), np.asarray(right, float)
+    if len(c) == 0:
+        return {"error": float("nan"), "perfect": float("nan"), "p": float("nan"), "cases": 0}
+    rng = np.random.default_rng(seed)
+    error = calibration_error(c, r)
+    drawn = np.array([calibration_error(c, (rng.random(len(c)) < c).astype(float)) for _ in range(draws)])
+    p = (1.0 + np.sum(drawn >= error - 1e-12)) / (1.0 + draws)
+    return {"error": error, "perfect": float(drawn.mean()), "p": float(p), "cases": len(c)}

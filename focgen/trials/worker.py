@@ -1,0 +1,40 @@
+"""One blind diagnosis in a process of its own: ``python -m focgen.trials.worker CASE OUT [EFFECT]``.
+
+CASE holds the rig and the logs and nothing else. With EFFECT the diagnosis is told what to look for (the oracle).
+What happened goes to OUT/outcome.json: ``status`` (done or failed), ``seconds`` and ``fault``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import sys
+import time
+from pathlib import Path
+
+import focgen
+
+
+def oracle_possible() -> bool:
+    """Whether the diagnosis can be told which effects to consider."""
+    return "only" in inspect.signature(focgen.diagnose).parameters
+
+
+def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
+    """Diagnose and note what happened; never raises."""
+    started = time.perf_counter()
+    fault = None
+    try:
+        extra = {"only": effects} if effects else {}
+        if (case / "controller.toml").exists():
+            extra["controller"] = case / "controller.toml"
+        focgen.diagnose(case / "rig.toml", sorted((case / "logs").iterdir()), out=out, **extra)
+    except Exception as error:  # every failure is a miss, whatever it is
+        fault = f"{type(error).__name__}: {error}"
+    outcome = {"status": "failed" if fault else "done", "seconds": time.perf_counter() - started, "fault": fault}
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "outcome.json").write_text(json.dumps(outcome) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]), tuple(sys.argv[3:]))
