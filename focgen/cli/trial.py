@@ -24,16 +24,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("action", choices=tuple(ACTIONS))
     parser.add_argument("folder", metavar="DIR")
-    parser.add_argument("--signals", choices=("C", "B", "A"), default="C",
-                        help="C: command, pressure, curvature, output; B: no curvature; A: command and output")
+    parser.add_argument(
+        "--signals",
+        choices=("C", "B", "A"),
+        default="C",
+        help="C: command, pressure, curvature, output; B: no curvature; A: command and output",
+    )
     parser.add_argument("--cases", type=int, default=200, metavar="N")
     parser.add_argument("--seed", type=int, default=0, metavar="S")
-    parser.add_argument("--suite", choices=("full", "short", "closed"), default="full",
-                        help="about 600 s, 270 s, or closed-loop logs")
+    parser.add_argument(
+        "--suite",
+        choices=("full", "short", "closed"),
+        default="full",
+        help="about 600 s, 270 s, or closed-loop logs",
+    )
     parser.add_argument("--kinds", metavar="KIND,…", help=f"only these kinds of cases, of {', '.join(KINDS)}")
-    parser.add_argument("--jobs", type=int, metavar="N", help="run, score: processes at a time (default: the cores)")
+    parser.add_argument(
+        "--jobs", type=int, metavar="N", help="run, score: processes at a time (default: the cores)"
+    )
     parser.add_argument("--oracle", action="store_true", help="score: also diagnose knowing the effect")
-    parser.add_argument("--no-baseline", action="store_true", help="score: leave the residual correlation out")
+    parser.add_argument(
+        "--no-baseline", action="store_true", help="score: leave the residual correlation out"
+    )
 
 
 def run(args: argparse.Namespace) -> Outcome:
@@ -43,8 +55,15 @@ def run(args: argparse.Namespace) -> Outcome:
 
 def _make(args: argparse.Namespace) -> Outcome:
     kinds = tuple(args.kinds.split(",")) if args.kinds else None
-    made = trial("make", args.folder, cases=args.cases, seed=args.seed, signals=args.signals, suite=args.suite,
-                 kinds=kinds)
+    made = trial(
+        "make",
+        args.folder,
+        cases=args.cases,
+        seed=args.seed,
+        signals=args.signals,
+        suite=args.suite,
+        kinds=kinds,
+    )
     return Outcome(made, f"{made.cases} sealed cases in {made.folder}")
 
 
@@ -55,8 +74,15 @@ def _run(args: argparse.Namespace) -> Outcome:
 
 
 def _score(args: argparse.Namespace) -> Outcome:
-    scores = trial("score", args.folder, oracle=args.oracle, baseline=not args.no_baseline,
-                   jobs=args.jobs or os.cpu_count() or 1)
-    head = (f"{scores.cases} cases, signals {scores.signals}, suite {scores.suite}, seed {scores.seed}; "
-            f"{scores.failed} without a diagnosis")
+    scores = trial(
+        "score",
+        args.folder,
+        oracle=args.oracle,
+        baseline=not args.no_baseline,
+        jobs=args.jobs or os.cpu_count() or 1,
+    )
+    head = (
+        f"{scores.cases} cases, signals {scores.signals}, suite {scores.suite}, seed {scores.seed}; "
+        f"{scores.failed} without a diagnosis"
+    )
     return Outcome(scores, f"{head}\n{table(scores.rows)}", holds=scores.reached)

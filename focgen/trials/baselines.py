@@ -1,8 +1,8 @@
 """The baseline every diagnosis must beat: which hand-made regressor looks most like the residual.
 
-The nominal rig is simulated stage by stage on measured inputs, its own parameters refitted to first order; the stage whose
-residual is the largest share of its signal is taken, and of its effects the one whose regressor has the largest
-cosine with that residual.
+The nominal rig is simulated stage by stage on measured inputs, its own parameters refitted to first order;
+the stage whose residual is the largest share of its signal is taken, and of its effects the one whose
+regressor has the largest cosine with that residual.
 """
 
 from __future__ import annotations
@@ -20,12 +20,35 @@ from focgen.trials.severity import Trial, moved_rigs, rms
 
 _STEP = 0.01
 _STAGES = {
-    "pressure": ("transport_delay", "slow_regulator", "valve_asymmetry", "valve_stiction", "flow_limit",
-                 "supply_saturation", "leak"),
-    "curvature": ("hysteresis", "creep", "unloading_asymmetry", "softening", "gain_nonlinearity", "dead_zone",
-                  "contact", "resonance", "gain_drift"),
-    "output": ("sensor_nonlinearity", "sensor_hysteresis", "sensor_relaxation", "sensor_lag", "sensor_drift",
-               "sensor_quantization", "sensor_saturation"),
+    "pressure": (
+        "transport_delay",
+        "slow_regulator",
+        "valve_asymmetry",
+        "valve_stiction",
+        "flow_limit",
+        "supply_saturation",
+        "leak",
+    ),
+    "curvature": (
+        "hysteresis",
+        "creep",
+        "unloading_asymmetry",
+        "softening",
+        "gain_nonlinearity",
+        "dead_zone",
+        "contact",
+        "resonance",
+        "gain_drift",
+    ),
+    "output": (
+        "sensor_nonlinearity",
+        "sensor_hysteresis",
+        "sensor_relaxation",
+        "sensor_lag",
+        "sensor_drift",
+        "sensor_quantization",
+        "sensor_saturation",
+    ),
 }
 
 
@@ -60,8 +83,15 @@ def _look(rig: Rig, logs, inputs: str, name: str, effects: Sequence[str]) -> tup
     ends = np.cumsum([len(log) for log in logs])[:-1]
     looks = {}
     for effect in effects:
-        shape = _without(np.concatenate([_REGRESSORS[effect](s, t, rig.sample_time) for s, t in
-                                         zip(np.split(made / np.ptp(made), ends), np.split(time, ends))]), sensitive)
+        shape = _without(
+            np.concatenate(
+                [
+                    _REGRESSORS[effect](s, t, rig.sample_time)
+                    for s, t in zip(np.split(made / np.ptp(made), ends), np.split(time, ends))
+                ]
+            ),
+            sensitive,
+        )
         looks[effect] = abs(shape @ rest) / (np.linalg.norm(shape) * np.linalg.norm(rest) + 1e-300)
     return rms(rest) / np.ptp(measured), max(looks, key=looks.get)
 

@@ -50,7 +50,9 @@ def _compile(target: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         fault = (done.stderr.strip().splitlines() or ["no message"])[0]
-        raise BuildError("trial", f"the compiler refused the generator: {fault}", "try another compiler through CC")
+        raise BuildError(
+            "trial", f"the compiler refused the generator: {fault}", "try another compiler through CC"
+        )
     os.replace(part, target)
 
 

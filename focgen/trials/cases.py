@@ -11,14 +11,15 @@ from focgen.control.controller import Controller
 from focgen.rig.model import Ranges, Rig
 from focgen.trials import excitation
 from focgen.trials.designs import Design, draw_design
-from focgen.trials.forms import Spans, draw_form
+from focgen.trials.forms import Spans
 from focgen.trials.machine import Machine, Session, Setting
 from focgen.trials.plan import Assignment
 from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of, sample
 from focgen.trials.rigs import draw_chain, draw_linear, in_time_unit, nominal_of
-from focgen.trials.severity import SEVERITIES, VISIBLE, Trial, calibrate, rms, surviving
+from focgen.trials.severity import SEVERITIES, VISIBLE, Trial, calibrate, surviving
+from focgen.trials.vocabulary import draw_form
 
-_COARSE, _FINE = 0.01, 0.0025     # s: steps of the calibration and of the logs
+_COARSE, _FINE = 0.01, 0.0025  # s: steps of the calibration and of the logs
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,9 @@ def _draw_case(assignment: Assignment, signals: str, suite: str, rng: np.random.
     truth = [draw_effect(effect, assignment.severity, stage, rng) for effect in effects]
     settings = [setting for setting, _ in truth]
     label = {
-        "kind": assignment.kind, "signals": signals, "suite": suite,
+        "kind": assignment.kind,
+        "signals": signals,
+        "suite": suite,
         "truth": visibility([facts for _, facts in truth], settings, stage, recorder),
         "design": design.facts() if design else None,
         "noise": recorder.noise,
@@ -90,7 +93,9 @@ def _set_up(assignment, signals, suite, design: Design | None, rng) -> Stage:
     return replace(bare, spans=spans, coarse=coarse)
 
 
-def clocks_of(experiments: Sequence[excitation.Experiment], Ts: float, rng: np.random.Generator) -> list[float]:
+def clocks_of(
+    experiments: Sequence[excitation.Experiment], Ts: float, rng: np.random.Generator
+) -> list[float]:
     """When each experiment begins: after the one before and a rest of 10 to 30 s; whole samples."""
     clocks, now = [], 0.0
     for experiment in experiments:
@@ -103,8 +108,15 @@ def _spans(rig: Rig, full: float, trial: Trial, session: float) -> Spans:
     found = {name: float(np.ptp(values)) for name, values in trial.signals(rig).items()}
     top = full * rig.regulator.dc_gain
     drive = rig.actuator.drive(top) if rig.actuator else top
-    return Spans(full, found["pressure"], abs(float(drive)), found["curvature"], found["output"],
-                 _atmosphere(rig, found["pressure"]), session)
+    return Spans(
+        full,
+        found["pressure"],
+        abs(float(drive)),
+        found["curvature"],
+        found["output"],
+        _atmosphere(rig, found["pressure"]),
+        session,
+    )
 
 
 def _atmosphere(rig: Rig, span: float) -> float:
@@ -119,8 +131,15 @@ def draw_effect(effect: str, severity: str, stage: Stage, rng: np.random.Generat
     """One of the effect's forms, calibrated, and what the label says of it."""
     drawn = draw_form(effect, rng, stage.spans)
     setting, gap = calibrate(drawn, stage.rig, stage.coarse, SEVERITIES[severity])
-    facts = {"effect": effect, "stage": drawn.stage, "form": drawn.form.name, "severity": severity,
-             "parameters": list(setting.parameters), "memory": list(setting.memory or ()), "gap": gap}
+    facts = {
+        "effect": effect,
+        "stage": drawn.stage,
+        "form": drawn.form.name,
+        "severity": severity,
+        "parameters": list(setting.parameters),
+        "memory": list(setting.memory or ()),
+        "gap": gap,
+    }
     return setting, facts
 
 

@@ -1,8 +1,10 @@
-"""Closed-loop cases: a fractional controller of the generator's own drives the rig, with or without a fault of its own.
+"""Closed-loop cases: a fractional controller of the generator's own drives the rig, with or without a fault
+of its own.
 
-The controller in the case folder is the ideal one: transfer function by Grünwald–Letnikov on its stated length, gain
-schedule, trapezoidal integrator. What ran may have had a shorter memory, fixed-point arithmetic, a late or lost sample,
-or an actuator that could not follow. Reference and measurement are logged as the controller saw them.
+The controller in the case folder is the ideal one: transfer function by Grünwald–Letnikov on its stated
+length, gain schedule, trapezoidal integrator. What ran may have had a shorter memory, fixed-point arithmetic,
+a late or lost sample, or an actuator that could not follow. Reference and measurement are logged as the
+controller saw them.
 """
 
 from __future__ import annotations
@@ -47,15 +49,23 @@ def draw_controller(rig: Rig, spans: Spans, rng: np.random.Generator) -> Control
     actuator: Actuator = rig.actuator
     speed, dc = rng.uniform(0.5, 0.9), float(rig.regulator.dc_gain)
     points = tuple(np.linspace(0.0, spans.pressure, 6)) if rig.signals.pressure else None
-    slope = [sum((i + 1) * g * p**i for i, g in enumerate(actuator.gain)) for p in points or (0.7 * spans.pressure,)]
+    slope = [
+        sum((i + 1) * g * p**i for i, g in enumerate(actuator.gain))
+        for p in points or (0.7 * spans.pressure,)
+    ]
     gains = tuple(float(speed / (k * dc)) for k in slope)
     reach = (0.0, 1.3 * spans.output)
     return Controller(
-        name="loop", sample_time=rig.sample_time, integrator=True, length=4000, arithmetic="f64",
+        name="loop",
+        sample_time=rig.sample_time,
+        integrator=True,
+        length=4000,
+        arithmetic="f64",
         transfer=TransferFunction([(actuator.T, actuator.alpha), (1.0, 0.0)]),
         gain=GainSchedule(points, gains) if points else gains[0],
-        ranges=ControllerRanges(reach, reach, (0.0, 1.3 * spans.command),
-                                (0.0, 1.3 * spans.pressure) if points else None),
+        ranges=ControllerRanges(
+            reach, reach, (0.0, 1.3 * spans.command), (0.0, 1.3 * spans.pressure) if points else None
+        ),
     )
 
 
@@ -69,14 +79,18 @@ def draw_fault(effect: str | None, severity: str, used: float, rng: np.random.Ge
     if effect == "sample_jitter":
         return Fault(effect, "gaussian" if first else "late", jitter=_JITTER[severity])
     if effect == "missed_samples":
-        return Fault(effect, "single" if first else "bursts", lost=_LOST[severity], burst=1.0 if first else 5.0)
+        return Fault(
+            effect, "single" if first else "bursts", lost=_LOST[severity], burst=1.0 if first else 5.0
+        )
     if effect == "output_saturation":
         return Fault(effect, "told" if first else "wound up", limit=_LEFT[severity] * used, told=first)
     return Fault()
 
 
 def ticks(count: int, every: int, fault: Fault, rng: np.random.Generator) -> np.ndarray:
-    """When the controller runs, as flags on the fine grid (count,): every ``every`` steps, late or lost now and then."""
+    """When the controller runs, as flags on the fine grid (count,): every ``every`` steps, late or lost now
+    and then.
+    """
     due = np.arange(0, count, every)
     if fault.jitter:
         spread = fault.jitter * every
@@ -132,11 +146,16 @@ class Loop:
         saw of output and pressure, all (n,)."""
         count, session = len(reference), self.session
         flags = ticks(count, every, self.fault, rng)
-        noise = [_at(flags, coloured(rng, int(flags.sum()), recorder.noise.get(n, 0.0))) for n in ("output", "pressure")]
+        noise = [
+            _at(flags, coloured(rng, int(flags.sum()), recorder.noise.get(n, 0.0)))
+            for n in ("output", "pressure")
+        ]
         k, held = self.fresh()
         out = [np.zeros(count) for _ in range(6)]
         ports = [session.pointer(a) for a in (reference, flags, *noise, *out)]
-        session.blocks(count, clock, lambda first, stop: session.lib.close_loop(session.chain, k, first, stop, *ports))
+        session.blocks(
+            count, clock, lambda first, stop: session.lib.close_loop(session.chain, k, first, stop, *ports)
+        )
         u, p, z, y, seen_y, seen_p = out
         return Trace(session.h, clock, u, p, z, y), flags, noise[0], seen_y, seen_p
 
@@ -173,8 +192,12 @@ def logged(trace: Trace, flags, noise_y, seen_y, seen_p, reference, recorder: Re
     curvature = trace.curvature[at] + coloured(rng, len(at), recorder.noise["curvature"])
     return {
         "time": at * trace.h + (trace.clock if recorder.absolute else 0.0),
-        "command": trace.command[at], "reference": reference[at],
-        "pressure": seen_p[at], "curvature": quantised(curvature, recorder.lsb["curvature"]), "output": seen_y[at], "noise": noise_y[at],
+        "command": trace.command[at],
+        "reference": reference[at],
+        "pressure": seen_p[at],
+        "curvature": quantised(curvature, recorder.lsb["curvature"]),
+        "output": seen_y[at],
+        "noise": noise_y[at],
     }
 
 

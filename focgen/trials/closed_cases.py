@@ -27,33 +27,52 @@ from focgen.trials.severity import Trial, rms
 
 _TS, _FINE, _COARSE = 0.02, 0.001, 0.01
 _EVERY = round(_TS / _FINE)
-_NOTICED = 1e-3     # of the command's span: below, the controller did what the ideal one would have done
+_NOTICED = 1e-3  # of the command's span: below, the controller did what the ideal one would have done
 
 
 def make_closed_case(assignment: Assignment, signals: str, rng: np.random.Generator) -> Case:
     """Draw and simulate one closed-loop case."""
     stage, references = _set_up(signals, rng)
-    recorder = replace(draw_recorder(rng, {n: getattr(stage.spans, n) for n in MEASURED}, _TS), jitter=0.0, skew=0.0)
+    recorder = replace(
+        draw_recorder(rng, {n: getattr(stage.spans, n) for n in MEASURED}, _TS), jitter=0.0, skew=0.0
+    )
     controller = draw_controller(stage.rig, stage.spans, rng)
     quiet = _run(Session(Machine(stage.rig), _FINE), controller, Fault(), stage, references, recorder, rng)
     commands = [trace.command for trace, *_ in quiet][: len(stage.seen)]
     every = round(_COARSE / _FINE)
-    stage = replace(stage, coarse=Trial([c[::every] for c in commands], stage.clocks[: len(stage.seen)], _COARSE))
+    stage = replace(
+        stage, coarse=Trial([c[::every] for c in commands], stage.clocks[: len(stage.seen)], _COARSE)
+    )
     plant = [e for e in assignment.effects if e not in CONTROLLER_EFFECTS]
     drawn = [draw_effect(effect, assignment.severity, stage, rng) for effect in plant]
     settings = [setting for setting, _ in drawn]
-    fault = draw_fault(next((e for e in assignment.effects if e in CONTROLLER_EFFECTS), None),
-                       assignment.severity, max(c.max() for c in commands), rng)
+    fault = draw_fault(
+        next((e for e in assignment.effects if e in CONTROLLER_EFFECTS), None),
+        assignment.severity,
+        max(c.max() for c in commands),
+        rng,
+    )
     truth = visibility([facts for _, facts in drawn], settings, stage, recorder)
     session = Session(Machine(stage.rig, tuple(settings)), _FINE)
     played = _run(session, controller, fault, stage, references, recorder, rng)
-    logs = [(e.name, logged(*run, reference, recorder, rng))
-            for e, run, reference in zip([*stage.seen, *stage.unseen], played, references)]
+    logs = [
+        (e.name, logged(*run, reference, recorder, rng))
+        for e, run, reference in zip([*stage.seen, *stage.unseen], played, references)
+    ]
     count = len(stage.seen)
     if fault.effect:
-        truth.append(_facts(fault, assignment.severity, Loop(session, controller, fault, stage.spans), logs[:count]))
-    label = {"kind": assignment.kind, "signals": signals, "suite": "closed", "truth": truth, "design": None,
-             "floor": floor_of(logs[count:]), "noise": recorder.noise}
+        truth.append(
+            _facts(fault, assignment.severity, Loop(session, controller, fault, stage.spans), logs[:count])
+        )
+    label = {
+        "kind": assignment.kind,
+        "signals": signals,
+        "suite": "closed",
+        "truth": truth,
+        "design": None,
+        "floor": floor_of(logs[count:]),
+        "noise": recorder.noise,
+    }
     rig = believed(assignment, stage.rig, rng)
     if recorder.one_file:
         rig = replace(rig, signals=replace(rig.signals, run="run"))
@@ -66,7 +85,9 @@ def _set_up(signals: str, rng) -> tuple[Stage, list[np.ndarray]]:
     seen, unseen = excitation.references(rng, _TS), excitation.unseen(rng, _TS)
     top = full * float(rig.regulator.dc_gain)
     drive = float(rig.actuator.drive(top))
-    atmosphere = {"_bar": 1.013, "_kPa": 101.3, "_MPa": 0.1013}.get(f"_{(rig.signals.pressure or 'p_').split('_')[-1]}")
+    atmosphere = {"_bar": 1.013, "_kPa": 101.3, "_MPa": 0.1013}.get(
+        f"_{(rig.signals.pressure or 'p_').split('_')[-1]}"
+    )
     clocks = clocks_of([*seen, *unseen], _TS, rng)
     spans = Spans(full, top, drive, drive, drive, atmosphere or 5.0 * top, clocks[-1])
     rig = replace(rig, ranges=Ranges((0.0, 1.3 * full), None, (0.0, 1.3 * drive)))
@@ -76,15 +97,30 @@ def _set_up(signals: str, rng) -> tuple[Stage, list[np.ndarray]]:
 
 def _run(session: Session, controller, fault: Fault, stage: Stage, references, recorder, rng) -> list[tuple]:
     loop = Loop(session, controller, fault, stage.spans)
-    return [loop.run(reference, _EVERY, clock, recorder, rng) for reference, clock in zip(references, stage.clocks)]
+    return [
+        loop.run(reference, _EVERY, clock, recorder, rng)
+        for reference, clock in zip(references, stage.clocks)
+    ]
 
 
 def _facts(fault: Fault, severity: str, loop: Loop, logs) -> dict:
-    """The label of a controller's fault; its gap is that of the command to the ideal one's, as a share of the span."""
-    missed = [columns["command"] - loop.ideal_output(columns["reference"] - columns["output"], columns["pressure"])
-              for _, columns in logs]
+    """The label of a controller's fault; its gap is that of the command to the ideal one's, as a share of the
+    span.
+    """
+    missed = [
+        columns["command"] - loop.ideal_output(columns["reference"] - columns["output"], columns["pressure"])
+        for _, columns in logs
+    ]
     gap = rms(np.concatenate(missed)) / loop.spans.command
     timing = fault.effect in ("sample_jitter", "missed_samples")
-    return {"effect": fault.effect, "stage": "controller", "form": fault.form, "severity": severity,
-            "parameters": [fault.length, fault.bits, fault.jitter, fault.lost, fault.limit], "memory": [],
-            "gap": gap, "survives": {}, "visible": bool(timing or gap >= _NOTICED)}
+    return {
+        "effect": fault.effect,
+        "stage": "controller",
+        "form": fault.form,
+        "severity": severity,
+        "parameters": [fault.length, fault.bits, fault.jitter, fault.lost, fault.limit],
+        "memory": [],
+        "gap": gap,
+        "survives": {},
+        "visible": bool(timing or gap >= _NOTICED),
+    }

@@ -49,13 +49,43 @@ def _slow_sine(rng: np.random.Generator, Ts: float) -> list[Experiment]:
 
 
 DESIGNS = (
-    Design("rising_steps", ("gain_nonlinearity", "softening", "gain_drift"), 2, "CBA",
-           ("random", "shuffl", "repeat", "again", "down", "releas", "revers", "unload", "falling", "staircase",
-            "triangle", "first"), excitation.rising),
-    Design("no_curvature", ("contact", "sensor_saturation", "sensor_nonlinearity"), 2, "BA",
-           ("curvature", "camera", "vision", "kappa"), excitation.full),
-    Design("slow_sine", ("transport_delay", "slow_regulator"), 2, "CBA",
-           ("step", "fast", "chirp", "multisine", "quick", "higher"), _slow_sine),
+    Design(
+        "rising_steps",
+        ("gain_nonlinearity", "softening", "gain_drift"),
+        2,
+        "CBA",
+        (
+            "random",
+            "shuffl",
+            "repeat",
+            "again",
+            "down",
+            "releas",
+            "revers",
+            "unload",
+            "falling",
+            "staircase",
+            "triangle",
+            "first",
+        ),
+        excitation.rising,
+    ),
+    Design(
+        "no_curvature",
+        ("contact", "sensor_saturation", "sensor_nonlinearity"),
+        2,
+        "BA",
+        ("curvature", "camera", "vision", "kappa"),
+        excitation.full,
+    ),
+    Design(
+        "slow_sine",
+        ("transport_delay", "slow_regulator"),
+        2,
+        "CBA",
+        ("step", "fast", "chirp", "multisine", "quick", "higher"),
+        _slow_sine,
+    ),
 )
 
 

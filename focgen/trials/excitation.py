@@ -61,10 +61,15 @@ def staircase(rng: np.random.Generator, Ts: float, count: int, hold: float) -> n
 def multisine(rng: np.random.Generator, Ts: float, seconds: float, repeats: int) -> np.ndarray:
     """A random-phase odd multisine up to 2 Hz, repeated exactly."""
     n = round(seconds / Ts)
-    t, lines = np.arange(n) * Ts, np.unique(np.round(np.geomspace(1, 2.0 * seconds, 24) / 2).astype(int) * 2 + 1)
+    t, lines = (
+        np.arange(n) * Ts,
+        np.unique(np.round(np.geomspace(1, 2.0 * seconds, 24) / 2).astype(int) * 2 + 1),
+    )
     wave = sum(np.sin(2.0 * np.pi * k * t / seconds + rng.uniform(0, 2 * np.pi)) / k**0.35 for k in lines)
     wave = 0.5 + rng.uniform(0.3, 0.42) * wave / np.abs(wave).max()
-    return _joined(np.linspace(0.0, wave[0], round(2.0 / Ts)), np.tile(wave, repeats), _hold(0.0, 3.0, Ts), Ts=Ts)
+    return _joined(
+        np.linspace(0.0, wave[0], round(2.0 / Ts)), np.tile(wave, repeats), _hold(0.0, 3.0, Ts), Ts=Ts
+    )
 
 
 def long_hold(rng: np.random.Generator, Ts: float, hold: float, recovery: float) -> np.ndarray:
@@ -76,8 +81,10 @@ def minor_loops(rng: np.random.Generator, Ts: float, speed: float) -> np.ndarray
     """A slow triangle with smaller loops inside; ``speed`` in levels per s."""
     low, high = rng.uniform(0.3, 0.4), rng.uniform(0.65, 0.75)
     corners = [0.0, high, low, 0.95, low + 0.1, high, 0.0]
-    parts = [np.linspace(a, b, round(abs(b - a) / speed / Ts), endpoint=False)
-             for a, b in zip(corners, corners[1:])]
+    parts = [
+        np.linspace(a, b, round(abs(b - a) / speed / Ts), endpoint=False)
+        for a, b in zip(corners, corners[1:])
+    ]
     return _joined(*parts, _hold(0.0, 4.0, Ts), Ts=Ts)
 
 
@@ -115,13 +122,17 @@ def rising(rng: np.random.Generator, Ts: float) -> list[Experiment]:
 def unseen(rng: np.random.Generator, Ts: float) -> list[Experiment]:
     """About 100 s of another kind, kept sealed: random levels, and a sine about another mean."""
     levels = rng.uniform(0.1, 1.0, 7)
-    jumps = _joined(*(_hold(level, rng.uniform(5.0, 9.0), Ts) for level in levels), _hold(0.0, 6.0, Ts), Ts=Ts)
+    jumps = _joined(
+        *(_hold(level, rng.uniform(5.0, 9.0), Ts) for level in levels), _hold(0.0, 6.0, Ts), Ts=Ts
+    )
     t = np.arange(round(40.0 / Ts)) * Ts
     f, mean = rng.uniform(0.12, 0.18), rng.uniform(0.35, 0.6)
     wave = mean + 0.32 * np.sin(2.0 * np.pi * f * t)
     return [
         Experiment("unseen_jumps", jumps),
-        Experiment("unseen_sine", _joined(np.linspace(0, mean, round(2 / Ts)), wave, _hold(0, 4.0, Ts), Ts=Ts)),
+        Experiment(
+            "unseen_sine", _joined(np.linspace(0, mean, round(2 / Ts)), wave, _hold(0, 4.0, Ts), Ts=Ts)
+        ),
     ]
 
 
@@ -132,7 +143,9 @@ def references(rng: np.random.Generator, Ts: float) -> list[Experiment]:
     mean = rng.uniform(0.4, 0.5)
     wave = mean + 0.3 * np.sin(2.0 * np.pi * 0.1 * t)
     return [
-        Experiment("setpoints", _joined(*(_hold(level, 10.0, Ts) for level in levels), _hold(0, 8.0, Ts), Ts=Ts)),
+        Experiment(
+            "setpoints", _joined(*(_hold(level, 10.0, Ts) for level in levels), _hold(0, 8.0, Ts), Ts=Ts)
+        ),
         Experiment("climb", staircase(rng, Ts, 5, 9.0)),
         Experiment("sway", _joined(np.linspace(0, mean, round(4 / Ts)), wave, _hold(0, 5.0, Ts), Ts=Ts)),
     ]

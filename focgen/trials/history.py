@@ -1,7 +1,8 @@
 """Long memories by fast online convolution: block by block, older blocks through the FFT.
 
-A relaxed (online) convolution after Hairer, Lubich & Schlichte (1985): once block m is complete, its last 2^k blocks
-are spread over as many future ones, 2^k being the largest power of two that divides m. O(N log² N) and exact.
+A relaxed (online) convolution after Hairer, Lubich & Schlichte (1985): once block m is complete, its last 2^k
+blocks are spread over as many future ones, 2^k being the largest power of two that divides m. O(N log² N) and
+exact.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ BLOCK = 256
 
 
 class Memory:
-    """A signal's increments ``d`` (n,), the weights ``w`` of its past, and ``far`` (n,), what past blocks contribute."""
+    """A signal's increments ``d`` (n,), the weights ``w`` of its past, and ``far`` (n,), what past blocks
+    contribute.
+    """
 
     def __init__(self, weights: np.ndarray):
         count = len(weights)

@@ -13,9 +13,9 @@ _CAUSED = ("named", "set")
 class Judged:
     """A case as it was (``kind``, ``effects``, ``stages``, ``visible``) and what the diagnosis said of it.
 
-    ``causes``: for each entry its candidates (effect, confidence), most likely first. ``verdict`` is "failed" where there
-    is no diagnosis. ``promise`` and ``promise_interval``: the shrink that was predicted; ``achieved`` and ``oracle``:
-    what replay on the unseen logs gives, None where it cannot be measured.
+    ``causes``: for each entry its candidates (effect, confidence), most likely first. ``verdict`` is "failed"
+    where there is no diagnosis. ``promise`` and ``promise_interval``: the shrink that was predicted;
+    ``achieved`` and ``oracle``: what replay on the unseen logs gives, None where it cannot be measured.
     """
 
     number: str
@@ -95,7 +95,9 @@ class Judged:
     def says_tied(self) -> bool:
         """Whether truth and a rival are left standing, and the proposal would tell them apart."""
         rivals = set(self.tied) - set(self.effects)
-        held = any(set(self.effects) <= (names := {e for e, _ in cause}) and names & rivals for cause in self.causes)
+        held = any(
+            set(self.effects) <= (names := {e for e, _ in cause}) and names & rivals for cause in self.causes
+        )
         return held and any(word in self.proposal.lower() for word in self.resolves)
 
     def first_confidences(self) -> list[tuple[float, bool]]:
@@ -126,17 +128,26 @@ def judge(number: str, label: dict, outcome: dict, diagnosis: dict | None, **mea
     said = diagnosis or {"verdict": "failed"}
     interval = said.get("shrink_interval")
     return Judged(
-        number=number, kind=label["kind"],
-        effects=tuple(t["effect"] for t in truth), stages=tuple(t["stage"] for t in truth),
+        number=number,
+        kind=label["kind"],
+        effects=tuple(t["effect"] for t in truth),
+        stages=tuple(t["stage"] for t in truth),
         visible=bool(truth) and all(t["visible"] for t in truth),
-        severity=truth[0]["severity"] if truth else "", form=truth[0]["form"] if truth else "",
-        verdict=said["verdict"], stage=(said.get("where") or {}).get("stage"),
-        causes=tuple(tuple((c["effect"], float(c["confidence"])) for c in cause["candidates"])
-                     for cause in said.get("causes") or ()),
+        severity=truth[0]["severity"] if truth else "",
+        form=truth[0]["form"] if truth else "",
+        verdict=said["verdict"],
+        stage=(said.get("where") or {}).get("stage"),
+        causes=tuple(
+            tuple((c["effect"], float(c["confidence"])) for c in cause["candidates"])
+            for cause in said.get("causes") or ()
+        ),
         proposal=_proposal(said.get("next_experiment")),
-        tied=tuple(design.get("tied", ())), resolves=tuple(design.get("resolves", ())),
-        promise=said.get("shrink"), promise_interval=tuple(interval) if interval else None,
-        seconds=outcome.get("seconds"), **measured,
+        tied=tuple(design.get("tied", ())),
+        resolves=tuple(design.get("resolves", ())),
+        promise=said.get("shrink"),
+        promise_interval=tuple(interval) if interval else None,
+        seconds=outcome.get("seconds"),
+        **measured,
     )
 
 

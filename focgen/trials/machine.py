@@ -15,7 +15,7 @@ from focgen.trials.history import BLOCK, Memory, l1_factor, l1_weights, log_kern
 
 @dataclass(frozen=True)
 class Setting:
-    """One form at work: its name in C, its parameters, and the memory it needs (kind, parameters…), if any."""
+    """One form at work: its name in C, its parameters, and the memory it needs (kind, parameters …)."""
 
     form: str
     parameters: tuple[float, ...]
@@ -32,7 +32,9 @@ class Machine:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """What happened in one experiment, on the fine grid; arrays (n,) in the rig's units, ``clock`` and ``h`` in s."""
+    """What happened in one experiment, on the fine grid; arrays (n,) in the rig's units, ``clock`` and ``h``
+    in s.
+    """
 
     h: float
     clock: float
@@ -80,7 +82,9 @@ class Session:
         command = np.ascontiguousarray(command, float)
         out = [np.zeros(len(command)) for _ in range(3)]
         ports = [self.pointer(a) for a in (command, *out)]
-        self.blocks(len(command), clock, lambda first, stop: self.lib.advance(self.chain, first, stop, *ports))
+        self.blocks(
+            len(command), clock, lambda first, stop: self.lib.advance(self.chain, first, stop, *ports)
+        )
         return Trace(self.h, clock, command, *out)
 
     def blocks(self, count: int, clock: float, advance) -> None:
@@ -100,7 +104,9 @@ class Session:
         return values
 
 
-def simulate(machine: Machine, commands: Sequence[np.ndarray], clocks: Sequence[float], h: float) -> list[Trace]:
+def simulate(
+    machine: Machine, commands: Sequence[np.ndarray], clocks: Sequence[float], h: float
+) -> list[Trace]:
     """The session's experiments: ``commands`` on the fine grid of step ``h`` s, beginning at ``clocks`` s."""
     session = Session(machine, h)
     return [session.run(command, clock) for command, clock in zip(commands, clocks)]

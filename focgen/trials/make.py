@@ -1,12 +1,12 @@
 """``focgen trial make``: a folder of sealed cases.
 
-    DIR/trial.json                    what was made, and each case's commitment
-    DIR/cases/0001/rig.toml           the nominal rig
-    DIR/cases/0001/logs/*.csv         one session of the real one
-    DIR/cases/0001/controller.toml    closed-loop suites only
-    DIR/cases/0001/commitment.txt     SHA-256 of salt and label
-    DIR/sealed/0001/label.json        salt and label
-    DIR/sealed/0001/unseen/*.csv      logs that score the promise
+DIR/trial.json                    what was made, and each case's commitment
+DIR/cases/0001/rig.toml           the nominal rig
+DIR/cases/0001/logs/*.csv         one session of the real one
+DIR/cases/0001/controller.toml    closed-loop suites only
+DIR/cases/0001/commitment.txt     SHA-256 of salt and label
+DIR/sealed/0001/label.json        salt and label
+DIR/sealed/0001/unseen/*.csv      logs that score the promise
 """
 
 from __future__ import annotations
@@ -48,9 +48,18 @@ class Made:
     commitments: dict[str, str]
 
 
-def make(folder: str | Path, *, cases: int = 200, seed: int = 0, signals: str = "C", suite: str = "full",
-         kinds: tuple[str, ...] | None = None) -> Made:
-    """Make sealed cases; the same arguments give the same bytes. Raises InputError for arguments that make no sense."""
+def make(
+    folder: str | Path,
+    *,
+    cases: int = 200,
+    seed: int = 0,
+    signals: str = "C",
+    suite: str = "full",
+    kinds: tuple[str, ...] | None = None,
+) -> Made:
+    """Make sealed cases; the same arguments give the same bytes. Raises InputError for arguments that make no
+    sense.
+    """
     folder = Path(folder)
     _check(folder, cases, seed, signals, suite)
     root = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite)])
@@ -60,10 +69,20 @@ def make(folder: str | Path, *, cases: int = 200, seed: int = 0, signals: str = 
         rng = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite), index])
         number = f"{index:04d}"
         closed = suite == "closed"
-        case = make_closed_case(assignment, signals, rng) if closed else make_case(assignment, signals, suite, rng)
+        case = (
+            make_closed_case(assignment, signals, rng)
+            if closed
+            else make_case(assignment, signals, suite, rng)
+        )
         commitments[number] = _write(folder, number, case, _salt(rng))
     made = Made(str(folder), suite, signals, seed, len(plan), commitments)
-    facts = {"focgen": focgen.__version__, "suite": suite, "signals": signals, "seed": seed, "commitments": commitments}
+    facts = {
+        "focgen": focgen.__version__,
+        "suite": suite,
+        "signals": signals,
+        "seed": seed,
+        "commitments": commitments,
+    }
     write_file(folder / "trial.json", json.dumps(facts, indent=1) + "\n")
     return made
 
@@ -88,13 +107,18 @@ def _write(folder: Path, number: str, case: Case, salt: str) -> str:
     digests = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in unseen.items()}
     label = json.loads(json.dumps({**case.label, "unseen": digests}))
     committed = commitment(salt, label)
-    given = {"rig.toml": tomlkit.dumps(rig_table(case.rig)), "commitment.txt": committed + "\n",
-             **{f"logs/{name}": text for name, text in logs.items()}}
+    given = {
+        "rig.toml": tomlkit.dumps(rig_table(case.rig)),
+        "commitment.txt": committed + "\n",
+        **{f"logs/{name}": text for name, text in logs.items()},
+    }
     if case.controller:
         given["controller.toml"] = controller_text(case.controller)
     write_files(folder / "cases" / number, given)
-    write_files(folder / "sealed" / number, {"label.json": sealed(salt, label),
-                                             **{f"unseen/{name}": text for name, text in unseen.items()}})
+    write_files(
+        folder / "sealed" / number,
+        {"label.json": sealed(salt, label), **{f"unseen/{name}": text for name, text in unseen.items()}},
+    )
     return committed
 
 
@@ -103,5 +127,7 @@ def _files(case: Case, experiments: list[tuple[str, dict]]) -> dict[str, str]:
     signals, unit = case.rig.signals, case.recorder.time_unit
     if case.recorder.one_file:
         return {"session.csv": as_csv(experiments, signals, unit, True)}
-    return {f"{i:02d}_{name}.csv": as_csv([(name, columns)], signals, unit, False)
-            for i, (name, columns) in enumerate(experiments, start=1)}
+    return {
+        f"{i:02d}_{name}.csv": as_csv([(name, columns)], signals, unit, False)
+        for i, (name, columns) in enumerate(experiments, start=1)
+    }

@@ -8,28 +8,57 @@ import numpy as np
 
 from focgen.errors import InputError
 from focgen.trials.closed import CONTROLLER_EFFECTS
-from focgen.trials.forms import OUTSIDE, VOCABULARY
+from focgen.trials.vocabulary import OUTSIDE, VOCABULARY
 
 KINDS = ("single", "pair", "none", "parameters", "outside", "unidentifiable", "linear")
 CLOSED_KINDS = ("single", "none", "parameters", "outside")
-_SHARES = {"single": 0.62, "pair": 0.11, "none": 0.05, "parameters": 0.07, "outside": 0.09,
-           "unidentifiable": 0.06}
+_SHARES = {
+    "single": 0.62,
+    "pair": 0.11,
+    "none": 0.05,
+    "parameters": 0.07,
+    "outside": 0.09,
+    "unidentifiable": 0.06,
+}
 
 # What two effects do alike: together they are one to any log.
 _ALIKE = (
-    {"transport_delay", "slow_regulator"}, {"valve_asymmetry", "flow_limit"}, {"valve_asymmetry", "slow_regulator"},
-    {"supply_saturation", "leak"}, {"flow_limit", "slow_regulator"},
-    {"gain_nonlinearity", "dead_zone"}, {"gain_nonlinearity", "contact"}, {"softening", "gain_drift"},
-    {"contact", "dead_zone"}, {"softening", "hysteresis"}, {"hysteresis", "unloading_asymmetry"},
-    {"sensor_nonlinearity", "sensor_saturation"}, {"sensor_relaxation", "sensor_lag"},
-    {"contact", "sensor_saturation"}, {"contact", "sensor_nonlinearity"}, {"hysteresis", "sensor_hysteresis"},
-    {"gain_nonlinearity", "sensor_nonlinearity"}, {"creep", "sensor_lag"}, {"creep", "sensor_relaxation"},
-    {"creep", "sensor_drift"}, {"gain_drift", "sensor_drift"},
+    {"transport_delay", "slow_regulator"},
+    {"valve_asymmetry", "flow_limit"},
+    {"valve_asymmetry", "slow_regulator"},
+    {"supply_saturation", "leak"},
+    {"flow_limit", "slow_regulator"},
+    {"gain_nonlinearity", "dead_zone"},
+    {"gain_nonlinearity", "contact"},
+    {"softening", "gain_drift"},
+    {"contact", "dead_zone"},
+    {"softening", "hysteresis"},
+    {"hysteresis", "unloading_asymmetry"},
+    {"sensor_nonlinearity", "sensor_saturation"},
+    {"sensor_relaxation", "sensor_lag"},
+    {"contact", "sensor_saturation"},
+    {"contact", "sensor_nonlinearity"},
+    {"hysteresis", "sensor_hysteresis"},
+    {"gain_nonlinearity", "sensor_nonlinearity"},
+    {"creep", "sensor_lag"},
+    {"creep", "sensor_relaxation"},
+    {"creep", "sensor_drift"},
+    {"gain_drift", "sensor_drift"},
 )
 
 # With a command and a response alone, these have a meaning of their own.
-_LINEAR = ("transport_delay", "valve_asymmetry", "flow_limit", "valve_stiction", "hysteresis", "gain_nonlinearity",
-           "dead_zone", "sensor_quantization", "sensor_saturation", "resonance")
+_LINEAR = (
+    "transport_delay",
+    "valve_asymmetry",
+    "flow_limit",
+    "valve_stiction",
+    "hysteresis",
+    "gain_nonlinearity",
+    "dead_zone",
+    "sensor_quantization",
+    "sensor_saturation",
+    "resonance",
+)
 
 
 @dataclass(frozen=True)
@@ -51,13 +80,16 @@ class Assignment:
         return self.kind in ("pair", "outside", "unidentifiable")
 
 
-def assignments(count: int, kinds: tuple[str, ...], signals: str, suite: str,
-                rng: np.random.Generator) -> list[Assignment]:
-    """``count`` cases of the given kinds, in the usual shares, shuffled; every effect as often as any other."""
+def assignments(
+    count: int, kinds: tuple[str, ...], signals: str, suite: str, rng: np.random.Generator
+) -> list[Assignment]:
+    """``count`` cases of the given kinds, in the usual shares, shuffled; effects equally often."""
     allowed = CLOSED_KINDS if suite == "closed" else KINDS
     unknown = sorted(set(kinds) - set(allowed))
     if unknown:
-        raise InputError("--kinds", f"has the unknown kind {unknown[0]!r}", f"choose from {', '.join(allowed)}")
+        raise InputError(
+            "--kinds", f"has the unknown kind {unknown[0]!r}", f"choose from {', '.join(allowed)}"
+        )
     shares = {kind: _SHARES.get(kind, 0.08) for kind in kinds}
     whole = sum(shares.values())
     quota = {kind: max(1, round(count * share / whole)) for kind, share in shares.items()}

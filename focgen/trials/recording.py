@@ -19,10 +19,10 @@ MEASURED = ("pressure", "curvature", "output")
 class Recorder:
     """How this rig's logs are taken.
 
-    ``noise`` rms and ``lsb`` by signal, in its units; ``skew`` s by which the measured columns are taken after
-    their time stamp; ``jitter`` largest deviation of a sample from its instant, s; ``absolute``: whether the time stamps
-    run through the session; ``one_file``: whether a column separates the experiments; ``time_unit``: s of
-    the log for each s of the generator.
+    ``noise`` rms and ``lsb`` by signal, in its units; ``skew`` s by which the measured columns are taken
+    after their time stamp; ``jitter`` largest deviation of a sample from its instant, s; ``absolute``:
+    whether the time stamps run through the session; ``one_file``: whether a column separates the experiments;
+    ``time_unit``: s of the log for each s of the generator.
     """
 
     noise: dict[str, float]
@@ -36,7 +36,9 @@ class Recorder:
 
 def draw_recorder(rng: np.random.Generator, spans: dict[str, float], Ts: float) -> Recorder:
     """Noise 0.4 to 2 % of each span, 11 to 16 bits, and in half of the cases each a jitter and a skew."""
-    noise = {name: span * 10.0 ** rng.uniform(np.log10(0.004), np.log10(0.02)) for name, span in spans.items()}
+    noise = {
+        name: span * 10.0 ** rng.uniform(np.log10(0.004), np.log10(0.02)) for name, span in spans.items()
+    }
     if "pressure" in noise:
         noise["pressure"] *= 0.6
     lsb = {name: 1.3 * span / 2 ** rng.integers(11, 17) for name, span in spans.items()}

@@ -27,8 +27,10 @@ _COMMANDS = ((1.0, "V"), (1000.0, "mV"), (10.0, "pct"))
 
 def draw_units(rng: np.random.Generator) -> Units:
     """Units of a chain at random, the seed's own in half of the cases."""
-    picks = [choices[0 if rng.random() < 0.5 else rng.integers(len(choices))]
-             for choices in (_PRESSURES, _CURVATURES, _COMMANDS)]
+    picks = [
+        choices[0 if rng.random() < 0.5 else rng.integers(len(choices))]
+        for choices in (_PRESSURES, _CURVATURES, _COMMANDS)
+    ]
     names = dict(zip(("pressure", "curvature", "command"), (p[1] for p in picks)))
     return Units(picks[0][0], picks[1][0], picks[2][0], names)
 
@@ -116,7 +118,9 @@ def nominal_of(rig: Rig, rng: np.random.Generator, scatter: tuple[float, float])
         believed = Actuator(off(actuator.T), min(off(actuator.alpha, 0.5), 0.95), gain, actuator.offset)
     else:
         num = [(off(t.coefficient), t.order) for t in actuator.dynamics.num]
-        den = [(t.coefficient if t.order == 0 else off(t.coefficient), t.order) for t in actuator.dynamics.den]
+        den = [
+            (t.coefficient if t.order == 0 else off(t.coefficient), t.order) for t in actuator.dynamics.den
+        ]
         believed = LinearActuator(TransferFunction(num, den), actuator.offset)
     return replace(rig, actuator=believed)
 
@@ -125,13 +129,22 @@ def in_time_unit(rig: Rig, unit: float) -> Rig:
     """The same rig when every second becomes ``unit`` seconds."""
 
     def slowed(transfer: TransferFunction) -> TransferFunction:
-        return TransferFunction(*([(t.coefficient * unit**t.order, t.order) for t in part]
-                                  for part in (transfer.num, transfer.den)))
+        return TransferFunction(
+            *(
+                [(t.coefficient * unit**t.order, t.order) for t in part]
+                for part in (transfer.num, transfer.den)
+            )
+        )
 
     actuator = rig.actuator
     if isinstance(actuator, Actuator):
         actuator = replace(actuator, T=actuator.T * unit**actuator.alpha)
     else:
         actuator = replace(actuator, dynamics=slowed(actuator.dynamics))
-    return replace(rig, sample_time=rig.sample_time * unit, actuator=actuator,
-                   regulator=slowed(rig.regulator), sensor=slowed(rig.sensor))
+    return replace(
+        rig,
+        sample_time=rig.sample_time * unit,
+        actuator=actuator,
+        regulator=slowed(rig.regulator),
+        sensor=slowed(rig.sensor),
+    )

@@ -13,7 +13,9 @@ from focgen.trials.statistics import interval, reliability
 
 @dataclass(frozen=True)
 class Row:
-    """One figure: ``value`` with its 90 % ``interval`` over ``cases``; ``target`` and whether it is ``reached`` (None: none)."""
+    """One figure: ``value`` with its 90 % ``interval`` over ``cases``; ``target`` and whether it is
+    ``reached`` (None: none).
+    """
 
     name: str
     value: float | None
@@ -29,7 +31,9 @@ _AT_LEAST, _AT_MOST = "≥", "≤"
 
 @dataclass(frozen=True)
 class _Measure:
-    """``of`` gives a case's number; ``who`` the cases that count; ``target``: sense and limit, one or one for C, B, A."""
+    """``of`` gives a case's number; ``who`` the cases that count; ``target``: sense and limit, one or one for
+    C, B, A.
+    """
 
     name: str
     who: Callable[[Judged], bool]
@@ -79,20 +83,46 @@ ROWS = (
     _Measure("named one effect, wrongly", _visible, lambda j: j.wrongly_named, _AT_MOST, (0.02, 0.03, 0.03)),
     _Measure("truth in the reported set", _reporting, lambda j: j.in_set, limits=(0.97,)),
     _Measure("  … its mean size", _reporting, lambda j: len(j.reported), _AT_MOST, (1.3, 2.0, 2.4)),
-    _Measure("false alarm on none or parameter error", _null, lambda j: j.caused or j.verdict in ("unknown", "failed"),
-             _AT_MOST, (0.02,)),
+    _Measure(
+        "false alarm on none or parameter error",
+        _null,
+        lambda j: j.caused or j.verdict in ("unknown", "failed"),
+        _AT_MOST,
+        (0.02,),
+    ),
     _Measure("unknown caught", lambda j: j.kind == "outside", lambda j: j.says_unknown, limits=(0.90,)),
-    _Measure("known wrongly abstained", _visible, lambda j: j.verdict in ("unknown", "failed"), _AT_MOST, (0.06,)),
-    _Measure("pairs: both found", lambda j: j.kind == "pair" and j.visible, lambda j: j.found, limits=(0.88,)),
-    _Measure("pairs: false extras per case", lambda j: j.kind == "pair" and j.visible, lambda j: j.extras, _AT_MOST, (0.12,)),
+    _Measure(
+        "known wrongly abstained", _visible, lambda j: j.verdict in ("unknown", "failed"), _AT_MOST, (0.06,)
+    ),
+    _Measure(
+        "pairs: both found", lambda j: j.kind == "pair" and j.visible, lambda j: j.found, limits=(0.88,)
+    ),
+    _Measure(
+        "pairs: false extras per case",
+        lambda j: j.kind == "pair" and j.visible,
+        lambda j: j.extras,
+        _AT_MOST,
+        (0.12,),
+    ),
     _Measure("singles: false extras per case", _visible, lambda j: j.extras, _AT_MOST),
     _Measure("promised shrink: median error", _promised, _error, _AT_MOST, (0.04,), np.median),
     _Measure("promised shrink: within 0.10", _promised, lambda j: _error(j) <= 0.10, limits=(0.85,)),
     _Measure("promised shrink: 90 % interval covers", _promised, _covered, "in", (0.85, 0.95)),
-    _Measure("unidentifiable: says so and resolves", lambda j: j.kind == "unidentifiable", lambda j: j.says_tied, limits=(0.9,)),
-    _Measure("one linear stage: top-1 effect", lambda j: j.kind == "linear" and j.visible, lambda j: j.top_right),
-    _Measure("below visibility: named one effect, wrongly", lambda j: j.kind == "single" and not j.visible,
-             lambda j: j.wrongly_named, _AT_MOST),
+    _Measure(
+        "unidentifiable: says so and resolves",
+        lambda j: j.kind == "unidentifiable",
+        lambda j: j.says_tied,
+        limits=(0.9,),
+    ),
+    _Measure(
+        "one linear stage: top-1 effect", lambda j: j.kind == "linear" and j.visible, lambda j: j.top_right
+    ),
+    _Measure(
+        "below visibility: named one effect, wrongly",
+        lambda j: j.kind == "single" and not j.visible,
+        lambda j: j.wrongly_named,
+        _AT_MOST,
+    ),
     _Measure("median time, s", lambda j: j.seconds is not None, lambda j: j.seconds, _AT_MOST, (), np.median),
     _Measure("longest time, s", lambda j: j.seconds is not None, lambda j: j.seconds, _AT_MOST, (), np.max),
 )
@@ -110,8 +140,14 @@ def _row(measure: _Measure, judged: Sequence[Judged], signals: str) -> Row:
     if not values:
         return Row(measure.name, None, None, 0, target, None)
     value = float(measure.figure(values))
-    return Row(measure.name, value, interval(values, measure.figure), len(values), target,
-               _reaches(value, measure, signals))
+    return Row(
+        measure.name,
+        value,
+        interval(values, measure.figure),
+        len(values),
+        target,
+        _reaches(value, measure, signals),
+    )
 
 
 def _limit(measure: _Measure, signals: str) -> float:
@@ -152,7 +188,9 @@ def _oracle(judged: Sequence[Judged]) -> list[Row]:
 
 
 def _reliability(judged: Sequence[Judged]) -> list[Row]:
-    """Of the first candidate of every cause, in all cases: how often it is there against how often it should be."""
+    """Of the first candidate of every cause, in all cases: how often it is there against how often it should
+    be.
+    """
     stated = [first for j in judged for first in j.first_confidences()]
     found = reliability([c for c, _ in stated], [r for _, r in stated])
     if not stated:

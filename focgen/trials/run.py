@@ -1,6 +1,7 @@
 """``focgen trial run``: every case diagnosed blind, in a process and a folder of its own; resumable.
 
-Results go to DIR/runs/NNNN (the diagnosis and ``outcome.json``). A case whose process dies or takes too long has failed.
+Results go to DIR/runs/NNNN (the diagnosis and ``outcome.json``). A case whose process dies or takes too long
+has failed.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from pathlib import Path
 from focgen.errors import InputError
 from focgen.progress import say, track
 
-_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+_ONE_THREAD = {
+    name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+}
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,8 @@ def facts_of(folder: Path) -> dict:
 
 
 def run(folder: str | Path, *, jobs: int | None = None, limit: float = 900.0) -> Ran:
-    """Diagnose every case that has not been; ``jobs`` processes at a time (default: the cores), ``limit`` s for each.
+    """Diagnose every case that has not been; ``jobs`` processes at a time (default: the cores), ``limit`` s
+    for each.
 
     Raises InputError where the folder holds no trial.
     """
@@ -48,13 +52,17 @@ def run(folder: str | Path, *, jobs: int | None = None, limit: float = 900.0) ->
     numbers = list(facts_of(folder)["commitments"])
     open_ones = [n for n in numbers if not (folder / "runs" / n / "outcome.json").exists()]
     with ThreadPoolExecutor(jobs or os.cpu_count() or 1) as pool:
-        waiting = [pool.submit(diagnose_case, folder / "cases" / n, folder / "runs" / n, limit) for n in open_ones]
+        waiting = [
+            pool.submit(diagnose_case, folder / "cases" / n, folder / "runs" / n, limit) for n in open_ones
+        ]
         for _ in track(as_completed(waiting), "trial run", len(waiting)):
             pass
     failed = [n for n in numbers if outcome_of(folder / "runs" / n)["status"] != "done"]
     if failed:
-        say(f"trial run: {len(failed)} failed, the first being case {failed[0]}: "
-            f"{outcome_of(folder / 'runs' / failed[0])['fault']}")
+        say(
+            f"trial run: {len(failed)} failed, the first being case {failed[0]}: "
+            f"{outcome_of(folder / 'runs' / failed[0])['fault']}"
+        )
     return Ran(str(folder), len(open_ones), len(numbers) - len(open_ones), len(failed))
 
 

@@ -1,8 +1,8 @@
 """``focgen trial score``: unseal, verify, and score every row of the table beside its target.
 
-Which cases a row counts, and what counts as right, is said by the row itself (:data:`focgen.trials.rows.ROWS`) and by
-:mod:`focgen.trials.judging`. Intervals are 90 % bootstrap intervals over cases. A case without a diagnosis
-counts as a miss in every row.
+Which cases a row counts, and what counts as right, is said by the row itself
+(:data:`focgen.trials.rows.ROWS`) and by :mod:`focgen.trials.judging`. Intervals are 90 % bootstrap intervals
+over cases. A case without a diagnosis counts as a miss in every row.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from focgen.trials.worker import oracle_possible
 
 @dataclass(frozen=True)
 class Scores:
-    """The table: ``rows`` with figures, intervals and targets; ``confusions`` truth → called → count (visible singles)."""
+    """The table: ``rows`` with figures, intervals and targets; ``confusions`` truth → called → count (visible
+    singles).
+    """
 
     folder: str
     signals: str
@@ -46,18 +48,29 @@ class Scores:
 def score(folder: str | Path, *, oracle: bool = False, baseline: bool = True, jobs: int = 1) -> Scores:
     """Score a trial that has been run; ``oracle``: also diagnose the singles and pairs knowing the effect.
 
-    Writes DIR/scores.json. Raises InputError where a label, a case or an unseen log is not what was committed to.
+    Writes DIR/scores.json. Raises InputError where a label, a case or an unseen log is not what was committed
+    to.
     """
     folder = Path(folder)
     facts = facts_of(folder)
-    labels = {number: _unsealed(folder, number, committed) for number, committed in facts["commitments"].items()}
+    labels = {
+        number: _unsealed(folder, number, committed) for number, committed in facts["commitments"].items()
+    }
     if oracle:
         _ask_oracle(folder, labels, jobs)
     with ProcessPoolExecutor(jobs) as pool:
         waiting = [pool.submit(_judged, folder, number, label, baseline) for number, label in labels.items()]
         judged = [one.result() for one in track(waiting, "trial score")]
-    scores = Scores(str(folder), facts["signals"], facts["suite"], facts["seed"], len(judged),
-                    sum(j.verdict == "failed" for j in judged), rows(judged, facts["signals"]), confusions(judged))
+    scores = Scores(
+        str(folder),
+        facts["signals"],
+        facts["suite"],
+        facts["seed"],
+        len(judged),
+        sum(j.verdict == "failed" for j in judged),
+        rows(judged, facts["signals"]),
+        confusions(judged),
+    )
     content = {"scores": scores, "cases": judged}
     write_file(folder / "scores.json", json.dumps(plain(content), indent=1) + "\n")
     return scores
@@ -66,7 +79,9 @@ def score(folder: str | Path, *, oracle: bool = False, baseline: bool = True, jo
 def _unsealed(folder: Path, number: str, committed: str) -> dict:
     carried = (folder / "cases" / number / "commitment.txt").read_text(encoding="utf-8").strip()
     if carried != committed:
-        raise InputError(str(folder / "cases" / number), "carries another commitment than the trial", "make the cases anew")
+        raise InputError(
+            str(folder / "cases" / number), "carries another commitment than the trial", "make the cases anew"
+        )
     sealed = folder / "sealed" / number
     return unseal(sealed / "label.json", committed, sealed / "unseen")
 
@@ -75,11 +90,24 @@ def _ask_oracle(folder: Path, labels: dict[str, dict], jobs: int) -> None:
     if not oracle_possible():
         say("trial score: the diagnosis cannot be told the effect; no oracle")
         return
-    wanted = [n for n, label in labels.items() if label["kind"] in ("single", "pair", "linear")
-              and label["truth"] and not (folder / "oracle" / n / "outcome.json").exists()]
+    wanted = [
+        n
+        for n, label in labels.items()
+        if label["kind"] in ("single", "pair", "linear")
+        and label["truth"]
+        and not (folder / "oracle" / n / "outcome.json").exists()
+    ]
     with ThreadPoolExecutor(jobs) as pool:
-        asked = [pool.submit(diagnose_case, folder / "cases" / n, folder / "oracle" / n, 900.0,
-                             tuple(t["effect"] for t in labels[n]["truth"])) for n in wanted]
+        asked = [
+            pool.submit(
+                diagnose_case,
+                folder / "cases" / n,
+                folder / "oracle" / n,
+                900.0,
+                tuple(t["effect"] for t in labels[n]["truth"]),
+            )
+            for n in wanted
+        ]
         for one in track(asked, "oracle"):
             one.result()
 
@@ -89,8 +117,13 @@ def _judged(folder: Path, number: str, label: dict, baseline: bool) -> Judged:
     outcome, diagnosis = outcome_of(run), _diagnosis_of(run)
     single = label["kind"] == "single" and label["suite"] != "closed"
     return judge(
-        number, label, outcome, diagnosis,
-        achieved=_kept(folder, run, number, label) if diagnosis and diagnosis.get("shrink") is not None else None,
+        number,
+        label,
+        outcome,
+        diagnosis,
+        achieved=_kept(folder, run, number, label)
+        if diagnosis and diagnosis.get("shrink") is not None
+        else None,
         oracle=_kept(folder, folder / "oracle" / number, number, label),
         baseline=baselines.guess(folder / "cases" / number) if baseline and single else None,
         best_fit=_best_fit(diagnosis),
@@ -114,7 +147,9 @@ def _kept(folder: Path, run: Path, number: str, label: dict) -> float | None:
     if not (run / "augmented.toml").exists():
         return None
     try:
-        value = achieved.shrink(run, sorted((folder / "sealed" / number / "unseen").iterdir()), label["floor"])
+        value = achieved.shrink(
+            run, sorted((folder / "sealed" / number / "unseen").iterdir()), label["floor"]
+        )
     except FocgenError:
         return None
     note.write_text(json.dumps(value), encoding="utf-8")
@@ -122,7 +157,9 @@ def _kept(folder: Path, run: Path, number: str, label: dict) -> float | None:
 
 
 def _best_fit(diagnosis: dict | None) -> str | None:
-    """The effect of the lowest error on the given logs, where the diagnosis tells: ``fits`` [{effect, error}]."""
+    """The effect of the lowest error on the given logs, where the diagnosis tells: ``fits`` [{effect,
+    error}].
+    """
     fits = (diagnosis or {}).get("fits") or ()
     return min(fits, key=lambda fit: fit["error"])["effect"] if fits else None
 

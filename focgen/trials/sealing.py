@@ -25,14 +25,16 @@ def sealed(salt: str, label: dict) -> str:
 
 
 def unseal(path: Path, committed: str, unseen: Path) -> dict:
-    """The label, once it and the unseen logs prove to be what was committed to. Raises InputError where not."""
+    """The label, if it and the unseen logs are what was committed to. Raises InputError where not."""
     content = json.loads(path.read_text(encoding="utf-8"))
     label = content["label"]
     if commitment(content["salt"], label) != committed:
         raise InputError(str(path), "is not the label that was committed to", "make the cases anew")
     for name, digest in label["unseen"].items():
         if file_hash(unseen / name) != digest:
-            raise InputError(str(unseen / name), "is not the log that was committed to", "make the cases anew")
+            raise InputError(
+                str(unseen / name), "is not the log that was committed to", "make the cases anew"
+            )
     return label
 
 

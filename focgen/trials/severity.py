@@ -1,12 +1,14 @@
 """How strong an effect is, and whether these logs can show it.
 
 *Gap*: root mean square over all samples of the session, at the output of the effect's own stage and without
-noise, of the rig with the effect minus the same rig without it, as a share of that signal's span. The amplitude
-is found by bisection so that the gap is the severity's: low 3 %, mid 8 %, high 20 %, or the form's largest.
+noise, of the rig with the effect minus the same rig without it, as a share of that signal's span. The
+amplitude is found by bisection so that the gap is the severity's: low 3 %, mid 8 %, high 20 %, or the form's
+largest.
 
-*Surviving gap*: what is left of it, in the logged signals, once the own parameters of the rig (T, alpha, gain or num and
-den, offset) have been refitted: the projection off their sensitivities. Each signal is weighted by its noise.
-*Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more, both root mean square.
+*Surviving gap*: what is left of it, in the logged signals, once the own parameters of the rig (T, alpha, gain
+or num and den, offset) have been refitted: the projection off their sensitivities. Each signal is weighted by
+its noise. *Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more, both root
+mean square.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ _SIGNAL_OF = {"regulator": "pressure", "actuator": "curvature", "sensor": "outpu
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What the rig goes through: commands on the fine grid of step ``h`` s, and the session's clock at each."""
+    """What the rig goes through: commands on the grid of step ``h`` s, and the session's clock at each."""
 
     commands: Sequence[np.ndarray]
     clocks: Sequence[float]
@@ -38,8 +40,10 @@ class Trial:
         """Noise-free pressure, curvature and output (N,) of all experiments, one after the other."""
         session = Session(Machine(rig, tuple(settings)), self.h)
         traces = [session.run(command, clock) for command, clock in zip(self.commands, self.clocks)]
-        found = {name: np.concatenate([getattr(t, name) for t in traces])
-                 for name in ("pressure", "curvature", "output")}
+        found = {
+            name: np.concatenate([getattr(t, name) for t in traces])
+            for name in ("pressure", "curvature", "output")
+        }
         found["output"] = session.read(found["output"])
         return found
 
@@ -50,7 +54,7 @@ def rms(values: np.ndarray) -> float:
 
 
 def calibrate(drawn: Drawn, rig: Rig, trial: Trial, target: float) -> tuple[Setting, float]:
-    """The setting whose gap is ``target`` (a share of the span), or the form's largest; and the gap it has."""
+    """The setting whose gap is ``target`` (share of the span), or the form's largest; and the gap it has."""
     name = _SIGNAL_OF[drawn.stage]
     without = trial.signals(rig)[name]
     span = float(np.ptp(without))
@@ -71,14 +75,19 @@ def calibrate(drawn: Drawn, rig: Rig, trial: Trial, target: float) -> tuple[Sett
     return drawn.at(float(np.exp(middle))), now
 
 
-def surviving(rig: Rig, trial: Trial, gap: dict[str, np.ndarray], noise: dict[str, float]) -> dict[str, float]:
-    """Root mean square of what a refit of the own parameters leaves of ``gap``, signal by signal, over its noise.
+def surviving(
+    rig: Rig, trial: Trial, gap: dict[str, np.ndarray], noise: dict[str, float]
+) -> dict[str, float]:
+    """Root mean square of what a refit of the own parameters leaves of ``gap``, signal by signal, over its
+    noise.
 
     ``gap`` and ``noise`` (rms) carry the logged signals only.
     """
     base = trial.signals(rig)
-    columns = [_stacked({n: (trial.signals(moved)[n] - base[n]) / step for n in gap}, noise)
-               for moved, step in moved_rigs(rig)]
+    columns = [
+        _stacked({n: (trial.signals(moved)[n] - base[n]) / step for n in gap}, noise)
+        for moved, step in moved_rigs(rig)
+    ]
     wish = _stacked(gap, noise)
     matrix = np.stack(columns, axis=1)
     matrix /= np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)

@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 
-def interval(values: Sequence[float], figure: Callable = np.mean, draws: int = 2000, seed: int = 0) -> tuple[float, float]:
+def interval(
+    values: Sequence[float], figure: Callable = np.mean, draws: int = 2000, seed: int = 0
+) -> tuple[float, float]:
     """90 % percentile bootstrap interval of ``figure`` of the values; NaN where there are none."""
     values = np.asarray(values, float)
     if len(values) == 0:
@@ -26,7 +28,8 @@ def calibration_error(confidence: np.ndarray, right: np.ndarray, bins: int = 10)
 
 
 def reliability(confidence: Sequence[float], right: Sequence[bool], draws: int = 4000, seed: int = 0) -> dict:
-    """Calibration error, what a perfectly calibrated tool would score on as many cases, and the bootstrap p-value.
+    """Calibration error, what a perfectly calibrated tool would score on as many cases, and the bootstrap
+    p-value.
 
     ``p``: how often outcomes drawn with the stated confidences give an error as large or larger.
     """

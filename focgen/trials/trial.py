@@ -16,7 +16,8 @@ def trial(action: str, folder: str | Path, **options) -> Made | Ran | Scores:
     """Make sealed cases in a folder, diagnose them blind, or unseal and score them.
 
     ``options`` are those of :func:`focgen.trials.make.make`, :func:`focgen.trials.run.run` and
-    :func:`focgen.trials.score.score`. Raises InputError for an action that is none of the three, and as those do.
+    :func:`focgen.trials.score.score`. Raises InputError for an action that is none of the three, and as those
+    do.
     """
     if action not in ACTIONS:
         raise InputError("trial", f"has no action {action!r}", f"choose one of {', '.join(ACTIONS)}")

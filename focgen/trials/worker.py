@@ -1,7 +1,7 @@
 """One blind diagnosis in a process of its own: ``python -m focgen.trials.worker CASE OUT [EFFECT]``.
 
-CASE holds the rig and the logs and nothing else. With EFFECT the diagnosis is told what to look for (the oracle).
-What happened goes to OUT/outcome.json: ``status`` (done or failed), ``seconds`` and ``fault``.
+CASE holds the rig and the logs and nothing else. With EFFECT the diagnosis is told what to look for (the
+oracle). What happened goes to OUT/outcome.json: ``status`` (done or failed), ``seconds`` and ``fault``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,11 @@ def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
         focgen.diagnose(case / "rig.toml", sorted((case / "logs").iterdir()), out=out, **extra)
     except Exception as error:  # every failure is a miss, whatever it is
         fault = f"{type(error).__name__}: {error}"
-    outcome = {"status": "failed" if fault else "done", "seconds": time.perf_counter() - started, "fault": fault}
+    outcome = {
+        "status": "failed" if fault else "done",
+        "seconds": time.perf_counter() - started,
+        "fault": fault,
+    }
     out.mkdir(parents=True, exist_ok=True)
     (out / "outcome.json").write_text(json.dumps(outcome) + "\n", encoding="utf-8")
 

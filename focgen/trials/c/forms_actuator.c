@@ -7,7 +7,8 @@ static double everett(const effect *e, double a, double b) {
     return a > b ? pow(a - b, e->par[1]) * (1.0 + e->par[2] * (a + b)) : 0.0;
 }
 
-/* Preisach's model by its memory of extrema, st[1 …]; st[0] counts them. Level from -0.3 on, in units of the span. */
+/* Preisach's model by its memory of extrema, st[1 …]; st[0] counts them. Level from -0.3 on, in units of
+ * the span. */
 static double preisach(effect *e, double w) {
     const double low = -0.3;
     double *m = &e->st[2];
@@ -47,7 +48,8 @@ double preisach_share(effect *e, const chain *c, double in, double t) {
     return in + e->par[0] * (e->par[3] * out - in);
 }
 
-/* Duhem friction whose hold grows with the level: par[0] amplitude, par[1] span, par[2] steepness, par[3] power. */
+/* Duhem friction whose hold grows with the level: par[0] amplitude, par[1] span, par[2] steepness, par[3]
+ * power. */
 double duhem_friction(effect *e, const chain *c, double in, double t) {
     double *before = &e->st[0], *H = &e->st[1];
     double move = (in - *before) / e->par[1];
@@ -69,7 +71,8 @@ double log_creep(effect *e, const chain *c, double in, double t) {
     return in + e->par[0] * c->creep_now;
 }
 
-/* Thermally activated flow (Eyring): par[0] share, par[1] s, par[2] the stress at which flow becomes exponential. */
+/* Thermally activated flow (Eyring): par[0] share, par[1] s, par[2] the stress at which flow becomes
+ * exponential. */
 double eyring_creep(effect *e, const chain *c, double in, double t) {
     double *strain = &e->st[0], s = e->par[2];
     (void)t;
@@ -77,7 +80,8 @@ double eyring_creep(effect *e, const chain *c, double in, double t) {
     return in + e->par[0] * *strain;
 }
 
-/* Pseudo-elastic softening (Ogden and Roxburgh): stiff on the first way up, softer below the largest load seen. */
+/* Pseudo-elastic softening (Ogden and Roxburgh): stiff on the first way up, softer below the largest load
+ * seen. */
 double roxburgh(effect *e, const chain *c, double in, double t) {
     double *most = &e->kept[0], span = e->par[1];
     (void)c, (void)t;
@@ -191,7 +195,8 @@ static double oscillator(effect *e, const chain *c, double in, double hardening)
     return s[0];
 }
 
-/* A share par[0] of the drive goes through a hardening oscillator: par[1] rad/s, par[2] damping, par[3] span. */
+/* A share par[0] of the drive goes through a hardening oscillator: par[1] rad/s, par[2] damping, par[3]
+ * span. */
 double duffing_share(effect *e, const chain *c, double in, double t) {
     (void)t;
     return in + e->par[0] * (oscillator(e, c, in, 0.5) - in);

@@ -2,7 +2,8 @@
 
 /* ---- on the command ---- */
 
-/* Spool held by static friction par[0]; once loose it slides, with lag par[2], until kinetic friction par[1] holds. */
+/* Spool held by static friction par[0]; once loose it slides, with lag par[2], until kinetic friction
+ * par[1] holds. */
 double spool_friction(effect *e, const chain *c, double in, double t) {
     double *x = &e->st[0], *sliding = &e->st[1], pull = in - *x;
     (void)t;
@@ -146,7 +147,8 @@ double supply_tank(effect *e, const chain *c, double in, double t) {
     return *p;
 }
 
-/* A turbulent leak behind a restriction: the chamber sags by par[0] sqrt-like, within par[1] s; par[2] span. */
+/* A turbulent leak behind a restriction: the chamber sags by par[0] sqrt-like, within par[1] s; par[2]
+ * span. */
 double leak_turbulent(effect *e, const chain *c, double in, double t) {
     double *sag = &e->st[0], level = fmax(in - *sag, 0.0) / e->par[2];
     double lost = e->par[0] * e->par[2] * sqrt(level * (level + 0.15)) / sqrt(1.15);

@@ -18,7 +18,8 @@ double divider_curve(effect *e, const chain *c, double in, double t) {
 
 /* ---- direction ---- */
 
-/* The reading hangs back, the more the longer the strain goes one way; uneven up (par[2]) and down (par[3]). */
+/* The reading hangs back, the more the longer the strain goes one way; uneven up (par[2]) and down
+ * (par[3]). */
 double uneven_hang(effect *e, const chain *c, double in, double t) {
     double *before = &e->st[0], *hang = &e->st[1], move = (in - *before) / e->par[1];
     (void)c, (void)t;
@@ -28,7 +29,8 @@ double uneven_hang(effect *e, const chain *c, double in, double t) {
     return in - e->par[0] * e->par[1] * *hang;
 }
 
-/* Two calibration curves, one up, one down, that meet at both ends; the way between them takes par[2] of the span. */
+/* Two calibration curves, one up, one down, that meet at both ends; the way between them takes par[2] of
+ * the span. */
 double lens_curves(effect *e, const chain *c, double in, double t) {
     double *before = &e->st[0], *side = &e->st[1], move = (in - *before) / e->par[1];
     double w = fmin(fmax(in / e->par[1], 0.0), 1.0);

@@ -1,0 +1,107 @@
+"""Forms of the actuator's effects: what its material and its neighbours do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.trials.forms import Form, alone, either_way, wander
+
+
+def _preisach(rng, s):
+    width, level = rng.uniform(1.3, 1.9), rng.uniform(-0.15, 0.3)
+    return lambda a: (a, width, level, s.drive)
+
+
+def _duhem(rng, s):
+    steep, power = rng.uniform(4.0, 10.0), rng.uniform(1.2, 1.8)
+    return lambda a: (a, s.drive, steep, power)
+
+
+def _eyring(rng, s):
+    tau, stress = rng.uniform(30.0, 90.0), rng.uniform(0.25, 0.5)
+    return lambda a: (a, tau, stress * s.drive)
+
+
+def _roxburgh(rng, s):
+    floor, slope = rng.uniform(0.08, 0.2), rng.uniform(0.1, 0.3)
+    return lambda a: (a, s.drive, floor, slope)
+
+
+def _worked(rng, s):
+    strokes = rng.uniform(3.0, 12.0)
+    return lambda a: (a, s.drive, strokes)
+
+
+def _warm_gain(rng, s):
+    tau, sign = rng.uniform(0.3, 2.0) * s.session, either_way(rng)
+    return lambda a: (sign * a, tau)
+
+
+def _wander_gain(rng, s):
+    waves, length = wander(rng), rng.uniform(1.0, 1.6) * s.session
+    return lambda a: (a, length, *waves)
+
+
+def _viscosity(rng, s):
+    blend = rng.uniform(0.01, 0.04)
+    return lambda a: (a, blend * s.drive)
+
+
+def _locking(rng, s):
+    sharp = rng.uniform(2.5, 6.0)
+    return lambda a: (s.drive / a, sharp)
+
+
+def _balloon(rng, s):
+    middle, width, sign = rng.uniform(0.35, 0.65), rng.uniform(0.15, 0.3), either_way(rng)
+    limit = 0.8 * width if sign < 0 else 1.0  # the curve must keep rising
+    return lambda a: (sign * min(a, limit), s.drive, middle, width)
+
+
+def _preload(rng, s):
+    bend = rng.uniform(0.2, 0.8)
+    return lambda a: (a * s.drive, bend * a * s.drive)
+
+
+def _hertz(rng, s):
+    knee = rng.uniform(0.4, 0.65)
+    return lambda a: (a, knee * s.curvature, 0.2 * s.curvature)
+
+
+def _foam(rng, s):
+    knee = rng.uniform(0.4, 0.65)
+    return lambda a: (s.curvature / a, knee * s.curvature)
+
+
+def _oscillator(rng, s):
+    natural, damping = 2.0 * np.pi * rng.uniform(0.6, 2.2), rng.uniform(0.04, 0.2)
+    return lambda a: (a, natural, damping, s.drive)
+
+
+def _log_memory(rng):
+    return ("creep", rng.uniform(4.0, 20.0), 200.0)
+
+
+FORMS: dict[str, tuple[Form, ...]] = {
+    "hysteresis": (Form("preisach_share", 0.05, 1.0, _preisach), Form("duhem_friction", 0.01, 0.3, _duhem)),
+    "creep": (Form("log_creep", 0.02, 1.0, alone, _log_memory), Form("eyring_creep", 0.02, 1.0, _eyring)),
+    "unloading_asymmetry": (
+        Form("recovery_viscosity", 0.05, 6.0, _viscosity),
+        Form("sticky_release", 0.05, 6.0, lambda rng, s: lambda a: (a, s.curvature)),
+    ),
+    "softening": (Form("roxburgh", 0.02, 0.8, _roxburgh), Form("worked_soft", 0.02, 0.8, _worked)),
+    "gain_nonlinearity": (
+        Form("locking_chain", 0.3, 4.0, _locking),
+        Form("balloon_curve", 0.01, 0.4, _balloon),
+    ),
+    "dead_zone": (
+        Form("slack_hinge", 0.02, 0.45, lambda rng, s: lambda a: (a * s.drive, 0.02 * s.drive)),
+        Form("preload", 0.02, 0.45, _preload),
+    ),
+    "contact": (Form("hertz_load", 0.03, 20.0, _hertz), Form("foam_pad", 0.2, 40.0, _foam)),
+    "resonance": (Form("duffing_share", 0.05, 1.0, _oscillator), Form("side_mode", 0.05, 1.2, _oscillator)),
+    "gain_drift": (
+        Form("warming_gain", 0.01, 1.0, _warm_gain),
+        Form("wandering_gain", 0.005, 0.6, _wander_gain),
+    ),
+}

@@ -1,0 +1,24 @@
+"""Every effect of the vocabulary, and some that it has no name for, with their forms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.trials import forms_actuator, forms_regulator, forms_sensor
+from focgen.trials.forms import Drawn, Form, Spans
+from focgen.trials.forms_outside import OUTSIDE
+
+_STAGES = {"regulator": forms_regulator, "actuator": forms_actuator, "sensor": forms_sensor}
+
+# effect -> its stage and its forms
+VOCABULARY: dict[str, tuple[str, tuple[Form, ...]]] = {
+    effect: (stage, forms) for stage, module in _STAGES.items() for effect, forms in module.FORMS.items()
+}
+
+
+def draw_form(effect: str, rng: np.random.Generator, spans: Spans) -> Drawn:
+    """One of the effect's forms at random, all but its amplitude fixed."""
+    stage, forms = VOCABULARY.get(effect) or OUTSIDE[effect]
+    form = forms[rng.integers(len(forms))]
+    amplitude = form.draw(rng, spans)
+    return Drawn(effect, stage, form, amplitude, form.memory(rng) if form.memory else None)
