@@ -98,7 +98,7 @@ _KINDS = (_model_inverse, _fopid, _fopd, _pid, _lead, _half, _second_order, _lag
 
 
 def random_controller(seed: int, longest: int = 120) -> Controller:
-    """A controller of a random kind, scale, sample time, memory and schedule; not all of them can be planned."""
+    """A controller of a random kind, scale, sample time, memory and schedule; not all can be planned."""
     rng = np.random.default_rng([seed, 7])
     kind = _KINDS[seed % len(_KINDS)]
     h = float(10.0 ** rng.uniform(-4.0, 0.0))

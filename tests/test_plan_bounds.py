@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from focgen.control.controller import ControllerRanges, GainSchedule
 from focgen.errors import PlanError
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
 from focgen.plan.model import Plan
+from focgen.plan.proofs import at_rest, reset_error
 from focgen.plan.scenario import Reset, Scenario, physical_trace, to_physical, to_raw
 from focgen.plan.worst import worst_case_input
 from tests.controllers import random_controller, random_scenario, seed_controller, simple
@@ -121,6 +123,72 @@ def test_truncation_bound_is_reached_by_a_constant_that_began_long_ago():
     physical = Scenario(ref, -ref, None, (Reset(0, 0, -1.0, 1.0, 0.0),))
     error = np.abs(ideal(controller, physical, 50).d - ideal(controller, physical).d)[0]
     assert 0.98 * plan.error_bound.truncation < error.max() <= plan.error_bound.truncation
+
+
+def test_truncation_of_an_integral_drifts_to_its_clamp_and_no_further():
+    """What a memory of 20 leaves out of s^0.1 is integrated."""
+    controller = simple(TransferFunction([(1.0, -0.9)]), length=20)
+    bound = build_plan(controller, "f64").error_bound.truncation
+    physical = Scenario(np.full((1, 5000), 0.4), np.zeros((1, 5000)))
+    error = np.abs(ideal(controller, physical, 20).d - ideal(controller, physical).d)
+    assert 0.1 * bound < error.max() <= bound
+
+
+@pytest.mark.parametrize("arithmetic", ("q15", "q31"))
+def test_rounding_of_a_recursion_is_within_its_part_of_the_bound(arithmetic):
+    """v_k = (e_k + v_{k−1})/2: exact weights and gain, inputs that are counts. Rounding is what is left."""
+    controller = simple(TransferFunction([(1.0, 0.0)], [(0.01, 1.0), (1.0, 0.0)]))
+    plan = build_plan(controller, arithmetic)
+    raw = to_raw(plan, random_scenario(controller, 4, lanes=4, samples=300))
+    physical = to_physical(plan, raw)
+    error = physical_trace(plan, execute(plan, raw)).d - ideal(controller, physical, controller.length).d
+    parts = dict(plan.error_bound.parts)
+    assert 0.0 < np.abs(error).max() <= parts["rounding"] + parts.get("product", 0.0)
+
+
+@pytest.mark.parametrize("arithmetic", ("q15", "q31"))
+def test_an_integral_takes_up_its_inputs_rounding_as_fast_as_the_bound_says(arithmetic):
+    """1/s of inputs that all lie almost half a count off, with exact weights: the bound is reached."""
+    controller = simple(TransferFunction([(1.0, -1.0)]), sample_time=2.0**-7)
+    plan, samples = build_plan(controller, arithmetic), 1000
+    off = 0.25 + 0.499 * plan.error.lsb
+    physical = Scenario(np.full((1, samples), off), np.full((1, samples), -off))
+    trace = physical_trace(plan, execute(plan, to_raw(plan, physical)))
+    error = np.abs(trace.d - ideal(controller, physical, controller.length).d)[0]
+    parts = dict(plan.error_bound.parts)
+    growth = plan.error_bound.operator_per_sample - sum(parts.values()) + parts["inner integral"]
+    assert 0.9 * growth * samples < error[-1] <= growth * samples + parts["product"]
+
+
+@pytest.mark.parametrize("arithmetic", ("q15", "q31"))
+def test_a_steep_schedule_costs_what_the_bound_says(arithmetic):
+    """A breakpoint and the scheduling signal each almost half a count off, on the steepest segment."""
+    ranges = ControllerRanges((-1.0, 1.0), (-1.0, 1.0), (-10.0, 10.0), (0.0, 1.0))
+    lsb = 2.0**-14 if arithmetic == "q15" else 2.0**-30
+    schedule = GainSchedule((0.25 + 0.499 * lsb, 0.5 + 0.499 * lsb), (0.0, 1.0))
+    unit = TransferFunction([(1.0, 0.0)])
+    controller = simple(unit, gain=schedule, ranges=ranges, integrator=True, sample_time=2.0**-6)
+    plan = build_plan(controller, arithmetic)
+    assert plan.schedule.signal.lsb == lsb
+    at = 0.375 - 0.499 * lsb
+    physical = Scenario(np.ones((1, 3)), -np.ones((1, 3)), np.full((1, 3), at))
+    error = np.abs(
+        physical_trace(plan, execute(plan, to_raw(plan, physical))).d - ideal(controller, physical, 1).d
+    )
+    parts = dict(plan.error_bound.parts)
+    assert 0.8 * parts["gain"] < error.max() <= parts["gain"] + parts["product"]
+
+
+@pytest.mark.parametrize("seed", (4, 5, 7, 14, 15, 24, 25))
+def test_a_reset_starts_a_recursion_as_near_to_its_rest_as_said(seed):
+    """Every few counts of e: the history's value against the exact rest of the integer recursion."""
+    plan = build_plan(random_controller(seed), "q15")
+    feedback, e = plan.feedback, np.arange(plan.error.low, plan.error.high + 1, 37)
+    product = e * feedback.steady
+    held = (product + (1 << feedback.steady_shift >> 1)) >> feedback.steady_shift
+    ratio = sum(plan.direct.values) / at_rest(plan) * plan.error.lsb / plan.filtered.lsb
+    worst = float(np.abs(held - e * ratio).max())
+    assert 0.3 * reset_error(plan) < worst <= reset_error(plan)
 
 
 def test_whole_orders_leave_nothing_out():

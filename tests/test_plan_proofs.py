@@ -64,6 +64,15 @@ def test_every_weight_survives_and_is_close(arithmetic, order, length):
     assert firsts == sorted(firsts) and sum(len(d.real) for d in drafts) == length + 1
 
 
+@pytest.mark.parametrize("arithmetic", FIXED)
+def test_a_small_weight_among_large_ones_gets_a_block_of_its_own(arithmetic):
+    """As where two terms of opposite sign nearly cancel at one lag."""
+    weights = np.array([1.0, -0.6, 0.3, 0.2, 0.1, 3e-12, -0.1, -0.12])
+    drafts = split(weights, 0, WORDS[arithmetic].limit, WORDS[arithmetic])
+    kept = np.concatenate([d.counts * 2.0**d.exponent for d in drafts])
+    assert np.allclose(kept, weights, rtol=2e-4, atol=0.0)
+
+
 def test_blocks_are_contiguous_and_their_sums_meet_at_the_total():
     plan = build_plan(seed_controller(300), "q15")
     blocks = plan.direct.blocks
