@@ -1,0 +1,6 @@
+"""Logs: tables from files, one reader a file; roles, time stamps, sessions."""
+
+from focgen.logs.experiment import ROLES, Experiment
+from focgen.logs.read import read_logs
+
+__all__ = ["ROLES", "Experiment", "read_logs"]

@@ -1,0 +1,159 @@
+"""What drives the fit of one experiment, and what is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import fft
+
+from focgen.errors import FitError, LogError
+from focgen.fractional.simulation import Convolution
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.model import UNITY, Rig
+
+_HELD = 0.1  # share of samples in which a held input changes
+_AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
+_FEWEST = 30  # samples
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """One experiment made ready: the input's powers as the dynamics see them, and the fitted signal.
+
+    ``pressure`` (n,) is the input of the actuator, measured or through the regulator; ``before`` its constant value
+    ahead of the first sample; ``level`` the value it is stepped to. ``drives`` (powers, n) are pressure^m − before^m,
+    m = 1, 2, …, through the sensor where its output is fitted. ``hold`` says what they do between samples,
+    ``sensor_gain`` is the sensor's at rest (1 where the curvature is fitted).
+    """
+
+    name: str
+    step: float
+    pressure: np.ndarray
+    measured: np.ndarray
+    drives: np.ndarray
+    hold: str
+    before: float
+    level: float
+    input_role: str
+    fitted_role: str
+    sensor_gain: float
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.measured)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the input jumps at the first sample."""
+        return bool(np.any(self.drives[:, 0] != 0.0))
+
+    @cached_property
+    def _size(self) -> int:
+        return fft.next_fast_len(2 * len(self), real=True)
+
+    @cached_property
+    def _changes(self) -> np.ndarray:
+        return fft.rfft(np.diff(self.drives, axis=1), self._size)
+
+    def respond(self, steps: np.ndarray | None, means: np.ndarray | None) -> np.ndarray:
+        """Convolve each drive with each kernel; shape (kernels, powers, n).
+
+        ``steps`` (kernels, ≥ n) are step responses at 0, h, …; ``means`` their means over the sample before h, 2h, ….
+        A held input needs ``steps``, a linear one ``means``, and ``steps`` as well where it jumps at first.
+        """
+        n = len(self)
+        kernels = (steps if self.hold == "zero" else means)[:, : n - 1]
+        moved = fft.irfft(fft.rfft(kernels, self._size)[:, None, :] * self._changes, self._size)[:, :, : n - 1]
+        out = np.zeros((len(kernels), len(self.drives), n))
+        out[:, :, 1:] = moved
+        if self.jumps:
+            out += steps[:, None, :n] * self.drives[None, :, :1]
+        return out
+
+
+def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | None = None) -> Excitation:
+    """Make an experiment ready for fitting.
+
+    Input is the measured pressure where logged, else the command through the regulator; fitted is the curvature where
+    logged, else the output through the sensor. ``before`` is the input's value ahead of the first sample (None: as at
+    the first sample). Raises LogError where a signal is constant or too short.
+    """
+    _check(experiment)
+    pressure, level_before, hold, role = _input(experiment, rig, before)
+    drives = np.array([pressure**m - level_before**m for m in range(1, powers + 1)])
+    fitted = "curvature" if "curvature" in experiment else "output"
+    gain = 1.0
+    if fitted == "output" and rig.sensor != UNITY:
+        gain, drives, hold = _through_sensor(rig.sensor, drives, experiment.sample_time, hold)
+    return Excitation(
+        experiment.name, experiment.sample_time, pressure, experiment[fitted], drives, hold, level_before,
+        _level(pressure, level_before), role, fitted, gain, experiment.notes,
+    )
+
+
+def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:
+    """The values the input may have had before the first sample: that of the first sample, and 0 where it differs.
+
+    A log that begins with the step itself starts at rest at 0 with its input already up.
+    """
+    values = experiment["pressure" if "pressure" in experiment else "command"]
+    if np.ptp(values) == 0.0:
+        return (0.0,)
+    return (None,) if abs(values[0]) <= _AT_REST * np.abs(values).max() else (None, 0.0)
+
+
+def _check(experiment: Experiment) -> None:
+    if len(experiment) < _FEWEST:
+        raise LogError(experiment.name, f"has {len(experiment)} samples", f"give at least {_FEWEST}")
+    fitted = experiment["curvature" if "curvature" in experiment else "output"]
+    if np.ptp(fitted) == 0.0:
+        raise LogError(experiment.name, f"has an output of {fitted[0]:g} throughout", "check the sensor and the column")
+    role = "pressure" if "pressure" in experiment else "command"
+    if not np.any(experiment[role]):
+        raise LogError(experiment.name, f"has a {role} of 0 throughout", "give a log in which the rig is driven")
+
+
+def _input(experiment: Experiment, rig: Rig, before: float | None) -> tuple[np.ndarray, float, str, str]:
+    """The actuator's input: (samples, value before them, hold, role it comes from)."""
+    if "pressure" in experiment:
+        values = experiment["pressure"]
+        return values, _value_before(values, before), hold_of(values), "pressure"
+    command = experiment["command"]
+    rest = _value_before(command, before)
+    if rig.regulator == UNITY:
+        return command, rest, "zero", "command"
+    gain = rig.regulator.dc_gain
+    if not np.isfinite(gain):
+        raise FitError("regulator", "integrates, so it has no rest to start from", "log the pressure")
+    moved = Convolution(rig.regulator, experiment.sample_time, "zero").run(command - rest)
+    return gain * rest + moved, gain * rest, "linear", "command"
+
+
+def _value_before(values: np.ndarray, before: float | None) -> float:
+    return float(values[0]) if before is None else before
+
+
+def hold_of(values: np.ndarray) -> str:
+    """"zero" for an input that is held (it changes in few of its samples), else "linear"."""
+    return "zero" if np.count_nonzero(np.diff(values)) <= _HELD * len(values) else "linear"
+
+
+def _through_sensor(sensor: TransferFunction, drives: np.ndarray, step: float, hold: str) -> tuple:
+    gain = sensor.dc_gain
+    if not np.isfinite(gain):
+        raise FitError("sensor", "integrates, so it has no rest to start from", "log the curvature")
+    run = Convolution(sensor, step, hold).run
+    return gain, np.array([run(drive) for drive in drives]), "linear"
+
+
+def _level(pressure: np.ndarray, before: float) -> float:
+    """The median of the input where it is more than half-way to its farthest value."""
+    away = np.abs(pressure - before)
+    return float(np.median(pressure[away >= 0.5 * away.max()]))
+
+
+Kernel = Callable[[float, float, float, int], np.ndarray]

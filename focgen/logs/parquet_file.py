@@ -1,0 +1,35 @@
+"""Logs in .parquet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from focgen.errors import LogError, MissingExtra
+from focgen.logs.table import LogTable
+
+
+def read(path: Path) -> LogTable:
+    """Read a file. Raises LogError where it is damaged, MissingExtra without pyarrow."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise MissingExtra.of("pyarrow", "parquet", str(path)) from None
+    path.open("rb").close()  # a missing file is reported as one
+    try:
+        table = pyarrow.parquet.read_table(path)
+    except (pyarrow.ArrowException, OSError):
+        raise LogError(str(path), "is not a whole Parquet file", "write it again") from None
+    return LogTable(str(path), {name: _column(table.column(name)) for name in table.column_names})
+
+
+def _column(column) -> np.ndarray | list:
+    """Numbers as an array with NaN for nulls, time stamps in s, everything else as a list."""
+    values = column.to_numpy()
+    if values.dtype.kind == "M":
+        return values.astype("datetime64[ns]").astype(np.int64) * 1e-9
+    if values.dtype.kind == "m":
+        return values.astype("timedelta64[ns]").astype(np.int64) * 1e-9
+    return values if values.dtype.kind in "fiu" else values.tolist()
