@@ -70,8 +70,10 @@ def _linear_inverse(name: str, actuator: LinearActuator) -> Inversion:
     where, transfer = f"{name} [actuator]", actuator.dynamics
     if not transfer.num:
         raise DesignError(where, "is zero", "give num at least one term")
-    _refuse_right_half(where, transfer.num, "zero", "does not invert (non-minimum phase)")
-    _refuse_right_half(where, transfer.den, "pole", "is unstable: cancelling the pole would hide it, not move it")
+    _refuse_right_half(where, transfer.num, "has a zero at {place} rad/s: its inverse is unstable (non-minimum phase)",
+                       "move that factor to [regulator] or [sensor], which are not inverted")
+    _refuse_right_half(where, transfer.den, "has a pole at {place} rad/s: cancelling what is unstable only hides it",
+                       "stabilise it first, or write controller.toml by hand")
     kind = transfer.den[-1].order - transfer.num[-1].order
     gain = transfer.num[-1].coefficient / transfer.den[-1].coefficient
     if kind < 0.0 or kind > 1.0:
@@ -85,25 +87,23 @@ def _linear_inverse(name: str, actuator: LinearActuator) -> Inversion:
 
 
 def _quotient(num: Polynomial, den: Polynomial, gain: float) -> TransferFunction:
-    """Return gain · num/den with the lowest coefficient of ``den`` 1."""
-    unit = den[-1].coefficient
-    return TransferFunction([(gain * c / unit, o) for c, o in num], [(c / unit, o) for c, o in den])
+    """Return gain · num/den with the common power of s divided out and the lowest coefficient of ``den`` 1."""
+    unit, common = den[-1].coefficient, min(num[-1].order, den[-1].order)
+    return TransferFunction([(gain * c / unit, o - common) for c, o in num], [(c / unit, o - common) for c, o in den])
 
 
 def _shifted(terms: Polynomial, by: float) -> Polynomial:
     return polynomial((term.coefficient, term.order + by) for term in terms)
 
 
-def _refuse_right_half(where: str, terms: Polynomial, kind: str, what: str) -> None:
+def _refuse_right_half(where: str, terms: Polynomial, what: str, remedy: str) -> None:
     low = terms[-1].order
     found = first_sheet_zeros(tuple(Term(c, o - low) for c, o in terms), _HALF_PLANE + 0.05)
     right = found[np.abs(np.angle(found)) <= _HALF_PLANE + _AXIS]
     if len(right):
         place = max(right, key=lambda root: root.real)
         shown = f"{place.real:.3g}" + (f" ± {abs(place.imag):.3g}j" if place.imag else "")
-        raise DesignError(where, f"has a {kind} at {shown} rad/s and {what}",
-                          "leave that factor out of [actuator] (put it in [regulator] or [sensor], which are not "
-                          "inverted), or write controller.toml by hand")
+        raise DesignError(where, what.format(place=shown), remedy)
 
 
 def _rolled_off(inversion: Inversion, crossover: float) -> Inversion:

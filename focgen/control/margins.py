@@ -112,4 +112,8 @@ def _gain_margins(level: np.ndarray, phase: np.ndarray) -> tuple[float, float]:
 def _is_stable(loop: Curve) -> bool:
     """Nyquist: 1 + L turns back by exactly what its integrators turned it at low frequency, and no further."""
     turn = np.unwrap(np.angle(1.0 + loop.values))
-    return bool(turn[0] < math.pi / 4 and abs(turn[-1]) < math.pi / 2)
+    sizes = np.abs(loop.values[:2])
+    kind = -np.log(sizes[1] / sizes[0]) / np.log(loop.omega[1] / loop.omega[0])  # of the loop: L ~ s^−kind
+    begin = -0.5 * math.pi * kind if sizes[0] > 2.0 else 0.0
+    turn = turn - 2.0 * math.pi * round((turn[0] - begin) / (2.0 * math.pi))
+    return bool(abs(turn[0] - begin) < math.pi / 2 and abs(turn[-1]) < math.pi / 2)

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 BAND = 0.05
-_TAIL = 0.1  # of the record: the error there is called steady
+_TAIL = 0.1  # of the record: what happens there is called steady
 
 
 @dataclass(frozen=True)
 class StepMeasures:
-    """``settling_s``: when the output stays within ±5 % of the step for good, s; NaN where it does not within the
-    record. ``overshoot_pct``: past the set point, in percent of the step. ``steady_error``: set point minus the
+    """``settling_s``: when the output is within ±5 % of the step for good, s; NaN where it is not for at least the
+    record's last tenth. ``overshoot_pct``: past the set point, in percent of the step. ``steady_error``: set point minus the
     mean of the record's last tenth, in output units.
     """
 
@@ -51,7 +51,7 @@ def _settling(progress: np.ndarray, band: float) -> float:
     if len(outside) == 0:
         return 0.0
     last = int(outside[-1])
-    if last + 1 >= len(away):
+    if last + 1 >= len(away) - round(_TAIL * len(away)):
         return math.nan
     # where the band is crossed whole between two samples, what counts is the side it is entered from
     edge = 1.0 + band if progress[last] > 1.0 else 1.0 - band

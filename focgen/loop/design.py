@@ -21,7 +21,7 @@ from focgen.control.units import units_of
 from focgen.errors import DesignError
 from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
-from focgen.loop.tuning import HORIZON, OVERSHOOT, Bench, Tuned, Wish, tune
+from focgen.loop.tuning import HORIZON, OVERSHOOT, Bench, Tuned, Wish, fastest, meeting, tune
 from focgen.loop.trial import run_steps
 from focgen.output import write_file
 from focgen.plan.build import build_plan
@@ -226,13 +226,14 @@ def _tuned(bench: Bench, settling, overshoot, notes: list[str]) -> tuple[Wish, T
     if settling is not None or overshoot is not None:
         return wish, tune(bench, wish)
     wish = replace(wish, settling=SETTLING)
-    try:
-        return wish, tune(bench, wish)
-    except DesignError:
-        tuned = tune(bench, replace(wish, settling=None))
-        notes.append(f"{SETTLING:g} s is not feasible here; {tuned.mean_settling:.3g} s is the fastest with at most "
+    found = meeting(bench, wish)
+    if found is not None:
+        return wish, found
+    found = fastest(bench, wish.overshoot)
+    if found.mean_settling > SETTLING:
+        notes.append(f"{SETTLING:g} s is not feasible here; {found.mean_settling:.3g} s is the fastest with at most "
                      f"{wish.overshoot:g} % overshoot")
-        return replace(wish, settling=tuned.mean_settling), tuned
+    return replace(wish, settling=max(found.mean_settling, SETTLING)), found
 
 
 # --------------------------------------------------------------------------------------------- the controller

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import zeta
 
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import actuator_of
@@ -16,7 +17,7 @@ from focgen.plan.model import Plan
 from focgen.plan.response import designed_response, running_gain, running_response
 from focgen.rig.model import Actuator, Rig
 
-_ALIASES = 40  # pairs of side bands; what they leave out is below 1e-4 near the crossover
+_ALIASES = 40  # pairs of side bands summed one by one
 _LOW = 1e-5  # of the sampling frequency: where the curves begin
 _HIGH = 1e3  # of the same: where the continuous ones end
 
@@ -42,12 +43,29 @@ def held_response(transfer: TransferFunction, sample_time: float, omega) -> np.n
     """
     h, omega = sample_time, np.asarray(omega, dtype=float)
     back = np.exp(-1j * omega * h)
+    at_once, rest = _split(transfer)
+    if not rest.num:
+        return at_once * back
     bands = omega + 2.0 * math.pi / h * np.arange(-_ALIASES, _ALIASES + 1)[:, None]
-    total = (transfer.frequency_response(bands) / (1j * bands)).sum(axis=0)
-    at_once = 0.0
-    if transfer.num and transfer.num[0].order == transfer.den[0].order:
-        at_once = transfer.num[0].coefficient / transfer.den[0].coefficient
-    return (1.0 - back) * (total / h - 0.5 * at_once)
+    total = (rest.frequency_response(bands) / (1j * bands)).sum(axis=0) + _far_bands(rest, h, omega)
+    return (1.0 - back) * total / h + at_once * back
+
+
+def _split(transfer: TransferFunction) -> tuple[float, TransferFunction]:
+    """What passes at once, and the strictly proper rest."""
+    if not transfer.num or transfer.num[0].order < transfer.den[0].order:
+        return 0.0, transfer
+    at_once = transfer.num[0].coefficient / transfer.den[0].coefficient
+    lower = [(-at_once * c, o) for c, o in transfer.den[1:]]
+    return at_once, TransferFunction([*transfer.num[1:], *lower], transfer.den)
+
+
+def _far_bands(rest: TransferFunction, h: float, omega: np.ndarray) -> np.ndarray:
+    """Σ P(jω_n)/(jω_n) over the bands beyond those summed one by one, where P is its leading power."""
+    fall = rest.den[0].order - rest.num[0].order + 1.0
+    size = rest.num[0].coefficient / rest.den[0].coefficient * (2.0 * math.pi / h) ** -fall
+    place, first = omega * h / (2.0 * math.pi), _ALIASES + 1.0
+    return size * (1j**-fall * zeta(fall, first + place) + (-1j) ** -fall * zeta(fall, first - place))
 
 
 def sampled_response(controller: Controller, omega, length: int | None = None) -> np.ndarray:

@@ -8,7 +8,7 @@ that meet the wish the one is taken whose operating points settle most alike.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -111,13 +111,18 @@ class _Search:
         self.bench, self.scale = bench, scale
         self.step = step or max(own, scale / _SAMPLES)
         self.samples = max(20, math.ceil(HORIZON * scale / self.step))
-        if self.samples > _MOST_SAMPLES:
-            raise DesignError(bench.rig.name, f"a settling time of {scale:.3g} s is {scale / self.step:.0f} samples",
+        if HORIZON * scale / own > _MOST_SAMPLES:
+            raise DesignError(bench.rig.name, f"a settling time of {scale:.3g} s is {scale / own:.0f} samples",
                               f"wish for a faster loop, or raise the rig's sample_time ({own:g} s)")
         self.chain = chain(bench.rig, self.step, self.samples, parts=None if self.step == own else _PARTS)
         self.inversion = invert(bench.rig, 3.0 / scale)
         static = bench.rig.regulator.dc_gain * bench.rig.sensor.dc_gain
         self.unit = 3.0 / (scale * static)
+
+    def ratios(self, wanted) -> np.ndarray:
+        """The ratios worth trying: 1 where nothing is scheduled or there is one operating point."""
+        several = self.inversion.scheduled and np.ptp(self.bench.pressures) > 0.0
+        return np.asarray(wanted) if several else np.ones(1)
 
     def at(self, step: float) -> _Search:
         """The same search at another sampling interval."""
@@ -125,9 +130,9 @@ class _Search:
 
     def line(self, level: float, ratio: float) -> Line:
         low, high = self.bench.pressures[0], self.bench.pressures[-1]
-        first = level * self.unit
-        slope = first * (ratio - 1.0) / (high - low) if ratio != 1.0 else 0.0
-        return Line(first - slope * low, slope)
+        first = float(level * self.unit)
+        slope = first * (ratio - 1.0) / (high - low) if ratio != 1.0 else 0.0  # one point has ratio 1
+        return Line(float(first - slope * low), float(slope))
 
     def measures(self, lines: list[Line]) -> list[tuple[StepMeasures, ...]]:
         """Return what each line makes of each operating point."""
@@ -165,18 +170,21 @@ def simulate_lines(bench: Bench, inversion: Inversion, lines: list[Line], prepar
 def tune(bench: Bench, wish: Wish) -> Tuned:
     """Return the line that meets ``wish``. Raises DesignError naming what is feasible."""
     if wish.settling is None:
-        return _fastest(bench, wish)
-    search = _Search(bench, wish.settling)
-    pair = _matching(search, wish)
-    found = None if pair is None else _at_own_rate(bench, search, pair, wish)
-    if found is None:
-        found = _fastest(bench, wish)
+        return fastest(bench, wish.overshoot)
+    found = meeting(bench, wish) or fastest(bench, wish.overshoot)
     if found.mean_settling > wish.settling:
         raise DesignError(
             bench.rig.name, f"no K_o(p) settles in {wish.settling:g} s on average with at most {wish.overshoot:g} % "
             f"overshoot; feasible is {found.mean_settling:.3g} s",
             f"wish for --settling {_upward(found.mean_settling):g} or more, or allow more --overshoot")
     return found
+
+
+def meeting(bench: Bench, wish: Wish) -> Tuned | None:
+    """Return the line whose mean settling time is the wish's, None where none was found."""
+    search = _Search(bench, wish.settling)
+    pair = _matching(search, wish)
+    return None if pair is None else _at_own_rate(bench, search, pair, wish)
 
 
 def _upward(value: float) -> float:
@@ -199,26 +207,43 @@ def _at_own_rate(bench: Bench, search: _Search, pair: tuple[float, float, float]
     return None
 
 
-def _fastest(bench: Bench, wish: Wish) -> Tuned:
-    """Return the line with the shortest mean settling time that keeps the overshoot."""
+def fastest(bench: Bench, overshoot: float) -> Tuned:
+    """Return the line with the shortest mean settling time found whose overshoot stays within ``overshoot`` (%).
+
+    Raises DesignError where none settles.
+    """
     scale = _guess(bench)
     for _ in range(_ATTEMPTS):
         search = _Search(bench, scale)
-        ratios = _RATIOS if search.inversion.scheduled else np.ones(1)
-        trials = search.trials(np.geomspace(0.1, 3.0, 30), ratios)
-        mean = np.where(trials.overshoot <= _MARGIN * wish.overshoot, trials.mean, np.inf)
-        best = int(mean.argmin())
-        if math.isinf(mean[best]):
+        best = _quickest(search.trials(np.geomspace(0.1, 3.0, 24), search.ratios(_COARSE_RATIOS)), overshoot)
+        if best is None:
             scale *= 3.0
-        elif not scale / 3.0 <= mean[best] <= 1.5 * scale:
-            scale = mean[best]
+        elif not scale / 3.0 <= best[0] <= 1.5 * scale:
+            scale = best[0]
         else:
-            found = _at_own_rate(bench, search, (*trials.lines[best], trials.lines[best][0]), replace(wish, settling=None))
+            found = _refined(bench, search, best, overshoot)
             if found is not None:
                 return found
-            scale = 1.2 * mean[best]
-    raise DesignError(bench.rig.name, f"no K_o(p) was found that settles with at most {wish.overshoot:g} % overshoot",
+            scale = 1.2 * best[0]
+    raise DesignError(bench.rig.name, f"no K_o(p) was found that settles with at most {overshoot:g} % overshoot",
                       "allow more --overshoot, or check the rig and its sample_time")
+
+
+def _refined(bench: Bench, search: _Search, best: tuple[float, float, float], overshoot: float) -> Tuned | None:
+    """Look around the best line of the coarse grid twice, ever closer."""
+    for width in (1.0, 0.3):
+        levels = best[1] * np.exp(0.25 * width * np.linspace(-1.0, 1.0, 9))
+        ratios = search.ratios(best[2] * np.exp(0.4 * width * np.linspace(-1.0, 1.0, 7)))
+        best = min(best, _quickest(search.trials(levels, ratios), overshoot) or best)
+    _, level, ratio = best
+    return _at_own_rate(bench, search, (level, ratio, level), Wish(None, overshoot))
+
+
+def _quickest(trials: _Trials, overshoot: float) -> tuple[float, float, float] | None:
+    """Return mean settling time, level and ratio of the quickest line that keeps the overshoot."""
+    mean = np.where(trials.overshoot <= _MARGIN * overshoot, trials.mean, np.inf)
+    best = int(mean.argmin())
+    return None if math.isinf(mean[best]) else (float(mean[best]), *map(float, trials.lines[best]))
 
 
 def _guess(bench: Bench) -> float:
@@ -236,12 +261,12 @@ def _matching(search: _Search, wish: Wish) -> tuple[float, float, float] | None:
 
     None where there is none.
     """
-    scheduled = search.inversion.scheduled
-    levels = _promising(search.trials(_LEVELS, _COARSE_RATIOS if scheduled else np.ones(1)), wish)
+    levels = _promising(search.trials(_LEVELS, search.ratios(_COARSE_RATIOS)), wish)
     if levels is None:
         return None
-    pairs = _crossings(search.trials(levels, _RATIOS if scheduled else np.ones(1)), wish, len(levels))
-    if not pairs or not scheduled:
+    ratios = search.ratios(_RATIOS)
+    pairs = _crossings(search.trials(levels, ratios), wish, len(levels))
+    if not pairs or len(ratios) == 1:
         return pairs[0] if pairs else None
     level, ratio, _ = pairs[0]
     near = ratio * np.linspace(0.88, 1.12, 7)

@@ -27,13 +27,14 @@ def simulation_pictures(simulation: Simulation) -> dict[str, bytes]:
         top.set_title(f"Closed loop as it will run ({simulation.arithmetic}, memory {simulation.length})")
         low, high = simulation.controller.ranges.output
         for limit in (low, high):
-            if _near(limit, simulation.running.command):
+            if _reached(limit, simulation.running.command):
                 bottom.axhline(limit, color=COLOURS["limit"], lw=0.8, ls=":")
         return {"setpoints.png": png(fig)}
 
 
-def _near(limit: float, command: np.ndarray) -> bool:
-    return bool(np.abs(command - limit).min() <= 0.05 * (np.ptp(command) or 1.0))
+def _reached(limit: float, command: np.ndarray) -> bool:
+    """Whether the command stays at the limit for more than the moment it starts from."""
+    return bool(np.count_nonzero(np.isclose(command, limit, rtol=0.0, atol=1e-9)) > 0.01 * command.size)
 
 
 def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
@@ -41,9 +42,15 @@ def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
     for i, result in enumerate(simulation.setpoints):
         colour = CYCLE[i % len(CYCLE)]
         _reference(top, run.time[[0, -1]], result.start, result.reference, colour)
+        if simulation.frozen[i] is not None:
+            top.plot(run.time, simulation.frozen[i], color=colour, lw=0.9, ls=":")
         top.plot(run.time, run.output[:, i], color=colour)
         bottom.step(run.time, run.command[:, i], where="post", color=colour, label=f"{result.reference:.4g}")
         _settling(top, run.time, run.output[:, i], result.settling_s, colour)
+    top.plot([], [], color=GREY, lw=0.9, ls=":", label="K frozen, linear")
+    top.plot([], [], color=GREY, lw=0.8, ls="--", label="set point ±5 %")
+    top.plot([], [], "o", color=GREY, mec="white", mew=0.8, label="settled")
+    top.legend(ncols=3, loc="lower right")
     top.set_xlim(0.0, _interesting(simulation))
     bottom.legend(title=_label("set point", simulation.controller.units.measurement), ncols=4, loc="best")
 
@@ -90,8 +97,8 @@ def _schedule_picture(design: Design, rig: Rig) -> bytes:
     formula = (schedule.intercept + schedule.slope * p) / rig.actuator.K(p)
     beyond = np.linspace(first - 0.3 * (last - first), last + 0.1 * (last - first), 400)
     with figure(2, 1, size=(7.0, 5.6), sharex=True) as (fig, (top, bottom)):
-        top.plot(p, formula, color=COLOURS["ideal"], lw=0.9, label="K_o(p)/K(p)")
-        top.plot(beyond, design.controller.gain_at(beyond), color=COLOURS["running"], label="schedule table")
+        top.plot(beyond, design.controller.gain_at(beyond), color=COLOURS["running"], lw=2.2, label="schedule table")
+        top.plot(p, formula, color=COLOURS["ideal"], lw=0.7, zorder=3, label="K_o(p)/K(p)")
         top.plot(schedule.breakpoints, schedule.gains, "o", color=COLOURS["running"])
         top.axvline(schedule.lower_limit, color=GREY, lw=0.8, ls=":")
         top.annotate("held below", (schedule.lower_limit, 0.05), xycoords=("data", "axes fraction"), ha="right",
@@ -103,7 +110,8 @@ def _schedule_picture(design: Design, rig: Rig) -> bytes:
         places = [point.pressure for point in design.points]
         bottom.plot(places, [point.K_o for point in design.points], "o", color=COLOURS["controller"],
                     label="operating points")
-        bottom.set_ylim(0.0, None) if schedule.intercept + schedule.slope * last > 0 else None
+        ends = [0.0, *(1.15 * (schedule.intercept + schedule.slope * end) for end in (first, last))]
+        bottom.set_ylim(min(ends), max(ends))
         bottom.set_ylabel("K_o")
         bottom.set_xlabel(_label("pressure", unit))
         bottom.legend(loc="lower right")
@@ -133,7 +141,7 @@ def _margins_picture(design: Design, rig: Rig) -> bytes:
         top.set_ylabel("|L|")
         bottom.set_ylabel("phase (°)")
         bottom.set_xlabel("frequency (rad/s)")
-        top.set_title(_label("Open loop at", "").strip() + f" p = {worst.pressure:.4g} {design.controller.units.schedule}".rstrip())
+        top.set_title(f"Open loop at p = {worst.pressure:.4g} {design.controller.units.schedule}".rstrip())
         top.legend()
         return png(fig)
 
