@@ -63,16 +63,17 @@ def calibrate(drawn: Drawn, rig: Rig, trial: Trial, target: float) -> tuple[Sett
         return rms(trial.signals(rig, [drawn.at(a)])[name] - without) / span
 
     low, high = np.log(drawn.form.low), np.log(drawn.form.high)
-    reached = gap(drawn.form.high)
-    if reached <= target:
-        return drawn.at(drawn.form.high), reached
+    best = drawn.form.high, gap(drawn.form.high)
+    if best[1] <= target:
+        return drawn.at(best[0]), best[1]
     for _ in range(14):
-        middle = 0.5 * (low + high)
-        now = gap(float(np.exp(middle)))
-        low, high = (middle, high) if now < target else (low, middle)
+        a = float(np.exp(0.5 * (low + high)))
+        now = gap(a)
+        low, high = (np.log(a), high) if now < target else (low, np.log(a))
+        best = min(best, (a, now), key=lambda pair: abs(pair[1] - target))
         if abs(now / target - 1.0) < 0.02:
             break
-    return drawn.at(float(np.exp(middle))), now
+    return drawn.at(best[0]), best[1]
 
 
 def surviving(

@@ -75,8 +75,7 @@ double loose_plug(effect *e, const chain *c, double in, double t) {
 
 /* The reading cannot tell the side: folded about par[0]. par[1] rounds the fold. */
 double folded_reading(effect *e, const chain *c, double in, double t) {
-    double away = in - e->par[0];
+    double at = e->par[0], round = e->par[1], away = in - at;
     (void)c, (void)t;
-    return e->par[0] + sqrt(away * away + e->par[1] * e->par[1]) - sqrt(e->par[0] * e->par[0] + e->par[1] * e->par[1])
-           - e->par[0];
+    return hypot(away, round) - hypot(at, round);
 }

@@ -55,7 +55,11 @@ double tube_cells(effect *e, const chain *c, double in, double t) {
     double share = exp(-c->h / (e->par[0] * 0.2 / 6.0));
     double value = delayed(e, in, 0.8 * e->par[0] / c->h);
     (void)t;
-    for (int i = 0; i < 6; i++) value = e->st[i] = value + share * (e->st[i] - value);
+    for (int i = 0; i < 6; i++) {
+        double *inlet = &e->st[i], *cell = &e->st[6 + i], mean = 0.5 * (*inlet + value);
+        *inlet = value;
+        value = *cell = mean + share * (*cell - mean);
+    }
     return value;
 }
 

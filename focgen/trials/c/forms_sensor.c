@@ -111,8 +111,8 @@ double sticky_rail(effect *e, const chain *c, double in, double t) {
     double *depth = &e->st[0], over = fmax(in - e->par[0], 0.0);
     (void)t;
     *depth = over > 0.0 ? 1.0 : *depth * exp(-c->h / e->par[1]);
-    double out = fmin(in, e->par[0]);
-    return over > 0.0 || *depth < 0.05 ? out : out + *depth * fmax(fmin(e->par[0] - out, 0.02 * e->par[0]), 0.0);
+    double out = fmin(in, e->par[0]), below = fmin(e->par[0] - out, 0.02 * e->par[0]);
+    return over > 0.0 || *depth < 0.05 ? out : out + *depth * below;
 }
 
 /* A converter with steps par[0], mid-tread, whose comparator needs par[1] of a step more to come back. */
