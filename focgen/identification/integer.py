@@ -1,0 +1,174 @@
+"""Integer-order models, from 1 pole to 3 poles and 2 zeros, fitted by the same algorithm for comparison.
+
+A strictly proper model is a denominator, of factors s + a and s² + b s + c with positive coefficients (so it is
+stable), and a numerator, on which the output depends linearly. Levenberg–Marquardt runs over the denominator's
+coefficients, from several starts; numerator and offset are projected out (Golub and Pereyra, 1973). Among the starts
+of a shape are the optima of the smaller ones, so that a larger model never fits worse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+
+from focgen.errors import FitError
+from focgen.identification.excitation import Excitation
+
+SHAPES = tuple((poles, zeros) for poles in (1, 2, 3) for zeros in range(poles))
+"""(poles, zeros) of every strictly proper pair, by rising number of poles, then of zeros."""
+
+_STARTS = {1: (0.1,), 2: (0.02, 0.12, 0.6), 3: (0.015, 0.08, 0.5)}  # time constants, times the length
+_FASTEST, _SLOWEST = 3.0, 30.0  # a pole's rate: per sample, and times the length
+_APART = 1e-6  # relative distance of two poles, nearer than which they are taken apart
+_ROUNDS = 25  # of Levenberg–Marquardt
+
+
+@dataclass(frozen=True, eq=False)
+class IntegerFit:
+    """``num`` and ``den``: coefficients by falling power of s, den monic. ``simulated`` (n,): the model's output."""
+
+    poles: int
+    zeros: int
+    num: np.ndarray
+    den: np.ndarray
+    offset: float
+    simulated: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """As in Table I: ``1p``, ``2p1z``."""
+        return shape_name(self.poles, self.zeros)
+
+    @property
+    def parameters(self) -> int:
+        """Of numerator and denominator, the offset not counted."""
+        return self.poles + self.zeros + 1
+
+
+def shape_name(poles: int, zeros: int) -> str:
+    """The name of a shape, as in Table I."""
+    return f"{poles}p{zeros}z" if zeros else f"{poles}p"
+
+
+def fit_integer_models(experiment: Excitation) -> tuple[IntegerFit, ...]:
+    """Fit every shape of ``SHAPES`` to an experiment. Raises FitError where one does not converge from any start."""
+    made: dict[tuple[int, int], IntegerFit] = {}
+    optima: dict[tuple[int, int], np.ndarray] = {}
+    for poles, zeros in SHAPES:
+        problem = _Projected(experiment, poles, zeros)
+        optima[poles, zeros] = x = _best(problem, _starts(experiment, poles, zeros, optima))
+        made[poles, zeros] = problem.finished(x)
+    return tuple(made.values())
+
+
+def _best(problem: _Projected, starts: list[np.ndarray]) -> np.ndarray:
+    runs = []
+    for start in starts:
+        try:
+            runs.append(least_squares(problem.residual, start, method="lm", xtol=1e-6, ftol=1e-8,
+                                      max_nfev=_ROUNDS * (len(start) + 1)))
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+    if not runs:
+        name = shape_name(problem.poles, problem.zeros)
+        raise FitError(problem.experiment.name, f"no {name} model converges", "look at the log")
+    return min(runs, key=lambda run: run.cost).x
+
+
+def _starts(experiment: Excitation, poles: int, zeros: int, optima: dict) -> list[np.ndarray]:
+    """Choices of distinct time constants, and the smaller shapes' optima with a pole added."""
+    rates = [1.0 / (share * len(experiment)) for share in _STARTS[poles]]  # per sample
+    starts = [_coefficients(np.array(chosen)) for chosen in combinations(rates, poles)]
+    for smaller in ((poles - 1, zeros), (poles - 1, zeros - 1)):
+        if smaller in optima:
+            known = -_poles(smaller[0], optima[smaller])
+            added = 1.0 if smaller[1] == zeros else 3.0 * float(np.abs(known).max())
+            starts.append(_coefficients(np.append(known, min(added, 1.0))))
+    return starts
+
+
+def _coefficients(rates: np.ndarray) -> np.ndarray:
+    """Logarithms of (a), (b, c) or (b, c, a) for poles at −rates; a complex pair stands in the quadratic."""
+    rates = rates[np.argsort(-np.abs(rates.imag), kind="stable")]
+    if len(rates) == 1:
+        return np.log(rates.real)
+    pair = np.array([(rates[0] + rates[1]).real, (rates[0] * rates[1]).real])
+    return np.log(np.concatenate([pair, rates[2:].real]))
+
+
+def _poles(count: int, x: np.ndarray) -> np.ndarray:
+    """The poles, per sample."""
+    c = np.exp(x)
+    if count == 1:
+        return np.array([-c[0]], complex)
+    root = np.sqrt(complex(c[0] ** 2 - 4.0 * c[1]))
+    far = -0.5 * (c[0] + root)  # the other by the product: no cancellation
+    return np.array([far, c[1] / far, *(-c[2:])])
+
+
+class _Projected:
+    """The residual after the best numerator and offset, as a function of the denominator; time in samples."""
+
+    def __init__(self, experiment: Excitation, poles: int, zeros: int):
+        self.experiment, self.poles, self.zeros = experiment, poles, zeros
+        self.spread = float(np.std(experiment.measured))
+        slow, fast = np.log(1.0 / (_SLOWEST * len(experiment))), np.log(_FASTEST)
+        self.edges = np.array({1: [(slow, fast)], 2: [(slow, fast + 1), (2 * slow, 2 * fast)],
+                               3: [(slow, fast + 1), (2 * slow, 2 * fast), (slow, fast)]}[poles]).T
+
+    def inside(self, x: np.ndarray) -> np.ndarray:
+        """``x`` with every coefficient within what the record can tell."""
+        return np.clip(x, *self.edges)
+
+    def basis(self, x: np.ndarray) -> np.ndarray:
+        """Responses to the input of s^zeros/den, …, 1/den, and 1 for the offset; (n, zeros + 2)."""
+        poles = _apart(_poles(self.poles, self.inside(x)))
+        single = [_respond(p, self.experiment) for p in poles]
+        slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
+        rows = [sum(p**k / d * r for p, d, r in zip(poles, slopes, single)).real for k in range(self.zeros, -1, -1)]
+        return np.column_stack([*rows, np.ones(len(self.experiment))])
+
+    def best(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Basis and the linear coefficients that fit best."""
+        basis = self.basis(x)
+        sizes = np.linalg.norm(basis, axis=0)
+        q, r = np.linalg.qr(basis / sizes)
+        return basis, solve_triangular(r, q.T @ self.experiment.measured) / sizes
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """Model − measured, in units of the measured signal's spread."""
+        basis, linear = self.best(x)
+        return (basis @ linear - self.experiment.measured) / self.spread
+
+    def finished(self, x: np.ndarray) -> IntegerFit:
+        """The fit in units of seconds."""
+        basis, linear = self.best(x)
+        den = np.poly(_apart(_poles(self.poles, self.inside(x)))).real
+        scale = self.experiment.step ** -np.arange(self.poles + 1.0)  # per sample → per second
+        num = linear[:-1] * scale[self.poles - self.zeros : self.poles + 1]
+        return IntegerFit(self.poles, self.zeros, num, den * scale, float(linear[-1]), basis @ linear)
+
+
+def _apart(poles: np.ndarray) -> np.ndarray:
+    """Coinciding poles a little apart, so that partial fractions hold."""
+    made = poles.copy()
+    for i in range(1, len(made)):
+        if np.min(np.abs(made[:i] - made[i])) < _APART * abs(made[i]):
+            made[i] *= 1.0 + 10.0 * i * _APART
+    return made
+
+
+def _respond(pole: complex, experiment: Excitation) -> np.ndarray:
+    """1/(s − pole) at the samples, exactly for the input's hold; time in samples."""
+    drive, decay = experiment.drives[0], np.exp(pole)
+    mean = np.expm1(pole) / pole
+    if experiment.hold == "zero":
+        return lfilter([0.0, mean], [1.0, -decay], drive.astype(complex))
+    late = (mean - 1.0) / pole if abs(pole) > 1e-4 else 0.5 + pole / 6.0  # weight of a sample's end
+    first = lfilter([late, mean - late], [1.0, -decay], drive.astype(complex))
+    return first - late * drive[0] * decay ** np.arange(len(drive)) if drive[0] else first
