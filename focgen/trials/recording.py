@@ -92,6 +92,6 @@ def as_csv(rows: Sequence[tuple[str, dict]], signals: Signals, time_unit: float,
         lead = f"{name}," if runs else ""
         table = np.stack([columns["time"] * time_unit, *(columns[role] for role in roles[1:])], axis=1)
         body = io.StringIO()
-        np.savetxt(body, table, fmt="%.7g", delimiter=",")
+        np.savetxt(body, table, fmt=["%.9g"] + ["%.7g"] * (len(roles) - 1), delimiter=",")
         out.write("".join(lead + line + "\n" for line in body.getvalue().splitlines()))
     return out.getvalue()

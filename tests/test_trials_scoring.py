@@ -1,0 +1,177 @@
+"""The arithmetic of the scores on results made by hand."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import focgen
+from focgen.trials.judging import judge
+from focgen.trials.rows import rows, table
+from focgen.trials.run import outcome_of
+from focgen.trials.statistics import calibration_error, interval, reliability
+
+STAGES = {
+    "hysteresis": "actuator",
+    "creep": "actuator",
+    "leak": "regulator",
+    "sensor_lag": "sensor",
+    "gain_nonlinearity": "actuator",
+    "pick_up": "sensor",
+    "folded_reading": "sensor",
+}
+DONE = {"status": "done", "seconds": 2.0}
+
+
+def label(kind, *effects, visible=True, design=None):
+    truth = [
+        {"effect": e, "stage": STAGES[e], "form": "f", "severity": "mid", "visible": visible} for e in effects
+    ]
+    return {"kind": kind, "truth": truth, "design": design, "suite": "full"}
+
+
+def said(verdict, *causes, stage=None, proposal="", shrink=None, spread=None):
+    """``causes``: each a dict effect → confidence."""
+    found = [{"candidates": [{"effect": e, "confidence": c} for e, c in cause.items()]} for cause in causes]
+    first = next(iter(causes[0])) if causes else None
+    return {
+        "verdict": verdict,
+        "where": {"stage": stage or STAGES.get(first)},
+        "causes": found,
+        "shrink": shrink,
+        "shrink_interval": spread,
+        "next_experiment": {"what": proposal, "why": ""},
+    }
+
+
+def one(kind, effects, diagnosis, number="1", outcome=DONE, **measured):
+    return judge(number, label(kind, *effects), outcome, diagnosis, **measured)
+
+
+def by_name(judged, signals="C"):
+    return {row.name.strip(" …"): row for row in rows(judged, signals)}
+
+
+def test_singles():
+    judged = [
+        one("single", ["hysteresis"], said("named", {"hysteresis": 0.9})),
+        one("single", ["hysteresis"], said("named", {"creep": 0.9})),  # named wrongly
+        one("single", ["leak"], said("named", {"leak": 0.9}, {"creep": 0.8})),  # a false second cause
+        one("single", ["creep"], said("set", {"sensor_lag": 0.5, "creep": 0.4})),
+        one("single", ["creep"], said("unknown", stage="actuator")),
+        one("single", ["leak"], None, outcome={"status": "failed", "seconds": None}),  # a crash
+        judge("7", label("single", "leak", visible=False), DONE, said("named", {"creep": 0.9})),
+    ]
+    found = by_name(judged)
+    assert found["top-1 effect"].value == pytest.approx(2 / 6) and found["top-1 effect"].cases == 6
+    assert found["stage right"].value == pytest.approx(4 / 6)
+    assert found["named one effect, wrongly"].value == pytest.approx(2 / 6)
+    assert found["truth in the reported set"].value == pytest.approx(3 / 5)
+    assert found["its mean size"].value == pytest.approx((1 + 1 + 2 + 2 + 0) / 5)
+    assert found["known wrongly abstained"].value == pytest.approx(2 / 6)
+    assert found["singles: false extras per case"].value == pytest.approx(2 / 6)
+    assert found["below visibility: named one effect, wrongly"].value == 1.0
+    assert found["top-1 effect"].reached is False and found["top-1 effect"].target == "≥ 0.92"
+    assert by_name(judged, "A")["top-1 effect"].target == "≥ 0.72"
+
+
+def test_nulls_and_unknowns():
+    judged = [
+        one("none", [], said("none")),
+        one("parameters", [], said("parameters")),
+        one("parameters", [], said("named", {"leak": 0.9})),
+        one("none", [], None, outcome={"status": "failed"}),
+        one("outside", ["pick_up"], said("unknown", stage="sensor")),
+        one("outside", ["pick_up"], said("named", {"sensor_lag": 0.9})),
+        one("outside", ["folded_reading"], said("named", {"sensor_nonlinearity": 0.9})),  # rightly called so
+    ]
+    found = by_name(judged)
+    assert found["false alarm on none or parameter error"].value == pytest.approx(2 / 4)
+    assert found["unknown caught"].value == pytest.approx(2 / 3)
+
+
+def test_pairs():
+    pair = ["hysteresis", "leak"]
+    judged = [
+        one("pair", pair, said("named", {"leak": 0.9}, {"hysteresis": 0.9})),
+        one("pair", pair, said("set", {"leak": 0.5, "hysteresis": 0.4})),  # one cause holds but one of them
+        one("pair", pair, said("set", {"creep": 0.5, "hysteresis": 0.4}, {"hysteresis": 0.5, "leak": 0.5})),
+        one("pair", pair, said("named", {"leak": 0.9}, {"creep": 0.9}, {"sensor_lag": 0.9})),
+    ]
+    found = by_name(judged)
+    assert found["pairs: both found"].value == pytest.approx(2 / 4)
+    assert found["pairs: false extras per case"].value == pytest.approx(2 / 4)
+
+
+def test_promises():
+    judged = [
+        one(
+            "single",
+            ["leak"],
+            said("named", {"leak": 1.0}, shrink=s, spread=(s - 0.1, s + 0.1)),
+            achieved=a,
+            oracle=o,
+        )
+        for s, a, o in ((0.9, 0.88, 0.9), (0.9, 0.5, 0.8), (0.8, 0.87, 0.9))
+    ]
+    judged.append(one("single", ["leak"], said("unknown"), oracle=0.4))  # nothing promised, nothing achieved
+    found = by_name(judged)
+    assert found["promised shrink: median error"].value == pytest.approx(0.07)
+    assert found["promised shrink: within 0.10"].value == pytest.approx(2 / 3)
+    assert found["promised shrink: 90 % interval covers"].value == pytest.approx(2 / 3)
+    assert found["achieved shrink over the oracle's"].value == pytest.approx(2.25 / 3.0)
+
+
+def test_unidentifiable():
+    design = {"tied": ["gain_nonlinearity", "creep"], "resolves": ["repeat"]}
+
+    def case(diagnosis):
+        return judge("1", label("unidentifiable", "gain_nonlinearity", design=design), DONE, diagnosis)
+
+    both = {"creep": 0.5, "gain_nonlinearity": 0.5}
+    assert case(said("set", both, proposal="Repeat the first step at the end")).says_tied
+    assert not case(said("set", both, proposal="a slow sine")).says_tied
+    assert not case(said("named", {"gain_nonlinearity": 0.9}, proposal="repeat")).says_tied
+    assert not case(said("set", {"creep": 0.5, "leak": 0.5}, proposal="repeat")).says_tied
+
+
+def test_calibration_error_by_hand():
+    confidence, right = np.array([0.5, 0.5, 0.9, 0.9]), np.array([1.0, 0.0, 1.0, 0.0])
+    assert calibration_error(confidence, right, bins=2) == pytest.approx(0.5 * 0.0 + 0.5 * 0.4)
+
+
+def test_reliability_accepts_calibrated_and_refuses_overconfident():
+    accepted = []
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        stated = rng.uniform(0.3, 1.0, 150)
+        accepted.append(reliability(stated, rng.random(150) < stated, draws=200)["p"] > 0.05)
+        boast = reliability(np.full(150, 0.97), rng.random(150) < 0.8, draws=200)
+        assert boast["p"] < 0.05 and boast["error"] > boast["perfect"]
+    assert sum(accepted) >= 20  # 95 % of 24, less two and a half standard deviations
+
+
+def test_interval_covers_as_often_as_it_says():
+    covered = 0
+    for seed in range(200):
+        hits = np.random.default_rng(seed).random(100) < 0.7
+        low, high = interval(hits, draws=300)
+        covered += low <= 0.7 <= high
+    assert 168 <= covered <= 192  # 90 % of 200, within three standard deviations
+
+
+def test_failed_diagnosis_is_noted_and_not_repeated(tmp_path):
+    folder = tmp_path / "t"
+    focgen.trial("make", folder, cases=1, seed=5, suite="short", kinds=("none",))
+    (folder / "cases" / "0001" / "rig.toml").write_text("nonsense = [")
+    ran = focgen.trial("run", folder, jobs=1)
+    assert (ran.now, ran.before, ran.failed) == (1, 0, 1)
+    assert "RigError" in outcome_of(folder / "runs" / "0001")["fault"]
+    again = focgen.trial("run", folder, jobs=1)
+    assert (again.now, again.before, again.failed) == (0, 1, 1)
+    scores = focgen.trial("score", folder, baseline=False)
+    assert scores.failed == 1 and json.loads((folder / "scores.json").read_text())["scores"]["failed"] == 1
+    assert "missed" in table(scores.rows)
+    shutil.rmtree(folder / "runs")
+    assert focgen.trial("score", folder, baseline=False).failed == 1
