@@ -207,18 +207,22 @@ def _span(rig: Rig, inversion: Inversion, points, ranges: Ranges, lowest: float 
 
 
 def _check_gain(rig: Rig, inversion: Inversion, begin: float, end: float, near: float, far: float) -> None:
-    place = np.linspace(begin, end, 2001)
-    value = inversion.K(place)
-    if np.min(value) * np.max(value) <= 0.0:
-        zero = float(place[np.argmin(np.abs(value))])
-        raise DesignError(f"{rig.name} [actuator]", f"has a gain K(p) that changes sign at p = {zero:.3g}, so K_o/K is not defined there",
-                          "give set points, or [ranges] pressure, on one side of it")
-    place = np.linspace(near, far, 2001)
-    slope = np.gradient(inversion.K(place) * place, place) if near != far else np.ones(1)
-    if np.min(slope) * np.max(slope) <= 0.0:
-        turn = float(place[np.argmin(np.abs(slope))])
+    zero = _turning(np.linspace(begin, end, 2001), inversion.K)
+    if zero is not None:
+        raise DesignError(f"{rig.name} [actuator]", f"has a gain K(p) that changes sign at p = {zero:.3g}, so K_o/K is "
+                          "not defined there", "give set points, or [ranges] pressure, on one side of it")
+    slope = np.polynomial.Polynomial((0.0, *inversion.gain)).deriv()
+    turn = _turning(np.linspace(near, far, 2001), slope)
+    if turn is not None:
         raise DesignError(f"{rig.name} [actuator]", f"has an output K(p)p that turns back at p = {turn:.3g}",
                           "give set points below it")
+
+
+def _turning(place: np.ndarray, function) -> float | None:
+    """Return where ``function`` first loses the sign it begins with, None where it keeps it."""
+    sign = np.sign(function(place))
+    lost = (sign != sign[0]) | (sign == 0.0)
+    return float(place[lost.argmax()]) if lost.any() else None
 
 
 def _tuned(bench: Bench, settling, overshoot, notes: list[str]) -> tuple[Wish, Tuned]:
