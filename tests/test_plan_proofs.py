@@ -150,10 +150,12 @@ def test_any_unit_gives_the_same_machine(arithmetic, unit):
 def test_a_steady_error_of_one_count_still_moves_the_integrator():
     """Guard bits: the smallest error that can be read must not be lost, however slow the controller is."""
     for gain in (1.0, 1e-3, 1e-6):
-        plan = build_plan(simple(TransferFunction([(1.0, 0.0)]), gain=gain, integrator=True), "q15")
-        ref = np.ones((1, 4), dtype=np.int64)
-        d = execute(plan, Scenario(ref, np.zeros_like(ref))).d[0]
-        assert d[-1] * plan.increment.lsb == pytest.approx(gain * plan.error.lsb * 0.005, rel=1e-2)
+        for transfer in ([(1.0, 0.0)], [(1.0, 0.0), (1.0, 1.0)], [(0.2, 0.0), (1.0, 1.0)]):
+            plan = build_plan(simple(TransferFunction(transfer), gain=gain, integrator=True), "q15")
+            ref = np.ones((1, 4), dtype=np.int64)
+            d = execute(plan, Scenario(ref, np.zeros_like(ref))).d[0]
+            expected = gain * transfer[0][0] * plan.error.lsb * 0.005
+            assert d[-1] * plan.increment.lsb == pytest.approx(expected, rel=0.05)
 
 
 # ----------------------------------------------------------------------------------------- worst cases
@@ -279,3 +281,11 @@ def test_a_recursion_that_16_bits_cannot_hold_is_refused_and_31_can():
     slow = simple(TransferFunction([(1.0, 0.0)], [(4.0, 2.0), (0.01, 1.0), (1.0, 0.0)]), length=10)
     assert "q31" in str(refused(slow, "q15"))
     build_plan(slow, "q31")
+
+
+def test_weights_that_would_lose_the_gain_at_rest_are_refused():
+    """(s + 0.001) at 10 ms: 100.001 − 100 is nothing in 16 bits; integral action would be gone, or reversed."""
+    derivative = TransferFunction([(1e-3, 0.0), (1.0, 1.0)])
+    assert "gain at rest" in str(refused(simple(derivative, integrator=True), "q15"))
+    plan = build_plan(simple(derivative, integrator=True), "q31")
+    assert sum(plan.direct.values) == pytest.approx(1e-3, rel=1e-4)

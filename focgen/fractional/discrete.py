@@ -16,6 +16,7 @@ from focgen.fractional.transfer import Polynomial, TransferFunction
 
 _UNIT = np.finfo(float).eps / 2  # relative error of one rounding
 _LONGEST = 1 << 21
+_RUN = 100_000_000  # products up to which a recursion is run
 _SETTLED = 1e-3  # residual at which a longer inverse gains nothing worth having
 
 
@@ -99,9 +100,9 @@ def inverse_l1_bound(coefficients) -> float:
         raise UnstableRecursion(outside)
     size, bound = 256, math.inf
     while size <= _LONGEST:
-        inverse = _power_series_inverse(a, size)
+        inverse = power_series_inverse(a, size)
         total = math.fsum(np.abs(inverse)) * (1 + 2 * _UNIT)
-        residual = _residual(a, inverse)
+        residual = inverse_residual(a, inverse)
         if residual < 0.5:
             bound = min(bound, float(total / (1.0 - residual) * (1 + 8 * _UNIT)))
         if residual <= _SETTLED:
@@ -112,8 +113,14 @@ def inverse_l1_bound(coefficients) -> float:
     return bound
 
 
-def _power_series_inverse(a: np.ndarray, count: int) -> np.ndarray:
-    """Return the first ``count`` coefficients of 1/A, by Newton's iteration H ← H (2 − A H)."""
+def power_series_inverse(a: np.ndarray, count: int) -> np.ndarray:
+    """Return the first ``count`` coefficients of 1/A, about.
+
+    By running the recursion; where that would take too long by Newton's iteration H ← H (2 − A H), whose
+    rounding is that of its largest number and grows with the square of ‖1/A‖₁.
+    """
+    if len(a) * count <= _RUN:
+        return signal.lfilter([1.0], a, np.eye(1, count)[0])
     inverse = np.array([1.0 / a[0]])
     while len(inverse) < count:
         size = min(2 * len(inverse), count)
@@ -125,8 +132,8 @@ def _power_series_inverse(a: np.ndarray, count: int) -> np.ndarray:
     return inverse
 
 
-def _residual(a: np.ndarray, inverse: np.ndarray) -> float:
-    """Return an upper bound of ‖A H − 1‖₁."""
+def inverse_residual(a: np.ndarray, inverse: np.ndarray) -> float:
+    """Return an upper bound of ‖A H − 1‖₁, H being a power series' first coefficients."""
     product = signal.fftconvolve(a, inverse)
     product[0] -= 1.0
     # A transform of size n errs by less than ~7 u log2(n) of its 2-norm (Higham, Accuracy and Stability of

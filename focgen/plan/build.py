@@ -9,7 +9,7 @@ from focgen.control.controller import ARITHMETICS, Controller
 from focgen.errors import PlanError
 from focgen.plan import fixed, floating
 from focgen.plan.bounds import error_bound
-from focgen.plan.canonical import Tables, tables
+from focgen.plan.canonical import Tables, realise, tables
 from focgen.plan.formats import WORDS
 from focgen.plan.model import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
@@ -33,6 +33,7 @@ def build_plan(
     check_stable(controller, folded, length)
     draft = _fixed if arithmetic in WORDS else _floating
     plan = draft(controller, arithmetic, length, name or controller.name, folded)
+    _check_at_rest(plan, folded)
     plan = replace(plan, proofs=prove(plan))
     return replace(plan, error_bound=error_bound(plan, folded))
 
@@ -60,6 +61,19 @@ def _numbers(controller: Controller) -> list[float]:
     spans = [s for s in (ranges.reference, ranges.measurement, ranges.output, ranges.schedule) if s]
     gains = [*gain.breakpoints, *gain.gains] if controller.scheduled else [gain]
     return [controller.sample_time, *gains, *(x for span in spans for x in span)]
+
+
+def _check_at_rest(plan: Plan, folded: Tables) -> None:
+    """A gain for constants that rounding took away, or turned round, would be the loop's undoing."""
+    form, half_step = realise(plan.controller), 0.5 * plan.sample_time
+    for made, table, terms, factor in (
+        (plan.direct, folded.direct, form.direct, 1.0),
+        (plan.inner and plan.inner.rest, folded.rest, form.rest, half_step),
+    ):
+        meant = sum(abs(t.coefficient) for t in terms if t.order == 0.0) * factor / abs(folded.normaliser)
+        if made is not None and abs(math.fsum(made.values) - table.total) > 0.5 * meant > 0.0:
+            what = f"the weights of {plan.arithmetic} lose the gain at rest: the highest order outweighs it"
+            raise PlanError(plan.name, what, "choose q31, f32 or f64, or a longer sample_time")
 
 
 _NOTHING_YET = ErrorBound(float("inf"), float("inf"), None)

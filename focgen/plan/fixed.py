@@ -16,6 +16,8 @@ from focgen.plan.gains import Gain, fixed_gain, span_of
 from focgen.plan.model import Block, Feedback, Format, InnerIntegrator, Integrator, Sum
 from focgen.plan.stability import Inverse, inverse
 
+_FEWEST_COUNTS = 16  # of the integrator that the smallest steady error must add
+
 
 @dataclass(frozen=True)
 class Signals:
@@ -89,7 +91,7 @@ def filter_of(controller: Controller, tables: Tables, inputs: Signals, word: Wor
     direct = split(tables.direct.weights, 0, sample.each.worst, word) if tables.direct else None
     inner = _inner(controller, tables, sample) if tables.rest else None
     if tables.feedback is None:
-        return _without_feedback(direct, inner, sample, controller)
+        return _without_feedback(direct, inner, sample)
     return _with_feedback(direct, inner, sample, controller, tables)
 
 
@@ -153,7 +155,8 @@ def _combined(
     return made, inner, reach
 
 
-def _without_feedback(direct, inner, sample: _Sample, controller: Controller) -> Filter:
+def _without_feedback(direct, inner, sample: _Sample) -> Filter:
+    """v is p, narrowed to 32 bits."""
     word, exponent = sample.word, _floor(direct, inner, sample)
     while True:
         made, placed, reach = _combined(direct, inner, sample, exponent)
@@ -177,7 +180,7 @@ def _with_feedback(direct, inner, sample: _Sample, controller: Controller, table
         reach += own.norm * span(inner.state).worst * inner.state.lsb
     exponent = exponent_for(reach, word.limit, controller.name, "the filtered error")
     while exponent < 150:
-        made = _recursion(direct, inner, sample, back, exponent, own, tables)
+        made = _recursion(direct, inner, sample, back, exponent)
         if made is not None and reach * 2.0**-exponent + _noise(made, own) <= word.limit:
             return made
         exponent += 1
@@ -205,9 +208,7 @@ def _noise(made: Filter, own: Inverse) -> float:
     return 0.5 * carried + own.norm * (0.5 * aligned * 2.0**-made.narrow) + at_reset
 
 
-def _recursion(
-    direct, inner, sample: _Sample, back, exponent: int, own: Inverse, tables: Tables
-) -> Filter | None:
+def _recursion(direct, inner, sample: _Sample, back: list[Draft], exponent: int) -> Filter | None:
     """The filter with v in counts of 2^``exponent``; None where the wide format cannot be finer than v."""
     word = sample.word
     whole = Interval(-word.limit - 1, word.limit)
@@ -235,10 +236,15 @@ def _recursion(
     return None
 
 
+def _still(direct: Sum | None, table: Sum | None) -> float:
+    """The gain from a constant e to v, the inner integral apart."""
+    total = float(np.sum(direct.values)) if direct else 0.0
+    return total / (1.0 + float(np.sum(table.values))) if table else total
+
+
 def _steady(direct: Sum | None, table: Sum, sample: _Sample, exponent: int, word: Word) -> tuple[int, int]:
     """Constant e to constant v, as count and right shift."""
-    total = float(np.sum(direct.values)) if direct else 0.0
-    ratio = total / (1.0 + float(np.sum(table.values))) * 2.0 ** (sample.exponent - exponent)
+    ratio = _still(direct, table) * 2.0 ** (sample.exponent - exponent)
     by = 2 * word.bits - 2
     while nearest(abs(ratio) * 2.0**by) > word.limit:
         by -= 1
@@ -262,7 +268,15 @@ def actuation(controller: Controller, made: Filter, inputs: Signals, word: Word)
             raise _too_small(controller, by)
         increment = _narrowed(reach, by, inputs.output_exponent, word.sum_bits, unit)
         return Actuation(gain, product, by, increment, None)
-    return _integrated(controller, gain, product, exponent, inputs, word)
+    table = made.feedback.table if made.feedback else None
+    slowest = abs(_still(made.direct, table)) * inputs.error.lsb * _smallest(gain)
+    return _integrated(controller, gain, product, slowest, inputs, word)
+
+
+def _smallest(gain: Gain) -> float:
+    """The smallest gain that is not 0, with the h/2 in it."""
+    counts = gain.schedule.gains if gain.schedule else (gain.constant,)
+    return min((abs(c) for c in counts if c), default=0) * gain.format.lsb
 
 
 def _too_small(controller: Controller, by: int) -> PlanError:
@@ -278,21 +292,24 @@ def _narrowed(reach: Interval, by: int, exponent: int, bits: int, unit: str) -> 
 
 
 def _integrated(
-    controller, gain: Gain, product: Format, exponent: int, inputs: Signals, word: Word
+    controller: Controller, gain: Gain, product: Format, slowest: float, inputs: Signals, word: Word
 ) -> Actuation:
-    """The integrator is as fine as its width allows: 32 bits in q15 where no step of one count would be lost,
-    else 64."""
+    """The integrator is as fine as its width allows: 32 bits, in q15, only where they lose no increment.
+
+    ``slowest`` is the increment of a steady error of one count at the smallest gain.
+    """
+    exponent, unit = _log2(product.lsb), controller.units.output
     for bits in sorted({word.sum_bits, 64}):
         fine = _finest(exponent, span(product), inputs, bits)
         if fine is None:
             continue
-        by = fine - exponent
-        d = span(product).shifted(by)
-        if bits == 64 or d.worst >= 1 << word.bits:
-            unit = controller.units.output
+        d = span(product).shifted(fine - exponent)
+        lost = d.worst < 1 << word.bits or 0.0 < slowest < _FEWEST_COUNTS * 2.0**fine
+        if bits == 64 or not lost:
             to_output = inputs.output_exponent - fine
             state = _format(bits, fine, span(inputs.output) * Interval(1 << to_output, 1 << to_output), unit)
-            return Actuation(gain, product, by, _format(bits, fine, d, unit), Integrator(state, to_output))
+            increment = _format(bits, fine, d, unit)
+            return Actuation(gain, product, fine - exponent, increment, Integrator(state, to_output))
     raise _too_small(controller, inputs.output_exponent - exponent)
 
 

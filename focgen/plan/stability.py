@@ -14,18 +14,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import fftconvolve, lfilter
+from scipy.signal import fftconvolve
 
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
-from focgen.fractional.discrete import UnprovenStability, poles_outside, shortest_stable_length
+from focgen.fractional.discrete import (
+    UnprovenStability,
+    inverse_residual,
+    poles_outside,
+    power_series_inverse,
+    shortest_stable_length,
+)
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.canonical import Tables, realise
 
 _LONGEST = 1 << 18
 _WANTED = 1e-6  # residual at which a longer inverse gains nothing
-_BY_RECURSION = 300_000_000  # products
-_GROWN = 1e9
+_GROWN = 1e12  # beyond this no fixed or floating format is of use
 _SLACK = 1.0 + 1e-6  # over the rounding of the transforms
 
 
@@ -46,52 +51,27 @@ class Inverse:
 def inverse(coefficients: np.ndarray) -> Inverse | None:
     """Invert 1 + Σ a_j z^−j, given as (1, a_1, …); None where it is not, or not provably, stable."""
     coefficients = np.asarray(coefficients, dtype=float)
-    count, best = max(1024, _power_of_two(4 * len(coefficients))), None
+    count, best = max(1024, 4 * len(coefficients)), None
     while count <= max(_LONGEST, 4 * len(coefficients)):
-        best = _attempt(coefficients, count) or best
+        found = _attempt(coefficients, count)
+        if best is not None and (found is None or found.residual > 0.5 * best.residual):
+            break
+        best = found
         if best is not None and best.residual < _WANTED:
             break
         count *= 4
     return best
 
 
-def _power_of_two(count: int) -> int:
-    return 1 << (count - 1).bit_length()
-
-
 def _attempt(coefficients: np.ndarray, count: int) -> Inverse | None:
-    response = _series_inverse(coefficients, count)
-    if response is None:
+    with np.errstate(over="ignore", invalid="ignore"):
+        response = power_series_inverse(coefficients, count)
+    if not np.abs(response).max() < _GROWN:
         return None
-    product = fftconvolve(coefficients, response)
-    product[0] -= 1.0
-    residual = float(np.abs(product).sum())
+    residual = inverse_residual(coefficients, response)
     if not residual < 0.9:
         return None
     return Inverse(response, residual, float(np.abs(response).sum()) / (1.0 - residual) * _SLACK)
-
-
-def _series_inverse(coefficients: np.ndarray, count: int) -> np.ndarray | None:
-    """The first ``count`` samples of 1/A; None where they grow beyond reason."""
-    if len(coefficients) * count <= _BY_RECURSION:
-        with np.errstate(over="ignore", invalid="ignore"):
-            response = lfilter([1.0], coefficients, np.eye(1, count)[0])
-        return response if np.abs(response).max() < _GROWN else None
-    return _newton(coefficients, count)
-
-
-def _newton(coefficients: np.ndarray, count: int) -> np.ndarray | None:
-    """Newton's iteration for a power series, which doubles the samples that are right."""
-    response = np.array([1.0 / coefficients[0]])
-    while len(response) < count:
-        known, size = len(response), min(2 * len(response), count)
-        error = fftconvolve(coefficients[:size], response)[:size]
-        error = np.pad(error, (0, size - len(error)))
-        error[:known] = 0.0
-        response = np.concatenate([response, -fftconvolve(response, error)[known:size]])
-        if not np.abs(response).max() < _GROWN:
-            return None
-    return response
 
 
 def check_stable(controller: Controller, tables: Tables, length: int) -> None:
