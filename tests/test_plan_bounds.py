@@ -45,7 +45,9 @@ def shares(plan: Plan, physical: Scenario, raw: Scenario, reference) -> tuple[fl
     return float(operator.max()), float(output.max())
 
 
-@pytest.mark.parametrize("seed", range(80))
+@pytest.mark.parametrize(
+    "seed", [*range(80), *(pytest.param(s, marks=pytest.mark.long) for s in range(80, 800))]
+)
 def test_bounds_hold_for_physical_inputs_anywhere_in_their_ranges(seed):
     """Inputs, u0 and tracked outputs between the counts; every arithmetic against the same float64 run."""
     controller = random_controller(seed)

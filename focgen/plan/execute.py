@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_LOW, FLAG_SCHEDULE, Format, Plan, Schedule, Sum
-from focgen.plan.scenario import Reset, Scenario, Trace
+from focgen.plan.scenario import Scenario, Trace
 
 
 def execute(plan: Plan, scenario: Scenario) -> Trace:
@@ -64,41 +64,34 @@ class _Run:
         self.plan, self.scenario = plan, scenario
         self.kind = _kind(plan.error)
         self.shape = scenario.ref.shape
-        self.ref, self.meas = (
-            self._input(scenario.ref, plan.reference),
-            self._input(scenario.meas, plan.measurement),
-        )
+        self.ref = self._input(scenario.ref, plan.reference)
+        self.meas = self._input(scenario.meas, plan.measurement)
         self.e = self.ref - self.meas
         self.segments = self._segments()
         self.starts = {(s.lane, s.start): s for s in self.segments}
+        self.starting: dict[int, list[int]] = {}  # lanes by the sample at which a segment of theirs begins
+        for s in self.segments:
+            self.starting.setdefault(s.start, []).append(s.lane)
 
     def _input(self, values, format_: Format) -> np.ndarray:
         values = np.asarray(values, dtype=self.kind)
         return values if format_.floating else _clamp(values, format_)
 
     def _segments(self) -> list[_Segment]:
-        """Cut every lane at its resets; a lane begins with init."""
+        """Cut every lane at its resets; a lane begins with init, whose error is 0 even where the ranges
+        exclude it.
+        """
         lanes, samples = self.shape
-        cuts = {(lane, 0): Reset(lane, 0, 0, 0, 0) for lane in range(lanes)}
-        cuts.update({(r.lane, r.sample): r for r in self.scenario.resets})
-        order, found = sorted(cuts), []
-        for here, after in zip(order, order[1:] + [(-1, 0)]):
-            stop = after[1] if after[0] == here[0] else samples
-            found.append(self._segment(cuts[here], stop, here in self._reset_places()))
+        starts = {(lane, 0): (self.kind(0), self.kind(0)) for lane in range(lanes)}
+        for r in self.scenario.resets:
+            e = self._input(r.ref, self.plan.reference) - self._input(r.meas, self.plan.measurement)
+            starts[r.lane, r.sample] = (self.kind(e), self.kind(r.u0))
+        order, found = sorted(starts), []
+        for (lane, start), after in zip(order, order[1:] + [(-1, 0)]):
+            constant, u0 = starts[lane, start]
+            stop = after[1] if after[0] == lane else samples
+            found.append(_Segment(lane, start, stop, constant, _clamp(u0, self.plan.output)))
         return found
-
-    def _reset_places(self) -> set[tuple[int, int]]:
-        return {(r.lane, r.sample) for r in self.scenario.resets}
-
-    def _segment(self, reset: Reset, stop: int, real: bool) -> _Segment:
-        """Init differs from reset(0, 0, 0): its error is 0 even where the ranges exclude it."""
-        ref, meas = (
-            self._input(x, f)
-            for x, f in ((reset.ref, self.plan.reference), (reset.meas, self.plan.measurement))
-        )
-        constant = self.kind(ref - meas) if real else self.kind(0)
-        u0 = _clamp(np.asarray(reset.u0, dtype=self.kind), self.plan.output)
-        return _Segment(reset.lane, reset.sample, stop, constant, u0)
 
     # ------------------------------------------------------------------------------- sums over the error
 
@@ -171,20 +164,12 @@ class _Run:
         inner, out = self.plan.inner, np.empty(self.shape, self.kind)
         z, before = np.zeros(self.shape[0], self.kind), np.zeros(self.shape[0], self.kind)
         for k in range(self.shape[1]):
-            for lane in self._starting(k):
+            for lane in self.starting.get(k, ()):
                 z[lane], before[lane] = 0, self.r_rest[lane, k]
             now = self.r[:, k]
             z = _clamp(z + (now + before), inner.state)
             out[:, k], before = z, now.copy()
         return out if self.plan.floating else _shift(out, inner.to_wide)
-
-    def _starting(self, k: int) -> list[int]:
-        """Lanes whose segment begins at sample k."""
-        if not hasattr(self, "_by_sample"):
-            self._by_sample: dict[int, list[int]] = {}
-            for lane, start in self.starts:
-                self._by_sample.setdefault(start, []).append(lane)
-        return self._by_sample.get(k, [])
 
     def _fed_back(self, p: np.ndarray) -> np.ndarray:
         """v_k from p_k and the past of v, whose columns are samples, ``lags`` of them ahead of the first."""
@@ -194,7 +179,7 @@ class _Run:
         carry, out = np.zeros(lanes, self.kind), np.empty(self.shape, self.kind)
         table = _Recursion(plan.feedback.table, self.kind)
         for k in range(samples):
-            for lane in self._starting(k):
+            for lane in self.starting.get(k, ()):
                 past[lane, k : k + lags] = self.v_rest[lane, k]
                 carry[lane] = 0
             x = p[:, k] - table(past[:, k : k + lags])
@@ -232,18 +217,17 @@ class _Run:
         plan, lanes = self.plan, self.shape[0]
         state, out = plan.integrator.state, np.empty(self.shape, self.kind)
         total, before = np.zeros(lanes, self.kind), np.zeros(lanes, self.kind)
-        tracks = {}
+        tracks: dict[int, list] = {}
         for t in self.scenario.tracks:
             tracks.setdefault(t.sample, []).append(t)
         for k in range(self.shape[1]):
-            for lane in self._starting(k):
+            for lane in self.starting.get(k, ()):
                 total[lane] = self._wide(self.starts[lane, k].u0)
                 before[lane] = self._increment(self.g[lane, k] * self.v_rest[lane, k])
             for t in tracks.get(k, ()):
                 total[t.lane] = self._wide(_clamp(np.asarray(t.u, dtype=self.kind), plan.output))
             total = _clamp(total + (d[:, k] + before), state)
-            out[:, k], before = total, d[:, k]
-            before = before.copy()
+            out[:, k], before = total, d[:, k].copy()
         return out if plan.floating else _saturate(_shift(out, plan.integrator.to_output), plan.output.bits)
 
     def _wide(self, u):
