@@ -1,8 +1,8 @@
 """Make the example rig and its logs, the same bytes every time:  python tools/make_examples.py
 
 The logs are synthetic. They come from the nominal rig of the paper with one thing added that its model does not
-have, an actuator with internal friction (Bouc–Wen), and with noise on every signal. So a fractional model fits
-the steps well, and fails where the paper's fails: on sines.
+have, an actuator that unloads more slowly than it loads, and with noise on every signal. So a fractional model fits
+the positive steps well, and fails where the paper's fails: when the pressure falls.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from focgen.rig.replay import simulate_session
 STEP = 0.02  # s
 LEVELS = (0.075, 0.1, 0.125, 0.15, 0.175, 0.2)  # bar
 FREQUENCIES = (0.05, 0.1, 0.2, 0.4)  # Hz
-FRICTION = {"name": "hysteresis", "form": "bouc_wen", "stage": "actuator", "size": 0.0007, "width": 0.002}
+UNLOADING = {"name": "unloading_asymmetry", "form": "speed", "stage": "actuator", "unloading_speed": 0.55}
 NOISE = {"pressure": 0.0006, "curvature": 0.00008, "output": 0.00008}  # bar, 1/mm, 1/mm
 DIGITS = {"command": 3, "pressure": 4, "curvature": 6, "output": 6}
 
@@ -78,7 +78,7 @@ def csv(rig: Rig, experiments: list[Experiment], rng: np.random.Generator) -> st
     roles = ("command", "pressure", "curvature", "output")
     columns = rig.signals.columns()
     lines = [",".join(["run", "t_s", *(columns[role] for role in roles)])]
-    real = replace(rig, effects=(FRICTION,))
+    real = replace(rig, effects=(UNLOADING,))
     for experiment, clean in zip(experiments, simulate_session(real, experiments)):
         table = {**experiment.signals, **noisy(clean, rng)}
         for k, time in enumerate(experiment.time):

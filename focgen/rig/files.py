@@ -97,7 +97,12 @@ def _effects(top: Table) -> tuple:
 
 def write_rig(rig: Rig, path: str | Path) -> None:
     """Write a rig so that :func:`read_rig` gives an equal one."""
-    Path(path).write_text(tomlkit.dumps(rig_table(rig)), encoding="utf-8")
+    Path(path).write_text(rig_text(rig), encoding="utf-8")
+
+
+def rig_text(rig: Rig) -> str:
+    """The rig as the text of its file; equal rigs give equal bytes."""
+    return tomlkit.dumps(rig_table(rig))
 
 
 def rig_table(rig: Rig) -> dict:

@@ -1,0 +1,39 @@
+"""``focgen identify``: from logs to the fractional model of a rig."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from focgen.cli.outcome import Outcome
+from focgen.identification.identify import identify
+from focgen.output import write_files
+from focgen.report.identification import identification_pictures
+from focgen.report.identification_summary import identification_payload, identification_text
+
+HELP = "fit K(p)/(T s^alpha + 1) to logs of a rig, and integer-order models beside it"
+EXAMPLE = """example:
+  focgen identify logs/steps.csv --rig rig.toml --out identified.toml --report pictures --unseen logs/sines.csv
+
+  fits K, T and alpha to each experiment, pools T and alpha, draws the line K(p) through the gains, and writes the rig
+  with them to identified.toml. Prints the goodness of fit of every model from 1 pole to 3 poles and 2 zeros (Table I)."""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("logs", nargs="+", metavar="LOG", help=".csv, .csv.gz, .parquet, .mat or .tdms")
+    parser.add_argument("--rig", required=True, metavar="RIG", help="rig.toml: columns, regulator and sensor")
+    parser.add_argument("--out", required=True, metavar="NEW_RIG", help="the rig.toml to write")
+    parser.add_argument("--from", dest="first", type=float, metavar="S", help="begin here, s within each experiment")
+    parser.add_argument("--to", dest="last", type=float, metavar="S", help="end here, s within each experiment")
+    parser.add_argument("--gain-degree", type=int, default=1, metavar="N", help="degree of K(p) (default: 1, a line)")
+    parser.add_argument("--unseen", nargs="+", default=(), metavar="LOG", help="logs to show the rig against, not fitted")
+    parser.add_argument("--report", metavar="DIR", help="write pictures there: Table I, fits, parameters, loops")
+
+
+def run(args: Namespace) -> Outcome:
+    found = identify(args.logs, args.rig, args.out, args.first, args.last, args.gain_degree, args.unseen)
+    text = f"{identification_text(found)}\n\nwrote {args.out}"
+    if args.report:
+        write_files(args.report, identification_pictures(found))
+        text += f"\npictures in {args.report}"
+    return Outcome(identification_payload(found) | {"new_rig": args.out}, f"{text}\nnext: focgen design {args.out} --out "
+                   "controller.toml")

@@ -1,0 +1,117 @@
+"""Pictures of an identification: Table I, the fits (Fig. 5, 6), the parameters (Fig. 7), loops (Fig. 8)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.identification.model import ExperimentFit, Identification
+from focgen.report.identification_summary import model_label
+from focgen.report.style import COLOURS, CYCLE, GREY, figure, png
+
+_COMPARED = ("iom_1p", "iom_2p1z", "iom_3p2z")
+_LAST = 0.5  # of a swinging log: the part drawn as loops, when the start has died away
+
+
+def identification_pictures(found: Identification) -> dict[str, bytes]:
+    """Return PNG pictures by file name; ``loops.png`` only where a log swings."""
+    pictures = {"gof.png": _gof(found), "fits.png": _fits(found), "models.png": _models(found),
+                "parameters.png": _parameters(found)}
+    if any(log.swings for log in found.unseen) or any(not fit.step for fit in found.experiments):
+        pictures["loops.png"] = _loops(found)
+    return pictures
+
+
+def _gof(found: Identification) -> bytes:
+    names = [fit.name for fit in found.experiments] + ["mean"]
+    models = [m for m in found.gof if m != "rig"]
+    with figure(1, 1, size=(7.0, 3.2)) as (fig, axes):
+        width = 0.8 / len(models)
+        for i, model in enumerate(models):
+            places = np.arange(len(names)) + (i - 0.5 * (len(models) - 1)) * width
+            axes.bar(places, [max(found.gof[model][n], 0.0) for n in names], width, label=model_label(model),
+                     color=CYCLE[i % len(CYCLE)])
+        axes.set_xticks(range(len(names)), names)
+        axes.set_ylabel("goodness of fit")
+        axes.set_ylim(min(0.5, axes.get_ylim()[0]), 1.0)
+        axes.set_title("Fractional and integer-order models (Table I)")
+        axes.legend(ncols=len(models), loc="upper center", bbox_to_anchor=(0.5, -0.1))
+        return png(fig)
+
+
+def _fits(found: Identification) -> bytes:
+    with figure(1, 1, size=(7.0, 3.6)) as (fig, axes):
+        for i, fit in enumerate(found.experiments):
+            axes.plot(fit.time, fit.measured, color=CYCLE[i % len(CYCLE)], lw=0.8, label=fit.name)
+            axes.plot(fit.time, fit.simulated, color=COLOURS["ideal"], lw=1.0)
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel(found.experiments[0].fitted)
+        axes.set_title("Measured (colour) and fractional model (black)")
+        axes.legend(title="experiment", ncols=2)
+        return png(fig)
+
+
+def _models(found: Identification) -> bytes:
+    """The experiment in the middle, with the models of Fig. 6 and what they leave."""
+    fit = sorted(found.experiments, key=lambda f: f.level)[len(found.experiments) // 2]
+    with figure(2, 1, size=(7.0, 5.0), sharex=True, height_ratios=(2, 1)) as (fig, (top, bottom)):
+        top.plot(fit.time, fit.measured, color=GREY, lw=0.8, label="measured")
+        for label, simulated, colour in _candidates(fit):
+            top.plot(fit.time, simulated, color=colour, label=label)
+            bottom.plot(fit.time, fit.measured - simulated, color=colour, lw=0.8)
+        top.set_ylabel(fit.fitted)
+        top.set_title(f"Experiment {fit.name}: models of different kind")
+        bottom.set_ylabel("residual")
+        bottom.set_xlabel("time (s)")
+        top.legend(ncols=2)
+        return png(fig)
+
+
+def _candidates(fit: ExperimentFit):
+    yield "FOM", fit.simulated, COLOURS["ideal"]
+    for i, model in enumerate(f for f in fit.integer if f"iom_{f.name}" in _COMPARED):
+        yield model_label(f"iom_{model.name}"), model.simulated, CYCLE[i]
+
+
+def _parameters(found: Identification) -> bytes:
+    """Fig. 7 with intervals."""
+    steps = [fit for fit in found.experiments if fit.step]
+    levels = np.array([fit.level for fit in steps])
+    pooled = found.pooled
+    with figure(3, 1, size=(7.0, 6.6), sharex=True) as (fig, axes):
+        for ax, key in zip(axes, ("K", "T", "alpha")):
+            values = np.array([getattr(fit, key) for fit in steps])
+            half = np.array([(fit.ci95[key][1] - fit.ci95[key][0]) / 2.0 for fit in steps])
+            ax.errorbar(levels, values, half, fmt="o", color=COLOURS["model"], capsize=3, label="each experiment, 95 %")
+        reach = np.linspace(levels.min(), levels.max(), 50)
+        axes[0].plot(reach, np.polynomial.polynomial.polyval(reach, pooled.gain), color=COLOURS["ideal"],
+                     label=f"K(p), R² = {pooled.gain_r2:.4f}")
+        for ax, key in zip(axes[1:], ("T", "alpha")):
+            ax.axhspan(*pooled.ci95[key], color=COLOURS["band"])
+            ax.axhline(getattr(pooled, key), color=COLOURS["ideal"], label=f"pooled {getattr(pooled, key):.4g}, 95 %")
+        for ax, label in zip(axes, ("K", "T (s^α)", "α")):
+            ax.set_ylabel(label)
+            ax.legend()
+        axes[-1].set_xlabel("level of the step")
+        axes[0].set_title("Parameters of the fractional model over the level")
+        return png(fig)
+
+
+def _loops(found: Identification) -> bytes:
+    """Fig. 8: output over input, logged and as the identified rig has it."""
+    swings = [(u.name, u.pressure, u.measured, u.simulated) for u in found.unseen if u.swings]
+    swings += [(f.name, f.pressure, f.measured, found.pooled.simulated[f.name])
+               for f in found.experiments if not f.step]
+    columns = min(4, len(swings))
+    rows = -(-len(swings) // columns)
+    with figure(rows, columns, size=(2.4 * columns + 1.0, 2.6 * rows + 0.5), sharex=True, sharey=True,
+                squeeze=False) as (fig, axes):
+        for ax, (name, pressure, measured, simulated) in zip(axes.flat, swings):
+            late = slice(int(len(pressure) * (1.0 - _LAST)), None)
+            ax.plot(pressure[late], measured[late], color=GREY, lw=0.7, label="log")
+            ax.plot(pressure[late], simulated[late], color=COLOURS["model"], lw=1.2, label="model")
+            ax.set_title(name)
+        for ax in axes[-1]:
+            ax.set_xlabel("pressure")
+        axes[0, 0].set_ylabel(found.experiments[0].fitted)
+        axes[0, 0].legend(loc="upper left")
+        return png(fig)
