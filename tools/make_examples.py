@@ -22,7 +22,7 @@ from focgen.rig.replay import simulate_session
 STEP = 0.02  # s
 LEVELS = (0.075, 0.1, 0.125, 0.15, 0.175, 0.2)  # bar
 FREQUENCIES = (0.05, 0.1, 0.2, 0.4)  # Hz
-UNLOADING = {"name": "unloading_asymmetry", "form": "speed", "stage": "actuator", "unloading_speed": 0.55}
+UNLOADING = {"name": "unloading_asymmetry", "form": "speed", "stage": "actuator", "unloading_speed": 0.4}
 NOISE = {"pressure": 0.0006, "curvature": 0.00008, "output": 0.00008}  # bar, 1/mm, 1/mm
 DIGITS = {"command": 3, "pressure": 4, "curvature": 6, "output": 6}
 

@@ -32,9 +32,10 @@ def _gof(found: Identification) -> bytes:
                      color=CYCLE[i % len(CYCLE)])
         axes.set_xticks(range(len(names)), names)
         axes.set_ylabel("goodness of fit")
-        axes.set_ylim(min(0.5, axes.get_ylim()[0]), 1.0)
+        lowest = min(found.gof[model][n] for model in models for n in names)
+        axes.set_ylim(max(0.0, np.floor(10.0 * lowest - 0.5) / 10.0), 1.0)
         axes.set_title("Fractional and integer-order models (Table I)")
-        axes.legend(ncols=len(models), loc="upper center", bbox_to_anchor=(0.5, -0.1))
+        axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.1))
         return png(fig)
 
 

@@ -1,0 +1,146 @@
+"""Fits of the fractional model: exact without noise, honest intervals with it, the paper's order of models."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from focgen.errors import FitError, LogError
+from focgen.fractional.responses import mittag_leffler
+from focgen.identification import identify as module
+from focgen.identification.excitation import prepare
+from focgen.identification.fractional import fit_fractional
+from focgen.identification.integer import SHAPES, fit_integer_models
+from focgen.identification.quality import gof
+from focgen.logs.experiment import Experiment
+from tests.conftest import paper_rig
+
+K, T, ALPHA, LEVEL = 0.05, 1.32, 0.6, 0.15
+
+
+def exact_step(time: np.ndarray, T: float = T, alpha: float = ALPHA) -> np.ndarray:
+    """1 − E_α(−t^α/T), the model's unit step response, from the Mittag-Leffler function."""
+    late = np.maximum(time, 0.0)
+    return np.where(time > 0.0, 1.0 - mittag_leffler(alpha, 1.0, -(late**alpha) / T), 0.0)
+
+
+def step_log(step=0.02, seconds=41.0, release=None, noise=None, level=LEVEL, offset=0.0, **model) -> Experiment:
+    """A held step of pressure at 1 s, released at ``release`` s."""
+    time = step * np.arange(int(round(seconds / step)))
+    pressure = level * (np.arange(len(time)) >= round(1.0 / step))
+    curvature = K * level * exact_step(time - 1.0, **model) + offset
+    if release is not None:
+        pressure = pressure * (np.arange(len(time)) < round(release / step))
+        curvature = curvature - K * level * exact_step(time - release, **model)
+    noise = 0.0 if noise is None else noise
+    return Experiment("step", step, {"pressure": pressure, "curvature": curvature + noise, "output": curvature})
+
+
+def fitted(log: Experiment):
+    return fit_fractional([prepare(log, paper_rig())])
+
+
+@pytest.mark.parametrize("alpha", [0.3, 0.6, 0.95, 1.4])
+@pytest.mark.parametrize("release", [None, 21.0])
+def test_parameters_come_back_exactly_without_noise(alpha, release):
+    """N = 2000 at 10 ms; plain Grünwald–Letnikov is off by 6e-3 in α."""
+    fit = fitted(step_log(0.01, 21.0 if release is None else 30.0, release, alpha=alpha, offset=0.003))
+    assert abs(fit.alpha - alpha) <= 1e-7 and abs(fit.T / T - 1.0) <= 1e-6 and abs(fit.K[0] / K - 1.0) <= 1e-6
+    assert fit.offset[0] == pytest.approx(0.003, abs=1e-9)
+
+
+def coverage(colour: float, seeds: int) -> float:
+    """Share of the 95 % intervals of K, T and α that contain the truth; noise of 2 % of the final value."""
+    clean, hits = step_log(), 0
+    for seed in range(seeds):
+        white = np.random.default_rng(seed).normal(size=len(clean) + 200)
+        noise = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], white)[200:]
+        fit = fitted(step_log(noise=0.02 * K * LEVEL * noise))
+        hits += abs(fit.K[0] - K) <= fit.half["K"][0]
+        hits += (abs(fit.T - T) <= fit.half["T"]) + (abs(fit.alpha - ALPHA) <= fit.half["alpha"])
+    return hits / (3 * seeds)
+
+
+def test_intervals_cover_the_truth_with_white_noise():
+    assert 0.92 <= coverage(0.0, 200) <= 0.98
+
+
+def test_intervals_cover_the_truth_with_coloured_noise():
+    """Ignoring the correlation would cover about half of it."""
+    assert 0.90 <= coverage(0.9, 100) <= 0.985
+
+
+def test_the_fractional_model_ranks_as_in_the_paper():
+    """FOM ≈ 3p2z > 2p1z > 1p, of 40 s steps with 2 % noise."""
+    scores = []
+    for seed in range(4):
+        noise = 0.02 * K * LEVEL * np.random.default_rng(seed).normal(size=2050)
+        x = prepare(step_log(noise=noise), paper_rig())
+        models = {f.name: gof(x.measured, f.simulated) for f in fit_integer_models(x)}
+        scores.append({**models, "fom": gof(x.measured, fit_fractional([x]).simulated[0])})
+    mean = {name: np.mean([s[name] for s in scores]) for name in scores[0]}
+    assert abs(mean["fom"] - mean["3p2z"]) < 0.01
+    assert min(mean["fom"], mean["3p2z"]) > mean["2p1z"] + 0.01 and mean["2p1z"] > mean["1p"] + 0.1
+
+
+def test_larger_integer_models_never_fit_worse():
+    noise = 0.02 * K * LEVEL * np.random.default_rng(1).normal(size=2050)
+    x = prepare(step_log(noise=noise), paper_rig())
+    scores = {(f.poles, f.zeros): gof(x.measured, f.simulated) for f in fit_integer_models(x)}
+    assert set(scores) == set(SHAPES)
+    for (poles, zeros), score in scores.items():
+        assert score >= scores.get((poles, zeros - 1), -1.0) - 1e-3
+
+
+def test_an_integer_plant_is_found_exactly():
+    """A held input through (2 s + 1)/((s + 3)(s + 0.2)): the closed form of its step response."""
+    time = 0.02 * np.arange(1500)
+    late = np.maximum(time - 1.0, 0.0)
+    residues = {pole: (2.0 * pole + 1.0) / (2.0 * pole + 3.2) / pole for pole in (-3.0, -0.2)}
+    answer = 1.0 / 0.6 + sum(r * np.exp(p * late) for p, r in residues.items())
+    moved = np.arange(1500) >= 50
+    log = Experiment("plant", 0.02, {"pressure": 1.0 * moved, "curvature": answer * (time > 1.0)})
+    fit = {f.name: f for f in fit_integer_models(prepare(log, paper_rig()))}["2p1z"]
+    assert fit.num == pytest.approx([2.0, 1.0], rel=1e-4) and fit.den == pytest.approx([1.0, 3.2, 0.6], rel=1e-4)
+
+
+def six_levels(**changes) -> list[Experiment]:
+    line = lambda p: (0.0015 + 0.345 * p) * p / (K * LEVEL)  # noqa: E731
+    logs = []
+    for i, level in enumerate((0.075, 0.1, 0.125, 0.15, 0.175, 0.2)):
+        log = step_log(**changes)
+        signals = {"pressure": log["pressure"] / LEVEL * level, "curvature": log["curvature"] * line(level),
+                   "output": log["output"]}
+        logs.append(Experiment(f"{level}", log.sample_time, signals, start=100.0 * i))
+    return logs
+
+
+def test_pooled_rig_has_the_line():
+    found = module.identify(six_levels(), paper_rig())
+    assert found.pooled.gain == pytest.approx((0.0015, 0.345), rel=1e-5) and found.pooled.gain_r2 > 1.0 - 1e-9
+    assert found.pooled.T == pytest.approx(T, rel=1e-6) and found.pooled.alpha == pytest.approx(ALPHA, abs=1e-6)
+    assert found.gof["rig"]["mean"] > 0.9999
+    assert any("positive steps only" in w for w in found.warnings)
+    assert any("levels rise" in w for w in found.warnings)
+
+
+def test_releases_are_fitted_and_silence_the_warning():
+    found = module.identify(six_levels(release=25.0), paper_rig())
+    assert found.pooled.gain == pytest.approx((0.0015, 0.345), rel=1e-5)
+    assert not any("positive steps only" in w for w in found.warnings)
+
+
+def test_a_degree_that_the_levels_cannot_show_is_lowered_and_said():
+    found = module.identify(six_levels()[:2], paper_rig(), gain_degree=3)
+    assert len(found.pooled.gain) == 2 and any("2 distinct levels" in note for note in found.notes)
+
+
+def test_useless_logs_are_refused():
+    flat = step_log()
+    with pytest.raises(LogError, match="throughout"):
+        module.identify([Experiment("flat", 0.02, {**flat.signals, "curvature": np.ones(len(flat))})], paper_rig())
+    with pytest.raises(LogError, match="0 throughout"):
+        module.identify([Experiment("rest", 0.02, {**flat.signals, "pressure": np.zeros(len(flat))})], paper_rig())
+    noise = np.random.default_rng(0).normal(size=len(flat))
+    with pytest.raises((FitError, LogError)):
+        wandering = {"pressure": noise, "curvature": np.roll(noise, 5)}
+        module.identify([Experiment("noise", 0.02, wandering)], paper_rig())
