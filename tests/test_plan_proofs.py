@@ -284,7 +284,7 @@ def test_a_recursion_that_16_bits_cannot_hold_is_refused_and_31_can():
 
 
 def test_weights_that_would_lose_the_gain_at_rest_are_refused():
-    """(s + 0.001) at 10 ms: 100.001 − 100 is nothing in 16 bits; integral action would be gone, or reversed."""
+    """(s + 0.001) at 10 ms: 100.001 − 100 is 0 in 16 bits; integral action would be gone, or reversed."""
     derivative = TransferFunction([(1e-3, 0.0), (1.0, 1.0)])
     assert "gain at rest" in str(refused(simple(derivative, integrator=True), "q15"))
     plan = build_plan(simple(derivative, integrator=True), "q31")

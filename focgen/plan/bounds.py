@@ -264,22 +264,22 @@ class _Floating(_Account):
         plan, tables = self.plan, self.tables
         back = self.weight_error(plan.feedback.table, tables.feedback, 1)
         back += self.sum_error(plan.feedback.table, tables.feedback, 1.0) + (self.u + _DOUBLE) * 4.0
-        at_reset = gamma(
-            tables.feedback.weights.size + (plan.error_lags if plan.direct else 0) + 8, self.u + _DOUBLE
-        )
         if self.M * back >= 0.5:
             return FilteredError({"rounding": np.inf})
         reach = (self.reach + self.M * rounding) / (1.0 - self.M * back)
         rest = max(1.0, self.M * abs(tables.feedback.total))
-        static["rounding"] = self.M * (rounding + back * reach) + at_reset * self.start(rest)
+        static["rounding"] = self.M * (rounding + back * reach) + rest * self.reset_rounding()
         return FilteredError(static, inner.growth, inner.ceiling)
 
-    def start(self, rest: float) -> float:
-        """What a reset's rounding is relative to: v = e B(1)/A(1), both sums rounded."""
-        tables = self.tables
-        a = float(np.abs(tables.feedback.weights).sum()) / abs(tables.feedback.total)
-        b = tables.direct.l1 / abs(tables.feedback.total) if tables.direct else 0.0
-        return b * self.E * (1.0 + a) * rest
+    def reset_rounding(self) -> float:
+        """Of v = e · B(1)/A(1): two roundings, those of the sums in double, and the reference's."""
+        direct, back = self.tables.direct, self.tables.feedback
+        if direct is None:
+            return 0.0
+        count = len(direct.weights) + len(back.weights) + 8
+        sums = direct.l1 / abs(back.total) * (1.0 + back.l1 / abs(back.total))
+        ratio = abs(direct.total / back.total)
+        return self.E * (2.0 * (self.u + _DOUBLE) * ratio + 2.0 * gamma(count, _DOUBLE) * sums) * 1.01
 
     def gain_error(self) -> float:
         plan, g = self.plan, self.largest_gain

@@ -225,7 +225,8 @@ class ErrorBound:
     ``operator``: of d/(h/2) with an integrator and of d without one, i.e. of the signal ahead of the
     integrator, in physical units, in any one sample. ``output_per_sample``: by which the output's error can
     grow each sample, the output's own rounding included: n samples after a reset, an init or a track it is at
-    most n times this. ``truncation``: of the operator, against an infinite memory.
+    most n times this. It holds against physical inputs, outputs set and limits that lie between two counts:
+    their rounding, half a count each, is included. ``truncation``: of the operator, against infinite memory.
     ``operator_per_sample``: with an inner integrator the error of its state adds up until its clamp ends it;
     n samples after a reset the operator's error is at most n times this (and ``operator``). 0 elsewhere.
     ``parts`` splits ``operator`` by cause, for reports.
