@@ -24,8 +24,8 @@ from focgen.progress import track
 from focgen.rig.files import read_rig, rig_text
 from focgen.rig.model import Actuator, LinearActuator, Rig
 
-_STEADY = 0.1  # of the level: nearer than this to rest or level, a sample belongs to a step
-_STEP_SHARE = 0.8  # of the samples that do
+_STEADY = 0.1  # of the step: nearer to its level than this, the input is at it
+_STAY = 0.15  # of the experiment: a step's input stays at its level at least so long
 
 
 def identify(
@@ -93,9 +93,10 @@ def _fit(x: Excitation) -> ExperimentFit:
 
 
 def is_step(x: Excitation) -> bool:
-    """Whether the input is at rest or at one level nearly all the time."""
-    away = np.minimum(np.abs(x.pressure - x.before), np.abs(x.pressure - x.level))
-    return bool(np.mean(away <= _STEADY * abs(x.level - x.before)) >= _STEP_SHARE)
+    """Whether the input stays at its level for a good part of the time without a break."""
+    there = np.abs(x.pressure - x.level) <= _STEADY * abs(x.level - x.before)
+    ends = np.flatnonzero(~np.concatenate([[False], there, [False]]))
+    return bool(np.diff(ends).max() - 1 >= _STAY * len(x))
 
 
 def _pooled(steps: list[Excitation], degree: int) -> tuple[Pooled, tuple[str, ...]]:
