@@ -208,11 +208,11 @@ typedef struct {
 } foc_block;
 
 /* Sum of shift(sum of a block, its shift) over all blocks. Total and rounding fit their types (proved). */
-static inline int32_t foc_sum_q15(const FOC_ROM int16_t *weights, const FOC_ROM foc_block *blocks, uint8_t count,
+static inline int32_t foc_sum_q15(const FOC_ROM int16_t *weights, const FOC_ROM foc_block *blocks, uint16_t count,
                                   const int16_t *ring, uint16_t size, uint16_t now)
 {
     int32_t total = 0;
-    uint8_t b;
+    uint16_t b;
 
     for (b = 0; b < count; b++) {
         const uint16_t taps = blocks[b].taps;
@@ -223,11 +223,11 @@ static inline int32_t foc_sum_q15(const FOC_ROM int16_t *weights, const FOC_ROM 
     return total;
 }
 
-static inline int64_t foc_sum_q31(const FOC_ROM int32_t *weights, const FOC_ROM foc_block *blocks, uint8_t count,
+static inline int64_t foc_sum_q31(const FOC_ROM int32_t *weights, const FOC_ROM foc_block *blocks, uint16_t count,
                                   const int32_t *ring, uint16_t size, uint16_t now)
 {
     int64_t total = 0;
-    uint8_t b;
+    uint16_t b;
 
     for (b = 0; b < count; b++) {
         const uint16_t taps = blocks[b].taps;

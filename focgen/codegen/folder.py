@@ -1,0 +1,167 @@
+"""The contexts of the folder's ``README.md`` and of ``example/main.c``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import focgen
+from focgen.codegen.formulas import transfer_text
+from focgen.codegen.literals import comment, quantity
+from focgen.codegen.manifest import sizes
+from focgen.plan.canonical import memory_bias
+from focgen.plan.model import Plan
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A row of the table of signals."""
+
+    name: str
+    what: str
+    low: str
+    high: str
+    unit: str
+    lsb: str
+    bits: int
+
+
+@dataclass(frozen=True)
+class ReadmeContext:
+    """Everything ``README.md.jinja`` asks for."""
+
+    name: str
+    title: str
+    version: str
+    arithmetic: str
+    fixed: bool
+    ctype: str
+    transfer: str
+    sample_time: str
+    length: int
+    signals: list[Signal]
+    scheduled: bool
+    integral: bool
+    state_bytes: int
+    table_bytes: int
+    multiplies: int
+    proofs: int
+    tightest: str
+    operator: str
+    output_per_sample: str
+    truncation: str
+    biases: list[str]
+    unit: str
+
+
+def readme_context(plan: Plan, title: str) -> ReadmeContext:
+    """Prepare the folder's README."""
+    size, bound, unit = sizes(plan), plan.error_bound, plan.controller.units.output
+    operator_unit = f"{unit}/s" if plan.integrator and unit else unit
+    return ReadmeContext(
+        name=plan.name,
+        title=title,
+        version=focgen.__version__,
+        arithmetic=plan.arithmetic,
+        fixed=not plan.floating,
+        ctype=plan.output.ctype,
+        transfer=transfer_text(plan),
+        sample_time=f"{plan.sample_time:g}",
+        length=plan.length,
+        signals=_signals(plan),
+        scheduled=plan.schedule is not None,
+        integral=plan.integrator is not None,
+        state_bytes=size["state_bytes"],
+        table_bytes=size["table_bytes"],
+        multiplies=_multiplies(plan),
+        proofs=len(plan.proofs),
+        tightest=_tightest(plan),
+        operator=_quantity(bound.operator, operator_unit),
+        output_per_sample=_quantity(bound.output_per_sample, unit),
+        truncation="none can be given" if bound.truncation is None else _quantity(bound.truncation, operator_unit),
+        biases=_biases(plan),
+        unit=unit,
+    )
+
+
+def _quantity(value: float, unit: str) -> str:
+    return f"{value:.3g} {unit}".rstrip()
+
+
+def _signals(plan: Plan) -> list[Signal]:
+    ranges, units = plan.controller.ranges, plan.controller.units
+    rows = [
+        ("ref", "reference", ranges.reference, units.measurement, plan.reference, "REF_LSB"),
+        ("meas", "measurement", ranges.measurement, units.measurement, plan.measurement, "REF_LSB"),
+        ("u", "output", ranges.output, units.output, plan.output, "U_LSB"),
+    ]
+    if plan.schedule:
+        signal = plan.schedule.signal
+        rows.insert(2, ("sched", "scheduling signal", ranges.schedule, units.schedule, signal, "SCHED_LSB"))
+    return [
+        Signal(name, what, f"{ends[0]:g}", f"{ends[1]:g}", unit, f"{plan.name}_{lsb}", form.bits)
+        for name, what, ends, unit, form, lsb in rows
+    ]
+
+
+def _multiplies(plan: Plan) -> int:
+    sums = [plan.direct, plan.inner and plan.inner.rest, plan.feedback and plan.feedback.table]
+    return sum(s.taps for s in sums if s) + 1 + (plan.schedule is not None)
+
+
+def _tightest(plan: Plan) -> str:
+    if not plan.proofs:
+        return ""
+    proof = min(plan.proofs, key=lambda p: p.margin_bits)
+    return f"`{proof.node}`, {proof.worst} of {proof.limit} ({proof.ctype})"
+
+
+def _biases(plan: Plan) -> list[str]:
+    return [
+        f"`{coefficient:.6g} s^{order:g}` is {bias:.3g} at rest instead of 0"
+        for coefficient, order, bias in memory_bias(plan.controller, plan.length)
+        if bias != 0.0
+    ]
+
+
+@dataclass(frozen=True)
+class ExampleContext:
+    """Everything ``main.c.jinja`` asks for."""
+
+    name: str
+    title: str
+    fixed: bool
+    scheduled: bool
+    integral: bool
+    real: str
+    reference: str
+    reference_about: str
+    schedule: str
+    output_unit: str
+    measurement_unit: str
+    suffix: str
+
+
+def example_context(plan: Plan, title: str) -> ExampleContext:
+    """Prepare the example: a step of the reference within its range, half way up."""
+    ranges, units = plan.controller.ranges, plan.controller.units
+    middle = 0.5 * (ranges.reference[0] + ranges.reference[1])
+    at = sum(ranges.schedule) / 2 if plan.schedule else 0.0
+    return ExampleContext(
+        name=plan.name,
+        title=comment(title),
+        fixed=not plan.floating,
+        scheduled=plan.schedule is not None,
+        integral=plan.integrator is not None,
+        real="double" if plan.arithmetic != "f32" else "float",
+        reference=_number(ranges.reference[1] if middle == 0.0 else middle),
+        reference_about=quantity(ranges.reference[1] if middle == 0.0 else middle, units.measurement),
+        schedule=_number(at),
+        output_unit=comment(units.output),
+        measurement_unit=comment(units.measurement),
+        suffix="f" if plan.arithmetic == "f32" else "",
+    )
+
+
+def _number(value: float) -> str:
+    text = f"{value:.6g}"
+    return text if "." in text or "e" in text else f"{text}.0"

@@ -1,0 +1,118 @@
+"""From a controller to a folder of C."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from focgen.codegen.folder import example_context, readme_context
+from focgen.codegen.header import header_context
+from focgen.codegen.manifest import manifest_of, sha256
+from focgen.codegen.names import check_name
+from focgen.codegen.render import render
+from focgen.codegen.source import source_context
+from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
+from focgen.control.files import controller_text, read_controller
+from focgen.errors import InputError, PlanError
+from focgen.output import write_files
+from focgen.plan.build import build_plan
+from focgen.plan.model import Plan
+from focgen.resources import shipped
+
+PACKAGES = ("plain", "cmake", "arduino", "platformio", "zephyr", "fmu")
+_LONGEST = 65_534  # the ring's slots are counted in 16 bits
+
+
+@dataclass(frozen=True)
+class Generated:
+    """What :func:`generate` has written: the ``files`` of ``folder``, ``plan`` and ``manifest``."""
+
+    folder: Path
+    files: tuple[str, ...]
+    plan: Plan
+    manifest: dict[str, Any]
+
+
+def generate(
+    controller: Controller | str | Path,
+    out: str | Path,
+    arithmetic: str | None = None,
+    memory: str | None = None,
+    length: int | None = None,
+    name: str | None = None,
+    target: str | None = None,
+    package: str = "plain",
+    tolerance: float | None = None,
+    horizon: int | None = None,
+) -> Generated:
+    """Write C for a controller into the folder ``out``, whole or not at all.
+
+    ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15), ``memory``,
+    ``length`` (past samples) and ``name`` (a C identifier) default to the controller's own.
+
+    Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised in this
+    arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be written.
+    """
+    _refuse_what_is_missing(memory, target, package, tolerance, horizon)
+    text, made, where = _source(controller)
+    _check(arithmetic, memory, length)
+    plan = build_plan(made, arithmetic, length, check_name(name or made.name, where))
+    files = folder_files(plan, text)
+    write_files(out, files)
+    return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
+
+
+def folder_files(plan: Plan, controller_toml: bytes) -> dict[str, str | bytes]:
+    """Name and content of every file of a generated folder; the same plan gives the same bytes.
+
+    Raises PlanError where the memory is too long for C's ring.
+    """
+    if plan.length > _LONGEST:
+        what = f"a memory length of {plan.length} is more than the ring in C can count"
+        raise PlanError(plan.name, what, f"give at most {_LONGEST}")
+    title, digest = plan.controller.name, sha256(controller_toml)
+    runtime = (shipped("c_runtime") / "foc_rt.h").read_text(encoding="utf-8")
+    manifest = manifest_of(plan, {"controller.toml": digest, "foc_rt.h": sha256(runtime)})
+    return {
+        f"{plan.name}.h": render("controller.h.jinja", header_context(plan, title, digest)),
+        f"{plan.name}.c": render("controller.c.jinja", source_context(plan, title, digest)),
+        "foc_rt.h": runtime,
+        "controller.toml": controller_toml,
+        "manifest.json": json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        "README.md": render("README.md.jinja", readme_context(plan, title)),
+        "example/main.c": render("main.c.jinja", example_context(plan, title)),
+    }
+
+
+def _source(controller: Controller | str | Path) -> tuple[bytes, Controller, str]:
+    """The file's content, the controller, and what errors call it."""
+    if isinstance(controller, Controller):
+        return controller_text(controller).encode("utf-8"), controller, controller.name
+    made = read_controller(controller)
+    return Path(controller).read_bytes(), made, str(controller)
+
+
+def _check(arithmetic: str | None, memory: str | None, length: int | None) -> None:
+    if arithmetic is not None and arithmetic not in ARITHMETICS:
+        raise InputError("--arithmetic", f"is {arithmetic!r}", f"choose one of {', '.join(ARITHMETICS)}")
+    if memory is not None and memory not in MEMORIES:
+        raise InputError("--memory", f"is {memory!r}", f"choose one of {', '.join(MEMORIES)}")
+    if length is not None and (not isinstance(length, int) or isinstance(length, bool) or length < 1):
+        raise InputError("--length", f"is {length!r}", "give a memory length of at least 1 sample")
+
+
+def _refuse_what_is_missing(memory, target, package, tolerance, horizon) -> None:
+    """Options of the command that this version does not have are refused, never ignored."""
+    if memory == "exponential":
+        raise InputError("--memory", "exponential is not available in this version", "use --memory short")
+    if target is not None:
+        raise InputError("--target", f"{target} has no kernels of its own in this version", "leave it out: the C runs there")
+    if package not in PACKAGES:
+        raise InputError("--for", f"is {package!r}", f"choose one of {', '.join(PACKAGES)}")
+    if package != "plain":
+        raise InputError("--for", f"{package} is not available in this version", "use --for plain and add the three files")
+    for option, value in (("--tolerance", tolerance), ("--horizon", horizon)):
+        if value is not None:
+            raise InputError(option, "belongs to --memory exponential, which this version lacks", "use --length")

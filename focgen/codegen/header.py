@@ -1,0 +1,111 @@
+"""The context of ``controller.h.jinja``: NAME.h, what a program that uses the controller reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import focgen
+from focgen.codegen.formulas import transfer_text
+from focgen.codegen.literals import comment, constant, literal, power_of_two, quantity
+from focgen.codegen.state import Member, members, state_bytes
+from focgen.plan.model import Format, Plan
+
+
+@dataclass(frozen=True)
+class Define:
+    """A macro: its name without the prefix, its value, what it is."""
+
+    name: str
+    value: str
+    about: str
+
+
+@dataclass(frozen=True)
+class HeaderContext:
+    """Everything ``controller.h.jinja`` asks for."""
+
+    name: str
+    title: str
+    version: str
+    arithmetic: str
+    sha256: str
+    transfer: str
+    fixed: bool
+    signal: str
+    sample_time: Define
+    scales: list[Define]
+    limits: list[Define]
+    sizes: list[Define]
+    members: tuple[Member, ...]
+    state_bytes: int
+    integral: bool
+    scheduled: bool
+
+
+def header_context(plan: Plan, title: str, sha256: str) -> HeaderContext:
+    """Prepare NAME.h; ``sha256`` is of the controller's file."""
+    return HeaderContext(
+        name=plan.name,
+        title=comment(title),
+        version=focgen.__version__,
+        arithmetic=plan.arithmetic,
+        sha256=sha256,
+        transfer=comment(transfer_text(plan)),
+        fixed=not plan.floating,
+        signal=plan.output.ctype,
+        sample_time=Define("SAMPLE_TIME", _sample_time(plan), "s: call step this often"),
+        scales=_scales(plan),
+        limits=_limits(plan),
+        sizes=_sizes(plan),
+        members=members(plan),
+        state_bytes=state_bytes(plan),
+        integral=plan.integrator is not None,
+        scheduled=plan.schedule is not None,
+    )
+
+
+def _sample_time(plan: Plan) -> str:
+    return literal(plan.sample_time, "double") + ("" if plan.arithmetic == "f64" else "f")
+
+
+def _scales(plan: Plan) -> list[Define]:
+    units = plan.controller.units
+    return [
+        Define("REF_LSB", _lsb(plan.error), _unit(units.measurement, "of reference and measurement")),
+        *([Define("SCHED_LSB", _lsb(plan.schedule.signal), _unit(units.schedule, "of the scheduling signal"))]
+          if plan.schedule else []),
+        Define("U_LSB", _lsb(plan.output), _unit(units.output, "of the output")),
+    ]
+
+
+def _lsb(form: Format) -> str:
+    return literal(1.0, form.ctype) if form.floating else power_of_two(form.lsb)
+
+
+def _unit(unit: str, of: str) -> str:
+    return f"{comment(unit)}, {of}" if unit else of
+
+
+def _limits(plan: Plan) -> list[Define]:
+    ranges, units = plan.controller.ranges, plan.controller.units
+    found = []
+    if not plan.floating:
+        found += _ends("REF", plan.reference, ranges.reference, units.measurement)
+        found += _ends("MEAS", plan.measurement, ranges.measurement, units.measurement)
+        if plan.schedule:
+            found += _ends("SCHED", plan.schedule.signal, ranges.schedule, units.schedule)
+    return found + _ends("U", plan.output, ranges.output, units.output)
+
+
+def _ends(name: str, form: Format, physical: tuple[float, float], unit: str) -> list[Define]:
+    return [
+        Define(f"{name}_{end}", constant(count, form.ctype), quantity(value, unit))
+        for end, count, value in (("MIN", form.low, physical[0]), ("MAX", form.high, physical[1]))
+    ]
+
+
+def _sizes(plan: Plan) -> list[Define]:
+    found = [Define("ERRORS", str(plan.error_lags + 1), "the present error and those before it")]
+    if plan.feedback:
+        found.append(Define("FILTERED", str(plan.filtered_lags + 1), "the same of the filtered error"))
+    return found

@@ -1,0 +1,90 @@
+"""``manifest.json``: what was generated, from what, and what is proved of it."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from typing import Any
+
+import focgen
+from focgen.codegen.state import size_of, state_bytes
+from focgen.plan.canonical import memory_bias
+from focgen.plan.model import ErrorBound, Plan, Proof, Sum
+
+
+def sha256(data: str | bytes) -> str:
+    """SHA-256 of text (UTF-8) or bytes, as hexadecimal text."""
+    return hashlib.sha256(data.encode("utf-8") if isinstance(data, str) else data).hexdigest()
+
+
+def manifest_of(plan: Plan, inputs: dict[str, str]) -> dict[str, Any]:
+    """The manifest of a plan; ``inputs`` maps every input to its SHA-256."""
+    return {
+        "name": plan.name,
+        "generator": f"focgen {focgen.__version__}",
+        "arithmetic": plan.arithmetic,
+        "memory": plan.memory,
+        "length": plan.length,
+        "sample_time": plan.sample_time,
+        **lsbs(plan),
+        "ranges": _ranges(plan),
+        "proofs": [proof_entry(proof) for proof in plan.proofs],
+        "error_bound": bound_entry(plan.error_bound),
+        "memory_bias": _bias(plan),
+        "sizes": sizes(plan),
+        "inputs": inputs,
+    }
+
+
+def lsbs(plan: Plan) -> dict[str, float]:
+    """The physical size of one count, under the names the header gives them."""
+    found = {"REF_LSB": plan.error.lsb, "U_LSB": plan.output.lsb}
+    if plan.schedule:
+        found["SCHED_LSB"] = plan.schedule.signal.lsb
+    return found
+
+
+def _ranges(plan: Plan) -> dict[str, list[float]]:
+    spans = vars(plan.controller.ranges)
+    return {key: list(span) for key, span in spans.items() if span is not None}
+
+
+def proof_entry(proof: Proof) -> dict[str, Any]:
+    """One node: its worst case and limit in counts, the margin in bits, and how it was proved."""
+    margin = None if math.isinf(proof.margin_bits) else round(proof.margin_bits, 3)
+    return {"node": proof.node, "worst": proof.worst, "type": proof.ctype, "limit": proof.limit,
+            "margin_bits": margin, "how": proof.how}
+
+
+def bound_entry(bound: ErrorBound) -> dict[str, Any]:
+    """The two parts of the error bound, in physical units."""
+    quantisation = {"operator": bound.operator, "output_per_sample": bound.output_per_sample,
+                    "parts": dict(bound.parts)}
+    if bound.operator_per_sample:
+        quantisation["operator_per_sample"] = bound.operator_per_sample
+    return {"quantisation": quantisation, "truncation": {"operator": bound.truncation}}
+
+
+def _bias(plan: Plan) -> list[dict[str, float]]:
+    """What each term reads of a constant, instead of 0, since the memory ends: T s^alpha at rest."""
+    keys = ("coefficient", "order", "reads")
+    return [dict(zip(keys, row)) for row in memory_bias(plan.controller, plan.length)]
+
+
+def sizes(plan: Plan) -> dict[str, int]:
+    """Bytes of the state (types aligned to their size, as on 32-bit cores) and of the constant tables."""
+    return {"state_bytes": state_bytes(plan), "table_bytes": _table_bytes(plan)}
+
+
+def _table_bytes(plan: Plan) -> int:
+    sums = [plan.direct, plan.inner and plan.inner.rest, plan.feedback and plan.feedback.table]
+    total = sum(_sum_bytes(plan, s) for s in sums if s)
+    if plan.schedule:
+        counts = len(plan.schedule.breakpoints) + len(plan.schedule.gains) + len(plan.schedule.slopes)
+        total += counts * size_of(plan.error.ctype) + (0 if plan.floating else len(plan.schedule.slopes))
+    return total
+
+
+def _sum_bytes(plan: Plan, table: Sum) -> int:
+    blocks = 0 if plan.floating else 6 * len(table.blocks)
+    return table.taps * size_of(plan.error.ctype) + blocks

@@ -1,0 +1,269 @@
+"""The context of ``controller.c.jinja``: expressions and tables of NAME.c, ready to be laid out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import focgen
+from focgen.codegen.expressions import CLAMP, LONGEST_SHIFT, bound, converted, saturated, scaled_up, shifted
+from focgen.codegen.formulas import step_formulas, transfer_text, weights_about
+from focgen.codegen.literals import comment, constant, literal, quantity, scale
+from focgen.codegen.state import carries, starts
+from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
+from focgen.plan.canonical import realise
+from focgen.plan.model import Plan
+
+
+@dataclass(frozen=True)
+class InnerText:
+    """The integral of the terms of negative order."""
+
+    sum: SumText
+    ctype: str
+    clamp: str
+    to_wide: str
+    about: str
+
+
+@dataclass(frozen=True)
+class FeedbackText:
+    """The recursion v = x − Σ; ``steady``: v for a constant e."""
+
+    sum: SumText
+    about: str
+    rounded: str
+    carries: bool
+    scaled_up: str
+    saturated: str
+    steady: str
+    steady_about: str
+
+
+@dataclass(frozen=True)
+class IntegralText:
+    """The controller's integrator; ``from_output`` takes ``u_applied`` to its counts."""
+
+    ctype: str
+    clamp: str
+    about: str
+    start: str
+    start_about: str
+    from_output: str
+    starting: bool
+
+
+@dataclass(frozen=True)
+class GainText:
+    """The constant gain."""
+
+    value: str
+    about: str
+
+
+@dataclass(frozen=True)
+class SourceContext:
+    """Everything ``controller.c.jinja`` asks for. None and empty strings leave their part of the text out.
+
+    Types: ``signal`` of inputs and output, ``filtered`` of v, ``wide`` of x, ``gain_type`` of g, ``increment`` of d.
+    """
+
+    name: str
+    title: str
+    version: str
+    arithmetic: str
+    sha256: str
+    transfer: str
+    formulas: list[str]
+    fixed: bool
+    signal: str
+    clamp: str
+    zero: str
+    error: str
+    filtered: str
+    filtered_about: str
+    wide: str
+    wide_about: str
+    numerator: SumText | None
+    inner: InnerText | None
+    feedback: FeedbackText | None
+    narrowed: str
+    at_rest: str
+    schedule: ScheduleText | None
+    gain: GainText | None
+    gain_type: str
+    increment: str
+    increment_about: str
+    product: str
+    integral: IntegralText | None
+    output: str
+
+
+def source_context(plan: Plan, title: str, sha256: str) -> SourceContext:
+    """Prepare NAME.c; ``sha256`` is of the controller's file. Raises PlanError for what C cannot express."""
+    signal = plan.output.ctype
+    return SourceContext(
+        name=plan.name,
+        title=comment(title),
+        version=focgen.__version__,
+        arithmetic=plan.arithmetic,
+        sha256=sha256,
+        transfer=comment(transfer_text(plan)),
+        formulas=step_formulas(plan),
+        fixed=not plan.floating,
+        signal=signal,
+        clamp=CLAMP[signal],
+        zero=literal(0, signal),
+        error="r - m" if signal == "int32_t" else "(int16_t)(r - m)" if signal == "int16_t" else "ref - meas",
+        filtered=plan.filtered.ctype,
+        filtered_about="" if plan.floating else f"counts of {scale(plan.filtered.lsb)}",
+        wide=plan.wide.ctype,
+        wide_about=bound(plan.wide, "x"),
+        numerator=_numerator(plan),
+        inner=_inner(plan),
+        feedback=_feedback(plan),
+        narrowed=_narrowed(plan, "x"),
+        at_rest=_at_rest(plan),
+        schedule=schedule_text(plan) if plan.schedule else None,
+        gain=None if plan.schedule else _gain(plan),
+        gain_type=plan.gain.ctype,
+        increment=plan.increment.ctype,
+        increment_about=_increment_about(plan),
+        product=_product(plan),
+        integral=_integral(plan),
+        output=_output(plan),
+    )
+
+
+def _narrowed(plan: Plan, x: str) -> str:
+    """v from ``x``, without what a recursion carries."""
+    return saturated(shifted(x, plan.wide.ctype, plan.narrow), plan.wide.ctype, plan.filtered.ctype)
+
+
+def _at_rest(plan: Plan) -> str:
+    """v for a constant e where there is no recursion."""
+    return _narrowed(plan, f"{plan.name}_numerator_sum(s)") if plan.direct else literal(0, plan.filtered.ctype)
+
+
+def _numerator(plan: Plan) -> SumText | None:
+    if plan.direct is None:
+        return None
+    about = weights_about(plan, realise(plan.controller).direct, plan.direct, "Numerator")
+    return sum_text(plan, plan.direct, "numerator", about)
+
+
+def _inner(plan: Plan) -> InnerText | None:
+    if plan.inner is None:
+        return None
+    state = plan.inner.state
+    what = "What 1/s integrates: numerator terms of negative order times s"
+    about = weights_about(plan, realise(plan.controller).rest, plan.inner.rest, what, half_step=True)
+    ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
+    total = f"s->inner + ({converted('r', plan.inner.rest.total.ctype, state.ctype)} + s->inner_input)"
+    return InnerText(
+        sum=sum_text(plan, plan.inner.rest, "integrand", about),
+        ctype=plan.inner.rest.total.ctype,
+        clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
+        to_wide=converted(shifted("s->inner", state.ctype, plan.inner.to_wide), state.ctype, plan.wide.ctype),
+        about=_proved(plan, "inner sum", state.bits),
+    )
+
+
+def _proved(plan: Plan, node: str, bits: int) -> str:
+    proof = next((p for p in plan.proofs if p.node == node), None)
+    return f"|sum| <= {proof.worst} < 2^{bits - 1}" if proof else ""
+
+
+def _feedback(plan: Plan) -> FeedbackText | None:
+    if plan.feedback is None:
+        return None
+    about = weights_about(plan, realise(plan.controller).den, plan.feedback.table, "Denominator")
+    wide, carried = plan.wide.ctype, carries(plan)
+    return FeedbackText(
+        sum=sum_text(plan, plan.feedback.table, "denominator", about),
+        about=bound(plan.wide, "x"),
+        rounded=shifted("x", wide, plan.narrow),
+        carries=carried,
+        scaled_up=scaled_up(wide, plan.narrow),
+        saturated=saturated("rounded", wide, plan.filtered.ctype) if carried else _narrowed(plan, "x"),
+        steady=_steady(plan),
+        steady_about=_steady_about(plan),
+    )
+
+
+def _steady(plan: Plan) -> str:
+    """v for a constant ``e``; 0 where the numerator has no gain at rest."""
+    if plan.feedback.steady == 0:
+        return literal(0, plan.filtered.ctype)
+    steady, form = constant(plan.feedback.steady, plan.filtered.ctype), plan.filtered.ctype
+    if plan.floating:
+        return f"{steady} * e"
+    double = f"int{2 * plan.error.bits}_t"
+    return saturated(shifted(f"({double}){steady} * e", double, plan.feedback.steady_shift), double, form)
+
+
+def _steady_about(plan: Plan) -> str:
+    if plan.feedback.steady == 0:
+        return ""
+    counts = plan.feedback.steady * 2.0**-plan.feedback.steady_shift
+    return f"{counts * plan.filtered.lsb / plan.error.lsb:.6g}"
+
+
+def _gain(plan: Plan) -> GainText:
+    value = constant(plan.constant_gain, plan.gain.ctype)
+    about = f"{plan.controller.gain:.6g}{' times h/2' if plan.integrator else ''}"
+    return GainText(value, about if plan.floating else f"{about}, counts of {scale(plan.gain.lsb)}")
+
+
+def _increment_about(plan: Plan) -> str:
+    unit = plan.controller.units.output
+    if plan.floating:
+        return quantity_unit(unit)
+    return f"{bound(plan.increment, 'd')}, counts of {scale(plan.increment.lsb, unit)}"
+
+
+def quantity_unit(unit: str) -> str:
+    """``in UNIT``, or nothing."""
+    return f"in {comment(unit)}" if unit else ""
+
+
+def _product(plan: Plan) -> str:
+    """d from ``gain`` and ``v``, by the cheapest product that is exact."""
+    gain = "gain" if plan.schedule else f"{plan.name}_GAIN"
+    if plan.floating:
+        return f"{gain} * v"
+    if plan.gain.ctype == "int16_t" and plan.filtered.ctype == "int32_t":
+        wide, product = "int64_t", f"foc_mul32x16(v, {gain})"
+    else:
+        small = plan.gain.ctype == "int16_t" and plan.gain_shift <= LONGEST_SHIFT["int32_t"]
+        wide = "int32_t" if small else "int64_t"
+        product = f"({wide}){gain} * v"
+    return converted(shifted(product, wide, plan.gain_shift), wide, plan.increment.ctype)
+
+
+def _integral(plan: Plan) -> IntegralText | None:
+    if plan.integrator is None:
+        return None
+    state, by, u = plan.integrator.state, plan.integrator.to_output, plan.output
+    ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
+    total = f"s->integral + ({converted('d', plan.increment.ctype, state.ctype)} + s->increment)"
+    start = min(max(0, state.low), state.high)
+    clamped = f"{CLAMP[u.ctype]}(u_applied, {plan.name}_U_MIN, {plan.name}_U_MAX)"
+    return IntegralText(
+        ctype=state.ctype,
+        clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
+        about=_proved(plan, "integrator sum", state.bits),
+        start=literal(start, state.ctype),
+        start_about=quantity(start * state.lsb, plan.controller.units.output),
+        from_output=converted(clamped, u.ctype, state.ctype) + scaled_up(state.ctype, by),
+        starting=starts(plan),
+    )
+
+
+def _output(plan: Plan) -> str:
+    """u from the integral, or from ``d`` without one."""
+    u = plan.output.ctype
+    if plan.integrator:
+        state = plan.integrator.state.ctype
+        return saturated(shifted("s->integral", state, plan.integrator.to_output), state, u)
+    d = plan.increment.ctype
+    return converted(f"{CLAMP[d]}(d, {plan.name}_U_MIN, {plan.name}_U_MAX)", d, u)

@@ -1,0 +1,109 @@
+"""What a controller remembers: the members of NAME_state and how large they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from focgen.codegen.literals import scale
+from focgen.plan.model import Format, Plan
+
+_SIZES = {"uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "float": 4, "int64_t": 8, "double": 8}
+
+
+@dataclass(frozen=True)
+class Member:
+    """One member of the state; ``array`` is the C text of its length, ``count`` the length."""
+
+    ctype: str
+    name: str
+    about: str
+    count: int = 1
+    array: str = ""
+
+    @property
+    def declaration(self) -> str:
+        """As C declares it."""
+        return f"{self.ctype} {self.name}{f'[{self.array}]' if self.array else ''};"
+
+
+def members(plan: Plan) -> tuple[Member, ...]:
+    """The members: single ones first, within reach of short addresses, then the rings; widest types first."""
+    found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan), *_bytes(plan)]
+    return tuple(sorted(found, key=lambda m: (bool(m.array), -_SIZES[m.ctype])))
+
+
+def _histories(plan: Plan) -> list[Member]:
+    error = Member(
+        plan.error.ctype, "error", f"ring of ref - meas{_counts(plan.error)}", plan.error_lags + 1, f"{plan.name}_ERRORS"
+    )
+    slots = [error, Member("uint16_t", "error_now", "slot of the latest error")]
+    if plan.feedback:
+        about = f"ring of the filtered error{_counts(plan.filtered)}"
+        size = f"{plan.name}_FILTERED"
+        slots.append(Member(plan.filtered.ctype, "filtered", about, plan.filtered_lags + 1, size))
+        slots.append(Member("uint16_t", "filtered_now", "slot of the latest filtered error"))
+    return slots
+
+
+def _inner(plan: Plan) -> list[Member]:
+    if plan.inner is None:
+        return []
+    return [
+        Member(plan.inner.state.ctype, "inner", f"integral of the terms of negative order{_counts(plan.inner.state)}"),
+        Member(plan.inner.rest.total.ctype, "inner_input", "what was added to it last, half a trapezoid"),
+    ]
+
+
+def _recursion(plan: Plan) -> list[Member]:
+    if not carries(plan):
+        return []
+    return [Member(plan.wide.ctype, "carry", "what the rounding of the filtered error has left over")]
+
+
+def _integral(plan: Plan) -> list[Member]:
+    if plan.integrator is None:
+        return []
+    found = [
+        Member(plan.integrator.state.ctype, "integral", f"the output before rounding{_counts(plan.integrator.state)}"
+               if not plan.floating else "the output"),
+        Member(plan.increment.ctype, "increment", "half a trapezoid, of the latest sample"),
+    ]
+    if plan.schedule:
+        found.append(Member(plan.filtered.ctype, "resting", "filtered error that reset has left, until a step"))
+    return found
+
+
+def _bytes(plan: Plan) -> list[Member]:
+    found = [Member("uint8_t", "flags", f"{plan.name}_FLAG_...")]
+    if starts(plan):
+        found.append(Member("uint8_t", "starting", "1 from reset to the first step"))
+    return found
+
+
+def carries(plan: Plan) -> bool:
+    """Whether the recursion's rounding leaves anything to carry."""
+    return plan.feedback is not None and not plan.floating and plan.narrow > 0
+
+
+def starts(plan: Plan) -> bool:
+    """Whether the first step after a reset must still find the gain of the sample before it."""
+    return plan.integrator is not None and plan.schedule is not None
+
+
+def _counts(form: Format) -> str:
+    return "" if form.floating else f", counts of {scale(form.lsb, form.unit)}"
+
+
+def state_bytes(plan: Plan) -> int:
+    """sizeof(NAME_state) where every type is aligned to its size, as on 32-bit ARM and RISC-V."""
+    total, widest = 0, 1
+    for member in members(plan):
+        size = _SIZES[member.ctype]
+        total = -(-total // size) * size + size * member.count
+        widest = max(widest, size)
+    return -(-total // widest) * widest
+
+
+def size_of(ctype: str) -> int:
+    """Bytes of a C type."""
+    return _SIZES[ctype]

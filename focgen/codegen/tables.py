@@ -1,0 +1,150 @@
+"""Constant tables of a generated source: weights, blocks, schedule."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from focgen.codegen.expressions import bound, shifted
+from focgen.codegen.literals import comment, exponent, quantity, rows, scale, wrapped
+from focgen.plan.model import Block, Plan, Sum
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows of a table under one comment (none where empty)."""
+
+    about: str
+    rows: list[str]
+
+
+@dataclass(frozen=True)
+class TableText:
+    """A constant table: comment lines, type, name, number of entries, rows."""
+
+    about: list[str]
+    ctype: str
+    name: str
+    count: int
+    groups: list[Group]
+
+
+@dataclass(frozen=True)
+class SumText:
+    """A history sum: its tables, and the function that computes it."""
+
+    tables: list[TableText]
+    function: str
+    ctype: str
+    about: str
+    call: str
+
+
+def sum_text(plan: Plan, table: Sum, name: str, about: list[str]) -> SumText:
+    """The sum ``table`` as C; its weights are called NAME_``name``, and ``about`` says what they are.
+
+    Blocks in which every weight is zero leave nothing behind.
+    """
+    blocks = [block for block in table.blocks if any(block.weights)]
+    weights = f"{plan.name}_{name}"
+    made = [_weights(plan, blocks, weights, about)]
+    if len(blocks) > 1:
+        made.append(_blocks(table, blocks, f"{weights}_blocks"))
+    about_sum = bound(table.total, "sum")
+    if about_sum:
+        about_sum = f"{about_sum}, counts of {scale(table.total.lsb)}"
+    return SumText(made, f"{weights}_sum", table.total.ctype, about_sum, _call(plan, table, blocks, weights))
+
+
+def _call(plan: Plan, table: Sum, blocks: list[Block], weights: str) -> str:
+    ring, size = ("error", "ERRORS") if table.history == "error" else ("filtered", "FILTERED")
+    history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
+    if len(blocks) > 1:
+        return f"foc_sum_{plan.arithmetic}({weights}, {weights}_blocks, {len(blocks)}, {history})"
+    one = blocks[0]
+    dot = f"foc_dot_{plan.arithmetic}({weights}, {len(one.weights)}, {history}, {one.last})"
+    return shifted(dot, one.sum.ctype, one.align)
+
+
+def _weights(plan: Plan, blocks: list[Block], name: str, about: list[str]) -> TableText:
+    ctype = plan.error.ctype
+    groups = [Group(_block_about(plan, block), rows(block.weights[::-1], ctype)) for block in blocks]
+    return TableText(about, ctype, name, sum(len(block.weights) for block in blocks), groups)
+
+
+def _block_about(plan: Plan, block: Block) -> str:
+    if plan.floating:
+        return ""
+    lags = f"lag {block.last}" if block.first == block.last else f"lags {block.last} ... {block.first}"
+    return f"{lags}: counts of 2^{exponent(block.lsb)}"
+
+
+def _blocks(table: Sum, blocks: list[Block], name: str) -> TableText:
+    about = [f"Its blocks, whose sums meet at counts of {scale(table.total.lsb)}; beside each the most its sum can be."]
+    lines = []
+    for block in blocks:
+        shifted("", block.sum.ctype, block.align)  # refuses what is too long
+        entry = f"{{{block.last}, {len(block.weights)}, {block.align}}},"
+        lines.append(f"{entry:<16} /* {bound(block.sum, 'sum')} */")
+    head = "oldest lag, taps, shift"
+    return TableText(about, "foc_block", name, len(blocks), [Group(head, lines)])
+
+
+@dataclass(frozen=True)
+class ScheduleText:
+    """The gain schedule: what it is, its tables, the call that reads it, and when its signal is beyond its
+    breakpoints (empty where it cannot be).
+    """
+
+    about: list[str]
+    tables: list[TableText]
+    call: str
+    outside: str
+
+
+def schedule_text(plan: Plan) -> ScheduleText:
+    """The schedule of a plan that has one."""
+    made = [
+        TableText([], ctype, f"{plan.name}_{key}", len(values), [Group(about, rows(values, ctype))])
+        for about, ctype, key, values in _columns(plan)
+    ]
+    names = ", ".join(table.name for table in made)
+    signal = "sched" if plan.floating else "at"
+    call = f"foc_schedule_{plan.arithmetic}({signal}, {names}, {len(plan.schedule.gains)})"
+    return ScheduleText(_schedule_about(plan), made, call, _outside(plan, signal))
+
+
+def _schedule_about(plan: Plan) -> list[str]:
+    schedule = plan.schedule
+    factor = 0.5 * plan.sample_time if plan.integrator else 1.0
+    at = [quantity(point * schedule.signal.lsb) for point in schedule.breakpoints]
+    gains = [quantity(gain * plan.gain.lsb / factor) for gain in schedule.gains]
+    pairs = wrapped([f"{point}: {gain}" for point, gain in zip(at, gains)], separator=",  ")
+    unit = f" ({comment(schedule.signal.unit)})" if schedule.signal.unit else ""
+    half_step = " The table holds the gains times h/2." if plan.integrator else ""
+    head = f"Gain schedule, linear between breakpoints{unit} and held beyond them.{half_step}"
+    return [head, *(line + "," * (line != pairs[-1]) for line in pairs)]
+
+
+def _columns(plan: Plan) -> list[tuple[str, str, str, tuple]]:
+    """(comment, type, name, values) of each table; the gains have one more entry than slopes and shifts."""
+    schedule, ctype = plan.schedule, plan.gain.ctype
+    if plan.floating:
+        named = ("points", schedule.breakpoints), ("gains", schedule.gains), ("slopes", schedule.slopes)
+        return [("", ctype, key, values) for key, values in named]
+    return [
+        (f"counts of {scale(schedule.signal.lsb, schedule.signal.unit)}", ctype, "points", schedule.breakpoints),
+        (f"counts of {scale(plan.gain.lsb)}", ctype, "gains", schedule.gains),
+        ("from each breakpoint to the next, before its shift", ctype, "slopes", schedule.slopes),
+        ("", "uint8_t", "shifts", schedule.slope_shifts),
+    ]
+
+
+def _outside(plan: Plan, signal: str) -> str:
+    """The condition of the flag; what the clamp of the signal rules out is left out."""
+    schedule, points = plan.schedule, f"{plan.name}_points"
+    found = []
+    if plan.floating or schedule.signal.low < schedule.breakpoints[0]:
+        found.append(f"{signal} < {points}[0]")
+    if plan.floating or schedule.signal.high > schedule.breakpoints[-1]:
+        found.append(f"{signal} > {points}[{len(schedule.breakpoints) - 1}]")
+    return " || ".join(found)
