@@ -18,12 +18,15 @@ from focgen.control.schedule import gain_table
 from focgen.errors import DesignError, FocgenError
 from focgen.fractional.transfer import TransferFunction
 from focgen.loop.design import design
+from focgen.loop.memory import choose_memory
 from focgen.loop.response import margins_at, shapes
 from focgen.loop.simulate import simulate
 from focgen.plan.build import build_plan
+from focgen.plan.canonical import tables
+from focgen.plan.stability import inverse
 from focgen.rig.files import write_rig
 from focgen.rig.model import UNITY, Actuator, LinearActuator, Ranges
-from tests.conftest import paper_rig
+from tests.conftest import paper_controller, paper_rig
 
 REACH = Ranges((0.0, 10.0), (0.0, 0.25), (0.0, 0.015))
 
@@ -170,6 +173,16 @@ def test_a_memory_too_short_for_the_wish_is_said():
     assert not made.holds and made.memory.bias[0].bias > 1.0
 
 
+def test_the_length_chosen_is_one_whose_recursion_is_stable():
+    """1/(10 s^1.2 + 1) cut off at 64 samples of 10 ms is unstable, however small its error at the crossover."""
+    controller = replace(paper_controller(), transfer=TransferFunction([(1.0, 0.0)], [(10.0, 1.2), (1.0, 0.0)]))
+    chosen = choose_memory(controller, 30.0, None)
+    assert inverse(tables(controller, 64).feedback.weights) is None
+    assert inverse(tables(controller, chosen.length).feedback.weights) is not None
+    short = choose_memory(controller, 30.0, 50)
+    assert short.crossover_error < 0.01  # it is not the error that ruled it out
+
+
 def test_a_rig_without_pressure_is_scheduled_by_its_command(made):
     blind = replace(paper_rig(), signals=replace(paper_rig().signals, pressure=None))
     found = simulate(blind, made.controller)
@@ -211,7 +224,8 @@ FAULTS = {
     "unstable": (linear_rig([(1.0, 0.0)], [(1.0, 1.0), (-2.0, 0.0)]), {}, "pole at 2 rad/s"),
     "double integrator": (linear_rig([(1.0, 0.0)], [(1.0, 2.0)]), {}, "integrates more than once"),
     "no static gain": (linear_rig([(1.0, 1.0)], [(1.0, 1.0), (1.0, 0.0)]), {}, "static gain is 0"),
-    "regulator integrates": (replace(paper_rig(), regulator=TransferFunction([(1, 0)], [(1, 1)])), {}, "[regulator]"),
+    "regulator integrates": (replace(paper_rig(), regulator=TransferFunction([(1, 0)], [(1, 1)])), {},
+                             "[regulator]: has the static gain inf, so the loop could not hold"),
     "out of reach": (paper_rig(), {"setpoints": [0.01, 0.5]}, "0.5 is out of reach; reachable is 0 … 0.345"),
     "at rest": (paper_rig(), {"setpoints": [0.0]}, "the rest itself"),
     "NaN set point": (paper_rig(), {"setpoints": [math.nan]}, "not finite"),

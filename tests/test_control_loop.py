@@ -67,6 +67,18 @@ def test_the_frozen_loop_is_the_linear_loop_of_state_space():
         assert np.abs(found - expected).max() < 1e-9
 
 
+def test_the_frozen_loop_is_the_product_of_its_parts():
+    """Whatever cancels, and with whatever factor."""
+    omega, rig = np.geomspace(0.01, 100.0, 20), paper_rig()
+    doubled = LinearActuator(TransferFunction([(0.14, 0.0)], [(2.64, 0.6), (2.0, 0.0)]))
+    for actuator in (rig.actuator, doubled, LinearActuator(TransferFunction([(1.0, 0.3), (1.0, 0.0)], [(1.0, 1.0)]))):
+        loop = frozen_loop(replace(rig, actuator=actuator), paper_controller(), 0.1)
+        still = 0.0015 + 0.345 * 0.1 if actuator is rig.actuator else 1.0
+        parts = paper_controller().transfer * rig.regulator * actuator.dynamics * rig.sensor
+        expected = parts.frequency_response(omega) * still * paper_controller().gain_at(0.1) / (1j * omega)
+        assert np.abs(loop.frequency_response(omega) / expected - 1.0).max() < 1e-12
+
+
 def test_the_sampled_loop_tends_to_the_frozen_one():
     """K held constant in rig and controller; sampling ever faster. Plain GL at 10 ms settles 1–3 % sooner."""
     rig = replace(paper_rig(), actuator=Actuator(1.32, 0.6, (0.0015 + 0.345 * 0.15,)))
@@ -104,6 +116,17 @@ def test_a_pressure_step_is_the_mittag_leffler_function_times_the_drive():
     rise = 1.0 - mittag_leffler(0.6, 1.0, -(run.time**0.6) / 1.32)
     drive = 0.0015 * np.array([0.1, 0.2]) + 0.345 * np.array([0.1, 0.2]) ** 2
     assert np.abs(run.output - rise[:, None] * drive).max() < 1e-13
+
+
+def test_what_passes_at_once_arrives_with_the_next_sample():
+    """An actuator with as many zeros as poles, and one behind a regulator that is like that, too."""
+    lead = TransferFunction([(0.5, 1.0), (1.0, 0.0)], [(1.0, 1.0), (1.0, 0.0)])
+    for regulator in (UNITY, lead):
+        rig = replace(paper_rig(), regulator=regulator, actuator=LinearActuator(lead), sensor=UNITY)
+        run = run_loop(chain(rig, 0.01, 100), Constant([1.0]), np.zeros((100, 1)), REST, delay=0)
+        exact = step_response(regulator * lead, run.time)
+        assert run.output[0, 0] == 0.0  # read before the command moves
+        assert np.abs(run.output[1:, 0] - exact[1:]).max() < 1e-5
 
 
 def test_from_a_rest_away_from_zero_nothing_moves():
