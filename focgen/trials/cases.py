@@ -10,8 +10,8 @@ import numpy as np
 from focgen.control.controller import Controller
 from focgen.rig.model import Ranges, Rig
 from focgen.trials import excitation
-from focgen.trials.designs import Design, draw_design
-from focgen.trials.forms import Spans
+from focgen.trials.designs import Design, Truth, draw_design
+from focgen.trials.forms import Drawn, Spans
 from focgen.trials.machine import Machine, Session, Setting
 from focgen.trials.plan import Assignment
 from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of, sample
@@ -67,8 +67,10 @@ def _draw_case(assignment: Assignment, signals: str, suite: str, rng: np.random.
     stage = _set_up(assignment, signals, suite, design, rng)
     spans = {name: getattr(stage.spans, name) for name in MEASURED}
     recorder = draw_recorder(rng, spans, stage.rig.sample_time)
-    effects = design.effects(rng) if design else assignment.effects
-    truth = [draw_effect(effect, assignment.severity, stage, rng) for effect in effects]
+    if design:
+        truth = [draw_truth(design.truths[rng.integers(len(design.truths))], stage, rng)]
+    else:
+        truth = [draw_effect(effect, assignment.severity, stage, rng) for effect in assignment.effects]
     settings = [setting for setting, _ in truth]
     label = {
         "kind": assignment.kind,
@@ -84,7 +86,7 @@ def _draw_case(assignment: Assignment, signals: str, suite: str, rng: np.random.
 def _set_up(assignment, signals, suite, design: Design | None, rng) -> Stage:
     Ts = float(rng.choice((0.02, 0.05)))
     rig, full = draw_linear(rng, Ts) if assignment.linear else draw_chain(rng, signals, Ts)
-    seen = design.experiments(rng, Ts) if design else excitation.SUITES[suite](rng, Ts)
+    seen = design.draw(rng, Ts) if design else excitation.SUITES[suite](rng, Ts)
     unseen = excitation.unseen(rng, Ts)
     clocks = clocks_of([*seen, *unseen], Ts, rng)
     bare = Stage(rig, full, seen, unseen, clocks, None, None)
@@ -131,8 +133,21 @@ def draw_effect(effect: str, severity: str, stage: Stage, rng: np.random.Generat
     """One of the effect's forms, calibrated, and what the label says of it."""
     drawn = draw_form(effect, rng, stage.spans)
     setting, gap = calibrate(drawn, stage.rig, stage.coarse, SEVERITIES[severity])
-    facts = {
-        "effect": effect,
+    return setting, _facts(drawn, setting, severity, gap)
+
+
+def draw_truth(truth: Truth, stage: Stage, rng: np.random.Generator) -> tuple[Setting, dict]:
+    """The effect and form that a design asks for, and what the label says of it."""
+    drawn = draw_form(truth.effect, rng, stage.spans, truth.form)
+    if truth.amplitude:
+        return drawn.at(truth.amplitude), _facts(drawn, drawn.at(truth.amplitude), "given", None)
+    setting, gap = calibrate(drawn, stage.rig, stage.coarse, truth.target)
+    return setting, _facts(drawn, setting, "given", gap)
+
+
+def _facts(drawn: Drawn, setting: Setting, severity: str, gap: float | None) -> dict:
+    return {
+        "effect": drawn.effect,
         "stage": drawn.stage,
         "form": drawn.form.name,
         "severity": severity,
@@ -140,7 +155,6 @@ def draw_effect(effect: str, severity: str, stage: Stage, rng: np.random.Generat
         "memory": list(setting.memory or ()),
         "gap": gap,
     }
-    return setting, facts
 
 
 def visibility(truth: list[dict], settings: list[Setting], stage: Stage, recorder: Recorder) -> list[dict]:

@@ -55,5 +55,5 @@ OUTSIDE: dict[str, tuple[str, tuple[Form, ...]]] = {
     "knocking_play": ("actuator", (Form("knocking_play", 0.02, 0.8, _knock),)),
     "pick_up": ("sensor", (Form("pick_up", 0.01, 0.5, _pick_up),)),
     "loose_plug": ("sensor", (Form("loose_plug", 0.02, 0.9, _plug),)),
-    "folded_reading": ("sensor", (Form("folded_reading", 0.1, 1.0, _fold),)),
+    "folded_reading": ("sensor", (Form("folded_reading", 0.5, 1.0, _fold),)),
 }

@@ -46,6 +46,23 @@ _ALIKE = (
     {"gain_drift", "sensor_drift"},
 )
 
+# Without the pressure these are alike, too.
+_ALIKE_BLIND = (
+    {"valve_stiction", "hysteresis"},
+    {"valve_stiction", "sensor_hysteresis"},
+    {"valve_asymmetry", "unloading_asymmetry"},
+    {"supply_saturation", "contact"},
+    {"supply_saturation", "sensor_saturation"},
+    {"supply_saturation", "gain_nonlinearity"},
+    {"supply_saturation", "sensor_nonlinearity"},
+    {"leak", "gain_nonlinearity"},
+    {"leak", "dead_zone"},
+    {"leak", "sensor_nonlinearity"},
+    {"transport_delay", "sensor_lag"},
+    {"slow_regulator", "sensor_lag"},
+    {"flow_limit", "unloading_asymmetry"},
+)
+
 # With a command and a response alone, these have a meaning of their own.
 _LINEAR = (
     "transport_delay",
@@ -108,7 +125,7 @@ def _of_kind(kind: str, count: int, signals: str, suite: str, rng) -> list[Assig
     if kind == "outside":
         return _dealt(_outside(signals), ("mid", "high"), kind, count, rng)
     if kind == "pair":
-        return [Assignment(kind, _pair(rng), str(rng.choice(("mid", "high")))) for _ in range(count)]
+        return [Assignment(kind, _pair(signals, rng), str(rng.choice(("mid", "high")))) for _ in range(count)]
     return [Assignment(kind, (), "high") for _ in range(count)]
 
 
@@ -128,12 +145,13 @@ def _outside(signals: str) -> tuple[str, ...]:
     return tuple(name for name in OUTSIDE if signals == "C" or name != "room_swing")
 
 
-def _pair(rng) -> tuple[str, ...]:
+def _pair(signals: str, rng) -> tuple[str, ...]:
     """Two effects, in half of the cases of one stage, that are not alike."""
     names = list(VOCABULARY)
+    alike = _ALIKE + (_ALIKE_BLIND if signals == "A" else ())
     same = rng.random() < 0.4
     while True:
         pair = tuple(rng.choice(names, 2, replace=False))
         stages = [VOCABULARY[e][0] for e in pair]
-        if (stages[0] == stages[1]) == same and set(pair) not in _ALIKE:
+        if (stages[0] == stages[1]) == same and set(pair) not in alike:
             return tuple(str(e) for e in pair)

@@ -16,9 +16,11 @@ VOCABULARY: dict[str, tuple[str, tuple[Form, ...]]] = {
 }
 
 
-def draw_form(effect: str, rng: np.random.Generator, spans: Spans) -> Drawn:
-    """One of the effect's forms at random, all but its amplitude fixed."""
+def draw_form(effect: str, rng: np.random.Generator, spans: Spans, name: str | None = None) -> Drawn:
+    """One of the effect's forms, ``name`` or at random, all but its amplitude fixed."""
     stage, forms = VOCABULARY.get(effect) or OUTSIDE[effect]
+    if name:
+        forms = tuple(form for form in forms if form.name == name)
     form = forms[rng.integers(len(forms))]
     amplitude = form.draw(rng, spans)
     return Drawn(effect, stage, form, amplitude, form.memory(rng) if form.memory else None)
