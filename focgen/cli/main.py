@@ -41,13 +41,13 @@ class _Parser(argparse.ArgumentParser):
         raise FocgenError(command, message, f"see `{self.prog} --help`")
 
 
-def parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+def parser(only: str | None = None) -> argparse.ArgumentParser:
+    """The parser of the whole command line, or with one command ``only``, so that the others need not be loaded."""
     style = argparse.RawDescriptionHelpFormatter
     top = _Parser(prog="focgen", description=_PROLOGUE, formatter_class=style)
     top.add_argument("--version", action="version", version=f"focgen {focgen.__version__}")
     sub = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name in commands():
+    for name in (only,) if only in commands() else commands():
         module = import_module(f"focgen.cli.{name}")
         one = sub.add_parser(
             name, help=module.HELP, description=module.HELP, epilog=module.EXAMPLE, formatter_class=style
@@ -61,7 +61,8 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns 0 (done), 1 (a check does not hold) or 2 (unusable input)."""
     try:
-        args = parser().parse_args(argv)
+        argv = sys.argv[1:] if argv is None else list(argv)
+        args = parser(argv[0] if argv else None).parse_args(argv)
         outcome = args.run(args)
         sys.stdout.write(to_json(outcome.payload) if args.json else outcome.text.rstrip("\n") + "\n")
         sys.stdout.flush()

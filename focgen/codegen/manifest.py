@@ -67,7 +67,7 @@ def bound_entry(bound: ErrorBound) -> dict[str, Any]:
 
 def _bias(plan: Plan) -> list[dict[str, float]]:
     """What each term reads of a constant, instead of 0, since the memory ends: T s^alpha at rest."""
-    keys = ("coefficient", "order", "reads")
+    keys = ("coefficient", "order", "bias")
     return [dict(zip(keys, row)) for row in memory_bias(plan.controller, plan.length)]
 
 

@@ -1,0 +1,64 @@
+"""How far a running controller is from the ideal one, against the bounds of its manifest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.plan.ideal import ideal
+from focgen.plan.model import ErrorBound, Plan
+from focgen.plan.scenario import Scenario, Trace, physical_trace
+
+
+@dataclass(frozen=True)
+class MaxError:
+    """The largest errors seen, in physical units: of the signal ahead of the integrator, and of the output."""
+
+    operator: float
+    output: float
+
+
+@dataclass(frozen=True)
+class ErrorsSeen:
+    """The largest errors and the largest shares of their bounds (above 1: exceeded)."""
+
+    largest: MaxError
+    operator_share: float
+    output_share: float
+
+    @property
+    def within(self) -> bool:
+        """Whether every bound holds."""
+        return self.operator_share <= 1.0 and self.output_share <= 1.0
+
+
+def errors_seen(plan: Plan, physical: Scenario, trace: Trace, bound: ErrorBound) -> ErrorsSeen:
+    """Compare a raw ``trace`` of the plan's controller with the same memory in float64 on the same physical inputs.
+
+    Without an integrator only the clamped output is seen, which errs no more than what is clamped.
+    """
+    reference, seen = ideal(plan.controller, physical, plan.length), physical_trace(plan, trace)
+    since = _samples_since_reset(physical)
+    truth = reference.d if plan.integrator else reference.u
+    operator, output = np.abs(seen.d - truth), np.abs(seen.u - reference.u)
+    allowed = np.full(since.shape, bound.operator)
+    if bound.operator_per_sample:
+        allowed = np.minimum(allowed, since * bound.operator_per_sample)
+    largest = MaxError(float(operator.max()), float(output.max()))
+    return ErrorsSeen(largest, _share(operator, allowed), _share(output, since * bound.output_per_sample))
+
+
+def _share(errors: np.ndarray, allowed: np.ndarray) -> float:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.max(np.where(errors > 0.0, errors / allowed, 0.0)))
+
+
+def _samples_since_reset(scenario: Scenario) -> np.ndarray:
+    """1 at the first sample after init or a reset, and so on; shape (lanes, samples)."""
+    count = np.tile(np.arange(1, scenario.samples + 1), (scenario.lanes, 1))
+    for r in sorted(scenario.resets, key=lambda r: r.sample):
+        count[r.lane, r.sample :] = np.arange(1, scenario.samples - r.sample + 1)
+    return count
+
+

@@ -1,0 +1,89 @@
+"""A generated folder read back: its plan, made anew from the controller it carries, and what its manifest claims."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from focgen.codegen.manifest import manifest_of, sha256
+from focgen.control.files import read_controller
+from focgen.errors import InputError
+from focgen.plan.build import build_plan
+from focgen.plan.model import ErrorBound, Plan
+
+_AGAIN = "run focgen generate again"
+
+
+@dataclass(frozen=True, eq=False)
+class GeneratedFolder:
+    """``plan`` from the folder's own controller.toml; ``bound`` as the manifest claims it; ``differences`` between what
+    the manifest says and what the plan gives.
+    """
+
+    path: Path
+    plan: Plan
+    bound: ErrorBound
+    differences: tuple[str, ...]
+
+
+def read_folder(path: str | Path) -> GeneratedFolder:
+    """Read a generated folder. Raises InputError where it is none, or lacks a file."""
+    path = Path(path)
+    manifest = _manifest(path)
+    try:
+        controller = read_controller(path / "controller.toml")
+        plan = build_plan(controller, manifest["arithmetic"], manifest["length"], manifest["name"])
+        claimed = _claimed(manifest["error_bound"])
+    except (KeyError, TypeError) as reason:
+        raise InputError(str(path / "manifest.json"), f"lacks {reason}", _AGAIN) from None
+    for name in (f"{plan.name}.h", f"{plan.name}.c", "foc_rt.h"):
+        if not (path / name).is_file():
+            raise InputError(str(path), f"lacks {name}", _AGAIN)
+    inputs = {name: sha256((path / name).read_bytes()) for name in ("controller.toml", "foc_rt.h")}
+    expected = json.loads(json.dumps(manifest_of(plan, inputs)))
+    return GeneratedFolder(path, plan, claimed, tuple(_differences(expected, manifest, "")))
+
+
+def _manifest(path: Path) -> dict[str, Any]:
+    if not path.is_dir():
+        raise InputError(str(path), "is no folder", "name a folder that focgen generate has written")
+    try:
+        manifest = json.loads((path / "manifest.json").read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(str(path), "has no manifest.json", "name a folder that focgen generate has written") from None
+    except (OSError, ValueError) as reason:
+        raise InputError(str(path / "manifest.json"), f"cannot be read ({reason})", _AGAIN) from None
+    if not isinstance(manifest, dict):
+        raise InputError(str(path / "manifest.json"), "is no JSON object", _AGAIN)
+    return manifest
+
+
+def _claimed(bound: dict[str, Any]) -> ErrorBound:
+    quantisation, truncation = bound["quantisation"], bound["truncation"]["operator"]
+    return ErrorBound(float(quantisation["operator"]), float(quantisation["output_per_sample"]), truncation,
+                      float(quantisation.get("operator_per_sample", 0.0)))
+
+
+def _differences(expected: Any, found: Any, place: str):
+    """Yield every place where the manifest is not what the plan gives."""
+    if isinstance(expected, dict) and isinstance(found, dict):
+        for key in sorted(expected.keys() | found.keys()):
+            where = f"{place}.{key}" if place else key
+            if key == "generator":
+                continue
+            if key not in found or key not in expected:
+                yield f"manifest.json: {where} is {'missing' if key in expected else 'unknown'}"
+            else:
+                yield from _differences(expected[key], found[key], where)
+    elif isinstance(expected, list) and isinstance(found, list) and len(expected) == len(found):
+        for i, (one, other) in enumerate(zip(expected, found)):
+            yield from _differences(one, other, f"{place}[{i}]")
+    elif expected != found:
+        yield f"manifest.json: {place} is {_short(found)}, the controller gives {_short(expected)}"
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,89 @@
+"""What a controller is tried with: steps, noise, saturation, schedule ends, resets, tracking, worst cases."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Reset, Scenario, Track, to_raw
+from focgen.plan.worst import worst_case_input
+
+LANES = 8
+_BEYOND = 0.15  # of a range: how far lanes that leave their ranges go beyond them
+
+
+def mixed(controller: Controller, samples: int, seed: int, beyond: bool = False) -> Scenario:
+    """Physical inputs: each lane another kind of signal, with resets and tracks at random; ``beyond`` leaves the ranges.
+
+    ``samples`` are in all, split among the lanes.
+    """
+    rng = np.random.default_rng([seed, int(beyond)])
+    each = -(-samples // LANES)
+    ranges = controller.ranges
+    ref, meas = (_signals(rng, span, each, beyond) for span in (ranges.reference, ranges.measurement))
+    sched = _signals(rng, ranges.schedule, each, beyond) if controller.scheduled else None
+    return Scenario(ref, meas, sched, _resets(rng, controller, each), _tracks(rng, controller, each))
+
+
+def _signals(rng: np.random.Generator, span: tuple[float, float], count: int, beyond: bool) -> np.ndarray:
+    kinds = rng.permutation(len(_KINDS))
+    rows = np.stack([_KINDS[kinds[lane % len(_KINDS)]](rng, count) for lane in range(LANES)])
+    if beyond:
+        rows = rows * (1.0 + 2.0 * _BEYOND) - _BEYOND
+    return span[0] + (span[1] - span[0]) * rows
+
+
+def _noise(rng, count):
+    return rng.uniform(0.0, 1.0, count)
+
+
+def _steps(rng, count):
+    return np.repeat(rng.uniform(0.0, 1.0, count), int(rng.integers(10, 120)))[:count]
+
+
+def _extremes(rng, count):
+    """From end to end: the worst for derivatives, and saturation."""
+    return np.repeat(rng.integers(0, 2, count), int(rng.integers(1, 40)))[:count].astype(float)
+
+
+def _sine(rng, count):
+    return 0.5 + 0.5 * np.sin(np.arange(count) * 10.0 ** rng.uniform(-3.0, 0.0))
+
+
+def _wander(rng, count):
+    return np.clip(rng.uniform() + np.cumsum(rng.normal(0.0, 0.01, count)), 0.0, 1.0)
+
+
+def _held(rng, count):
+    """An end for ever: integrators run into their limits and stay."""
+    return np.full(count, float(rng.integers(0, 2)))
+
+
+_KINDS = (_noise, _steps, _extremes, _sine, _wander, _held)
+
+
+def _resets(rng, controller: Controller, count: int) -> tuple[Reset, ...]:
+    spans = controller.ranges.reference, controller.ranges.measurement, controller.ranges.output
+    places = [(lane, int(at)) for lane in range(1, LANES) for at in rng.choice(count, min(2, count), replace=False)]
+    return tuple(Reset(lane, at, *(float(rng.uniform(*span)) for span in spans)) for lane, at in places)
+
+
+def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:
+    low, high = controller.ranges.output
+    margin = 0.1 * (high - low)  # an outer limiter may well be wider
+    places = {(lane, int(rng.integers(count))) for lane in range(0, LANES, 2) for _ in range(2)}
+    return tuple(Track(lane, at, float(rng.uniform(low - margin, high + margin))) for lane, at in sorted(places))
+
+
+def worst_cases(plan: Plan) -> dict[str, Scenario]:
+    """Raw inputs that take each node to its proved worst case, by node; the integer forms' alone have proofs."""
+    nodes = ["v"] if plan.floating else [proof.node for proof in plan.proofs]
+    return {node: worst_case_input(plan, node) for node in nodes}
+
+
+def raw_scenarios(plan: Plan, samples: int, seed: int) -> dict[str, Scenario]:
+    """Everything a plan is compared in, by name; raw inputs."""
+    inside, outside = mixed(plan.controller, samples, seed), mixed(plan.controller, max(samples // 4, 1), seed, True)
+    found = {"mixed": to_raw(plan, inside), "beyond the ranges": to_raw(plan, outside)}
+    return found | {f"worst case of {node}": scenario for node, scenario in worst_cases(plan).items()}
