@@ -110,11 +110,15 @@ def test_small_set_points_are_what_the_frozen_loop_with_the_true_slope_does(made
 
 @pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 def test_the_gain_margin_is_where_the_running_loop_starts_to_swing(arithmetic):
-    """The margin as it will run, against the loop as it runs: 2 % below it swings die out, 2 % above they grow."""
+    """The margin as it will run, against the loop as it runs: 2 % below it swings die out, 2 % above they
+    grow.
+    """
     rig = linear_rig(*FRACTIONAL)
     made = design(rig, settling=1.0, arithmetic=arithmetic, length=200)
     margin = 10.0 ** (made.margins[0].running.gain_db / 20.0)
-    free = replace(made.controller.ranges, reference=(-0.015, 0.015), measurement=(-0.015, 0.015), output=(-50.0, 50.0))
+    free = replace(
+        made.controller.ranges, reference=(-0.015, 0.015), measurement=(-0.015, 0.015), output=(-50.0, 50.0)
+    )
     for factor, grows in ((0.98, False), (1.02, True)):
         louder = replace(made.controller, ranges=free, gain=made.controller.gain * margin * factor)
         output = simulate(rig, louder, [0.0005], duration=12.0).running.output[:, 0]
@@ -126,7 +130,9 @@ def test_margins_follow_gain_and_delay_exactly():
     rig = linear_rig(*FRACTIONAL)
     controller = design(rig, settling=1.0, arithmetic="f64").controller
     plan = build_plan(controller)
-    now, late = (margins_at(rig, controller, plan, shapes(rig, controller, plan, d), 0.1).running for d in (0, 1))
+    now, late = (
+        margins_at(rig, controller, plan, shapes(rig, controller, plan, d), 0.1).running for d in (0, 1)
+    )
     assert now.delay_s - late.delay_s == pytest.approx(controller.sample_time, rel=1e-4)
     assert now.crossover_rad_s == pytest.approx(late.crossover_rad_s, rel=1e-9)
 
@@ -174,8 +180,10 @@ def test_a_memory_too_short_for_the_wish_is_said():
 
 
 def test_the_length_chosen_is_one_whose_recursion_is_stable():
-    """1/(10 s^1.2 + 1) cut off at 64 samples of 10 ms is unstable, however small its error at the crossover."""
-    controller = replace(paper_controller(), transfer=TransferFunction([(1.0, 0.0)], [(10.0, 1.2), (1.0, 0.0)]))
+    """1/(10 s^1.2 + 1) cut off at 64 samples of 10 ms is unstable, small as its error at the crossover is."""
+    controller = replace(
+        paper_controller(), transfer=TransferFunction([(1.0, 0.0)], [(10.0, 1.2), (1.0, 0.0)])
+    )
     chosen = choose_memory(controller, 30.0, None)
     assert inverse(tables(controller, 64).feedback.weights) is None
     assert inverse(tables(controller, chosen.length).feedback.weights) is not None
@@ -204,7 +212,11 @@ def test_breakpoints_are_as_few_as_the_tolerance_allows():
         pieces = len(table.schedule.breakpoints) - 1
         widest = 1.0 + 2.0 * tolerance + 2.0 * math.sqrt(tolerance + tolerance**2)
         assert table.error <= tolerance
-        assert math.ceil(math.log(10.0) / math.log(widest)) <= pieces <= 1.1 * math.log(10.0) / math.log(widest) + 1
+        assert (
+            math.ceil(math.log(10.0) / math.log(widest))
+            <= pieces
+            <= 1.1 * math.log(10.0) / math.log(widest) + 1
+        )
 
 
 # ------------------------------------------------------------------------------------------------- faults
@@ -219,13 +231,24 @@ FAULTS = {
     "K changes sign": (actuator(-0.03, 0.345), {"lowest": 0.05}, "changes sign at p = 0.087"),
     "output turns back": (actuator(0.2, -2.5, 9.26), {}, "turns back at p = 0.06"),
     "output saturates": (actuator(0.1, -0.3), {}, "0.01 is out of reach; reachable is -0.199 … 0.00833"),
-    "non-minimum phase": (linear_rig([(-1.0, 1.0), (1.0, 0.0)], [(1.0, 1.0), (1.0, 0.0)]), {}, "zero at 1 rad/s"),
-    "fractional zero": (linear_rig([(-1.0, 0.5), (2.0, 0.0)], [(1.0, 1.0), (1.0, 0.0)]), {}, "zero at 4 rad/s"),
+    "non-minimum phase": (
+        linear_rig([(-1.0, 1.0), (1.0, 0.0)], [(1.0, 1.0), (1.0, 0.0)]),
+        {},
+        "zero at 1 rad/s",
+    ),
+    "fractional zero": (
+        linear_rig([(-1.0, 0.5), (2.0, 0.0)], [(1.0, 1.0), (1.0, 0.0)]),
+        {},
+        "zero at 4 rad/s",
+    ),
     "unstable": (linear_rig([(1.0, 0.0)], [(1.0, 1.0), (-2.0, 0.0)]), {}, "pole at 2 rad/s"),
     "double integrator": (linear_rig([(1.0, 0.0)], [(1.0, 2.0)]), {}, "integrates more than once"),
     "no static gain": (linear_rig([(1.0, 1.0)], [(1.0, 1.0), (1.0, 0.0)]), {}, "static gain is 0"),
-    "regulator integrates": (replace(paper_rig(), regulator=TransferFunction([(1, 0)], [(1, 1)])), {},
-                             "[regulator]: has the static gain inf, so the loop could not hold"),
+    "regulator integrates": (
+        replace(paper_rig(), regulator=TransferFunction([(1, 0)], [(1, 1)])),
+        {},
+        "[regulator]: has the static gain inf, so the loop could not hold",
+    ),
     "out of reach": (paper_rig(), {"setpoints": [0.01, 0.5]}, "0.5 is out of reach; reachable is 0 … 0.345"),
     "at rest": (paper_rig(), {"setpoints": [0.0]}, "the rest itself"),
     "NaN set point": (paper_rig(), {"setpoints": [math.nan]}, "not finite"),
@@ -250,7 +273,9 @@ def test_faults_name_where_what_and_remedy(fault):
 
 def test_a_zero_of_the_regulator_or_sensor_does_not_matter():
     """Only the actuator is inverted."""
-    rig = linear_rig(*FRACTIONAL, sensor=TransferFunction([(-0.01, 1.0), (1.0, 0.0)], [(0.1, 1.0), (1.0, 0.0)]))
+    rig = linear_rig(
+        *FRACTIONAL, sensor=TransferFunction([(-0.01, 1.0), (1.0, 0.0)], [(0.1, 1.0), (1.0, 0.0)])
+    )
     assert invert(rig, 1.0).transfer == TransferFunction([(1.32, 0.6), (1.0, 0.0)])
 
 
@@ -260,8 +285,19 @@ def test_a_zero_of_the_regulator_or_sensor_does_not_matter():
 def test_the_command_prints_json_and_writes_the_controller(tmp_path, capsys):
     write_rig(linear_rig(*FRACTIONAL), tmp_path / "rig.toml")
     out = tmp_path / "new" / "controller.toml"
-    status = main(["design", str(tmp_path / "rig.toml"), "--out", str(out), "--settling", "1", "--json",
-                   "--report", str(tmp_path / "pictures")])
+    status = main(
+        [
+            "design",
+            str(tmp_path / "rig.toml"),
+            "--out",
+            str(out),
+            "--settling",
+            "1",
+            "--json",
+            "--report",
+            str(tmp_path / "pictures"),
+        ]
+    )
     found = json.loads(capsys.readouterr().out)
     assert status == 0 and read_controller(out).arithmetic == "q31"
     assert len(found["settling_s"]) == len(found["overshoot_pct"]) == len(found["operating_points"]) == 7

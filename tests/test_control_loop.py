@@ -50,8 +50,12 @@ def test_the_papers_frozen_loop_settles_as_stated(pressure, settling):
 
 
 def test_the_papers_frozen_loop_settles_in_1_36_s_on_average():
-    times = [measure_step(frozen_step(frozen_loop(paper_rig(), paper_loop(p), p), np.arange(0.0, 6.0, 1e-3)),
-                          1e-3, 0.0, 1.0).settling_s for p in PRESSURES]
+    times = [
+        measure_step(
+            frozen_step(frozen_loop(paper_rig(), paper_loop(p), p), np.arange(0.0, 6.0, 1e-3)), 1e-3, 0.0, 1.0
+        ).settling_s
+        for p in PRESSURES
+    ]
     assert np.mean(times) == pytest.approx(1.36, rel=0.01)
 
 
@@ -71,7 +75,11 @@ def test_the_frozen_loop_is_the_product_of_its_parts():
     """Whatever cancels, and with whatever factor."""
     omega, rig = np.geomspace(0.01, 100.0, 20), paper_rig()
     doubled = LinearActuator(TransferFunction([(0.14, 0.0)], [(2.64, 0.6), (2.0, 0.0)]))
-    for actuator in (rig.actuator, doubled, LinearActuator(TransferFunction([(1.0, 0.3), (1.0, 0.0)], [(1.0, 1.0)]))):
+    for actuator in (
+        rig.actuator,
+        doubled,
+        LinearActuator(TransferFunction([(1.0, 0.3), (1.0, 0.0)], [(1.0, 1.0)])),
+    ):
         loop = frozen_loop(replace(rig, actuator=actuator), paper_controller(), 0.1)
         still = 0.0015 + 0.345 * 0.1 if actuator is rig.actuator else 1.0
         parts = paper_controller().transfer * rig.regulator * actuator.dynamics * rig.sensor
@@ -87,8 +95,13 @@ def test_the_sampled_loop_tends_to_the_frozen_one():
     errors = []
     for h in (0.01, 0.005, 0.0025):
         controller, samples = replace(paper_loop(0.15), sample_time=h), round(3.0 / h)
-        run = run_loop(chain(rig, h, samples), FloatStepper(controller, samples, 1),
-                       np.full((samples, 1), target), REST, delay=0)
+        run = run_loop(
+            chain(rig, h, samples),
+            FloatStepper(controller, samples, 1),
+            np.full((samples, 1), target),
+            REST,
+            delay=0,
+        )
         errors.append(np.abs(run.output[:: round(0.01 / h), 0] / target - expected).max())
     assert errors[0] < 0.02 and errors[1] < 0.55 * errors[0] and errors[2] < 0.55 * errors[1]
 
@@ -97,7 +110,9 @@ def test_the_sampled_loop_tends_to_the_frozen_one():
 
 
 def test_a_held_command_meets_the_exact_response_of_the_whole_chain():
-    """Open loop, linear actuator: regulator · actuator · sensor in one transfer function, no substeps at all."""
+    """Open loop, linear actuator: regulator · actuator · sensor in one transfer function, no substeps at
+    all.
+    """
     linear = LinearActuator(TransferFunction([(0.07, 0.0)], [(1.32, 0.6), (1.0, 0.0)]))
     for h in (0.002, 0.01, 0.03):
         rig = replace(paper_rig(), actuator=linear)
@@ -140,7 +155,9 @@ def test_from_a_rest_away_from_zero_nothing_moves():
 
 def test_delay_shifts_the_command_by_one_sample():
     rig = replace(paper_rig(), regulator=UNITY, sensor=UNITY)
-    late, early = (run_loop(chain(rig, 0.01, 50), Constant([0.1]), np.zeros((50, 1)), REST, d) for d in (1, 0))
+    late, early = (
+        run_loop(chain(rig, 0.01, 50), Constant([0.1]), np.zeros((50, 1)), REST, d) for d in (1, 0)
+    )
     assert np.abs(late.output[1:] - early.output[:-1]).max() < 1e-15
     assert late.command[0, 0] == 0.0 and late.command[1, 0] == 0.1
 
@@ -157,11 +174,22 @@ def test_the_nonlinear_loop_is_that_of_its_differential_equations():
     """α = 1: every stage an ODE, solved by Runge–Kutta between the samples; a controller of a few lines."""
     rig = replace(paper_rig(), actuator=Actuator(0.8, 1.0, (0.0015, 0.345)))
     table = GainSchedule((0.05, 0.1, 0.2), (300.0, 200.0, 120.0))
-    controller = Controller("pi", 0.02, TransferFunction([(0.8, 1.0), (1.0, 0.0)]), table, True,
-                            ControllerRanges((0.0, 0.02), (0.0, 0.02), (0.0, 2.6), (0.0, 0.25)))
+    controller = Controller(
+        "pi",
+        0.02,
+        TransferFunction([(0.8, 1.0), (1.0, 0.0)]),
+        table,
+        True,
+        ControllerRanges((0.0, 0.02), (0.0, 0.02), (0.0, 2.6), (0.0, 0.25)),
+    )
     samples, target = 150, 0.012
-    run = run_loop(chain(rig, 0.02, samples), FloatStepper(controller, samples, 1),
-                   np.full((samples, 1), target), REST, delay=1)
+    run = run_loop(
+        chain(rig, 0.02, samples),
+        FloatStepper(controller, samples, 1),
+        np.full((samples, 1), target),
+        REST,
+        delay=1,
+    )
     expected, applied = _by_ode(table, samples, target)
     assert np.abs(run.output[:, 0] - expected).max() < 2e-6 * target / 0.012 * 5
     assert np.abs(run.command[:, 0] - applied).max() < 2e-3
@@ -181,7 +209,9 @@ def _by_ode(table, samples, target):
     for _ in range(samples):
         outputs.append(x[3])
         error = target - x[3]
-        increment = 0.01 * np.interp(x[0], table.breakpoints, table.gains) * (0.8 * (error - last) / 0.02 + error)
+        increment = (
+            0.01 * np.interp(x[0], table.breakpoints, table.gains) * (0.8 * (error - last) / 0.02 + error)
+        )
         integral = min(max(integral + increment + before, 0.0), 2.6)
         before, last = increment, error
         commands.append(waiting)
@@ -207,8 +237,12 @@ def test_equilibria_hold():
 def test_held_response_is_the_pulse_transfer_function():
     """Against the exact discretisation of integer transfer functions by the matrix exponential."""
     omega = np.geomspace(0.01, np.pi / 0.01, 50)
-    for num, den, accuracy in (([152.48], [1.0, 53.39, 1528.0], 1e-6), ([2.0, 3.0], [1.0, 5.0, 7.0, 1.0], 1e-6),
-                               ([1.0], [0.3, 1.0], 1e-6), ([0.5, 1.0], [1.0, 1.0], 1e-6)):
+    for num, den, accuracy in (
+        ([152.48], [1.0, 53.39, 1528.0], 1e-6),
+        ([2.0, 3.0], [1.0, 5.0, 7.0, 1.0], 1e-6),
+        ([1.0], [0.3, 1.0], 1e-6),
+        ([0.5, 1.0], [1.0, 1.0], 1e-6),
+    ):
         terms = [[(c, float(len(p) - 1 - i)) for i, c in enumerate(p)] for p in (num, den)]
         dnum, dden, _ = signal.cont2discrete((num, den), 0.01)
         z = np.exp(1j * omega * 0.01)
@@ -241,8 +275,12 @@ def test_sampled_response_is_that_of_the_stepper(length):
 
 
 def test_long_memory_tends_to_the_infinite_one():
-    controller = any_controller(TransferFunction([(1.0, 0.4), (2.0, 0.0), (0.7, -0.5)], [(0.05, 0.8), (1.0, 0.0)]))
+    controller = any_controller(
+        TransferFunction([(1.0, 0.4), (2.0, 0.0), (0.7, -0.5)], [(0.05, 0.8), (1.0, 0.0)])
+    )
     omega = np.geomspace(0.1, 300.0, 20)
     endless = sampled_response(controller, omega)
-    errors = [np.abs(sampled_response(controller, omega, n) / endless - 1.0).max() for n in (500, 5000, 50_000)]
+    errors = [
+        np.abs(sampled_response(controller, omega, n) / endless - 1.0).max() for n in (500, 5000, 50_000)
+    ]
     assert errors[0] > 10.0 * errors[1] and errors[1] > 10.0 * errors[2] and errors[2] < 1e-3

@@ -1,4 +1,6 @@
-"""Margins against python-control, against closed forms of fractional loops, and against what loops really do."""
+"""Margins against python-control, against closed forms of fractional loops, and against what loops really
+do.
+"""
 
 import math
 
@@ -35,7 +37,9 @@ def test_agrees_with_python_control_on_random_loops():
         if not really:
             continue
         stable += 1
-        assert found.phase_deg == pytest.approx(phase, abs=1e-2) or (math.isinf(phase) and math.isinf(found.phase_deg))
+        assert found.phase_deg == pytest.approx(phase, abs=1e-2) or (
+            math.isinf(phase) and math.isinf(found.phase_deg)
+        )
         assert found.gain_db == pytest.approx(20 * math.log10(gain), abs=1e-2) or math.isinf(gain)
     assert 20 < stable < 75
 

@@ -45,7 +45,9 @@ def test_the_integrator_leaves_no_steady_error(steps):
 
 
 def test_the_frozen_loop_stands_beside_it(steps):
-    """At the set points' pressures (0.074 … 0.199 bar) the frozen loop is the paper's, between 1.98 and 0.91 s."""
+    """At the set points' pressures (0.074 … 0.199 bar) the frozen loop is the paper's, between 1.98 and 0.91
+    s.
+    """
     for result, settling in zip(steps.setpoints, (1.98, 1.20, 0.91)):
         assert result.frozen.settling_s == pytest.approx(settling, rel=0.02)
         assert result.frozen.overshoot_pct < 0.1
@@ -57,12 +59,15 @@ def test_what_is_reported_is_in_the_signals(steps):
         output = steps.running.output[:, i]
         off = np.abs(output - result.reference) > 0.05 * result.reference
         assert off[time < result.settling_s - 0.011].any() and not off[time > result.settling_s + 0.011].any()
-        assert result.overshoot_pct == pytest.approx(100 * max(0.0, output.max() / result.reference - 1), abs=1e-9)
+        assert result.overshoot_pct == pytest.approx(
+            100 * max(0.0, output.max() / result.reference - 1), abs=1e-9
+        )
         assert result.peak_pressure >= steps.running.pressure[:, i].max()
 
 
 def test_q31_is_close_to_the_ideal_and_q15_less(steps):
     """From rest and within the memory, only quantisation is left between the two."""
+
     def gap(simulation):
         samples = min(simulation.length, len(simulation.running.output))
         return np.abs(simulation.running.output - simulation.ideal.output)[:samples].max()
@@ -95,7 +100,9 @@ def test_limits_hold_the_command():
 
 
 def test_an_unstable_loop_is_said():
-    louder = replace(paper_controller(), gain=6000.0, ranges=replace(paper_controller().ranges, schedule=None))
+    louder = replace(
+        paper_controller(), gain=6000.0, ranges=replace(paper_controller().ranges, schedule=None)
+    )
     found = simulate(paper_rig(), louder, (0.008,), duration=10.0)
     (result,) = found.setpoints
     assert not found.holds and result.verdict == "oscillates" and math.isnan(result.settling_s)
@@ -103,9 +110,16 @@ def test_an_unstable_loop_is_said():
 
 
 def test_a_rig_of_one_stage():
-    """What is absent is 1: an integrator around a lag, settled after ln 20 / k at k well below the lag's corner."""
-    rig = replace(paper_rig(), regulator=UNITY, actuator=None,
-                  sensor=TransferFunction([(1.0, 0.0)], [(0.001, 1.0), (1.0, 0.0)]), ranges=Ranges((0, 5), (0, 5), (0, 5)))
+    """What is absent is 1: an integrator around a lag, settled after ln 20 / k at k well below the lag's
+    corner.
+    """
+    rig = replace(
+        paper_rig(),
+        regulator=UNITY,
+        actuator=None,
+        sensor=TransferFunction([(1.0, 0.0)], [(0.001, 1.0), (1.0, 0.0)]),
+        ranges=Ranges((0, 5), (0, 5), (0, 5)),
+    )
     ranges = replace(paper_controller().ranges, reference=(0.0, 5.0), measurement=(0.0, 5.0), schedule=None)
     controller = replace(paper_controller(), transfer=UNITY, gain=0.5, ranges=ranges, arithmetic="f64")
     found = simulate(rig, controller, (1.0,), duration=20.0)
@@ -125,20 +139,42 @@ def other(**changes):
 
 
 FAULTS = {
-    "out of reach": (paper_rig(), other(reference=(0.0, 0.5)), {"setpoints": [0.45]}, DesignError, "reachable is 0 … 0.345"),
-    "outside the controller's range": (paper_rig(), paper_controller(), {"setpoints": [0.03]}, DesignError, "outside"),
+    "out of reach": (
+        paper_rig(),
+        other(reference=(0.0, 0.5)),
+        {"setpoints": [0.45]},
+        DesignError,
+        "reachable is 0 … 0.345",
+    ),
+    "outside the controller's range": (
+        paper_rig(),
+        paper_controller(),
+        {"setpoints": [0.03]},
+        DesignError,
+        "outside",
+    ),
     "units": (paper_rig(), other(measurement=(0.0, 20.0)), {}, ControllerError, "a factor of 1e+03"),
     "pressure units": (paper_rig(), other(schedule=(0.0, 25.0)), {}, ControllerError, "same unit"),
     "NaN": (paper_rig(), paper_controller(), {"setpoints": [math.nan]}, DesignError, "not finite"),
     "no step": (paper_rig(), paper_controller(), {"setpoints": [0.0]}, DesignError, "where the step starts"),
-    "no step between": (paper_rig(), paper_controller(), {"setpoints": [0.01, 0.01], "consecutive": True}, DesignError,
-                        "where the step starts"),
+    "no step between": (
+        paper_rig(),
+        paper_controller(),
+        {"setpoints": [0.01, 0.01], "consecutive": True},
+        DesignError,
+        "where the step starts",
+    ),
     "duration": (paper_rig(), paper_controller(), {"duration": -1.0}, DesignError, "above 0 s"),
     "too long": (paper_rig(), paper_controller(), {"duration": 1e6}, DesignError, "give 0.02 … 600 s"),
     "delay": (paper_rig(), paper_controller(), {"delay": 3}, DesignError, "0 or 1"),
     "length": (paper_rig(), paper_controller(), {"length": 0}, PlanError, "memory length"),
-    "zero numerator": (paper_rig(), replace(paper_controller(), transfer=TransferFunction([(0.0, 0.0)])), {}, PlanError,
-                       "zero numerator"),
+    "zero numerator": (
+        paper_rig(),
+        replace(paper_controller(), transfer=TransferFunction([(0.0, 0.0)])),
+        {},
+        PlanError,
+        "zero numerator",
+    ),
 }
 
 
@@ -154,15 +190,28 @@ def test_another_rig_and_another_rate_are_noted(files):
     stranger = replace(paper_controller(), sample_time=0.02, designed_from=Source("old.toml", "0" * 64))
     write_controller(stranger, files / "controller.toml")
     notes = simulate(files / "rig.toml", files / "controller.toml", POINTS, duration=1.0).notes
-    assert any("another state of the rig" in note for note in notes) and any("0.02 s" in note for note in notes)
+    assert any("another state of the rig" in note for note in notes) and any(
+        "0.02 s" in note for note in notes
+    )
 
 
 # ------------------------------------------------------------------------------------------------- command
 
 
 def test_json_carries_every_set_point(files, capsys):
-    status = main(["simulate", str(files / "rig.toml"), str(files / "controller.toml"), "--setpoints", "0.004", "0.01",
-                   "--json", "--report", str(files / "pictures")])
+    status = main(
+        [
+            "simulate",
+            str(files / "rig.toml"),
+            str(files / "controller.toml"),
+            "--setpoints",
+            "0.004",
+            "0.01",
+            "--json",
+            "--report",
+            str(files / "pictures"),
+        ]
+    )
     found = json.loads(capsys.readouterr().out)
     assert status == 0 and [s["reference"] for s in found["setpoints"]] == [0.004, 0.01]
     assert all({"settling_s", "overshoot_pct", "steady_error"} <= set(s) for s in found["setpoints"])
@@ -170,7 +219,9 @@ def test_json_carries_every_set_point(files, capsys):
 
 
 def test_a_loop_that_does_not_hold_gives_status_1_and_null(files, capsys):
-    louder = replace(paper_controller(), gain=6000.0, ranges=replace(paper_controller().ranges, schedule=None))
+    louder = replace(
+        paper_controller(), gain=6000.0, ranges=replace(paper_controller().ranges, schedule=None)
+    )
     write_controller(louder, files / "controller.toml")
     arguments = ["simulate", str(files / "rig.toml"), str(files / "controller.toml"), "--setpoints", "0.008"]
     assert main([*arguments, "--json"]) == 1

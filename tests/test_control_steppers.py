@@ -13,12 +13,12 @@ from focgen.plan.ideal import ideal
 from focgen.plan.scenario import Reset, Scenario, physical_trace, to_raw
 from tests.controllers import random_controller
 
-
 LANES = 3
 
 
 def signals(rng, controller, lanes, samples):
     """Set points, measurements and schedules all over their ranges, and a little beyond."""
+
     def walk(span):
         low, high = span
         steps = np.repeat(rng.uniform(low, high, (lanes, samples // 10 + 1)), 10, axis=1)[:, :samples]
@@ -33,7 +33,7 @@ def stepped(stepper, ref, meas, sched):
 
 
 def rest_of(controller, rng):
-    """An output to start from, and the scenario's resets for it: both at error 0, where the ranges have one."""
+    """An output to start from, and the scenario's resets for it: at error 0, where the ranges have one."""
     ranges = controller.ranges
     low = max(ranges.reference[0], ranges.measurement[0])
     high = min(ranges.reference[1], ranges.measurement[1])
@@ -64,7 +64,9 @@ def test_plan_stepper_is_the_bit_true_reference(arithmetic):
         start, resets = rest_of(controller, rng)
         scenario = Scenario(ref, meas, sched if controller.scheduled else None, resets)
         expected = physical_trace(plan, execute(plan, to_raw(plan, scenario))).u
-        assert np.array_equal(stepped(PlanStepper(plan, LANES, start), ref, meas, sched), expected), controller
+        assert np.array_equal(stepped(PlanStepper(plan, LANES, start), ref, meas, sched), expected), (
+            controller
+        )
 
 
 @pytest.mark.parametrize("endless", [True, False])
@@ -85,6 +87,10 @@ def test_online_convolution_is_the_convolution():
         kernel, x = rng.normal(size=(lags, 2, 3)), rng.normal(size=(samples, 3, 4))
         online = OnlineConvolution(kernel, 4, samples)
         found = np.stack([online.step(each) for each in x])
-        full = np.stack([[sum(np.convolve(kernel[:, o, i], x[:, i, c])[:samples] for i in range(3))
-                          for c in range(4)] for o in range(2)])
+        full = np.stack(
+            [
+                [sum(np.convolve(kernel[:, o, i], x[:, i, c])[:samples] for i in range(3)) for c in range(4)]
+                for o in range(2)
+            ]
+        )
         assert np.abs(found - full.transpose(2, 0, 1)).max() < 1e-11

@@ -16,33 +16,63 @@ HELP = "invert the rig's model, find the gain schedule K_o(p)/K(p), check the ma
 EXAMPLE = """example:
   focgen design identified.toml --out controller.toml --settling 1.5 --report pictures
 
-  writes controller.toml and prints the schedule, the steps from rest to seven set points in the closed loop, and
-  the margins: ideal, and as it will run. --settling is the mean settling time (to within 5 %) over these set
-  points; if it is not feasible, the error says what is."""
+  writes controller.toml and prints the schedule, the steps from rest to seven set points in the closed loop,
+  and the margins: ideal, and as it will run. --settling is the mean settling time (to within 5 %) over these
+  set points; if it is not feasible, the error says what is."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("rig", metavar="RIG", help="rig.toml with an [actuator]")
     parser.add_argument("--out", required=True, metavar="CONTROLLER", help="the controller.toml to write")
-    parser.add_argument("--settling", type=float, metavar="S",
-                        help="mean settling time over the operating points, s (default: 1.5, or the fastest feasible)")
-    parser.add_argument("--overshoot", type=float, metavar="PCT",
-                        help="largest overshoot at any operating point, %% (default: 5; alone: as fast as it allows)")
-    parser.add_argument("--arithmetic", default="q31", choices=ARITHMETICS, help="what it will run in (default: q31)")
-    parser.add_argument("--length", type=int, metavar="L",
-                        help="memory length, past samples (default: the shortest with 1 %% error at the crossover)")
-    parser.add_argument("--setpoints", type=float, nargs="+", metavar="Y",
-                        help="outputs that are the operating points (default: tenths 1 … 7 of the output's range)")
-    parser.add_argument("--delay", type=int, default=1, choices=(0, 1), help="computation delay, samples (default: 1)")
+    parser.add_argument(
+        "--settling",
+        type=float,
+        metavar="S",
+        help="mean settling time over the operating points, s (default: 1.5, or the fastest feasible)",
+    )
+    parser.add_argument(
+        "--overshoot",
+        type=float,
+        metavar="PCT",
+        help="largest overshoot at any operating point, %% (default: 5; alone: as fast as it allows)",
+    )
+    parser.add_argument(
+        "--arithmetic", default="q31", choices=ARITHMETICS, help="what it will run in (default: q31)"
+    )
+    parser.add_argument(
+        "--length",
+        type=int,
+        metavar="L",
+        help="memory length, past samples (default: the shortest with 1 %% error at the crossover)",
+    )
+    parser.add_argument(
+        "--setpoints",
+        type=float,
+        nargs="+",
+        metavar="Y",
+        help="outputs that are the operating points (default: tenths 1 … 7 of the output's range)",
+    )
+    parser.add_argument(
+        "--delay", type=int, default=1, choices=(0, 1), help="computation delay, samples (default: 1)"
+    )
     parser.add_argument("--report", metavar="DIR", help="write pictures of schedule and margins there")
 
 
 def run(args: Namespace) -> Outcome:
-    result = design(args.rig, args.out, args.settling, args.overshoot, args.arithmetic, args.length,
-                    delay=args.delay, setpoints=args.setpoints)
+    result = design(
+        args.rig,
+        args.out,
+        args.settling,
+        args.overshoot,
+        args.arithmetic,
+        args.length,
+        delay=args.delay,
+        setpoints=args.setpoints,
+    )
     text = f"{design_text(result)}\n\nwrote {args.out}\n"
     if args.report:
         write_files(args.report, design_pictures(result, read_rig(args.rig)))
         text += f"pictures in {args.report}\n"
-    text += f"next: focgen simulate {args.rig} {args.out}, or focgen generate {args.out} --out DIR --arithmetic {args.arithmetic}"
+    text += f"next: focgen simulate {args.rig} {args.out}\n"
+    text += f"      focgen generate {args.out} --out DIR --arithmetic {args.arithmetic}"
     return Outcome(design_payload(result) | {"controller": args.out}, text, result.holds)

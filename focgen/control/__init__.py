@@ -1,4 +1,4 @@
-"""The controller: what it is, its file, its design, and the closed loop it makes with a rig."""
+"""The controller: what it is, its file, and the mathematics of its design: inverse, schedule, margins."""
 
 from focgen.control.controller import Controller, ControllerRanges, GainSchedule, Source, Units
 from focgen.control.files import read_controller, write_controller

@@ -43,11 +43,15 @@ def derived_ranges(rig: Rig) -> tuple[Ranges, tuple[str, ...]]:
     pressure = given.pressure
     if pressure is None:
         pressure = _scaled(command, _static_gain(rig, "regulator"))
-        notes.append(f"the pressure's range is not given: {_span(pressure)}, the command's through the regulator")
+        notes.append(
+            f"the pressure's range is not given: {_span(pressure)}, the command's through the regulator"
+        )
     output = given.output
     if output is None:
         output = _output_range(rig, pressure)
-        notes.append(f"the output's range is not given: {_span(output)}, the pressure's through actuator and sensor")
+        notes.append(
+            f"the output's range is not given: {_span(output)}, the pressure's through actuator and sensor"
+        )
     return Ranges(command, pressure, output), tuple(notes)
 
 
@@ -64,8 +68,11 @@ def _static_gain(rig: Rig, stage: str) -> float:
     transfer = actuator_of(rig).dynamics if stage == "actuator" else getattr(rig, stage)
     gain = transfer.dc_gain
     if not (math.isfinite(gain) and gain != 0.0):
-        raise DesignError(f"{rig.name} [{stage}]", f"has the static gain {gain:g}, so no range follows through it",
-                          "give [ranges] for command, pressure and output")
+        raise DesignError(
+            f"{rig.name} [{stage}]",
+            f"has the static gain {gain:g}, so no range follows through it",
+            "give [ranges] for command, pressure and output",
+        )
     return gain
 
 
@@ -73,8 +80,11 @@ def _output_range(rig: Rig, pressure: tuple[float, float]) -> tuple[float, float
     values = static_output(rig, np.linspace(*pressure, _GRID))
     low, high = float(np.min(values)), float(np.max(values))
     if not low < high:
-        raise DesignError(f"{rig.name} [actuator]", "does not move its output over the pressure's range",
-                          "check gain and [ranges]")
+        raise DesignError(
+            f"{rig.name} [actuator]",
+            "does not move its output over the pressure's range",
+            "check gain and [ranges]",
+        )
     return low, high
 
 
@@ -95,7 +105,9 @@ def rest(rig: Rig, command: tuple[float, float]) -> Equilibrium:
     level = settled + actuator.offset
     output = level * rig.sensor.dc_gain if level else 0.0
     if not math.isfinite(output):
-        raise DesignError(rig.name, f"never rests at the command {idle:g}", "give a command range that holds 0")
+        raise DesignError(
+            rig.name, f"never rests at the command {idle:g}", "give a command range that holds 0"
+        )
     return Equilibrium(idle, pressure, output)
 
 
@@ -141,5 +153,8 @@ def _root(actuator: Actuator, drive: float, low: float, high: float) -> float:
 
 
 def _unreachable(rig: Rig, output: float, what: str, within: str) -> DesignError:
-    return DesignError(rig.name, f"the output {output:.4g} {what}; reachable is {within}",
-                       "give set points, or [ranges] output, within the rig's reach")
+    return DesignError(
+        rig.name,
+        f"the output {output:.4g} {what}; reachable is {within}",
+        "give set points, or [ranges] output, within the rig's reach",
+    )

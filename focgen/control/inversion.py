@@ -21,8 +21,9 @@ _AXIS = 1e-6  # rad
 class Inversion:
     """C(s) = K_o / K(p) · ``transfer`` · (1/s where ``integrator``).
 
-    ``gain`` are the coefficients of K(p) (one where K is constant). ``filter_time`` is the time constant (s) of the
-    roll-off that keeps the controller's gain from growing with frequency, 0 where none is needed.
+    ``gain`` are the coefficients of K(p) (one where K is constant). ``filter_time`` is the time constant
+    (s) of the roll-off that keeps the controller's gain from growing with frequency, 0 where none is
+    needed.
     """
 
     transfer: TransferFunction
@@ -49,8 +50,11 @@ def invert(rig: Rig, crossover: float) -> Inversion:
     """
     actuator = rig.actuator
     if actuator is None:
-        raise DesignError(rig.name, "has no [actuator], so there is nothing to invert",
-                          "identify it (focgen identify), or give [actuator] num = [[1.0, 0.0]]")
+        raise DesignError(
+            rig.name,
+            "has no [actuator], so there is nothing to invert",
+            "identify it (focgen identify), or give [actuator] num = [[1.0, 0.0]]",
+        )
     for stage in ("regulator", "sensor"):
         _check_static(rig, stage)
     if isinstance(actuator, Actuator):
@@ -62,18 +66,29 @@ def invert(rig: Rig, crossover: float) -> Inversion:
 def _check_static(rig: Rig, stage: str) -> None:
     gain = getattr(rig, stage).dc_gain
     if not math.isfinite(gain) or gain == 0.0:
-        raise DesignError(f"{rig.name} [{stage}]", f"has the static gain {gain:g}, so the loop could not hold a set point",
-                          f"give a {stage} with a finite static gain, or write controller.toml by hand")
+        raise DesignError(
+            f"{rig.name} [{stage}]",
+            f"has the static gain {gain:g}, so the loop could not hold a set point",
+            f"give a {stage} with a finite static gain, or write controller.toml by hand",
+        )
 
 
 def _linear_inverse(name: str, actuator: LinearActuator) -> Inversion:
     where, transfer = f"{name} [actuator]", actuator.dynamics
     if not transfer.num:
         raise DesignError(where, "is zero", "give num at least one term")
-    _refuse_right_half(where, transfer.num, "has a zero at {place} rad/s: its inverse is unstable (non-minimum phase)",
-                       "move that factor to [regulator] or [sensor], which are not inverted")
-    _refuse_right_half(where, transfer.den, "has a pole at {place} rad/s: cancelling what is unstable only hides it",
-                       "stabilise it first, or write controller.toml by hand")
+    _refuse_right_half(
+        where,
+        transfer.num,
+        "has a zero at {place} rad/s: its inverse is unstable (non-minimum phase)",
+        "move that factor to [regulator] or [sensor], which are not inverted",
+    )
+    _refuse_right_half(
+        where,
+        transfer.den,
+        "has a pole at {place} rad/s: cancelling what is unstable only hides it",
+        "stabilise it first, or write controller.toml by hand",
+    )
     kind = transfer.den[-1].order - transfer.num[-1].order
     gain = transfer.num[-1].coefficient / transfer.den[-1].coefficient
     if kind < 0.0 or kind > 1.0:
@@ -87,9 +102,11 @@ def _linear_inverse(name: str, actuator: LinearActuator) -> Inversion:
 
 
 def _quotient(num: Polynomial, den: Polynomial, gain: float) -> TransferFunction:
-    """Return gain · num/den with the common power of s divided out and the lowest coefficient of ``den`` 1."""
+    """Return gain · num/den with common powers of s divided out and the lowest coefficient of ``den`` 1."""
     unit, common = den[-1].coefficient, min(num[-1].order, den[-1].order)
-    return TransferFunction([(gain * c / unit, o - common) for c, o in num], [(c / unit, o - common) for c, o in den])
+    return TransferFunction(
+        [(gain * c / unit, o - common) for c, o in num], [(c / unit, o - common) for c, o in den]
+    )
 
 
 def _shifted(terms: Polynomial, by: float) -> Polynomial:
@@ -118,5 +135,6 @@ def _rolled_off(inversion: Inversion, crossover: float) -> Inversion:
     filtered = transfer
     for _ in range(lags):
         filtered = filtered * lag
-    note = f"a roll-off 1/({time:.4g} s + 1){'' if lags == 1 else f'^{lags}'} keeps the controller's gain from growing"
+    power = "" if lags == 1 else f"^{lags}"
+    note = f"a roll-off 1/({time:.4g} s + 1){power} keeps the controller's gain from growing"
     return Inversion(filtered, inversion.gain, inversion.integrator, time, (*inversion.notes, note))

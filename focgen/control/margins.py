@@ -18,10 +18,10 @@ class Margins:
     """How far a loop is from instability.
 
     ``gain_db``: by which the gain may grow, dB. ``gain_reduction_db``: by which it may fall, dB.
-    ``phase_deg``: smallest over the gain crossovers, degrees, negative where it is lost. ``delay_s``: additional
-    delay that would bring the loop to the edge, s. ``crossover_rad_s``: highest frequency of unit gain.
-    Infinite where nothing is crossed. ``stable``: Nyquist's criterion, for a loop that is stable when open but for
-    integrators.
+    ``phase_deg``: smallest over the gain crossovers, degrees, negative where it is lost. ``delay_s``:
+    additional delay that would bring the loop to the edge, s. ``crossover_rad_s``: highest frequency of
+    unit gain. Infinite where nothing is crossed. ``stable``: Nyquist's criterion, for a loop that is
+    stable when open but for integrators.
     """
 
     gain_db: float
@@ -34,7 +34,9 @@ class Margins:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """An open loop L on a grid fine enough to be taken as straight between: ``omega`` (n,) in rad/s, ``values`` (n,)."""
+    """An open loop L on a grid fine enough to be taken as straight between: ``omega`` (n,) in rad/s,
+    ``values`` (n,).
+    """
 
     omega: np.ndarray
     values: np.ndarray
@@ -81,7 +83,8 @@ def margins(loop: Curve) -> Margins:
     stable = _is_stable(loop)
     worst = float(np.degrees(signed[np.argmin(np.abs(signed))])) if len(signed) else math.inf
     return Margins(
-        gain_db=above, gain_reduction_db=below,
+        gain_db=above,
+        gain_reduction_db=below,
         phase_deg=worst if stable else -abs(worst),
         delay_s=float(np.min(lead / np.exp(omega), initial=math.inf)) if stable else 0.0,
         crossover_rad_s=float(np.exp(omega.max())) if len(omega) else math.nan,
@@ -105,12 +108,14 @@ def _gain_margins(level: np.ndarray, phase: np.ndarray) -> tuple[float, float]:
     turns = range(math.floor(phase.min() / (2 * math.pi)) - 1, math.ceil(phase.max() / (2 * math.pi)) + 1)
     places = [_crossings(phase, math.pi * (2 * turn + 1)) for turn in turns]
     decibels = _at(level, np.concatenate(places)) * 20.0 / math.log(10.0)
-    return (float(np.min(-decibels[decibels < 0], initial=math.inf)),
-            float(np.min(decibels[decibels >= 0], initial=math.inf)))
+    return (
+        float(np.min(-decibels[decibels < 0], initial=math.inf)),
+        float(np.min(decibels[decibels >= 0], initial=math.inf)),
+    )
 
 
 def _is_stable(loop: Curve) -> bool:
-    """Nyquist: 1 + L turns back by exactly what its integrators turned it at low frequency, and no further."""
+    """Nyquist: 1 + L turns back by just what its integrators turned it at low frequency, and no further."""
     turn = np.unwrap(np.angle(1.0 + loop.values))
     sizes = np.abs(loop.values[:2])
     kind = -np.log(sizes[1] / sizes[0]) / np.log(loop.omega[1] / loop.omega[0])  # of the loop: L ~ s^−kind

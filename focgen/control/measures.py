@@ -13,9 +13,9 @@ _TAIL = 0.1  # of the record: what happens there is called steady
 
 @dataclass(frozen=True)
 class StepMeasures:
-    """``settling_s``: when the output is within ±5 % of the step for good, s; NaN where it is not for at least the
-    record's last tenth. ``overshoot_pct``: past the set point, in percent of the step. ``steady_error``: set point minus the
-    mean of the record's last tenth, in output units.
+    """``settling_s``: when the output is within ±5 % of the step for good, s; NaN where it is not for at
+    least the record's last tenth. ``overshoot_pct``: past the set point, in percent of the step.
+    ``steady_error``: set point minus the mean of the record's last tenth, in output units.
     """
 
     settling_s: float
@@ -29,14 +29,15 @@ class StepMeasures:
 
 
 def measure_step(output, sample_time: float, start: float, target: float, band: float = BAND) -> StepMeasures:
-    """Judge the ``output``, shape (n,), after a step of the set point at sample 0 from ``start`` to ``target``.
+    """Judge the ``output``, shape (n,), after a step of the set point at sample 0 from ``start`` to
+    ``target``.
 
     Between samples the output is taken as straight. Raises ValueError where ``target`` equals ``start``.
     """
     if target == start:
         raise ValueError("the set point does not move")
     progress = (np.asarray(output, dtype=float) - start) / (target - start)
-    tail = progress[-max(1, round(_TAIL * len(progress))):]
+    tail = progress[-max(1, round(_TAIL * len(progress))) :]
     return StepMeasures(
         settling_s=_settling(progress, band) * sample_time,
         overshoot_pct=100.0 * max(0.0, float(progress.max()) - 1.0),

@@ -1,4 +1,6 @@
-"""The gain schedule that realises K_o(p)/K(p): where its breakpoints lie, and how far it is from the formula."""
+"""The gain schedule that realises K_o(p)/K(p): where its breakpoints lie, and how far it is from the
+formula.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ class Table:
 
 
 def gain_table(formula: Callable, low: float, high: float, tolerance: float = TOLERANCE) -> Table:
-    """Return breakpoints from ``low`` to ``high``, as few as keep straight lines within ``tolerance`` of ``formula``.
+    """Return breakpoints from ``low`` to ``high``, as few as keep straight lines within ``tolerance`` of
+    ``formula``.
 
     ``formula`` takes an array and must not change sign. Breakpoints and gains carry 6 digits; the error is
     that of the table as written. Raises ValueError where 256 breakpoints do not do.
@@ -46,7 +49,9 @@ def gain_table(formula: Callable, low: float, high: float, tolerance: float = TO
         points.append(_furthest(formula, points[-1], high, 0.9 * tolerance))
     points = _evened(formula, np.array(points), tolerance)
     rounded = [float(f"{point:.6g}") for point in points]
-    schedule = GainSchedule(tuple(rounded), tuple(float(f"{gain:.6g}") for gain in formula(np.array(rounded))))
+    schedule = GainSchedule(
+        tuple(rounded), tuple(float(f"{gain:.6g}") for gain in formula(np.array(rounded)))
+    )
     return Table(schedule, table_error(schedule, formula))
 
 
@@ -86,7 +91,9 @@ def _evened(formula: Callable, points: np.ndarray, tolerance: float) -> np.ndarr
 
 
 def table_error(schedule: GainSchedule, formula: Callable) -> float:
-    """Return the schedule's largest relative error against ``formula`` between its first and last breakpoint."""
+    """Return the schedule's largest relative error against ``formula`` between its first and last
+    breakpoint.
+    """
     points = np.array(schedule.breakpoints)
     place = np.concatenate([np.linspace(a, b, _PROBES) for a, b in zip(points, points[1:])])
     return float(np.max(np.abs(schedule(place) / formula(place) - 1.0)))

@@ -5,8 +5,31 @@ from __future__ import annotations
 from focgen.control.controller import Units
 from focgen.rig.model import Rig
 
-_KNOWN = ("V", "mV", "A", "mA", "bar", "mbar", "kPa", "Pa", "MPa", "psi", "mm", "cm", "m", "um", "deg", "rad", "N",
-          "mN", "s", "ms", "K", "C", "pct")
+_KNOWN = (
+    "V",
+    "mV",
+    "A",
+    "mA",
+    "bar",
+    "mbar",
+    "kPa",
+    "Pa",
+    "MPa",
+    "psi",
+    "mm",
+    "cm",
+    "m",
+    "um",
+    "deg",
+    "rad",
+    "N",
+    "mN",
+    "s",
+    "ms",
+    "K",
+    "C",
+    "pct",
+)
 
 
 def unit_of(column: str | None) -> str:

@@ -1,1 +1,1 @@
-"""The closed loop of controller and rig: its design in simulation, its margins, its response to set points."""
+"""The closed loop of controller and rig: its design in simulation, its margins, its set points."""

@@ -1,8 +1,10 @@
-"""The rig between the controller's samples: exact responses of every linear stage, the nonlinearity K(p)p between.
+"""The rig between the controller's samples: exact responses of every linear stage, the nonlinearity K(p)p
+between.
 
 The command is held over a sample; the regulator answers exactly. Its pressure goes through K(p)p at every
-substep, the result is taken as straight within a substep, and actuator and sensor answer that exactly, however
-fractional they are. So the only error is that of the straight lines, O(substep²); :func:`substeps` bounds it.
+substep, the result is taken as straight within a substep, and actuator and sensor answer that exactly,
+however fractional they are. So the only error is that of the straight lines, O(substep²);
+:func:`substeps` bounds it.
 """
 
 from __future__ import annotations
@@ -27,9 +29,9 @@ _CHECKED = 256  # samples
 class Chain:
     """Responses sampled for a loop of ``samples`` samples of ``sample_time`` s, each in ``substeps`` parts.
 
-    ``pressure`` (samples, substeps + 1, 1): from the held command to the pressure at the substeps of the sample,
-    both ends included. ``output`` and ``curvature`` (samples, 1, substeps + 1): from K(p)p there to the sensor's
-    output and the curvature at the sample's end.
+    ``pressure`` (samples, substeps + 1, 1): from the held command to the pressure at the substeps of the
+    sample, both ends included. ``output`` and ``curvature`` (samples, 1, substeps + 1): from K(p)p there
+    to the sensor's output and the curvature at the sample's end.
     """
 
     rig: Rig
@@ -42,14 +44,18 @@ class Chain:
 
 
 def chain(rig: Rig, sample_time: float, samples: int, parts: int | None = None) -> Chain:
-    """Prepare ``rig`` for loops of up to ``samples`` samples; ``parts`` substeps, by default :func:`substeps`.
+    """Prepare ``rig`` for loops of up to ``samples`` samples; ``parts`` substeps, by default
+    :func:`substeps`.
 
     Raises RigError where a stage cannot be simulated.
     """
     parts = parts or substeps(rig, sample_time)
     actuator = actuator_of(rig)
     return Chain(
-        rig, sample_time, samples, parts,
+        rig,
+        sample_time,
+        samples,
+        parts,
         _held(rig.regulator, sample_time, samples, parts),
         _straight(actuator.dynamics * rig.sensor, sample_time, samples, parts),
         _straight(actuator.dynamics, sample_time, samples, parts),
@@ -70,15 +76,21 @@ def _cached_substeps(regulator: TransferFunction, rest: TransferFunction, sample
 
 
 def substeps(rig: Rig, sample_time: float) -> int:
-    """Return how many parts of a sample keep the chain's step response within 1e-5 of the exact one (at most 32)."""
+    """Return how many parts of a sample keep the chain's step response within 1e-5 of the exact one (at most
+    32).
+    """
     try:
         return _cached_substeps(rig.regulator, actuator_of(rig).dynamics * rig.sensor, sample_time)
     except ArithmeticError as reason:
-        raise RigError(rig.name, f"cannot be simulated ({reason})", "check num and den of its stages") from None
+        raise RigError(
+            rig.name, f"cannot be simulated ({reason})", "check num and den of its stages"
+        ) from None
 
 
 def _held(stage: TransferFunction, sample_time: float, samples: int, parts: int) -> np.ndarray:
-    """Return the kernel from a command held for a sample to the stage's output at the substeps of every sample."""
+    """Return the kernel from a command held for a sample to the stage's output at the substeps of every
+    sample.
+    """
     fine = Convolution(stage, sample_time / parts, "zero").run(np.ones(samples * parts + 1))
     places = parts * np.arange(samples)[:, None] + np.arange(parts + 1)
     kernel = fine[places]
@@ -94,7 +106,9 @@ def _settled(kernel: np.ndarray) -> int:
 
 
 def _straight(stage: TransferFunction, sample_time: float, samples: int, parts: int) -> np.ndarray:
-    """Return the kernel from values at the substeps, joined by straight lines, to the output at the sample's end."""
+    """Return the kernel from values at the substeps, joined by straight lines, to the output at the sample's
+    end.
+    """
     count, step = samples * parts, sample_time / parts
     pulse = np.eye(1, count + 1)[0]
     falling = Convolution(stage, step, "linear").run(pulse)

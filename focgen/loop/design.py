@@ -10,27 +10,25 @@ from pathlib import Path
 
 import numpy as np
 
-from focgen.control.controller import ARITHMETICS, Controller, ControllerRanges, Source
-from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest
+from focgen.control.controller import ARITHMETICS, Controller, Source
+from focgen.control.equilibrium import Equilibrium
 from focgen.control.files import controller_text
-from focgen.control.inversion import Inversion, invert
+from focgen.control.inversion import Inversion
 from focgen.control.measures import StepMeasures
 from focgen.control.schedule import TOLERANCE, Table, gain_table
-from focgen.control.setpoints import default_setpoints
 from focgen.control.units import units_of
 from focgen.errors import DesignError
+from focgen.loop.bench import Bench, prepare
 from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
-from focgen.loop.tuning import HORIZON, OVERSHOOT, Bench, Tuned, Wish, fastest, meeting, tune
 from focgen.loop.trial import run_steps
+from focgen.loop.tuning import HORIZON, OVERSHOOT, Tuned, Wish, fastest, meeting, tune
 from focgen.output import write_file
 from focgen.plan.build import build_plan
-from focgen.plan.model import Plan
 from focgen.rig.files import read_rig
-from focgen.rig.model import Actuator, Ranges, Rig
+from focgen.rig.model import Rig
 
 SETTLING = 1.5  # s, where nothing is wished and it is feasible
-_EXTRAPOLATED = 0.5  # of the span of the operating points: how far beyond it the line K_o(p) is used
 _SLACK = 1.02  # of the wish, for the controller as it will run
 
 
@@ -38,8 +36,8 @@ _SLACK = 1.02  # of the wish, for the controller as it will run
 class OperatingPoint:
     """A step from rest to ``reference``, which ``pressure`` and ``command`` hold.
 
-    ``K`` and ``K_o`` at that pressure, ``gain`` = K_o/K from the schedule table. ``ideal``: infinite memory in
-    float64; ``running``: the plan, bit for bit. ``peak_pressure``: the largest on the way.
+    ``K`` and ``K_o`` at that pressure, ``gain`` = K_o/K from the schedule table. ``ideal``: infinite
+    memory in float64; ``running``: the plan, bit for bit. ``peak_pressure``: the largest on the way.
     """
 
     reference: float
@@ -57,10 +55,11 @@ class OperatingPoint:
 class ScheduleReport:
     """The gain schedule, which is the controller: ``gains`` at ``breakpoints`` (pressures), held beyond.
 
-    It realises (``intercept`` + ``slope`` p)/K(p) to within the relative ``error`` (wanted: ``tolerance``).
-    ``lower_limit``: the pressure below which the formula is not followed; ``formula_at_rest``: the gain it would ask
-    for at rest, against ``gains[0]``; ``K_zero``: the nearest pressure below where K(p) vanishes, None if nowhere.
-    One breakpoint and no pressure where K is constant.
+    It realises (``intercept`` + ``slope`` p)/K(p) to within the relative ``error`` (wanted:
+    ``tolerance``). ``lower_limit``: the pressure below which the formula is not followed;
+    ``formula_at_rest``: the gain it would ask for at rest, against ``gains[0]``; ``K_zero``: the nearest
+    pressure below where K(p) vanishes, None if nowhere. One breakpoint and no pressure where K is
+    constant.
     """
 
     breakpoints: tuple[float, ...]
@@ -78,8 +77,8 @@ class ScheduleReport:
 class Design:
     """A controller, the wish it was designed for, and the proof in simulation.
 
-    ``settling_s`` (mean over the operating points) and ``overshoot_pct`` (largest) are of the controller as it will
-    run; ``holds`` says whether they keep the wish and every loop is stable.
+    ``settling_s`` (mean over the operating points) and ``overshoot_pct`` (largest) are of the controller
+    as it will run; ``holds`` says whether they keep the wish and every loop is stable.
     """
 
     controller: Controller
@@ -108,20 +107,22 @@ def design(
     lowest: float | None = None,
     tolerance: float = TOLERANCE,
 ) -> Design:
-    """Invert the rig's model and find the gain schedule, eq. (6)–(7); write the controller to ``out`` where given.
+    """Invert the rig's model and find the gain schedule, eq. (6)–(7); write the controller to ``out`` where
+    given.
 
-    ``settling``: the mean settling time (5 %) over the operating points, s; ``overshoot``: the largest at any of
-    them, % (default 5). Without either, 1.5 s or, where that is not feasible, the fastest; with an overshoot
-    alone, the fastest. ``setpoints``: outputs that are the operating points (default: tenths 1 … 7 of the output
-    range, as in Fig. 10). ``lowest``: pressure below which the gain is held (default: the lowest operating
-    point's). ``delay``: computation delay, 0 or 1 sample. ``tolerance``: relative error of the schedule table.
+    ``settling``: the mean settling time (5 %) over the operating points, s; ``overshoot``: the largest at
+    any of them, % (default 5). Without either, 1.5 s or, where that is not feasible, the fastest; with an
+    overshoot alone, the fastest. ``setpoints``: outputs that are the operating points (default: tenths 1
+    … 7 of the output range, as in Fig. 10). ``lowest``: pressure below which the gain is held (default:
+    the lowest operating point's). ``delay``: computation delay, 0 or 1 sample. ``tolerance``: relative
+    error of the schedule table.
 
-    Raises DesignError where the rig cannot be inverted or the wish is not feasible (naming what is), PlanError
-    where the controller does not fit the arithmetic, RigError where the file cannot be used.
+    Raises DesignError where the rig cannot be inverted or the wish is not feasible (naming what is),
+    PlanError where the controller does not fit the arithmetic, RigError where the file cannot be used.
     """
     _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance)
     model, source = (rig, None) if isinstance(rig, Rig) else (read_rig(rig), _source(rig))
-    bench, notes = _bench(model, setpoints, lowest, delay)
+    bench, notes = prepare(model, setpoints, lowest, delay)
     wish, tuned = _tuned(bench, settling, overshoot, notes)
     table, report = _schedule(bench, tuned, tolerance)
     draft = _controller(bench, tuned, table, arithmetic, source)
@@ -152,79 +153,6 @@ def _source(path: str | Path) -> Source:
     return Source(Path(path).name, hashlib.sha256(Path(path).read_bytes()).hexdigest())
 
 
-# ------------------------------------------------------------------------------------------------ preparation
-
-
-def _bench(rig: Rig, setpoints, lowest: float | None, delay: int) -> tuple[Bench, list[str]]:
-    inversion = invert(rig, 1.0)  # for K(p) only, and to refuse early what cannot be inverted
-    ranges, notes = derived_ranges(rig)
-    notes = [*notes, *_said(rig)]
-    start = rest(rig, ranges.command)
-    references = default_setpoints(start.output, ranges.output) if setpoints is None else tuple(setpoints)
-    points = _points(rig, references, start, ranges)
-    span = _span(rig, inversion, points, ranges, lowest)
-    own = ControllerRanges(ranges.output, ranges.output, ranges.command,
-                           ranges.pressure if inversion.scheduled else None)
-    known = rig.signals.pressure is not None
-    if inversion.scheduled and not known:
-        notes.append("the rig logs no pressure: the schedule's signal is the command times the regulator's static gain")
-    return Bench(rig, start, points, own, span, delay, known), notes
-
-
-def _said(rig: Rig) -> list[str]:
-    notes = []
-    if rig.effects:
-        names = ", ".join(str(effect["name"]) for effect in rig.effects)
-        notes.append(f"the rig's effects ({names}) are left aside: the design is for the nominal chain")
-    return notes
-
-
-def _points(rig: Rig, references, start: Equilibrium, ranges: Ranges) -> tuple[Equilibrium, ...]:
-    if not references or not all(map(math.isfinite, references)):
-        raise DesignError("--setpoints", "are not finite numbers", "give outputs in the rig's unit")
-    if any(reference == start.output for reference in references):
-        raise DesignError("--setpoints", f"hold the rest itself ({start.output:g})", "give outputs away from rest")
-    ordered = sorted(set(references), key=lambda reference: abs(reference - start.output))
-    return tuple(holding(rig, reference, ranges) for reference in ordered)
-
-
-def _span(rig: Rig, inversion: Inversion, points, ranges: Ranges, lowest: float | None) -> tuple[float, float]:
-    """Return the pressures between which K_o/K is scheduled, after checking K(p) and K(p)p there."""
-    near, far = points[0].pressure, points[-1].pressure
-    if not inversion.scheduled:
-        return min(near, far), max(near, far)
-    beyond = far + _EXTRAPOLATED * (far - near)
-    inside = (ranges.pressure[1] - beyond) * (beyond - ranges.pressure[0]) >= 0.0
-    end = beyond if inside else (ranges.pressure[1] if far >= near else ranges.pressure[0])
-    begin = near if lowest is None else lowest
-    if (far - begin) * (far - near) < 0.0:
-        raise DesignError("lowest", f"is {begin:g}, beyond the operating points", f"give a pressure up to {near:.4g}")
-    end = end if abs(end - near) > abs(far - near) or near == far else far
-    if begin == end:  # one operating point, at the pressure's limit
-        begin, end = begin - 0.05 * abs(begin), end + 0.05 * abs(end)
-    _check_gain(rig, inversion, begin, end, near, far)
-    return min(begin, end), max(begin, end)
-
-
-def _check_gain(rig: Rig, inversion: Inversion, begin: float, end: float, near: float, far: float) -> None:
-    zero = _turning(np.linspace(begin, end, 2001), inversion.K)
-    if zero is not None:
-        raise DesignError(f"{rig.name} [actuator]", f"has a gain K(p) that changes sign at p = {zero:.3g}, so K_o/K is "
-                          "not defined there", "give set points, or [ranges] pressure, on one side of it")
-    slope = np.polynomial.Polynomial((0.0, *inversion.gain)).deriv()
-    turn = _turning(np.linspace(near, far, 2001), slope)
-    if turn is not None:
-        raise DesignError(f"{rig.name} [actuator]", f"has an output K(p)p that turns back at p = {turn:.3g}",
-                          "give set points below it")
-
-
-def _turning(place: np.ndarray, function) -> float | None:
-    """Return where ``function`` first loses the sign it begins with, None where it keeps it."""
-    sign = np.sign(function(place))
-    lost = (sign != sign[0]) | (sign == 0.0)
-    return float(place[lost.argmax()]) if lost.any() else None
-
-
 def _tuned(bench: Bench, settling, overshoot, notes: list[str]) -> tuple[Wish, Tuned]:
     wish = Wish(settling, OVERSHOOT if overshoot is None else overshoot)
     if settling is not None or overshoot is not None:
@@ -235,8 +163,10 @@ def _tuned(bench: Bench, settling, overshoot, notes: list[str]) -> tuple[Wish, T
         return wish, found
     found = fastest(bench, wish.overshoot)
     if found.mean_settling > SETTLING:
-        notes.append(f"{SETTLING:g} s is not feasible here; {found.mean_settling:.3g} s is the fastest with at most "
-                     f"{wish.overshoot:g} % overshoot")
+        notes.append(
+            f"{SETTLING:g} s is not feasible here; {found.mean_settling:.3g} s is the fastest with at most "
+            f"{wish.overshoot:g} % overshoot"
+        )
     return replace(wish, settling=max(found.mean_settling, SETTLING)), found
 
 
@@ -258,7 +188,12 @@ def _schedule(bench: Bench, tuned: Tuned, tolerance: float) -> tuple[Table | Non
         raise DesignError("schedule", str(reason), "allow a larger tolerance") from None
     at_rest = inversion.K(bench.start.pressure)
     return table, ScheduleReport(
-        table.schedule.breakpoints, table.schedule.gains, line.intercept, line.slope, table.error, tolerance,
+        table.schedule.breakpoints,
+        table.schedule.gains,
+        line.intercept,
+        line.slope,
+        table.error,
+        tolerance,
         min(bench.span, key=lambda p: abs(p - bench.start.pressure)),
         float(line(bench.start.pressure) / at_rest) if at_rest else None,
         _zero_below(inversion, bench),
@@ -272,18 +207,28 @@ def _zero_below(inversion: Inversion, bench: Bench) -> float | None:
     return float(min(real, key=lambda p: min(abs(p - e) for e in bench.span))) if len(real) else None
 
 
-def _controller(bench: Bench, tuned: Tuned, table: Table | None, arithmetic: str, source: Source | None) -> Controller:
+def _controller(
+    bench: Bench, tuned: Tuned, table: Table | None, arithmetic: str, source: Source | None
+) -> Controller:
     rig, inversion = bench.rig, tuned.inversion
     gain = float(f"{tuned.line.intercept / inversion.gain[0]:.6g}") if table is None else table.schedule
     return Controller(
-        name=rig.name, sample_time=rig.sample_time, transfer=inversion.transfer, gain=gain,
-        integrator=inversion.integrator, ranges=bench.ranges, arithmetic=arithmetic,
-        units=units_of(rig, scheduled=table is not None), designed_from=source,
+        name=rig.name,
+        sample_time=rig.sample_time,
+        transfer=inversion.transfer,
+        gain=gain,
+        integrator=inversion.integrator,
+        ranges=bench.ranges,
+        arithmetic=arithmetic,
+        units=units_of(rig, scheduled=table is not None),
+        designed_from=source,
     )
 
 
 def _lowest_crossover(bench: Bench, tuned: Tuned) -> float:
-    """K_o times the static gains: where the loop with K frozen crosses 1, at its slowest operating point, rad/s."""
+    """K_o times the static gains: where the loop with K frozen crosses 1, at its slowest operating point,
+    rad/s.
+    """
     static = abs(bench.rig.regulator.dc_gain * bench.rig.sensor.dc_gain)
     return float(np.min(np.abs(tuned.line(bench.pressures)))) * static
 
@@ -291,30 +236,58 @@ def _lowest_crossover(bench: Bench, tuned: Tuned) -> float:
 # ------------------------------------------------------------------------------------------------- judgement
 
 
-def _judged(bench: Bench, tuned: Tuned, controller: Controller, wish: Wish, schedule: ScheduleReport,
-            memory: MemoryChoice, notes: list[str]) -> Design:
+def _judged(
+    bench: Bench,
+    tuned: Tuned,
+    controller: Controller,
+    wish: Wish,
+    schedule: ScheduleReport,
+    memory: MemoryChoice,
+    notes: list[str],
+) -> Design:
     plan = build_plan(controller)
     steps = run_steps(bench, controller, plan, _horizon(tuned, wish))
-    points = tuple(_point(equilibrium, tuned, controller, *step) for equilibrium, step in zip(bench.points, steps))
+    points = tuple(
+        _point(equilibrium, tuned, controller, *step) for equilibrium, step in zip(bench.points, steps)
+    )
     loops = shapes(bench.rig, controller, plan, bench.delay)
-    found = tuple(margins_at(bench.rig, controller, plan, loops, p) for p in dict.fromkeys(bench.pressures.tolist()))
+    found = tuple(
+        margins_at(bench.rig, controller, plan, loops, p) for p in dict.fromkeys(bench.pressures.tolist())
+    )
     settling = float(np.mean([point.running.settling_s for point in points]))
     over = max(point.running.overshoot_pct for point in points)
     notes = [*notes, *tuned.inversion.notes, *_remarks(bench, points)]
     kept = settling <= _SLACK * (wish.settling or math.inf) and over <= wish.overshoot + 0.5
     holds = kept and all(m.running.stable for m in found)
-    return Design(controller, wish, schedule, points, found, memory, bench.delay, settling, over, holds, tuple(notes))
+    return Design(
+        controller, wish, schedule, points, found, memory, bench.delay, settling, over, holds, tuple(notes)
+    )
 
 
 def _horizon(tuned: Tuned, wish: Wish) -> float:
     return HORIZON * max(tuned.mean_settling, wish.settling or 0.0)
 
 
-def _point(at: Equilibrium, tuned: Tuned, controller: Controller, ideal: StepMeasures, running: StepMeasures,
-           peak: float) -> OperatingPoint:
+def _point(
+    at: Equilibrium,
+    tuned: Tuned,
+    controller: Controller,
+    ideal: StepMeasures,
+    running: StepMeasures,
+    peak: float,
+) -> OperatingPoint:
     K = float(tuned.inversion.K(at.pressure))
-    return OperatingPoint(at.output, at.pressure, at.command, K, float(tuned.line(at.pressure)),
-                          float(controller.gain_at(at.pressure)), ideal, running, peak)
+    return OperatingPoint(
+        at.output,
+        at.pressure,
+        at.command,
+        K,
+        float(tuned.line(at.pressure)),
+        float(controller.gain_at(at.pressure)),
+        ideal,
+        running,
+        peak,
+    )
 
 
 def _remarks(bench: Bench, points: tuple[OperatingPoint, ...]) -> list[str]:
@@ -322,5 +295,7 @@ def _remarks(bench: Bench, points: tuple[OperatingPoint, ...]) -> list[str]:
     high = max(point.peak_pressure for point in points)
     if span is None or high <= span[1]:
         return []
-    return [f"on the way the pressure reaches {high:.3g}, beyond the rig's range ({span[1]:g}): the model is "
-            "extrapolated there"]
+    return [
+        f"on the way the pressure reaches {high:.3g}, beyond the rig's range ({span[1]:g}): the model is "
+        "extrapolated there"
+    ]

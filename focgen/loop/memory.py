@@ -29,9 +29,10 @@ class TermBias:
 class MemoryChoice:
     """``length`` past samples, ``seconds`` of memory, and ``reason`` for them.
 
-    ``crossover_error``: relative error of the controller's response at ``crossover_rad_s``, against infinite memory.
-    ``bias``: of each fractional term at rest, e.g. T (L h)^−α / Γ(1−α) nearly; the integrator keeps it from the
-    steady state, but slow disturbances meet a controller with that much more gain.
+    ``crossover_error``: relative error of the controller's response at ``crossover_rad_s``, against
+    infinite memory. ``bias``: of each fractional term at rest, e.g. T (L h)^−α / Γ(1−α) nearly; the
+    integrator keeps it from the steady state, but slow disturbances meet a controller with that much more
+    gain.
     """
 
     length: int
@@ -48,7 +49,8 @@ class MemoryChoice:
 
 
 def choose_memory(controller: Controller, crossover: float, length: int | None) -> MemoryChoice:
-    """Judge ``length``, or choose the shortest of 1, 2, 5, 10 … 20 000 whose error at ``crossover`` is below 1 %.
+    """Judge ``length``, or choose the shortest of 1, 2, 5, 10 … 20 000 whose error at ``crossover`` is below
+    1 %.
 
     Raises DesignError where none does or the truncated recursion is unstable.
     """
@@ -58,15 +60,22 @@ def choose_memory(controller: Controller, crossover: float, length: int | None) 
     for tried in _SERIES:
         error = _error(controller, crossover, tried)
         if error <= TOLERANCE and _is_stable(controller, tried):
-            reason = f"the shortest of 1, 2, 5, 10, … whose error at the crossover is below {100 * TOLERANCE:g} %"
+            reason = (
+                f"the shortest of 1, 2, 5, 10, … whose error at the crossover is below {100 * TOLERANCE:g} %"
+            )
             return _choice(controller, tried, reason, crossover, error)
-    raise DesignError(controller.name, f"even {_SERIES[-1]} samples of memory are not enough at {crossover:.3g} rad/s",
-                      "raise the rig's sample_time, or choose --length yourself")
+    raise DesignError(
+        controller.name,
+        f"even {_SERIES[-1]} samples of memory are not enough at {crossover:.3g} rad/s",
+        "raise the rig's sample_time, or choose --length yourself",
+    )
 
 
 def _error(controller: Controller, crossover: float, length: int) -> float:
     place = np.array([crossover])
-    return float(abs(sampled_response(controller, place, length) / sampled_response(controller, place) - 1.0)[0])
+    return float(
+        abs(sampled_response(controller, place, length) / sampled_response(controller, place) - 1.0)[0]
+    )
 
 
 def _is_stable(controller: Controller, length: int) -> bool:
@@ -78,5 +87,7 @@ def _is_stable(controller: Controller, length: int) -> bool:
 
 
 def _choice(controller: Controller, length: int, reason: str, crossover: float, error: float) -> MemoryChoice:
-    bias = tuple(TermBias(*term) for term in memory_bias(controller, length) if not float(term[1]).is_integer())
+    bias = tuple(
+        TermBias(*term) for term in memory_bias(controller, length) if not float(term[1]).is_integer()
+    )
     return MemoryChoice(length, length * controller.sample_time, reason, crossover, error, bias)

@@ -11,9 +11,9 @@ BLOCK = 128  # a power of two: samples within one block are summed directly
 class OnlineConvolution:
     """y_k = Σ_{j ≤ k} W_j x_{k−j} for many columns at once; x_k may depend on y_0 … y_{k−1}.
 
-    ``kernel`` is W, shape (lags, outputs, inputs); every step takes x_k of shape (inputs, columns) and gives y_k
-    of shape (outputs, columns), for at most ``samples`` steps. A completed block's share of the future is added
-    at once, blocks of doubling size by FFT; a short kernel is summed directly.
+    ``kernel`` is W, shape (lags, outputs, inputs); every step takes x_k of shape (inputs, columns) and
+    gives y_k of shape (outputs, columns), for at most ``samples`` steps. A completed block's share of the
+    future is added at once, blocks of doubling size by FFT; a short kernel is summed directly.
     """
 
     def __init__(self, kernel: np.ndarray, columns: int, samples: int):
@@ -24,7 +24,9 @@ class OnlineConvolution:
         self._spectra: dict[int, np.ndarray] = {}
         self._block = lags if lags <= 2 * BLOCK else BLOCK
         self._direct = lags <= 2 * BLOCK
-        self._recent = np.ascontiguousarray(kernel[: self._block][::-1].transpose(1, 0, 2))  # oldest lag first
+        self._recent = np.ascontiguousarray(
+            kernel[: self._block][::-1].transpose(1, 0, 2)
+        )  # oldest lag first
 
     def past(self) -> np.ndarray:
         """Return Σ_{j ≥ 1} W_j x_{k−j}: what y_k is but for x_k."""

@@ -1,4 +1,6 @@
-"""A plan run in a simulated loop: bit for bit what the C computes, one sample at a time, many loops side by side."""
+"""A plan run in a simulated loop: bit for bit what the C computes, one sample at a time, many loops side by
+side.
+"""
 
 from __future__ import annotations
 

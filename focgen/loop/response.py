@@ -1,4 +1,6 @@
-"""Frequency responses of the loop: continuous and exact, or sampled with hold, delay and memory as it will run."""
+"""Frequency responses of the loop: continuous and exact, or sampled with hold, delay and memory as it will
+run.
+"""
 
 from __future__ import annotations
 
@@ -81,8 +83,10 @@ def sampled_response(controller: Controller, omega, length: int | None = None) -
 def _endless(controller: Controller, back):
     difference = (1.0 - back) / controller.sample_time
     form = realise(controller)
-    return [sum((t.coefficient * difference**t.order for t in terms), np.zeros(back.shape, complex))
-            for terms in (form.direct, form.rest, form.den)]
+    return [
+        sum((t.coefficient * difference**t.order for t in terms), np.zeros(back.shape, complex))
+        for terms in (form.direct, form.rest, form.den)
+    ]
 
 
 def _truncated(controller: Controller, back, length: int):
@@ -134,8 +138,12 @@ def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
     def running(omega):
         return running_response(plan, omega, _any_schedule(controller)) / unit * held(omega)
 
-    return Shapes(curve(ideal, low, _HIGH * nyquist), sampled(None), sampled(controller.length),
-                  curve(running, low, nyquist))
+    return Shapes(
+        curve(ideal, low, _HIGH * nyquist),
+        sampled(None),
+        sampled(controller.length),
+        curve(running, low, nyquist),
+    )
 
 
 def _any_schedule(controller: Controller) -> float | None:
@@ -146,9 +154,10 @@ def _any_schedule(controller: Controller) -> float | None:
 class PointMargins:
     """Margins at one operating point of ``pressure``.
 
-    ``frozen``: the ideal loop with K held constant, so that it cancels (the paper's). The others meet the slope
-    of K(p)p as small movements do. ``ideal``: continuous; ``sampled``: with sampling, hold and computation
-    delay; ``truncated``: with the memory length too; ``running``: with the quantised weights and gains too.
+    ``frozen``: the ideal loop with K held constant, so that it cancels (the paper's). The others meet the
+    slope of K(p)p as small movements do. ``ideal``: continuous; ``sampled``: with sampling, hold and
+    computation delay; ``truncated``: with the memory length too; ``running``: with the quantised weights
+    and gains too.
     """
 
     pressure: float
@@ -175,5 +184,14 @@ def margins_at(rig: Rig, controller: Controller, plan: Plan, loops: Shapes, pres
     )
 
 
-__all__ = ["PointMargins", "Shapes", "chain_transfer", "designed_response", "held_response", "margins_at",
-           "sampled_response", "shapes", "slope_at"]
+__all__ = [
+    "PointMargins",
+    "Shapes",
+    "chain_transfer",
+    "designed_response",
+    "held_response",
+    "margins_at",
+    "sampled_response",
+    "shapes",
+    "slope_at",
+]

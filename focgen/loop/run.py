@@ -1,4 +1,6 @@
-"""The closed loop of Fig. 9: set point → controller → hold → regulator → K(p)p → actuator → sensor → controller."""
+"""The closed loop of Fig. 9: set point → controller → hold → regulator → K(p)p → actuator → sensor →
+controller.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,8 @@ from focgen.loop.stepper import Stepper
 class LoopRun:
     """Signals at the controller's samples, each of shape (n, columns); sample k is at k · ``sample_time`` s.
 
-    ``command`` is what acts from that sample on. ``peak_pressure`` (columns,) is the largest over the whole run,
-    between samples too. ``curvature`` is None where it was not asked for.
+    ``command`` is what acts from that sample on. ``peak_pressure`` (columns,) is the largest over the
+    whole run, between samples too. ``curvature`` is None where it was not asked for.
     """
 
     sample_time: float
@@ -35,8 +37,15 @@ class LoopRun:
         return np.arange(len(self.output)) * self.sample_time
 
 
-def run_loop(chain: Chain, stepper: Stepper, reference: np.ndarray, start: Equilibrium, delay: int = 1,
-             pressure_known: bool = True, curvature: bool = True) -> LoopRun:
+def run_loop(
+    chain: Chain,
+    stepper: Stepper,
+    reference: np.ndarray,
+    start: Equilibrium,
+    delay: int = 1,
+    pressure_known: bool = True,
+    curvature: bool = True,
+) -> LoopRun:
     """Close the loop from rest at ``start`` and follow ``reference``, shape (n, columns).
 
     At sample k the controller reads output and pressure; what it computes acts at once (``delay`` 0) or from
@@ -59,7 +68,10 @@ class _Loop:
 
     def run(self, stepper: Stepper, reference: np.ndarray, curvature: bool) -> LoopRun:
         command = np.full(reference.shape, self.start.command)
-        pressure, output = np.full(reference.shape, self.start.pressure), np.full(reference.shape, self.start.output)
+        pressure, output = (
+            np.full(reference.shape, self.start.pressure),
+            np.full(reference.shape, self.start.output),
+        )
         waiting = command[0]
         for k in range(len(reference)):
             schedule = pressure[k] if self.known else waiting * self.chain.rig.regulator.dc_gain

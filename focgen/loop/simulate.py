@@ -34,11 +34,12 @@ _KEPT = 0.7  # of the movement in the quarter before
 
 @dataclass(frozen=True)
 class SetpointResult:
-    """What one set point did. ``settling_s``, ``overshoot_pct``, ``steady_error`` are of the controller as it runs.
+    """What one set point did. ``settling_s``, ``overshoot_pct``, ``steady_error`` are of the controller as
+    it runs.
 
-    ``start``: the set point before; ``ideal``: the controller with infinite memory in float64; ``frozen``: the
-    continuous linear loop with K held at the set point's ``pressure``, None where that is unstable.
-    ``verdict``: "settles", "oscillates", or "does not settle" within the time simulated.
+    ``start``: the set point before; ``ideal``: the controller with infinite memory in float64;
+    ``frozen``: the continuous linear loop with K held at the set point's ``pressure``, None where that is
+    unstable. ``verdict``: "settles", "oscillates", or "does not settle" within the time simulated.
     """
 
     reference: float
@@ -57,8 +58,9 @@ class SetpointResult:
 class Simulation:
     """The set points' results and the signals behind them.
 
-    ``running`` and ``ideal``: one column a set point, or one column in all where they are ``consecutive``; each
-    set point lasts ``duration`` s. ``frozen`` (n, set points), None where unstable. ``holds``: all settle.
+    ``running`` and ``ideal``: one column a set point, or one column in all where they are
+    ``consecutive``; each set point lasts ``duration`` s. ``frozen`` (n, set points), None where unstable.
+    ``holds``: all settle.
     """
 
     rig: Rig
@@ -87,14 +89,16 @@ def simulate(
     arithmetic: str | None = None,
     length: int | None = None,
 ) -> Simulation:
-    """Close the loop and step it to each of ``setpoints``, from rest, or one after the other (``consecutive``).
+    """Close the loop and step it to each of ``setpoints``, from rest, or one after the other
+    (``consecutive``).
 
     ``setpoints``: outputs (default: tenths 1 … 7 of the output range, Fig. 10). ``duration``: s a set point
     (default: 8 time constants of the slowest frozen loop). ``delay``: computation delay, 0 or 1 sample.
     ``arithmetic`` and ``length`` override the controller's.
 
-    Raises DesignError where a set point cannot be reached, ControllerError where rig and controller do not fit
-    together, PlanError where the controller cannot be realised, RigError and ControllerError for their files.
+    Raises DesignError where a set point cannot be reached, ControllerError where rig and controller do
+    not fit together, PlanError where the controller cannot be realised, RigError and ControllerError for
+    their files.
     """
     model = rig if isinstance(rig, Rig) else read_rig(rig)
     which = controller if isinstance(controller, Controller) else read_controller(controller)
@@ -119,7 +123,10 @@ def _check_options(duration: float | None, delay: int) -> None:
 def _check_fit(rig: Rig, controller: Controller) -> None:
     """Refuse ranges of the same signal that are orders of magnitude apart."""
     theirs, ours = rig.ranges, controller.ranges
-    pairs = [("output", theirs.output, "measurement", ours.measurement), ("command", theirs.command, "output", ours.output)]
+    pairs = [
+        ("output", theirs.output, "measurement", ours.measurement),
+        ("command", theirs.command, "output", ours.output),
+    ]
     pairs += [("pressure", theirs.pressure, "schedule", ours.schedule)]
     for signal, given, role, planned in pairs:
         if given is None or planned is None:
@@ -127,25 +134,37 @@ def _check_fit(rig: Rig, controller: Controller) -> None:
         ratio = max(map(abs, planned)) / max(map(abs, given))
         if not 1.0 / _UNITS < ratio < _UNITS:
             raise ControllerError(
-                f"{controller.name} [ranges] {role}", f"is {list(planned)}, the rig's {signal} {list(given)}: a factor of {ratio:.3g}",
-                "give both in the same unit")
+                f"{controller.name} [ranges] {role}",
+                f"is {list(planned)}, the rig's {signal} {list(given)}: a factor of {ratio:.3g}",
+                "give both in the same unit",
+            )
 
 
 def _said(rig: Rig, controller: Controller, path: Path | None) -> list[str]:
     notes = []
     if controller.sample_time != rig.sample_time:
-        notes.append(f"the controller runs at {controller.sample_time:g} s, the rig says {rig.sample_time:g} s")
+        notes.append(
+            f"the controller runs at {controller.sample_time:g} s, the rig says {rig.sample_time:g} s"
+        )
     source = controller.designed_from
-    if source is not None and path is not None and hashlib.sha256(path.read_bytes()).hexdigest() != source.sha256:
+    if (
+        source is not None
+        and path is not None
+        and hashlib.sha256(path.read_bytes()).hexdigest() != source.sha256
+    ):
         notes.append(f"the controller was designed from another state of the rig ({source.file})")
     if rig.effects:
         notes.append("the rig's effects are left aside: this is the nominal chain")
     if controller.scheduled and rig.signals.pressure is None:
-        notes.append("the rig logs no pressure: the schedule's signal is the command times the regulator's static gain")
+        notes.append(
+            "the rig logs no pressure: the schedule's signal is the command times the regulator's static gain"
+        )
     return notes
 
 
-def _targets(rig: Rig, controller: Controller, setpoints, start: Equilibrium, consecutive: bool) -> tuple[float, ...]:
+def _targets(
+    rig: Rig, controller: Controller, setpoints, start: Equilibrium, consecutive: bool
+) -> tuple[float, ...]:
     low, high = controller.ranges.reference
     if setpoints is None:
         return default_setpoints(start.output, rig.ranges.output or (low, high))
@@ -154,12 +173,17 @@ def _targets(rig: Rig, controller: Controller, setpoints, start: Equilibrium, co
         raise DesignError("--setpoints", "are not finite numbers", "give outputs in the rig's unit")
     outside = [t for t in targets if not low <= t <= high]
     if outside:
-        raise DesignError("--setpoints", f"{outside[0]:g} is outside the controller's reference range [{low:g}, {high:g}]",
-                          "give set points within it")
+        raise DesignError(
+            "--setpoints",
+            f"{outside[0]:g} is outside the controller's reference range [{low:g}, {high:g}]",
+            "give set points within it",
+        )
     before = (start.output, *targets[:-1]) if consecutive else (start.output,) * len(targets)
     still = [t for t, b in zip(targets, before) if t == b]
     if still:
-        raise DesignError("--setpoints", f"{still[0]:g} is where the step starts", "give set points that move the output")
+        raise DesignError(
+            "--setpoints", f"{still[0]:g} is where the step starts", "give set points that move the output"
+        )
     return targets
 
 
@@ -190,13 +214,28 @@ class _Trial:
         known = self.rig.signals.pressure is not None
         running, ideal = (
             run_loop(prepared, stepper, reference, self.start, self.delay, known)
-            for stepper in (PlanStepper(self.plan, columns, self.start.command),
-                            FloatStepper(self.controller, total, columns, self.start.command)))
+            for stepper in (
+                PlanStepper(self.plan, columns, self.start.command),
+                FloatStepper(self.controller, total, columns, self.start.command),
+            )
+        )
         frozen = tuple(self._frozen(i, count) for i in range(len(self.points)))
         results = tuple(self._judged(i, count, running, ideal, frozen[i]) for i in range(len(self.points)))
-        return Simulation(self.rig, self.controller, self.plan.arithmetic, self.plan.length, self.delay,
-                          self.consecutive, count * self.controller.sample_time, results, running, ideal, frozen,
-                          all(r.verdict == "settles" for r in results), notes)
+        return Simulation(
+            self.rig,
+            self.controller,
+            self.plan.arithmetic,
+            self.plan.length,
+            self.delay,
+            self.consecutive,
+            count * self.controller.sample_time,
+            results,
+            running,
+            ideal,
+            frozen,
+            all(r.verdict == "settles" for r in results),
+            notes,
+        )
 
     def _reference(self, count: int) -> np.ndarray:
         targets = np.array([point.output for point in self.points])
@@ -213,7 +252,9 @@ class _Trial:
         return begin + step * (self.points[index].output - begin)
 
     def _part(self, run: LoopRun, index: int, count: int) -> np.ndarray:
-        return run.output[index * count : (index + 1) * count, 0] if self.consecutive else run.output[:, index]
+        return (
+            run.output[index * count : (index + 1) * count, 0] if self.consecutive else run.output[:, index]
+        )
 
     def _judged(self, index: int, count: int, running: LoopRun, ideal: LoopRun, frozen) -> SetpointResult:
         begin, target, h = self._from(index), self.points[index].output, self.controller.sample_time
@@ -221,8 +262,14 @@ class _Trial:
         found = measure_step(part, h, begin, target)
         peak = running.peak_pressure[0 if self.consecutive else index]
         return SetpointResult(
-            target, begin, self.points[index].pressure, found.settling_s, found.overshoot_pct, found.steady_error,
-            float(peak), _verdict(found, part, target - begin),
+            target,
+            begin,
+            self.points[index].pressure,
+            found.settling_s,
+            found.overshoot_pct,
+            found.steady_error,
+            float(peak),
+            _verdict(found, part, target - begin),
             measure_step(self._part(ideal, index, count), h, begin, target),
             None if frozen is None else measure_step(frozen, h, begin, target),
         )

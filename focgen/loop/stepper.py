@@ -20,15 +20,23 @@ class Stepper(Protocol):
 
 
 class FloatStepper:
-    """The controller in float64: Grünwald–Letnikov sums of memory ``length`` (None: infinite), no rounding planned.
+    """The controller in float64: Grünwald–Letnikov sums of memory ``length`` (None: infinite), no rounding
+    planned.
 
     Starts at rest with error 0 at the output ``start``, for up to ``samples`` samples of ``columns`` loops.
     ``gain`` replaces the controller's gain: it takes the scheduling signal (columns,) and returns gains.
     Raises PlanError where the transfer function cannot be realised.
     """
 
-    def __init__(self, controller: Controller, samples: int, columns: int, start: float = 0.0,
-                 length: int | None = None, gain: Callable | None = None):
+    def __init__(
+        self,
+        controller: Controller,
+        samples: int,
+        columns: int,
+        start: float = 0.0,
+        length: int | None = None,
+        gain: Callable | None = None,
+    ):
         memory = samples if length is None else min(length, samples)
         self._sums = _Sums(tables(controller, max(1, memory)), columns, samples, inner_limits(controller))
         self._gain = gain or controller.gain_at
@@ -52,7 +60,9 @@ class _Sums:
 
     def __init__(self, parts: Tables, columns: int, samples: int, limits: tuple[float, float]):
         def convolution(table):
-            return None if table is None else OnlineConvolution(table.weights[:, None, None], columns, samples)
+            return (
+                None if table is None else OnlineConvolution(table.weights[:, None, None], columns, samples)
+            )
 
         self._direct, self._rest = convolution(parts.direct), convolution(parts.rest)
         self._feedback = convolution(parts.feedback)

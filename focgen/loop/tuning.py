@@ -1,8 +1,8 @@
 """K_o(p) found in simulation: the line with which steps from rest to the operating points meet the wish.
 
-A step to a high set point passes through all lower pressures, so its response depends on the whole line, and
-the line is sought as a whole: its level c and its ratio ρ = K_o(highest)/K_o(lowest operating point). Of all lines
-that meet the wish the one is taken whose operating points settle most alike.
+A step to a high set point passes through all lower pressures, so its response depends on the whole line,
+and the line is sought as a whole: its level c and its ratio ρ = K_o(highest)/K_o(lowest operating point).
+Of all lines that meet the wish the one is taken whose operating points settle most alike.
 """
 
 from __future__ import annotations
@@ -12,65 +12,38 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.control.controller import Controller, ControllerRanges
-from focgen.control.equilibrium import Equilibrium
+from focgen.control.controller import Controller
 from focgen.control.inversion import Inversion, invert
 from focgen.control.measures import StepMeasures, measure_step
 from focgen.control.schedule import Line
 from focgen.errors import DesignError
-from focgen.loop.chain import chain
+from focgen.loop.bench import Bench
+from focgen.loop.chain import chain, substeps
 from focgen.loop.run import run_loop
 from focgen.loop.stepper import FloatStepper
-from focgen.rig.model import Rig
 
 OVERSHOOT = 5.0  # %, where nothing is wished
 HORIZON = 5.0  # wished settling times that a step is followed for
 _SAMPLES = 150  # samples in a wished settling time: finer sampling is searched at this
-_LEVELS = np.geomspace(0.05, 6.0, 18)  # of K_o, 1 where the loop with frozen gain settles in the time aimed at
+# levels of K_o: 1 is where the loop with frozen gain settles in the time aimed at
+_LEVELS = np.geomspace(0.05, 6.0, 18)
 _COARSE_RATIOS = (0.6, 1.0, 1.7)
 _RATIOS = (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0)
 _CLOSE = 1.1
 _ATTEMPTS = 9
-_PARTS = 2  # substeps where only the search runs coarse
+_PARTS = 2  # substeps during the search; what it finds is checked with as many as the chain needs
 _MOST_SAMPLES = 60_000
 _MARGIN = 0.98  # of the wish that is aimed at, so that the fitted line keeps it
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What the loop shall do: ``settling`` the mean settling time (5 %) over the operating points in s, None for as
-    fast as possible; ``overshoot`` the largest overshoot at any of them, %."""
+    """What the loop shall do: ``settling`` the mean settling time (5 %) over the operating points in s, None
+    for as fast as possible; ``overshoot`` the largest overshoot at any of them, %.
+    """
 
     settling: float | None
     overshoot: float
-
-
-@dataclass(frozen=True)
-class Bench:
-    """Steps from rest to the operating points, and how the loop runs.
-
-    ``start``: where the rig rests; ``points``: nearest first; ``ranges``: the controller's; ``span``: the pressures
-    between which the gain is scheduled, held beyond; ``delay``: of the computation, samples; ``pressure_known``:
-    whether the rig measures the pressure.
-    """
-
-    rig: Rig
-    start: Equilibrium
-    points: tuple[Equilibrium, ...]
-    ranges: ControllerRanges
-    span: tuple[float, float]
-    delay: int
-    pressure_known: bool
-
-    @property
-    def references(self) -> np.ndarray:
-        """The set points, shape (points,)."""
-        return np.array([point.output for point in self.points])
-
-    @property
-    def pressures(self) -> np.ndarray:
-        """Their pressures, shape (points,)."""
-        return np.array([point.pressure for point in self.points])
 
 
 @dataclass(frozen=True)
@@ -104,7 +77,9 @@ class _Trials:
 
 
 class _Search:
-    """Simulates lines at the sampling interval ``step`` (s); by default it resolves ``scale``, the time aimed at (s)."""
+    """Simulates lines. The sampling interval resolves ``scale``, the settling time aimed at (s), with few
+    substeps; where ``step`` (s) is given, that is the interval, with as many substeps as the chain needs.
+    """
 
     def __init__(self, bench: Bench, scale: float, step: float | None = None):
         own = bench.rig.sample_time
@@ -112,9 +87,13 @@ class _Search:
         self.step = step or max(own, scale / _SAMPLES)
         self.samples = max(20, math.ceil(HORIZON * scale / self.step))
         if HORIZON * scale / own > _MOST_SAMPLES:
-            raise DesignError(bench.rig.name, f"a settling time of {scale:.3g} s is {scale / own:.0f} samples",
-                              f"wish for a faster loop, or raise the rig's sample_time ({own:g} s)")
-        self.chain = chain(bench.rig, self.step, self.samples, parts=None if self.step == own else _PARTS)
+            raise DesignError(
+                bench.rig.name,
+                f"a settling time of {scale:.3g} s is {scale / own:.0f} samples",
+                f"wish for a faster loop, or raise the rig's sample_time ({own:g} s)",
+            )
+        exact = substeps(bench.rig, self.step)
+        self.chain = chain(bench.rig, self.step, self.samples, exact if step else min(exact, _PARTS))
         self.inversion = invert(bench.rig, 3.0 / scale)
         static = bench.rig.regulator.dc_gain * bench.rig.sensor.dc_gain
         self.unit = 3.0 / (scale * static)
@@ -149,7 +128,9 @@ class _Search:
         return _Trials(pairs, times.mean(axis=1), np.nan_to_num(spread, nan=np.inf), overshoot)
 
 
-def simulate_lines(bench: Bench, inversion: Inversion, lines: list[Line], prepared) -> list[tuple[StepMeasures, ...]]:
+def simulate_lines(
+    bench: Bench, inversion: Inversion, lines: list[Line], prepared
+) -> list[tuple[StepMeasures, ...]]:
     """Step the loop from rest to every operating point with every line, all at once."""
     count, samples, h = len(bench.points), prepared.samples, prepared.sample_time
     level = np.repeat([line.intercept for line in lines], count)
@@ -162,8 +143,13 @@ def simulate_lines(bench: Bench, inversion: Inversion, lines: list[Line], prepar
     controller = Controller("search", h, inversion.transfer, 1.0, inversion.integrator, bench.ranges)
     stepper = FloatStepper(controller, samples, count * len(lines), bench.start.command, gain=gain)
     reference = np.tile(np.tile(bench.references, len(lines)), (samples, 1))
-    run = run_loop(prepared, stepper, reference, bench.start, bench.delay, bench.pressure_known, curvature=False)
-    found = [measure_step(run.output[:, i], h, bench.start.output, reference[0, i]) for i in range(reference.shape[1])]
+    run = run_loop(
+        prepared, stepper, reference, bench.start, bench.delay, bench.pressure_known, curvature=False
+    )
+    found = [
+        measure_step(run.output[:, i], h, bench.start.output, reference[0, i])
+        for i in range(reference.shape[1])
+    ]
     return [tuple(found[i : i + count]) for i in range(0, len(found), count)]
 
 
@@ -174,9 +160,11 @@ def tune(bench: Bench, wish: Wish) -> Tuned:
     found = meeting(bench, wish) or fastest(bench, wish.overshoot)
     if found.mean_settling > wish.settling:
         raise DesignError(
-            bench.rig.name, f"no K_o(p) settles in {wish.settling:g} s on average with at most {wish.overshoot:g} % "
+            bench.rig.name,
+            f"no K_o(p) settles in {wish.settling:g} s on average with at most {wish.overshoot:g} % "
             f"overshoot; feasible is {found.mean_settling:.3g} s",
-            f"wish for --settling {_upward(found.mean_settling):g} or more, or allow more --overshoot")
+            f"wish for --settling {_upward(found.mean_settling):g} or more, or allow more --overshoot",
+        )
     return found
 
 
@@ -194,10 +182,12 @@ def _upward(value: float) -> float:
 
 
 def _at_own_rate(bench: Bench, search: _Search, pair: tuple[float, float, float], wish: Wish) -> Tuned | None:
-    """Return the line at the rig's own sample time, its level corrected where the search ran at a coarser one."""
-    own = search if search.step == bench.rig.sample_time else search.at(bench.rig.sample_time)
+    """Return the line at the rig's own sample time, its level corrected where the search ran at a coarser
+    one.
+    """
+    own = search.at(bench.rig.sample_time)
     level, ratio, safe = pair
-    factors = (1.0,) if own is search else (1.0, 1.03, 0.97, 1.07, 0.93)
+    factors = (1.0,) if own.step == search.step else (1.0, 1.03, 0.97, 1.07, 0.93)
     levels = [between * factor for factor in factors for between in (level, math.sqrt(level * safe), safe)]
     lines = [own.line(each, ratio) for each in levels]
     for line, measures in zip(lines, own.measures(lines)):
@@ -208,7 +198,8 @@ def _at_own_rate(bench: Bench, search: _Search, pair: tuple[float, float, float]
 
 
 def fastest(bench: Bench, overshoot: float) -> Tuned:
-    """Return the line with the shortest mean settling time found whose overshoot stays within ``overshoot`` (%).
+    """Return the line with the shortest mean settling time found whose overshoot stays within ``overshoot``
+    (%).
 
     Raises DesignError where none settles.
     """
@@ -225,11 +216,16 @@ def fastest(bench: Bench, overshoot: float) -> Tuned:
             if found is not None:
                 return found
             scale = 1.2 * best[0]
-    raise DesignError(bench.rig.name, f"no K_o(p) was found that settles with at most {overshoot:g} % overshoot",
-                      "allow more --overshoot, or check the rig and its sample_time")
+    raise DesignError(
+        bench.rig.name,
+        f"no K_o(p) was found that settles with at most {overshoot:g} % overshoot",
+        "allow more --overshoot, or check the rig and its sample_time",
+    )
 
 
-def _refined(bench: Bench, search: _Search, best: tuple[float, float, float], overshoot: float) -> Tuned | None:
+def _refined(
+    bench: Bench, search: _Search, best: tuple[float, float, float], overshoot: float
+) -> Tuned | None:
     """Look around the best line of the coarse grid twice, ever closer."""
     for width in (1.0, 0.3):
         levels = best[1] * np.exp(0.25 * width * np.linspace(-1.0, 1.0, 9))
@@ -247,17 +243,22 @@ def _quickest(trials: _Trials, overshoot: float) -> tuple[float, float, float] |
 
 
 def _guess(bench: Bench) -> float:
-    """Return a settling time (s) that regulator, sensor, sampling and delay should allow: 45° of lag at crossover."""
+    """Return a settling time (s) that regulator, sensor, sampling and delay should allow: 45° of lag at
+    crossover.
+    """
     h = bench.rig.sample_time
     omega = np.geomspace(1e-6, math.pi, 4000) / h
     around = bench.rig.regulator * bench.rig.sensor
-    lag = -np.unwrap(np.angle(around.frequency_response(omega) / around.dc_gain)) + omega * h * (0.5 + bench.delay)
+    lag = -np.unwrap(np.angle(around.frequency_response(omega) / around.dc_gain)) + omega * h * (
+        0.5 + bench.delay
+    )
     late = np.flatnonzero(lag > 0.25 * math.pi)
     return 3.0 / float(omega[late[0] if len(late) else -1])
 
 
 def _matching(search: _Search, wish: Wish) -> tuple[float, float, float] | None:
-    """Return level and ratio whose mean settling time is the wish's, with the smallest spread, and a level tried nearby.
+    """Return level and ratio whose mean settling time is the wish's, with the smallest spread, and a level
+    tried nearby.
 
     None where there is none.
     """
@@ -285,7 +286,8 @@ def _promising(trials: _Trials, wish: Wish) -> np.ndarray | None:
 
 
 def _crossings(trials: _Trials, wish: Wish, levels: int) -> list[tuple[float, float, float]]:
-    """Return, for each ratio, the lowest level at which the mean settling time falls to the wish, best spread first.
+    """Return, for each ratio, the lowest level at which the mean settling time falls to the wish, best
+    spread first.
 
     Level between those tried, ratio, and the tried level that meets the wish.
     """

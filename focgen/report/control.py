@@ -57,7 +57,9 @@ def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
 
 def _interesting(simulation: Simulation) -> float:
     times = [r.settling_s for r in simulation.setpoints]
-    return min(simulation.duration, 2.5 * max(times)) if all(map(math.isfinite, times)) else simulation.duration
+    return (
+        min(simulation.duration, 2.5 * max(times)) if all(map(math.isfinite, times)) else simulation.duration
+    )
 
 
 def _draw_consecutive(top, bottom, simulation: Simulation) -> None:
@@ -79,11 +81,15 @@ def _reference(axes, span, start: float, reference: float, colour) -> None:
 
 def _settling(axes, time, output, settling: float, colour) -> None:
     if math.isfinite(settling):
-        axes.plot(settling, np.interp(settling, time, output), "o", color=colour, mec="white", mew=0.8, zorder=5)
+        axes.plot(
+            settling, np.interp(settling, time, output), "o", color=colour, mec="white", mew=0.8, zorder=5
+        )
 
 
 def design_pictures(design: Design, rig: Rig) -> dict[str, bytes]:
-    """Return ``margins.png`` (Bode plot of the open loops) and, where the gain is scheduled, ``schedule.png``."""
+    """Return ``margins.png`` (Bode plot of the open loops) and, where the gain is scheduled,
+    ``schedule.png``.
+    """
     found = {"margins.png": _margins_picture(design, rig)}
     if design.schedule.breakpoints:
         found["schedule.png"] = _schedule_picture(design, rig)
@@ -97,19 +103,38 @@ def _schedule_picture(design: Design, rig: Rig) -> bytes:
     formula = (schedule.intercept + schedule.slope * p) / rig.actuator.K(p)
     beyond = np.linspace(first - 0.3 * (last - first), last + 0.1 * (last - first), 400)
     with figure(2, 1, size=(7.0, 5.6), sharex=True) as (fig, (top, bottom)):
-        top.plot(beyond, design.controller.gain_at(beyond), color=COLOURS["running"], lw=2.2, label="schedule table")
+        top.plot(
+            beyond,
+            design.controller.gain_at(beyond),
+            color=COLOURS["running"],
+            lw=2.2,
+            label="schedule table",
+        )
         top.plot(p, formula, color=COLOURS["ideal"], lw=0.7, zorder=3, label="K_o(p)/K(p)")
         top.plot(schedule.breakpoints, schedule.gains, "o", color=COLOURS["running"])
         top.axvline(schedule.lower_limit, color=GREY, lw=0.8, ls=":")
-        top.annotate("held below", (schedule.lower_limit, 0.05), xycoords=("data", "axes fraction"), ha="right",
-                     xytext=(-4, 0), textcoords="offset points", fontsize=8, color=GREY)
+        top.annotate(
+            "held below",
+            (schedule.lower_limit, 0.05),
+            xycoords=("data", "axes fraction"),
+            ha="right",
+            xytext=(-4, 0),
+            textcoords="offset points",
+            fontsize=8,
+            color=GREY,
+        )
         top.set_ylabel("gain")
         top.set_title("The gain schedule is the controller")
         top.legend()
         bottom.plot(p, schedule.intercept + schedule.slope * p, color=COLOURS["controller"], label="K_o(p)")
         places = [point.pressure for point in design.points]
-        bottom.plot(places, [point.K_o for point in design.points], "o", color=COLOURS["controller"],
-                    label="operating points")
+        bottom.plot(
+            places,
+            [point.K_o for point in design.points],
+            "o",
+            color=COLOURS["controller"],
+            label="operating points",
+        )
         ends = [0.0, *(1.15 * (schedule.intercept + schedule.slope * end) for end in (first, last))]
         bottom.set_ylim(min(ends), max(ends))
         bottom.set_ylabel("K_o")
@@ -123,7 +148,10 @@ def _margins_picture(design: Design, rig: Rig) -> bytes:
     loops = shapes(rig, design.controller, plan, design.delay)
     worst = min(design.margins, key=lambda point: point.running.phase_deg)
     with figure(2, 1, size=(7.0, 5.6), sharex=True) as (fig, (top, bottom)):
-        for name, loop, colour in (("ideal", loops.ideal, COLOURS["ideal"]), ("as it will run", loops.running, COLOURS["running"])):
+        for name, loop, colour in (
+            ("ideal", loops.ideal, COLOURS["ideal"]),
+            ("as it will run", loops.running, COLOURS["running"]),
+        ):
             wanted = getattr(worst, "ideal" if name == "ideal" else "running")
             unit = np.interp(wanted.crossover_rad_s, loop.omega, np.abs(loop.values))
             phase = np.degrees(np.unwrap(np.angle(loop.values)))

@@ -43,9 +43,13 @@ def design_payload(design: Design) -> dict:
 
 
 def point_labels(design: Design) -> list[str]:
-    """Names of the operating points: their pressures, or their set points where pressures do not tell them apart."""
+    """Names of the operating points: their pressures, or their set points where pressures do not tell them
+    apart.
+    """
     pressures = [f"{point.pressure:.4g}" for point in design.points]
-    return pressures if len(set(pressures)) == len(pressures) else [f"{p.reference:.4g}" for p in design.points]
+    return (
+        pressures if len(set(pressures)) == len(pressures) else [f"{p.reference:.4g}" for p in design.points]
+    )
 
 
 def _worst(points: tuple[PointMargins, ...], loop: str) -> dict:
@@ -58,14 +62,23 @@ def _worst(points: tuple[PointMargins, ...], loop: str) -> dict:
 def design_text(design: Design) -> str:
     """The design for people."""
     schedule, controller = design.schedule, design.controller
+    integral = " / s" if controller.integrator else ""
     lines = [
-        f"{controller.name}: C(s) = {_gain_text(design)} ({controller.transfer}){' / s' if controller.integrator else ''}",
-        f"K_o(p) = {schedule.intercept:.4g} {schedule.slope:+.4g} p" if schedule.breakpoints else
-        f"K_o = {schedule.intercept:.4g}",
+        f"{controller.name}: C(s) = {_gain_text(design)} ({controller.transfer}){integral}",
+        f"K_o(p) = {schedule.intercept:.4g} {schedule.slope:+.4g} p"
+        if schedule.breakpoints
+        else f"K_o = {schedule.intercept:.4g}",
     ]
     if schedule.breakpoints:
         lines += _schedule_lines(design)
-    lines += ["", text_table(points_table(design)), "", text_table(margins_table(design)), "", _memory_line(design)]
+    lines += [
+        "",
+        text_table(points_table(design)),
+        "",
+        text_table(margins_table(design)),
+        "",
+        _memory_line(design),
+    ]
     lines += [f"note: {note}" for note in design.notes]
     return "\n".join([*lines, "", _wish_line(design)])
 
@@ -76,21 +89,27 @@ def _gain_text(design: Design) -> str:
 
 def _schedule_lines(design: Design) -> list[str]:
     schedule = design.schedule
-    lines = [f"schedule: {len(schedule.breakpoints)} breakpoints from {schedule.breakpoints[0]:.4g} to "
-             f"{schedule.breakpoints[-1]:.4g}, within {100 * schedule.error:.2g} % of K_o/K "
-             f"(wanted: {100 * schedule.tolerance:g} %), held beyond"]
+    lines = [
+        f"schedule: {len(schedule.breakpoints)} breakpoints from {schedule.breakpoints[0]:.4g} to "
+        f"{schedule.breakpoints[-1]:.4g}, within {100 * schedule.error:.2g} % of K_o/K "
+        f"(wanted: {100 * schedule.tolerance:g} %), held beyond"
+    ]
     if schedule.formula_at_rest is not None:
         zero = "" if schedule.K_zero is None else f"; K(p) vanishes at p = {schedule.K_zero:.3g}"
         held = float(design.controller.gain_at(schedule.lower_limit))
-        lines.append(f"below p = {schedule.lower_limit:.4g} the gain is held at {held:.4g}; the formula would ask for "
-                     f"{schedule.formula_at_rest:.4g} at rest{zero}")
+        lines.append(
+            f"below p = {schedule.lower_limit:.4g} the gain is held at {held:.4g}; the formula would ask for "
+            f"{schedule.formula_at_rest:.4g} at rest{zero}"
+        )
     return lines
 
 
 def _memory_line(design: Design) -> str:
     memory = design.memory
-    text = (f"memory: L = {memory.length} ({memory.seconds:.3g} s), {memory.reason}: "
-            f"{100 * memory.crossover_error:.2g} % at {memory.crossover_rad_s:.3g} rad/s")
+    text = (
+        f"memory: L = {memory.length} ({memory.seconds:.3g} s), {memory.reason}: "
+        f"{100 * memory.crossover_error:.2g} % at {memory.crossover_rad_s:.3g} rad/s"
+    )
     for term in memory.bias:
         text += f"; at rest {term.coefficient:.4g} s^{term.order:g} reads {term.bias:.3g} instead of 0"
     return text
@@ -99,30 +118,56 @@ def _memory_line(design: Design) -> str:
 def _wish_line(design: Design) -> str:
     wish = "" if design.wish.settling is None else f" of at most {design.wish.settling:.3g} s"
     verdict = "kept" if design.holds else "NOT kept by the controller as it will run"
-    return (f"wish: mean settling time{wish}, overshoot of at most {design.wish.overshoot:g} %: {verdict} "
-            f"({_seconds(design.settling_s)}, {design.overshoot_pct:.2g} %)")
+    return (
+        f"wish: mean settling time{wish}, overshoot of at most {design.wish.overshoot:g} %: {verdict} "
+        f"({_seconds(design.settling_s)}, {design.overshoot_pct:.2g} %)"
+    )
 
 
 def points_table(design: Design) -> TableOf:
     """Steps from rest to the operating points, as they will run."""
     units = design.controller.units
-    heads = (f"set point{_in(units.measurement)}", f"p{_in(units.schedule)}", "K", "K_o", "gain", "settling (s)",
-             "overshoot (%)", "ideal (s)", "peak p")
+    heads = (
+        f"set point{_in(units.measurement)}",
+        f"p{_in(units.schedule)}",
+        "K",
+        "K_o",
+        "gain",
+        "settling (s)",
+        "overshoot (%)",
+        "ideal (s)",
+        "peak p",
+    )
     rows = tuple(
-        (f"{p.reference:.4g}", f"{p.pressure:.4g}", f"{p.K:.4g}", f"{p.K_o:.4g}", f"{p.gain:.4g}",
-         _number(p.running.settling_s), f"{p.running.overshoot_pct:.1f}", _number(p.ideal.settling_s),
-         f"{p.peak_pressure:.3g}")
+        (
+            f"{p.reference:.4g}",
+            f"{p.pressure:.4g}",
+            f"{p.K:.4g}",
+            f"{p.K_o:.4g}",
+            f"{p.gain:.4g}",
+            _number(p.running.settling_s),
+            f"{p.running.overshoot_pct:.1f}",
+            _number(p.ideal.settling_s),
+            f"{p.peak_pressure:.3g}",
+        )
         for p in design.points
     )
-    return TableOf(heads, rows, f"Steps from rest, in {design.controller.arithmetic}, computation delay "
-                                f"{design.delay} sample{'' if design.delay == 1 else 's'}")
+    return TableOf(
+        heads,
+        rows,
+        f"Steps from rest, in {design.controller.arithmetic}, computation delay "
+        f"{design.delay} sample{'' if design.delay == 1 else 's'}",
+    )
 
 
 def margins_table(design: Design) -> TableOf:
     """The margins where the phase margin is smallest, ideal and step by step towards what will run."""
     meaning = {
-        "frozen": "K frozen (cancels)", "ideal": "ideal, slope of K(p)p", "sampled": "+ sampled, held, delayed",
-        "truncated": f"+ memory of {design.memory.length}", "running": f"+ quantised ({design.controller.arithmetic})",
+        "frozen": "K frozen (cancels)",
+        "ideal": "ideal, slope of K(p)p",
+        "sampled": "+ sampled, held, delayed",
+        "truncated": f"+ memory of {design.memory.length}",
+        "running": f"+ quantised ({design.controller.arithmetic})",
     }
     rows = []
     for loop, text in meaning.items():
@@ -133,8 +178,13 @@ def margins_table(design: Design) -> TableOf:
 
 
 def _margin_cells(m: Margins) -> tuple[str, ...]:
-    return f"{m.gain_db:.1f}", f"{m.phase_deg:.1f}", f"{m.delay_s:.3g}", f"{m.crossover_rad_s:.3g}", \
-        "yes" if m.stable else "NO"
+    return (
+        f"{m.gain_db:.1f}",
+        f"{m.phase_deg:.1f}",
+        f"{m.delay_s:.3g}",
+        f"{m.crossover_rad_s:.3g}",
+        "yes" if m.stable else "NO",
+    )
 
 
 # ------------------------------------------------------------------------------------------------ simulation
@@ -169,26 +219,48 @@ def simulation_text(simulation: Simulation) -> str:
         what = "; ".join(f"{r.reference:.4g} {r.verdict}" for r in bad)
         lines.append(f"the loop does not hold its set points within {simulation.duration:.3g} s: {what}")
     else:
-        lines.append(f"mean settling time {mean_settling(simulation):.3g} s, largest overshoot "
-                     f"{max(r.overshoot_pct for r in simulation.setpoints):.2g} %")
+        lines.append(
+            f"mean settling time {mean_settling(simulation):.3g} s, largest overshoot "
+            f"{max(r.overshoot_pct for r in simulation.setpoints):.2g} %"
+        )
     return "\n".join(lines)
 
 
 def setpoints_table(simulation: Simulation) -> TableOf:
     """What every set point did: as it runs, ideal, and frozen."""
     unit = _in(simulation.controller.units.measurement)
-    heads = (f"set point{unit}", "settling (s)", "overshoot (%)", f"steady error{unit}", "verdict", "ideal (s)",
-             "frozen (s)", "peak p")
+    heads = (
+        f"set point{unit}",
+        "settling (s)",
+        "overshoot (%)",
+        f"steady error{unit}",
+        "verdict",
+        "ideal (s)",
+        "frozen (s)",
+        "peak p",
+    )
     rows = tuple(_setpoint_cells(result) for result in simulation.setpoints)
     order = "one after the other" if simulation.consecutive else "from rest"
-    return TableOf(heads, rows, f"Steps {order}, in {simulation.arithmetic} with memory {simulation.length}, "
-                                f"computation delay {simulation.delay}")
+    return TableOf(
+        heads,
+        rows,
+        f"Steps {order}, in {simulation.arithmetic} with memory {simulation.length}, "
+        f"computation delay {simulation.delay}",
+    )
 
 
 def _setpoint_cells(r: SetpointResult) -> tuple[str, ...]:
     frozen = "unstable" if r.frozen is None else _number(r.frozen.settling_s)
-    return (f"{r.reference:.4g}", _number(r.settling_s), f"{r.overshoot_pct:.1f}", f"{r.steady_error:.2g}", r.verdict,
-            _number(r.ideal.settling_s), frozen, f"{r.peak_pressure:.3g}")
+    return (
+        f"{r.reference:.4g}",
+        _number(r.settling_s),
+        f"{r.overshoot_pct:.1f}",
+        f"{r.steady_error:.2g}",
+        r.verdict,
+        _number(r.ideal.settling_s),
+        frozen,
+        f"{r.peak_pressure:.3g}",
+    )
 
 
 def _in(unit: str) -> str:

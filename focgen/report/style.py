@@ -1,9 +1,10 @@
-"""One look for every picture: colours that colour-blind readers tell apart, one font, the same bytes every time.
+"""One look for every picture: colours that colour-blind readers tell apart, one font, the same bytes every
+time.
 
-    with figure(2, 1, sharex=True) as (fig, (top, bottom)):
-        top.plot(time, curvature, color=COLOURS["measured"])
-        picture = png(fig)
-    write_files(folder, {"steps.png": picture})
+with figure(2, 1, sharex=True) as (fig, (top, bottom)):
+    top.plot(time, curvature, color=COLOURS["measured"])
+    picture = png(fig)
+write_files(folder, {"steps.png": picture})
 """
 
 from __future__ import annotations
@@ -83,12 +84,14 @@ def _matplotlib():
 
 
 @contextmanager
-def figure(rows: int = 1, columns: int = 1, size: tuple[float, float] | None = None,
-           **subplots: Any) -> Iterator[tuple[Figure, Any]]:
-    """Yield a figure and its axes, as ``matplotlib.pyplot.subplots`` gives them; inside the block the style holds.
+def figure(
+    rows: int = 1, columns: int = 1, size: tuple[float, float] | None = None, **subplots: Any
+) -> Iterator[tuple[Figure, Any]]:
+    """Yield a figure and its axes, as ``matplotlib.pyplot.subplots`` gives them; inside the block the style
+    holds.
 
-    ``size`` in inches (default 7 wide, 2.8 a row); ``subplots`` goes to ``Figure.subplots``. Nothing is shared
-    between figures and no window is opened. Raises MissingExtra where matplotlib is not installed.
+    ``size`` in inches (default 7 wide, 2.8 a row); ``subplots`` goes to ``Figure.subplots``. Nothing is
+    shared between figures and no window is opened. Raises MissingExtra where matplotlib is not installed.
     """
     matplotlib = _matplotlib()
     with matplotlib.rc_context(_RC | {"axes.prop_cycle": matplotlib.cycler(color=CYCLE)}):
