@@ -6,8 +6,9 @@ from argparse import ArgumentParser, Namespace
 
 from focgen.cli.outcome import Outcome
 from focgen.control.controller import ARITHMETICS
+from focgen.control.files import controller_text
 from focgen.loop.design import design
-from focgen.output import write_files
+from focgen.output import write_file, write_files
 from focgen.report.control import design_pictures
 from focgen.report.control_summary import design_payload, design_text
 from focgen.rig.files import read_rig
@@ -59,19 +60,13 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> Outcome:
-    result = design(
-        args.rig,
-        args.out,
-        args.settling,
-        args.overshoot,
-        args.arithmetic,
-        args.length,
-        delay=args.delay,
-        setpoints=args.setpoints,
-    )
+    wishes = (args.settling, args.overshoot, args.arithmetic, args.length)
+    result = design(args.rig, None, *wishes, delay=args.delay, setpoints=args.setpoints)
+    pictures = design_pictures(result, read_rig(args.rig)) if args.report else {}
+    write_file(args.out, controller_text(result.controller))
     text = f"{design_text(result)}\n\nwrote {args.out}\n"
-    if args.report:
-        write_files(args.report, design_pictures(result, read_rig(args.rig)))
+    if pictures:
+        write_files(args.report, pictures)
         text += f"pictures in {args.report}\n"
     text += f"next: focgen simulate {args.rig} {args.out}\n"
     text += f"      focgen generate {args.out} --out DIR --arithmetic {args.arithmetic}"
