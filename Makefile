@@ -28,7 +28,11 @@ test: $(VENV)/ready-test       ## what continuous integration runs
 test-long: $(VENV)/ready-test  ## the suites that take minutes
 	$(RUN) -m pytest -n $(JOBS) -q -m long
 
-bench: $(VENV)/ready-test      ## speed and bias, side by side with their rivals
+$(VENV)/ready-bench: $(VENV)/ready-test
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	@touch $@
+
+bench: $(VENV)/ready-bench     ## speed and bias, side by side with their rivals
 	$(RUN) -m tests.bench
 
 clean:                         ## remove everything that was built

@@ -5,12 +5,15 @@ from importlib import import_module
 # Where each public name lives; imported on first use, since scipy takes its time.
 _NAMES = {
     "Convolution": "simulation",
+    "ExponentialMemory": "exponential",
     "GrunwaldLetnikov": "simulation",
     "Simulator": "simulation",
     "Term": "transfer",
     "TransferFunction": "transfer",
     "UnprovenStability": "discrete",
     "UnstableRecursion": "discrete",
+    "fit_exponential": "exponential",
+    "fit_states": "exponential",
     "from_control": "convert",
     "from_scipy": "convert",
     "gl_frequency_response": "discrete",
