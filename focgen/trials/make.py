@@ -32,8 +32,7 @@ from focgen.trials.plan import CLOSED_KINDS, KINDS, assignments
 from focgen.trials.recording import as_csv
 from focgen.trials.sealing import commitment, sealed
 
-_OPEN = tuple(k for k in KINDS if k != "linear")
-DEFAULT_KINDS = {"full": _OPEN, "short": _OPEN, "closed": CLOSED_KINDS}
+DEFAULT_KINDS = {"full": KINDS, "short": KINDS, "closed": CLOSED_KINDS}
 
 
 @dataclass(frozen=True)

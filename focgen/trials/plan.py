@@ -13,12 +13,13 @@ from focgen.trials.vocabulary import OUTSIDE, VOCABULARY
 KINDS = ("single", "pair", "none", "parameters", "outside", "unidentifiable", "linear")
 CLOSED_KINDS = ("single", "none", "parameters", "outside")
 _SHARES = {
-    "single": 0.62,
+    "single": 0.58,
     "pair": 0.11,
     "none": 0.05,
     "parameters": 0.07,
     "outside": 0.09,
     "unidentifiable": 0.06,
+    "linear": 0.04,
 }
 
 # What two effects do alike: together they are one to any log.
@@ -107,7 +108,7 @@ def assignments(
         raise InputError(
             "--kinds", f"has the unknown kind {unknown[0]!r}", f"choose from {', '.join(allowed)}"
         )
-    shares = {kind: _SHARES.get(kind, 0.08) for kind in kinds}
+    shares = {kind: _SHARES[kind] for kind in kinds}
     whole = sum(shares.values())
     quota = {kind: max(1, round(count * share / whole)) for kind, share in shares.items()}
     quota[max(quota, key=quota.get)] += count - sum(quota.values())

@@ -49,7 +49,9 @@ def draw_chain(rng: np.random.Generator, signals: str, sample_time: float) -> tu
         name=f"rig{rng.integers(1000)}",
         sample_time=sample_time,
         signals=_columns(units, signals),
-        actuator=Actuator(rng.uniform(0.6, 2.2), rng.uniform(0.5, 0.8), _draw_gain(rng, top, full)),
+        actuator=Actuator(
+            rng.uniform(0.6, 2.2), rng.uniform(0.5, 0.8), _draw_gain(rng, top, full), _draw_offset(rng, full)
+        ),
         regulator=regulator,
         sensor=TransferFunction([(pole, 0.0)], [(1.0, 1.0), (pole, 0.0)]),
     )
@@ -62,6 +64,11 @@ def _draw_gain(rng: np.random.Generator, top: float, full: float) -> tuple[float
         return (full / top,)
     low = rng.uniform(0.15, 0.7)
     return (low * full / top, (1.0 - low) * full / top**2)
+
+
+def _draw_offset(rng: np.random.Generator, full: float) -> float:
+    """A zero that was not quite zero, in a quarter of the rigs."""
+    return rng.uniform(-0.03, 0.03) * full if rng.random() < 0.25 else 0.0
 
 
 def _draw_regulator(rng: np.random.Generator, units: Units) -> tuple[TransferFunction, float]:
@@ -106,8 +113,9 @@ def draw_linear(rng: np.random.Generator, sample_time: float) -> tuple[Rig, floa
 def nominal_of(rig: Rig, rng: np.random.Generator, scatter: tuple[float, float]) -> Rig:
     """The rig as its owner believes it to be: own parameters off by ``scatter`` (low, high), either way.
 
-    The order of the fractional stage is off by half as much.
+    The order of the fractional stage is off by half as much, and an offset is not known at all.
     """
+    offset = rig.actuator.offset if scatter == (0.0, 0.0) else 0.0
 
     def off(value: float, share: float = 1.0) -> float:
         return value * (1.0 + share * rng.uniform(*scatter) * rng.choice((-1.0, 1.0)))
@@ -115,13 +123,13 @@ def nominal_of(rig: Rig, rng: np.random.Generator, scatter: tuple[float, float])
     actuator = rig.actuator
     if isinstance(actuator, Actuator):
         gain = tuple(off(g) for g in actuator.gain)
-        believed = Actuator(off(actuator.T), min(off(actuator.alpha, 0.5), 0.95), gain, actuator.offset)
+        believed = Actuator(off(actuator.T), min(off(actuator.alpha, 0.5), 0.95), gain, offset)
     else:
         num = [(off(t.coefficient), t.order) for t in actuator.dynamics.num]
         den = [
             (t.coefficient if t.order == 0 else off(t.coefficient), t.order) for t in actuator.dynamics.den
         ]
-        believed = LinearActuator(TransferFunction(num, den), actuator.offset)
+        believed = LinearActuator(TransferFunction(num, den), offset)
     return replace(rig, actuator=believed)
 
 
