@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from focgen.control.controller import Controller
@@ -76,14 +78,34 @@ def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:
     return tuple(Track(lane, at, float(rng.uniform(low - margin, high + margin))) for lane, at in sorted(places))
 
 
-def worst_cases(plan: Plan) -> dict[str, Scenario]:
-    """Raw inputs that take each node to its proved worst case, by node; the integer forms' alone have proofs."""
+def worst_cases(plan: Plan) -> Scenario:
+    """Raw inputs that take each node to its proved worst case, two lanes a node, up and down, in the order of the proofs.
+
+    The floating forms have no proofs; theirs take the filtered error to its largest.
+    """
     nodes = ["v"] if plan.floating else [proof.node for proof in plan.proofs]
-    return {node: worst_case_input(plan, node) for node in nodes}
+    return side_by_side([worst_case_input(plan, node) for node in nodes])
+
+
+def side_by_side(scenarios: list[Scenario]) -> Scenario:
+    """All lanes in one scenario; shorter ones go on with their last inputs."""
+    longest = max(s.samples for s in scenarios)
+    stacked = lambda parts: np.concatenate([_prolonged(p, longest) for p in parts])  # noqa: E731
+    begins = np.cumsum([0, *(s.lanes for s in scenarios)])
+    return Scenario(
+        stacked([s.ref for s in scenarios]),
+        stacked([s.meas for s in scenarios]),
+        None if scenarios[0].sched is None else stacked([s.sched for s in scenarios]),
+        tuple(replace(r, lane=r.lane + int(b)) for s, b in zip(scenarios, begins) for r in s.resets),
+        tuple(replace(t, lane=t.lane + int(b)) for s, b in zip(scenarios, begins) for t in s.tracks),
+    )
+
+
+def _prolonged(values: np.ndarray, samples: int) -> np.ndarray:
+    return np.pad(values, ((0, 0), (0, samples - values.shape[1])), mode="edge")
 
 
 def raw_scenarios(plan: Plan, samples: int, seed: int) -> dict[str, Scenario]:
     """Everything a plan is compared in, by name; raw inputs."""
-    inside, outside = mixed(plan.controller, samples, seed), mixed(plan.controller, max(samples // 4, 1), seed, True)
-    found = {"mixed": to_raw(plan, inside), "beyond the ranges": to_raw(plan, outside)}
-    return found | {f"worst case of {node}": scenario for node, scenario in worst_cases(plan).items()}
+    inside, outside = mixed(plan.controller, samples, seed), mixed(plan.controller, max(samples // 8, 1), seed, True)
+    return {"mixed": to_raw(plan, inside), "beyond the ranges": to_raw(plan, outside), "worst cases": worst_cases(plan)}
