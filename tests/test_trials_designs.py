@@ -1,4 +1,4 @@
-"""Designs meant to be unidentifiable are: another effect explains their logs below the least noise of any case."""
+"""Designs meant to be unidentifiable are: a rival explains their logs to less than the least noise."""
 
 import numpy as np
 import pytest

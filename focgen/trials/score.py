@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from focgen.cli.outcome import plain
 from focgen.errors import FocgenError, InputError
 from focgen.output import write_file
 from focgen.progress import say, track
@@ -71,8 +70,8 @@ def score(folder: str | Path, *, oracle: bool = False, baseline: bool = True, jo
         rows(judged, facts["signals"]),
         confusions(judged),
     )
-    content = {"scores": scores, "cases": judged}
-    write_file(folder / "scores.json", json.dumps(plain(content), indent=1) + "\n")
+    content = {"scores": asdict(scores), "cases": [asdict(j) for j in judged]}
+    write_file(folder / "scores.json", json.dumps(content, indent=1) + "\n")
     return scores
 
 
