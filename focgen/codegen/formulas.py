@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from focgen.codegen.literals import comment, quantity
+from focgen.codegen.literals import comment, quantity, wrapped
 from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.plan.canonical import realise, tables
 from focgen.plan.model import Plan, Sum
@@ -56,8 +56,8 @@ def weights_about(plan: Plan, terms: Polynomial, table: Sum, what: str, half_ste
     if normaliser != 1.0:
         factor += f" over {normaliser:.6g}, the denominator's weight of lag 0"
     lags = f"lags {table.last} ... {table.first}" if table.last > table.first else f"lag {table.first} only"
-    return [
-        f"{what}: {polynomial_text(terms)}.",
-        f"Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = {quantity(plan.sample_time, 's')};",
-        f"the weight of lag j is their sum{factor}. Oldest first, {lags}.",
-    ]
+    formula = (
+        f"Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = {quantity(plan.sample_time, 's')};"
+        f" the weight of lag j is their sum{factor}. Oldest first, {lags}."
+    )
+    return [f"{what}: {polynomial_text(terms)}.", *wrapped(formula.split(" "))]

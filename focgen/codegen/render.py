@@ -10,9 +10,25 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from focgen.resources import shipped
 
 
+_WIDTH = 112
+
+
+def broken(code: str, indent: int = 0) -> str:
+    """One line of C, broken after a comma where it is too long; what follows stands below the first argument."""
+    start = code.find("(") + 1
+    lines, line = [], code
+    while indent + len(line) > _WIDTH:
+        cut = line.rfind(", ", start, _WIDTH - indent) + 1
+        if cut == 0:
+            break
+        lines.append(line[:cut])
+        line = " " * start + line[cut + 1 :]
+    return ("\n" + " " * indent).join([*lines, line])
+
+
 @cache
 def _environment() -> Environment:
-    return Environment(
+    made = Environment(
         loader=FileSystemLoader(shipped("templates")),
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -20,6 +36,8 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
+    made.filters["broken"] = broken
+    return made
 
 
 def render(template: str, context) -> str:

@@ -1,0 +1,105 @@
+"""Generated text against files that were read and found good; made through the command line, then compiled.
+
+After a change that is meant: ``pytest tests/test_codegen_golden.py --update-golden``, and read the difference.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from focgen.cli.main import main
+from focgen.output import write_files
+from tests.c_code import STRICT, compiler, run
+
+ARITHMETICS = ("f64", "f32", "q31", "q15")
+GOLDEN = Path(__file__).parent / "golden"
+CONTROLLER = GOLDEN / "finger.toml"
+
+
+def generated(arithmetic: str, out: Path) -> dict[str, bytes]:
+    argv = ["generate", str(CONTROLLER), "--out", str(out), "--arithmetic", arithmetic, "--name", f"finger_{arithmetic}"]
+    assert main(argv) == 0
+    return {str(p.relative_to(out)): p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
+
+
+def alike(one, other) -> bool:
+    """Equal, but for the last digits of what Fourier transforms have summed."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(alike(one[k], other[k]) for k in one)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(alike, one, other))
+    if isinstance(one, (int, float)) and isinstance(other, (int, float)):
+        return math.isclose(one, other, rel_tol=1e-9)
+    return one == other
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_the_text_is_the_golden_one(arithmetic, tmp_path, request):
+    found, folder = generated(arithmetic, tmp_path / "out"), GOLDEN / f"finger_{arithmetic}"
+    for copied, source in (("foc_rt.h", "c_runtime/foc_rt.h"), ("controller.toml", "tests/golden/finger.toml")):
+        assert found.pop(copied) == (GOLDEN.parents[1] / source).read_bytes()
+    if request.config.getoption("--update-golden"):
+        write_files(folder, found)
+    golden = {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    assert found.keys() == golden.keys()
+    manifest, expected = (json.loads(files.pop("manifest.json")) for files in (found, golden))
+    for name, content in golden.items():
+        assert found[name].decode() == content.decode(), name
+    digests = manifest.pop("inputs"), expected.pop("inputs")
+    assert alike(manifest, expected) and digests[0].keys() == digests[1].keys()
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang"])
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_it_compiles_without_a_warning(name, arithmetic, tmp_path):
+    command = compiler(name)
+    generated(arithmetic, tmp_path)
+    source = tmp_path / f"finger_{arithmetic}.c"
+    for level in ("-O0", "-O2"):
+        run(*command, *STRICT, level, "-c", source, "-o", tmp_path / "x.o")
+    example = tmp_path / "example" / "main.c"
+    run(*command, *STRICT, "-I", tmp_path, example, source, "-o", tmp_path / "example.exe")
+    assert len(run(tmp_path / "example.exe").splitlines()) == 10
+
+
+def test_the_header_serves_cpp(tmp_path):
+    """Alone, and ahead of every other header."""
+    generated("q31", tmp_path)
+    (tmp_path / "use.cpp").write_text('#include "finger_q31.h"\nfinger_q31_state s;\nvoid f() { finger_q31_init(&s); }\n')
+    run(*compiler("g++"), "-std=c++11", "-pedantic", "-Wall", "-Wextra", "-Werror", "-c", tmp_path / "use.cpp",
+        "-o", tmp_path / "x.o")
+    assert "finger_q31_init" in run("nm", tmp_path / "x.o").split()
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_the_same_input_gives_the_same_bytes(arithmetic, tmp_path):
+    """Twice here, and in a process with another seed for its hashes, from another place."""
+    first, second = generated(arithmetic, tmp_path / "one"), generated(arithmetic, tmp_path / "two" / "deep")
+    assert first == second
+    argv = ["generate", str(CONTROLLER), "--out", "three", "--arithmetic", arithmetic, "--name", f"finger_{arithmetic}"]
+    environment = {**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo"}
+    subprocess.run([sys.executable, "-m", "focgen", *argv], cwd=tmp_path, env=environment, check=True, capture_output=True)
+    assert {name: (tmp_path / "three" / name).read_bytes() for name in first} == first
+
+
+def test_nothing_in_the_text_tells_when_or_where(tmp_path):
+    for name, content in generated("q15", tmp_path).items():
+        assert str(tmp_path).encode() not in content and str(GOLDEN).encode() not in content, name
+        assert b"202" not in content.replace(b"Copyright (c) 2026", b"") or name.endswith((".c", ".json", ".md")), name
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_c_is_plain_ascii_in_lines_of_bearable_length(arithmetic, tmp_path):
+    for name, content in generated(arithmetic, tmp_path).items():
+        if name.endswith((".c", ".h")):
+            lines = content.decode("ascii").splitlines()
+            assert max(map(len, lines)) <= 120, max(lines, key=len)
+            assert all(line == line.rstrip() for line in lines), name
+            assert "\n\n\n" not in content.decode() and "\t" not in content.decode()
