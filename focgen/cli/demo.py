@@ -1,0 +1,46 @@
+"""``focgen demo``: the whole chain on the example logs."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from focgen.cli.outcome import Outcome
+from focgen.demo import Demo, demo
+from focgen.report.demo_page import demo_lead, firmware_table
+from focgen.report.page import text_table
+
+HELP = "all of it on the example logs: model, controller, C in four arithmetics, verified, with a report"
+EXAMPLE = """example:
+  focgen demo --out build/demo
+
+  takes less than a minute and ends with build/demo/report.html."""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("--out", required=True, metavar="DIR", help="the folder to write")
+
+
+def run(args: Namespace) -> Outcome:
+    made = demo(args.out)
+    return Outcome(_payload(made), _text(made), made.holds)
+
+
+def _payload(made: Demo) -> dict:
+    found, designed = made.identification, made.design
+    return {
+        "paths": {"folder": made.folder, "report": made.report, "rig": made.folder / "identified.toml",
+                  "controller": made.folder / "controller.toml",
+                  "firmware": {a: made.folder / "firmware" / a for a in made.generated}},
+        "identify": {"T": found.pooled.T, "alpha": found.pooled.alpha, "gain": found.pooled.gain,
+                     "gof": {model: values["mean"] for model, values in found.gof.items()}},
+        "design": {"settling_s": designed.settling_s, "overshoot_pct": designed.overshoot_pct, "holds": designed.holds},
+        "simulate": {"settling_s": [s.settling_s for s in made.simulation.setpoints], "holds": made.simulation.holds},
+        "verify": {a: v.targets for a, v in made.verified.items()},
+        "holds": made.holds,
+    }
+
+
+def _text(made: Demo) -> str:
+    lead = demo_lead(made.identification, made.design, made.verified)
+    return (f"\n{lead}\n\n{text_table(firmware_table(made.generated, made.verified))}\n\nlook at  {made.report}\n"
+            f"         {made.folder / 'pictures'}\nread     {made.folder / 'firmware' / 'q31'}")

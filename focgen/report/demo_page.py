@@ -1,0 +1,75 @@
+"""The report of the demo: one section a step of the chain."""
+
+from __future__ import annotations
+
+from focgen.codegen.generate import Generated
+from focgen.identification.model import Identification
+from focgen.loop.design import Design
+from focgen.loop.simulate import Simulation
+from focgen.report.control_summary import margins_table, points_table, setpoints_table
+from focgen.report.identification_summary import gain_text, parameter_table, quality_table
+from focgen.report.page import Page, Picture, Section, TableOf
+from focgen.verification.verify import Verification
+
+
+def demo_page(identification: Identification, design: Design, simulation: Simulation,
+              generated: dict[str, Generated], verified: dict[str, Verification]) -> Page:
+    """The page; its pictures are in ``pictures/``, the C in ``firmware/``, beside it."""
+    sections = (_model(identification), _controller(design), _loop(simulation), _firmware(generated, verified))
+    return Page("From step tests to a verified fractional-order controller",
+                demo_lead(identification, design, verified), sections)
+
+
+def demo_lead(identification: Identification, design: Design, verified: dict[str, Verification]) -> str:
+    """The whole result in a few sentences."""
+    gof, pooled = identification.gof, identification.pooled
+    samples = sum(v.targets["host"].samples for v in verified.values())
+    wrong = sum(v.targets["host"].mismatches for v in verified.values())
+    return (
+        f"A fractional model with T = {pooled.T:.3g} and α = {pooled.alpha:.3g} fits six step tests with a mean GOF of "
+        f"{gof['fom']['mean']:.3f} (one pole: {gof['iom_1p']['mean']:.3f}; three poles and two zeros: "
+        f"{gof['iom_3p2z']['mean']:.3f}). Inverted, it gives a controller that settles in {design.settling_s:.2f} s on "
+        f"average with at most {design.overshoot_pct:.1f} % overshoot. Its C, in four arithmetics, equals the Python "
+        f"reference in {samples - wrong} of {samples} samples."
+    )
+
+
+def _model(found: Identification) -> Section:
+    pictures = [Picture("pictures/fits.png", "Six steps and releases, and the fractional model of each (as Fig. 5)"),
+                Picture("pictures/gof.png", "Goodness of fit of the fractional and the integer-order models (Table I)"),
+                Picture("pictures/models.png", "One step, four models, and what each leaves (as Fig. 6)"),
+                Picture("pictures/parameters.png", "The parameters over the level, with 95 % intervals (as Fig. 7)"),
+                Picture("pictures/loops.png", "Sines that the model was not fitted to: where it fails (as Fig. 8)")]
+    return Section("Model", (gain_text(found), *found.warnings), (quality_table(found), parameter_table(found)),
+                   tuple(pictures), ("identified.toml", "rig.toml", "logs/steps.csv", "logs/sines.csv"))
+
+
+def _controller(design: Design) -> Section:
+    pictures = (Picture("pictures/schedule.png", "The gain schedule, and the formula it stands for"),
+                Picture("pictures/margins.png", "The open loop, ideal and as it will run"))
+    return Section("Controller", design.notes, (points_table(design), margins_table(design)), pictures, ("controller.toml",))
+
+
+def _loop(simulation: Simulation) -> Section:
+    caption = "Output and command at seven set points, from rest, bit for bit as the C will run (as Fig. 10)"
+    return Section("Closed loop", simulation.notes, (setpoints_table(simulation),), (Picture("pictures/setpoints.png", caption),))
+
+
+def _firmware(generated: dict[str, Generated], verified: dict[str, Verification]) -> Section:
+    table = firmware_table(generated, verified)
+    files = tuple(f"firmware/{a}/{made.plan.name}.c" for a, made in generated.items())
+    return Section("C", ("Every sample of the C is compared with a reference that shares no code with it: output, "
+                         "increment and flags, in every bit. The error is against the same controller in float64.",),
+                   (table,), (), files)
+
+
+def firmware_table(generated: dict[str, Generated], verified: dict[str, Verification]) -> TableOf:
+    """Size, equality and error bound of each arithmetic."""
+    rows = []
+    for arithmetic, made in generated.items():
+        result, sizes = verified[arithmetic].targets["host"], made.manifest["sizes"]
+        rows.append((arithmetic, f"{sizes['state_bytes']} B", f"{sizes['table_bytes']} B",
+                     f"{result.samples - result.mismatches} of {result.samples}", f"{result.max_error.operator:.2g}",
+                     f"{result.error_bound['operator']:.2g}", "yes" if verified[arithmetic].holds else "NO"))
+    heads = ("arithmetic", "state", "tables", "samples equal", "largest error", "proven bound", "verified")
+    return TableOf(heads, tuple(rows), "The C, ahead of the integrator, in output units per second")
