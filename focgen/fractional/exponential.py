@@ -24,7 +24,7 @@ from focgen.fractional.exponential_fit import Alternation, best_weights, eased, 
 
 HORIZONS = (100, 10**8)  # samples
 TOLERANCES = (1e-8, 0.1)
-_CLOSEST_TO_INTEGER = 1e-6
+_CLOSEST_TO_INTEGER = 1e-7
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,8 @@ def fit_exponential(order: float, horizon: int, tolerance: float) -> Exponential
     """Find the memory with the fewest exponentials for D^``order`` within ``tolerance`` up to ``horizon``.
 
     ``order`` in (−1, 2), not whole; ``horizon`` 100 … 1e8 samples; ``tolerance`` 1e-8 … 0.1, the largest
-    |h_j/g_j − 1|. That fewer cannot do it is certain, to within 1 % of the tolerance. What they leave of the
-    tolerance goes to the last lags, which weigh least in the output, so the others come out better.
+    |h_j/g_j − 1|. That fewer cannot do it is certain, to within 1 % of the tolerance. What is left of it
+    goes to the last lags, which weigh least in the output, so the others come out better.
     Raises ValueError outside these ranges, or where float64 poles are too coarse for the tolerance.
     """
     differences = _differences(order, horizon)
@@ -140,13 +140,16 @@ def fit_states(order: float, horizon: int, states: int) -> ExponentialMemory:
 
 
 def theoretical_states(horizon: int, tolerance: float) -> float:
-    """Return ln(1/ε) ln(8R) / π², how the number of exponentials grows (Braess and Hackbusch 2005)."""
+    """Return ln(1/ε) ln(8R) / π², how the number of exponentials grows (Braess and Hackbusch 2005).
+
+    Their bound for 1/x has 16/ε in place of 1/ε; orders close below a whole one come near it.
+    """
     return math.log(1.0 / tolerance) * math.log(8.0 * horizon) / math.pi**2
 
 
 def _differences(order: float, horizon: int) -> int:
     if not (-1.0 < order < 2.0 and abs(order - round(order)) >= _CLOSEST_TO_INTEGER):
-        raise ValueError(f"the order {order} is whole or not between -1 and 2")
+        raise ValueError(f"the order {order} is not between -1 and 2, or within 1e-7 of a whole one")
     if not HORIZONS[0] <= horizon <= HORIZONS[1]:
         raise ValueError(f"the horizon {horizon} is not between {HORIZONS[0]} and {HORIZONS[1]} samples")
     return math.ceil(order)
