@@ -15,7 +15,7 @@ from focgen.codegen.render import render
 from focgen.codegen.source import source_context
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.control.files import controller_text, read_controller
-from focgen.errors import InputError, PlanError
+from focgen.errors import InputError
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.model import Plan
@@ -57,8 +57,8 @@ def generate(
     """
     _refuse_what_is_missing(memory, target, package, tolerance, horizon)
     text, made, where = _source(controller)
-    _check(arithmetic, memory, length)
-    plan = build_plan(made, arithmetic, length, check_name(name or made.name, where))
+    _check(arithmetic, memory, made.length if length is None else length)
+    plan = build_plan(made, arithmetic, length, check_name(made.name if name is None else name, where))
     files = folder_files(plan, text)
     write_files(out, files)
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
@@ -67,11 +67,8 @@ def generate(
 def folder_files(plan: Plan, controller_toml: bytes) -> dict[str, str | bytes]:
     """Name and content of every file of a generated folder; the same plan gives the same bytes.
 
-    Raises PlanError where the memory is too long for C's ring.
+    Raises PlanError for what C cannot express.
     """
-    if plan.length > _LONGEST:
-        what = f"a memory length of {plan.length} is more than the ring in C can count"
-        raise PlanError(plan.name, what, f"give at most {_LONGEST}")
     title, digest = plan.controller.name, sha256(controller_toml)
     runtime = (shipped("c_runtime") / "foc_rt.h").read_text(encoding="utf-8")
     manifest = manifest_of(plan, {"controller.toml": digest, "foc_rt.h": sha256(runtime)})
@@ -94,13 +91,15 @@ def _source(controller: Controller | str | Path) -> tuple[bytes, Controller, str
     return Path(controller).read_bytes(), made, str(controller)
 
 
-def _check(arithmetic: str | None, memory: str | None, length: int | None) -> None:
+def _check(arithmetic: str | None, memory: str | None, length: int) -> None:
     if arithmetic is not None and arithmetic not in ARITHMETICS:
         raise InputError("--arithmetic", f"is {arithmetic!r}", f"choose one of {', '.join(ARITHMETICS)}")
     if memory is not None and memory not in MEMORIES:
         raise InputError("--memory", f"is {memory!r}", f"choose one of {', '.join(MEMORIES)}")
-    if length is not None and (not isinstance(length, int) or isinstance(length, bool) or length < 1):
+    if not isinstance(length, int) or isinstance(length, bool) or length < 1:
         raise InputError("--length", f"is {length!r}", "give a memory length of at least 1 sample")
+    if length > _LONGEST:
+        raise InputError("--length", f"is {length}, more than the ring in C can count", f"give at most {_LONGEST}")
 
 
 def _refuse_what_is_missing(memory, target, package, tolerance, horizon) -> None:

@@ -58,8 +58,8 @@ def comment(text: str) -> str:
     """Text that is safe within a C comment: ASCII, one line, no trigraph and no end of the comment in it."""
     for found, instead in _REPLACED.items():
         text = text.replace(found, instead)
-    plain = text.encode("ascii", "replace").decode().replace("\\", "/")
-    return " ".join(plain.replace("*/", "* /").replace("/*", "/ *").replace("??", "?").split())
+    plain = re.sub(r"[^ -~]", "?", " ".join(text.split())).replace("\\", "/")
+    return " ".join(re.sub(r"\?+", "?", plain).replace("*/", "* /").replace("/*", "/ *").split())
 
 
 def quantity(value: float, unit: str = "") -> str:
