@@ -10,8 +10,10 @@ import numpy as np
 from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.explain import Explanation, explain
 from focgen.diagnosis.model import Diagnosis
+from focgen.diagnosis.running import running
 from focgen.diagnosis.segments import cuts, make
 from focgen.diagnosis.smooth import freed
+from focgen.control.files import read_controller
 from focgen.errors import LogError
 from focgen.logs.experiment import Experiment
 from focgen.progress import say
@@ -34,9 +36,9 @@ def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out
     """
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
     logs = _usable(experiments(rig, logs, first, last))
+    ran = running(read_controller(controller), logs) if controller is not None else None
     explanations = explain_all(rig, logs, THRESHOLD)
-    rigs = compose.compose(rig, explanations)
-    diagnosis, evidence = verdict.reach(rig, logs, rigs, explanations)
+    rigs, diagnosis, evidence = verdict.reach(rig, logs, compose.compose(rig, explanations), explanations, ran)
     if out is not None:
         from focgen.diagnosis.write import write
 
@@ -66,5 +68,6 @@ def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float) -> tuple
         say(f"{entry} to {exit}")
         found.append(explain(rig, segment, logs, threshold))
         best = found[-1].best
-        x = freed(segment, best.problem.simulate(best.vector), best.problem.references.clocks["response"])
+        response = best.problem.references.clocks["response"]
+        x = freed(segment, best.problem.simulate(best.vector), response, found[-1].left.share)
     return tuple(found)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.diagnosis.fit import Fit, Weighing, fit
-from focgen.diagnosis.leftover import Leftover, leftover
+from focgen.diagnosis.leftover import Leftover, foretold, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.scales import references
@@ -17,10 +17,13 @@ from focgen.diagnosis.segments import Segment, is_single, owner
 from focgen.diagnosis.separation import separation
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
-from focgen.rig.engine import fits_in
+from focgen.rig.engine import fits_in, slot_in
 from focgen.rig.model import Rig
 
 _DEPTH = 4
+_MENDING = 0.6  # of the best further family's evidence: a form of a family found already then goes first
+_WHOLE = 0.5  # of what inputs foretell of a residual: a further family has to explain as much
+_TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 _VISIBLE = (0.03, 0.05)  # of the remaining mean square, the first effect and any further: below, one is of no use
 
 
@@ -86,13 +89,13 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     problem, clues = _held(rig, segment, logs), clues_for(segment, rig)
     segment, given = problem.segment, problem.nominal()
     rankings: list[Ranking] = []
-    base, vector = problem, given
+    base, vector = _seen(problem, given, clues)
     while len(rankings) < _DEPTH:
-        ranking = rank(base, vector, [c for c in clues if c not in base.clues])
+        ranking = rank(base, vector, _worth_trying(base, vector, [c for c in clues if c not in base.clues]))
         rankings.append(ranking)
-        if not _worth(ranking, threshold, _VISIBLE[len(rankings) > 1]):
+        best = _chosen(ranking, {c.effect for c in base.clues}, threshold, len(rankings) > 1)
+        if best is None:
             break
-        best = ranking.best[ranking.winner]
         base, vector = best.problem, best.vector
     last = rankings[-1]
     best, ar = last.base, last.ar
@@ -101,8 +104,20 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     causes = _causes(best, nominal, rankings, clues, Weighing(ar))
     response = problem.references.clocks["response"]
     return Explanation(segment, given, nominal, best, ar, causes,
-                       leftover(segment, problem_residual(best), response),
-                       leftover(segment, problem_residual(nominal), response))
+                       leftover(segment, weighed(best), response),
+                       leftover(segment, weighed(nominal), response))
+
+
+def _seen(problem: Problem, given: np.ndarray, clues: Sequence[Clue]) -> tuple[Problem, np.ndarray]:
+    """The problem with what can be read off the output itself, as a rounding, and a vector to start from."""
+    base, vector = problem, given
+    for clue in clues:
+        values = clue.form.seen(problem.segment.y) if clue.form.seen else None
+        if values is not None:
+            slot = slot_in(clue.form, clue.stage)
+            scaled = [v / problem.references.scale(p, slot) for p, v in zip(clue.form.parameters, values)]
+            base, vector = base.with_clues([*base.clues, clue]), np.r_[vector, scaled]
+    return base, vector
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
@@ -117,12 +132,39 @@ def problem_residual(of: Fit) -> np.ndarray:
     return of.problem.residual(of.vector)
 
 
-def _worth(ranking: Ranking, threshold: float, visible: float) -> bool:
-    """Whether the winner is beyond chance and of use."""
+def weighed(of: Fit) -> np.ndarray:
+    """The residual (n,) by trust, as a share of the output's level."""
+    return of.problem.weighed(of.vector)
+
+
+def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
+    """All clues where inputs foretell something of the residual, else those that it could not show."""
+    ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
+    share = foretold(base.segment, weighed(ground), base.references.clocks["response"])
+    return clues if share > _TELLING else [c for c in clues if library()[c.effect].noiselike]
+
+
+def _chosen(ranking: Ranking, already: set[str], threshold: float, further: bool) -> Fit | None:
+    """The winner where it is beyond chance and of use. Another form of what was found already goes before a further
+    family, unless that explains clearly more: no form is quite what the rig does, and others mend what it lacks."""
     if ranking.winner is None or ranking.gain[ranking.winner] < threshold:
+        return None
+    winner = ranking.best[ranking.winner]
+    known = [ranking.best[name] for name in already if name in ranking.best]
+    again = max(known, key=lambda f: evidence(f, ranking.base), default=None)
+    if again is not None and evidence(again, ranking.base) > _MENDING * ranking.gain[ranking.winner]:
+        return again if _mends(ranking.base, again, _VISIBLE[1], 0.0) else None
+    return winner if _mends(ranking.base, winner, _VISIBLE[further], _WHOLE * further) else None
+
+
+def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:
+    """Whether the residual falls visibly, and by the part ``whole`` of what inputs foretell of it."""
+    before, after = (weighed(f) for f in (base, better))
+    old, new = np.mean(before**2), np.mean(after**2)
+    if old - new < visible * new:
         return False
-    before, after = (np.mean(problem_residual(f) ** 2) for f in (ranking.base, ranking.best[ranking.winner]))
-    return before - after > visible * after
+    response = base.problem.references.clocks["response"]
+    return not whole or old - new > whole * old * foretold(base.problem.segment, before, response)
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
@@ -156,16 +198,16 @@ def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tup
     for name in dict.fromkeys(c.effect for c in best.problem.clues):
         own = [c for c in best.problem.clues if c.effect == name]
         without = _without(best, own, weighing)
-        only = len(own) == len(best.problem.clues)
-        ranking = rankings[0] if only else rank(without.problem, without.vector, [c for c in clues if c.effect != name])
+        first = rankings[0].base.problem.clues == without.problem.clues
+        ranking = rankings[0] if first else rank(without.problem, without.vector, [c for c in clues if c.effect != name and c.form.seen is None])
         rivals = [Rival(name, own[0].stage, 0.0, evidence(best, without), best)]
         for other, candidate in ranking.best.items():
             if other != name and other not in {c.effect for c in without.problem.clues}:
                 again = fit(candidate.problem, candidate.vector, weighing, 6)
                 rivals.append(Rival(other, again.problem.clues[-1].stage, separation(best, again),
                                     evidence(again, without), again))
-        before, after = (np.mean(problem_residual(f) ** 2) for f in (nominal, best))
-        lost = np.mean(problem_residual(without) ** 2) - after
+        before, after = (np.mean(weighed(f) ** 2) for f in (nominal, best))
+        lost = np.mean(weighed(without) ** 2) - after
         share = float(np.clip(lost / max(before - after, 1e-300), 0, 1))
         rivals.sort(key=lambda r: r.separation)
         found.append(Cause(tuple(rivals), evidence(best, without), share))

@@ -29,9 +29,8 @@ class Fit:
         return len(self.vector) - self.problem.head
 
     def residual(self) -> list[np.ndarray]:
-        """Measured less simulated, by experiment, as a share of the output's level."""
-        segment = self.problem.segment
-        return segment.parts(self.problem.residual(self.vector) / segment.level_out)
+        """Measured less simulated, by experiment, as a share of the output's level, each sample by its trust."""
+        return self.problem.segment.parts(self.problem.weighed(self.vector))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +53,7 @@ def means(part: np.ndarray, coarse: int) -> np.ndarray:
 
 def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing) -> np.ndarray:
     """The weighed residual, as a share of the output's level."""
-    segment = problem.segment
-    found = weighing(segment.parts(problem.residual(vector) / segment.level_out))
+    found = weighing(problem.segment.parts(problem.weighed(vector)))
     return np.where(np.isfinite(found), np.clip(found, -1e3, 1e3), 1e3)
 
 

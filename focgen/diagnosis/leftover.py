@@ -41,17 +41,33 @@ def _groups(segment: Segment, response: float) -> dict[str, np.ndarray]:
     edges = [np.maximum(rate, 0.0), np.minimum(rate, 0.0), np.abs(rate) * rate, rate * slow]
     return {
         "level": np.stack([slow, slow**2, quick, *knots, *quick_knots], axis=1),
-        "rate": np.stack([x - a for a in lags] + edges, axis=1),
+        "rate": np.stack([x - a for a in lags] + edges + _jumps(x, run.rest), axis=1),
         "direction": np.stack([direction, direction * slow, *play], axis=1),
         "history": np.stack([lags[3], lags[4], most, most * slow, lags[4] * slow], axis=1),
         "time": np.stack([clock, clock**2, clock**3, clock * slow, clock**2 * slow], axis=1),
     }
 
 
-def leftover(segment: Segment, residual: np.ndarray, response: float) -> Leftover:
-    """What of ``residual`` (n,) the segment's input foretells; ``response`` in s."""
+def _jumps(x: np.ndarray, rest: np.ndarray) -> list[np.ndarray]:
+    """What changed in the last samples: regressors for what is faster than the rig."""
+    now = np.where(rest, 0.0, np.diff(x, prepend=0.0)) * 3
+    return [np.roll(now, k) for k in (0, 1, 2, 3)]
+
+
+def foretold(segment: Segment, residual: np.ndarray, response: float) -> float:
+    """Only the share of :func:`leftover`, from all regressors together."""
     thin = max(1, len(residual) // _POINTS)
-    groups = {k: _thinned(v, thin) for k, v in _groups(segment, response).items()}
+    trust = segment.trust[:, None]
+    columns = [_thinned(v * trust, thin) for v in _groups(segment, response).values()]
+    target = _thinned(residual[:, None], thin)[:, 0]
+    return max(0.0, _foretold(np.hstack([np.ones((len(target), 1)), *columns]), target))
+
+
+def leftover(segment: Segment, residual: np.ndarray, response: float) -> Leftover:
+    """What of ``residual`` (n,), weighed by trust, the segment's input foretells; ``response`` in s."""
+    thin = max(1, len(residual) // _POINTS)
+    trust = segment.trust[:, None]
+    groups = {k: _thinned(v * trust, thin) for k, v in _groups(segment, response).items()}
     target = _thinned(residual[:, None], thin)[:, 0]
     columns = [np.ones((len(target), 1)), *groups.values()]
     share = _foretold(np.hstack(columns), target)

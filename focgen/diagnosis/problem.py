@@ -135,3 +135,7 @@ class Problem:
     def residual(self, vector: np.ndarray) -> np.ndarray:
         """Measured less simulated (n,), in the log's units."""
         return self.segment.y - self.simulate(vector)
+
+    def weighed(self, vector: np.ndarray) -> np.ndarray:
+        """The residual (n,) as a share of the output's level, each sample by its trust."""
+        return self.residual(vector) * self.segment.trust / self.segment.level_out

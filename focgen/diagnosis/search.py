@@ -12,7 +12,9 @@ from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 
 _COARSE = 5000  # samples of the first, coarse pass
-_DEEP = 8  # how many forms are fitted to the end
+_DEEP = 5  # how many forms are fitted to the end beside the families' best
+_NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
+_FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
 _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
 
 
@@ -50,8 +52,11 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue], ar: np.ndarr
     leader = min([ground, *tried], key=lambda t: t.sse)
     rough = Weighing(fit_ar([means(p, coarse) for p in leader.residual()]), coarse)
     ground = fit(problem, ground.vector, rough, 6)
-    tried = sorted((fit(t.problem, t.vector, rough, 6) for t in tried), key=lambda t: -evidence(t, ground))
-    return finish(ground, _chosen(tried))
+    tried = sorted((fit(t.problem, t.vector, rough, 5) for t in tried), key=lambda t: -evidence(t, ground))
+    top = evidence(tried[0], ground) if tried else 0.0
+    if top < _NOTHING:
+        return finish(ground, tried[:2])
+    return finish(ground, [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR])
 
 
 def _chosen(tried: Sequence[Fit]) -> list[Fit]:

@@ -13,13 +13,15 @@ from focgen.rig.model import UNITY, Rig
 
 _ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
 _LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
+_TIMING = 0.3  # of a sample: what loggers leave open
 _ORDER = ("command", "pressure", "curvature", "output")
 
 
 @dataclass(frozen=True, eq=False)
 class Segment:
     """The stages between two logged signals: input ``x`` and output ``y`` (n,), experiments one after the other as in
-    ``run``. ``held``: the input is a staircase (a command). ``names`` of the experiments."""
+    ``run``. ``held``: the input is a staircase (a command). ``names`` of the experiments. ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off
+    makes a difference beyond the noise."""
 
     entry: str
     exit: str
@@ -29,6 +31,7 @@ class Segment:
     run: Run
     held: bool
     names: tuple[str, ...]
+    trust: np.ndarray
 
     @property
     def level_in(self) -> float:
@@ -76,7 +79,28 @@ def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None
     """The segment from ``entry`` to ``exit``, with the input as logged or as given."""
     x = joined(logs, entry) if x is None else x
     names = tuple(log.name for log in logs)
-    return Segment(entry, exit, between(entry, exit), x, joined(logs, exit), session(logs), entry == "command", names)
+    trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
+    return Segment(entry, exit, between(entry, exit), x, joined(logs, exit), session(logs), entry == "command", names,
+                   trust)
+
+
+def _unsteadiness(log: Experiment) -> float:
+    """By how much of a sample the times of the samples are uncertain."""
+    if log.raw_time is None or len(log.raw_time) < 3:
+        return _TIMING
+    steps = np.diff(log.raw_time)
+    return _TIMING + min(2.0, float(np.std(steps) / max(np.median(steps), 1e-300)))
+
+
+def _trust(y: np.ndarray, timing: float) -> np.ndarray:
+    """1/(the noise with that of timing, in units of the noise)."""
+    if len(y) < 5:
+        return np.ones(len(y))
+    noise = 1.4826 * np.median(np.abs(np.diff(y, 2))) / np.sqrt(6.0)
+    noise = max(float(noise), 2e-3 * float(np.ptp(y)), 1e-300)
+    slope = np.maximum(np.abs(np.diff(y, prepend=y[0])), np.abs(np.diff(y, append=y[-1])))
+    error = timing * np.maximum(slope - 3 * noise, 0.0) / noise
+    return 1.0 / np.sqrt(1.0 + error**2)
 
 
 def is_single(rig: Rig) -> bool:

@@ -12,9 +12,15 @@ from scipy.ndimage import gaussian_filter1d
 from focgen.diagnosis.segments import Segment
 
 
-def freed(segment: Segment, simulated: np.ndarray, response: float) -> np.ndarray:
-    """The segment's output: as simulated, plus the residual below the pace of the rig; ``response`` in s."""
-    width = max(4.0, 0.15 * response / segment.run.h)
+_WRONG = 0.05  # of the residual foretold by inputs: beyond it the simulation is not to be relied on
+
+
+def freed(segment: Segment, simulated: np.ndarray, response: float, left: float) -> np.ndarray:
+    """The segment's output: as simulated, plus the residual below the pace of the rig; ``response`` in s.
+
+    ``left``: the share of the residual that inputs foretell; where there is one, little is smoothed away.
+    """
+    width = max(4.0, 0.15 * response / segment.run.h) if left < _WRONG else 1.5
     residual = segment.parts(segment.y - simulated)
     slow = [gaussian_filter1d(part, min(width, len(part) / 6), mode="nearest") for part in residual]
     return simulated + np.concatenate(slow)

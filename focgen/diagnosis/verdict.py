@@ -8,9 +8,11 @@ import numpy as np
 
 from focgen.diagnosis import compose
 from focgen.diagnosis.confidence import confidences, tied
-from focgen.diagnosis.explain import Cause, Explanation, problem_residual
+from focgen.diagnosis.explain import Cause, Explanation, problem_residual, weighed
 from focgen.diagnosis.fit import Weighing, fit
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, Where
+from focgen.diagnosis.next_experiment import propose
+from focgen.diagnosis.running import Running
 from focgen.diagnosis.search import evidence as nats
 from focgen.diagnosis.shrink import Shrink, predict
 from focgen.diagnosis.where import locate, stage_shares
@@ -24,9 +26,9 @@ LEFT = 0.04  # of a residual's mean square foretold by inputs: beyond it somethi
 _PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
 
 
-def reach(rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs,
-          explanations: Sequence[Explanation]) -> tuple[Diagnosis, Evidence]:
-    """The diagnosis and what its pictures need."""
+def reach(rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations: Sequence[Explanation],
+          controller: Running | None = None) -> tuple[compose.Rigs, Diagnosis, Evidence]:
+    """The rigs that the verdict stands for, the diagnosis, and what its pictures need."""
     causes = [(e, c) for e in explanations for c in e.causes]
     unknown = [e for e in explanations if is_unknown(e)]
     if unknown:
@@ -39,22 +41,34 @@ def reach(rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs,
     floor = min(floor, float(np.mean(squares["explained"])))
     total = predict(squares["refitted"], squares["explained"], floor) if causes else None
     found = _ordered([_found(e, c, rigs, logs, squares, floor) for e, c in causes])
+    found += _departures(controller)
     word = _word(found, unknown, explanations)
     shares = stage_shares(found, unknown, word)
     diagnosis = Diagnosis(
         word, locate(explanations, shares, found, unknown, word), found, _gap(rig, logs, made, squares, floor),
-        total.value if total else None, total.interval if total else None, "refitted.toml", "augmented.toml", None,
+        total.value if total else None, total.interval if total else None, "refitted.toml", "augmented.toml",
+        propose(rig, logs, explanations, found),
         _description(unknown), (), tuple(note for log in logs for note in log.notes))
-    return diagnosis, Evidence(made, tuple(explanations))
+    return rigs, diagnosis, Evidence(made, tuple(explanations))
+
+
+def _departures(controller: Running | None) -> tuple[Found, ...]:
+    """The running controller's causes as entries of the diagnosis."""
+    found = []
+    for d in controller.causes if controller else ():
+        parameters = {d.parameter: Estimate(d.value, (d.value, d.value), d.unit)}
+        found.append(Found("controller", (Candidate(d.effect, 0.9, "running", parameters, 0.0),), d.share,
+                           (max(d.share - 0.1, 0.0), min(d.share + 0.1, 1.0))))
+    return tuple(found)
 
 
 def is_unknown(e: Explanation) -> bool:
     """Whether most of what inputs foretell of the nominal residual is still there after the effects."""
     if e.left.share < LEFT:
         return False
-    noise = np.mean(problem_residual(e.best) ** 2) * (1 - e.left.share)
-    could = np.mean(problem_residual(e.nominal) ** 2) - noise
-    return bool(np.mean(problem_residual(e.best) ** 2) - noise > UNEXPLAINED * could)
+    before, after = (float(np.mean(weighed(f) ** 2)) for f in (e.nominal, e.best))
+    noise = after * (1 - e.left.share)
+    return bool(after - noise > UNEXPLAINED * (before - noise))
 
 
 def _without(rigs: compose.Rigs, causes, unknown) -> compose.Rigs:
@@ -84,7 +98,7 @@ def _moved(e: Explanation) -> bool:
         return False
     weighing = Weighing(e.ar)
     given = fit(e.nominal.problem, e.given, weighing, 0)
-    visible = np.mean(problem_residual(given) ** 2) > 1.01 * np.mean(problem_residual(e.nominal) ** 2)
+    visible = np.mean(weighed(given) ** 2) > 1.01 * np.mean(weighed(e.nominal) ** 2)
     return bool(visible and nats(e.nominal, given) - 0.5 * own * np.log(len(given.innovations)) > _PARAMETERS)
 
 

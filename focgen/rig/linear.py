@@ -9,7 +9,7 @@ from scipy.signal import cont2discrete
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import kernels
-from focgen.rig.modes import respond
+from focgen.rig.modes import hold, respond
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
 
@@ -30,6 +30,17 @@ def run(transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: float, d
         return gain * respond(x, rest, h, T, alpha, duration)
     tables = _fractional(transfer, h, 2.0 ** np.ceil(np.log2(duration)))
     return kernels.modes(x, rest, *tables, switching=False)
+
+
+def oscillator(x: np.ndarray, rest: np.ndarray, h: float, period: float, damping: float) -> np.ndarray:
+    """The response of w²/(s² + 2 d w s + w²), w = 2π/``period`` (s), ``damping`` d < 1, input linear between samples."""
+    w = 2.0 * np.pi / period
+    pole = w * complex(-damping, np.sqrt(1.0 - damping**2))
+    scale = -2.0 * (w * w / (2j * pole.imag)) / pole
+    a, b0, b1 = hold(np.array([pole * h]))
+    pair = np.array([[c.real, c.imag] for c in map(complex, (a[0], scale * b0[0], scale * b1[0]))]).ravel()
+    none = np.zeros((2, 1))
+    return kernels.modes(x, rest, none, none, none, np.stack([pair, pair]), 0.0, switching=False)
 
 
 def single_lag(transfer: TransferFunction) -> tuple[float, float, float] | None:

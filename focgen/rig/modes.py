@@ -72,15 +72,15 @@ def tables(T: float, alpha: float, h: float, duration: float, unloading: float):
 
 
 def _tables(modes: Modes, h: float, speed: float):
-    a, b0, b1 = _hold(-modes.rates * speed * h)
+    a, b0, b1 = hold(-modes.rates * speed * h)
     gain = modes.weights / modes.rates
-    pa, p0, p1 = _hold(np.array([modes.pole * speed * h]))
+    pa, p0, p1 = hold(np.array([modes.pole * speed * h]))
     scale = -modes.residue / modes.pole
     pair = [pa[0], scale * p0[0], scale * p1[0]]
     return a, gain * b0, gain * b1, np.array([[c.real, c.imag] for c in map(complex, pair)]).ravel()
 
 
-def _hold(q):
+def hold(q):
     """Coefficients of z' = λ(z − x), λh = q, for x linear over the sample: a, of the past and of the present x."""
     a = np.exp(q)
     mean = np.where(np.abs(q) < 1e-4, 1 + q / 2 + q * q / 6, (a - 1) / np.where(q == 0, 1, q))

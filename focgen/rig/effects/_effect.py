@@ -80,6 +80,7 @@ class Form:
     """One formula: ``act(x, values, run)`` maps what passes its ``slot``, shape (n,), to what leaves it.
 
     In the slot ``dynamics`` it returns the factor by which all rates are multiplied when unloading.
+    ``seen(y)`` reads the values off what was measured, (n,), where that can be done at sight; None where it is not there.
     ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of a later session.
     """
 
@@ -87,6 +88,7 @@ class Form:
     slot: str
     parameters: tuple[Parameter, ...]
     act: Act
+    seen: Callable[[np.ndarray], tuple[float, ...] | None] | None = None
     leaves: Callable[[np.ndarray, tuple[float, ...], Run], dict[str, float]] | None = None
 
 
@@ -121,7 +123,7 @@ class Effect:
     """A family. ``stage`` is the usual one, ``also`` others it may sit in. ``single``: nature has one form only.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
-    ``penalty`` in nats is what the family pays for being able to imitate others.
+    ``noiselike``: what it does cannot be foretold from the input, as rounding.
     """
 
     name: str
@@ -133,4 +135,4 @@ class Effect:
     forms: Sequence[Form]
     also: tuple[str, ...] = ()
     single: bool = False
-    controller: bool = False
+    noiselike: bool = False

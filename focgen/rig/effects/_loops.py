@@ -3,7 +3,7 @@
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Form, Parameter
 
-_SHARE = Parameter("share", lower=-0.5, upper=0.9, starts=(0.2, 0.2), zero=0.0)
+_SHARE = Parameter("share", lower=0.0, upper=0.9, starts=(0.2, 0.2), zero=0.0)
 _WIDTH = Parameter("width", level=1, lower=2e-3, upper=1.0, starts=(0.05, 0.2), log=True)
 
 
@@ -33,7 +33,7 @@ def forms(slot):
         Form("prandtl_ishlinskii", slot, (_SHARE, _WIDTH), _prandtl_ishlinskii),
         Form("play", slot, (Parameter("width", level=1, lower=0.0, upper=0.6, starts=(0.02, 0.1), zero=0.0),), _play),
         Form("bouc_wen", slot, (
-            Parameter("size", level=1, lower=-20.0, upper=1.0, starts=(0.05, 0.05), zero=0.0), _WIDTH,
+            Parameter("size", level=1, lower=-1.0, upper=1.0, starts=(0.05, 0.05), zero=0.0), _WIDTH,
         ), _bouc_wen),
         Form("two_plays", slot, (
             Parameter("narrow", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0),

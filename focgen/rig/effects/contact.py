@@ -17,6 +17,12 @@ def _gradual(x, values, run):
     return np.minimum(x, place) + np.log1p(beyond) / stiffness
 
 
+def _soft(x, values, run):
+    place, slope, width = values
+    beyond = width * (np.logaddexp(0.0, (x - place) / width) - np.logaddexp(0.0, -place / width))
+    return x - (1.0 - slope) * beyond
+
+
 def _hertz(x, values, run):
     place, stiffness = values
     beyond = np.maximum(x - place, 0.0)
@@ -34,6 +40,13 @@ EFFECT = Effect(
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
     forms=[
         Form("knee", "response", (
+            _PLACE, Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
+        ), _knee),
+        Form("soft_knee", "response", (
+            _PLACE, Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
+            Parameter("width", level=1, lower=3e-3, upper=0.2, starts=(0.02, 0.05), log=True),
+        ), _soft),
+        Form("early_knee", "drive", (
             _PLACE, Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
         ), _knee),
         Form("gradual", "response", (_PLACE, _STIFFNESS), _gradual),

@@ -4,7 +4,7 @@ import numpy as np
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
-_SHARE = Parameter("share", lower=-0.5, upper=3.0, starts=(0.1, 0.1), zero=0.0)
+_SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
 
 def _tau(*starts):
@@ -38,8 +38,8 @@ EFFECT = Effect(
         Form("pole", "response", (_SHARE, _tau(0.1, 0.5)), _pole),
         Form("logarithmic", "response", (_SHARE, _tau(0.2, 1.0)), _logarithmic),
         Form("two_poles", "response", (
-            Parameter("quick", lower=-0.5, upper=3.0, starts=(0.05, 0.05), zero=0.0),
-            Parameter("slow", lower=-0.5, upper=3.0, starts=(0.05, 0.05), zero=0.0), _tau(0.2, 0.5),
+            Parameter("quick", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0),
+            Parameter("slow", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0), _tau(0.2, 0.5),
         ), _two),
     ],
 )

@@ -1,15 +1,11 @@
 """A lightly damped mode of the actuator: it rings after fast changes."""
 
-import numpy as np
-
-from focgen.fractional.transfer import TransferFunction
 from focgen.rig.effects._effect import Effect, Form, Parameter
-from focgen.rig.linear import run as respond
+from focgen.rig.linear import oscillator
 
 
 def _mode(x, period, damping, run):
-    w = 2.0 * np.pi / period
-    return respond(TransferFunction([(w * w, 0)], [(1, 2), (2 * damping * w, 1), (w * w, 0)]), x, run.rest, run.h, run.duration)
+    return oscillator(x, run.rest, run.h, period, damping)
 
 
 def _series(x, values, run):

@@ -3,10 +3,29 @@
 import numpy as np
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
+_COARSE = 0.006  # of the range: finer steps are the resolution of any converter
+
 
 def _round(x, values, run):
-    step = values[0]
-    return step * np.round(x / step) if step > 0 else x
+    step, phase = values
+    return step * np.round((x - phase) / step) + phase if step > 0 else x
+
+
+def _seen(y):
+    """Step and phase where most samples lie on a few evenly spaced levels."""
+    span = float(np.ptp(y))
+    values, counts = np.unique(np.round((y - y.min()) / max(span, 1e-300) * 20_000), return_counts=True)
+    common = values[counts > 0.002 * len(y)] / 20_000 * span + y.min()
+    covered = counts[counts > 0.002 * len(y)].sum() / len(y)
+    if len(common) < 3 or covered < 0.6:
+        return None
+    gaps = np.diff(common)
+    gaps = gaps[gaps > 0.25 * np.median(gaps)]
+    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    if step < _COARSE * span or np.mean(np.abs(gaps / step - np.round(gaps / step)) < 0.1) < 0.9:
+        return None
+    turns = np.angle(np.mean(np.exp(2j * np.pi * common / step))) / (2 * np.pi)
+    return step, float(turns * step)
 
 
 EFFECT = Effect(
@@ -17,7 +36,9 @@ EFFECT = Effect(
     confused_with=("valve_stiction",),
     needs=lambda e: None,
     single=True,
+    noiselike=True,
     forms=[Form("rounding", "reading", (
-        Parameter("step", level=1, lower=0.0, upper=0.5, starts=tuple(np.geomspace(0.008, 0.3, 12)), zero=0.0),
-    ), _round)],
+        Parameter("step", level=1, lower=0.0, upper=0.9, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0),
+        Parameter("phase", level=1, lower=-0.5, upper=0.5, starts=(0.0,)),
+    ), _round, seen=_seen)],
 )

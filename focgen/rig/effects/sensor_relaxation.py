@@ -3,7 +3,7 @@
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
-_SHARE = Parameter("share", lower=-0.9, upper=3.0, starts=(0.1, 0.1, 0.1), zero=0.0)
+_SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1, 0.1), zero=0.0)
 _TIME = Parameter("time", time=1, lower=0.02, upper=100.0, starts=(0.3, 2.0, 10.0), log=True)
 
 

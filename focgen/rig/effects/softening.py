@@ -3,7 +3,7 @@
 import numpy as np
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
-_GROWTH = Parameter("growth", lower=-0.5, upper=3.0, starts=(0.1, 0.1), zero=0.0)
+_GROWTH = Parameter("growth", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
 
 def _scale(*starts):
@@ -51,8 +51,8 @@ EFFECT = Effect(
     needs=lambda e: None if e.repeats else "no level is repeated after a higher one",
     forms=[
         Form("largest", "drive", (_GROWTH, Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))),
-             _largest, _leaves_peak),
-        Form("saturating", "drive", (_GROWTH, _scale(0.3, 1.0)), _saturating, _leaves_peak),
-        Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, _leaves_work),
+             _largest, leaves=_leaves_peak),
+        Form("saturating", "drive", (_GROWTH, _scale(0.3, 1.0)), _saturating, leaves=_leaves_peak),
+        Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
     ],
 )

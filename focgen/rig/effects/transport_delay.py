@@ -1,18 +1,11 @@
 """The response starts later by a fixed time: tubing, a bus, a slow converter."""
 
-import numpy as np
-
+from focgen.rig.effects._delay import delayed
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 
 def _shift(x, values, run):
-    back = values[0] / run.h
-    whole, part = int(back), back % 1.0
-    nearer, further = np.zeros_like(x), np.zeros_like(x)
-    for first, last in run.spans:
-        nearer[first + whole:last] = x[first:max(last - whole, first)]
-        further[first + whole + 1:last] = x[first:max(last - whole - 1, first)]
-    return (1.0 - part) * nearer + part * further
+    return delayed(x, values[0], run)
 
 
 EFFECT = Effect(
