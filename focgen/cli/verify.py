@@ -45,6 +45,7 @@ def _result(result: TargetResult) -> str:
     lines = [f"{result.samples - result.mismatches} of {result.samples} samples equal in every bit"]
     if result.first:
         lines.append(f"first difference: {result.first}")
+    lines += result.header
     lines.append(f"largest error {error.operator:.3g} ahead of the integrator, bound {bound['operator']:.3g}"
                  f"{'' if result.within else ': EXCEEDED'}; {error.output:.3g} at the output, which may grow by "
                  f"{bound['output_per_sample']:.3g} a sample")

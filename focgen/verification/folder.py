@@ -36,8 +36,10 @@ def read_folder(path: str | Path) -> GeneratedFolder:
         controller = read_controller(path / "controller.toml")
         plan = build_plan(controller, manifest["arithmetic"], manifest["length"], manifest["name"])
         claimed = _claimed(manifest["error_bound"])
-    except (KeyError, TypeError) as reason:
+    except KeyError as reason:
         raise InputError(str(path / "manifest.json"), f"lacks {reason}", _AGAIN) from None
+    except (TypeError, ValueError) as reason:
+        raise InputError(str(path / "manifest.json"), f"is not as it was written ({reason})", _AGAIN) from None
     for name in (f"{plan.name}.h", f"{plan.name}.c", "foc_rt.h"):
         if not (path / name).is_file():
             raise InputError(str(path), f"lacks {name}", _AGAIN)

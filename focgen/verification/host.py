@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from cffi import FFI
 
+from focgen.codegen.manifest import lsbs
 from focgen.codegen.render import render
 from focgen.compiler import compile_shared
 from focgen.plan.model import Plan
@@ -30,12 +31,19 @@ class DriverContext:
     increment: str
     scheduled: bool
     integral: bool
+    scales: tuple[str, ...]
 
 
 def driver(plan: Plan) -> str:
     """C that runs a plan's controller over arrays."""
-    integral = plan.integrator is not None
-    return render("driver.c.jinja", DriverContext(plan.name, plan.increment.ctype, plan.schedule is not None, integral))
+    scheduled, integral, scales = plan.schedule is not None, plan.integrator is not None, tuple(header_scales(plan))
+    return render("driver.c.jinja", DriverContext(plan.name, plan.increment.ctype, scheduled, integral, scales))
+
+
+def header_scales(plan: Plan) -> dict[str, float]:
+    """The values that the header's macros for LSBs and sample time must have, by name."""
+    exact = plan.arithmetic == "f64"
+    return {**lsbs(plan), "SAMPLE_TIME": plan.sample_time if exact else float(np.float32(plan.sample_time))}
 
 
 class Library:
@@ -66,6 +74,13 @@ class Library:
         u, d, flags = (np.stack(part) for part in zip(*lanes))
         return Trace(u, d if plan.integrator else u, flags)
 
+    def scales(self, plan: Plan) -> dict[str, float]:
+        """What the header's macros for LSBs and sample time are."""
+        names = list(header_scales(plan))
+        found = self._ffi.new("double[]", len(names))
+        getattr(self._library, f"{plan.name}_scales")(found)
+        return dict(zip(names, found))
+
     def _lane(self, plan: Plan, scenario: Scenario, lane: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         signal, count = _DTYPES[plan.output.ctype], scenario.samples
         sched = scenario.ref if scenario.sched is None else scenario.sched
@@ -82,7 +97,8 @@ class Library:
 
 def _declaration(plan: Plan) -> str:
     signal = plan.output.ctype
-    return (f"void {plan.name}_run(uint32_t, const {signal} *, const {signal} *, const {signal} *, const uint8_t *, "
+    return (f"void {plan.name}_scales(double *); "
+            f"void {plan.name}_run(uint32_t, const {signal} *, const {signal} *, const {signal} *, const uint8_t *, "
             f"const {signal} *, {signal} *, {plan.increment.ctype} *, uint8_t *);")
 
 

@@ -73,8 +73,8 @@ def _resets(rng, controller: Controller, count: int) -> tuple[Reset, ...]:
 
 def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:
     low, high = controller.ranges.output
-    margin = 0.1 * (high - low)  # an outer limiter may well be wider
-    places = {(lane, int(rng.integers(count))) for lane in range(0, LANES, 2) for _ in range(2)}
+    margin = 0.3 * (high - low)  # an outer limiter may well be wider
+    places = {(lane, int(rng.integers(count))) for lane in range(0, LANES, 2) for _ in range(6)}
     return tuple(Track(lane, at, float(rng.uniform(low - margin, high + margin))) for lane, at in sorted(places))
 
 
@@ -108,4 +108,20 @@ def _prolonged(values: np.ndarray, samples: int) -> np.ndarray:
 def raw_scenarios(plan: Plan, samples: int, seed: int) -> dict[str, Scenario]:
     """Everything a plan is compared in, by name; raw inputs."""
     inside, outside = mixed(plan.controller, samples, seed), mixed(plan.controller, max(samples // 8, 1), seed, True)
-    return {"mixed": to_raw(plan, inside), "beyond the ranges": to_raw(plan, outside), "worst cases": worst_cases(plan)}
+    found = {"mixed": to_raw(plan, inside), "beyond the ranges": to_raw(plan, outside), "worst cases": worst_cases(plan)}
+    return {**found, "breakpoints": at_breakpoints(plan)} if plan.schedule else found
+
+
+def at_breakpoints(plan: Plan) -> Scenario:
+    """Raw inputs: the schedule at each breakpoint and next to it on either side; an error up, down and small."""
+    form, points = plan.schedule.signal, np.asarray(plan.schedule.breakpoints)
+    if plan.floating:
+        points = points.astype(np.float32 if form.ctype == "float" else np.float64)
+        beside = [np.nextafter(points, points.dtype.type(end)) for end in (-np.inf, np.inf)]
+    else:
+        beside = [np.clip(points + step, int(form.low), int(form.high)) for step in (-1, 1)]
+    sched = np.stack([beside[0], points, beside[1]], axis=1).ravel()
+    ref, meas = plan.reference, plan.measurement
+    pairs = [(ref.high, meas.low), (ref.low, meas.high), (ref.high, meas.high - (meas.high - meas.low) / 16)]
+    held = np.asarray(pairs).astype(sched.dtype).T[:, :, None] * np.ones(sched.size, sched.dtype)
+    return Scenario(held[0], held[1], np.tile(sched, (len(pairs), 1)))

@@ -14,7 +14,7 @@ from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace, to_raw
 from focgen.verification.errors_seen import ErrorsSeen, MaxError, errors_seen
 from focgen.verification.folder import GeneratedFolder, read_folder
-from focgen.verification.host import Library
+from focgen.verification.host import Library, header_scales
 from focgen.verification.scenarios import mixed, raw_scenarios
 
 TARGETS = ("host", "cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7", "rv32imac", "avr")
@@ -25,7 +25,8 @@ class TargetResult:
     """One target. ``mismatches``: samples whose output, increment or flags differ from the reference in any bit.
 
     ``max_error`` of the C against the same memory in float64, ``error_bound`` as the manifest has it, ``within`` whether
-    it holds. ``first`` describes the first mismatch. ``skipped``: why the target was not run; the rest is None then.
+    it holds. ``first`` describes the first mismatch, ``header`` every scale of the header that is not the manifest's.
+    ``skipped``: why the target was not run; the rest is None then.
     """
 
     samples: int = 0
@@ -34,6 +35,7 @@ class TargetResult:
     error_bound: dict[str, float] | None = None
     within: bool = True
     first: str | None = None
+    header: tuple[str, ...] = ()
     skipped: str | None = None
 
 
@@ -52,7 +54,7 @@ class Verification:
     def holds(self) -> bool:
         """Whether everything that ran agrees and stays within its bounds, and something ran."""
         ran = [t for t in self.targets.values() if t.skipped is None]
-        return bool(ran) and not self.differences and all(t.within and not t.mismatches for t in ran)
+        return bool(ran) and not self.differences and all(t.within and not t.mismatches and not t.header for t in ran)
 
 
 def verify(folder: str | Path, samples: int = 10_000, seed: int = 0,
@@ -99,7 +101,14 @@ def compare(plan: Plan, library: Library, samples: int, seed: int, read: Generat
             first = _described(label, scenario, seen, expected, wrong)
     errors = _errors(plan, library, samples, seed, bound)
     limits = {"operator": bound.operator, "output_per_sample": bound.output_per_sample}
-    return TargetResult(total, mismatches, errors.largest, limits, errors.within, first)
+    return TargetResult(total, mismatches, errors.largest, limits, errors.within, first, _header(plan, library))
+
+
+def _header(plan: Plan, library: Library) -> tuple[str, ...]:
+    """The header's scales that are wrong; no sample depends on them, but every program that uses the controller."""
+    expected, found = header_scales(plan), library.scales(plan)
+    return tuple(f"{plan.name}_{key} is {found[key]!r}, the controller gives {value!r}"
+                 for key, value in expected.items() if found[key] != value)
 
 
 def _differs(plan: Plan, seen: Trace, expected: Trace) -> np.ndarray:

@@ -1,0 +1,366 @@
+"""Whatever is broken in a generated folder, ``verify`` says so: one fault at a time, sown into the text.
+
+Faults in foc_rt.h come with a manifest that knows the broken file's hash, so that the comparison of samples must find
+them. A lost saturation of a *narrowing* is not among them: it is proved that none is ever reached
+(test_codegen_c.py tries those functions by themselves); a lost clamp of an input or of the integral is.
+"""
+
+import json
+import re
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from focgen.cli.main import main
+from focgen.codegen.generate import generate
+from focgen.codegen.manifest import sha256
+from focgen.control.controller import ControllerRanges
+from focgen.errors import FocgenError
+from focgen.fractional.transfer import TransferFunction
+from focgen.verification.folder import read_folder
+from focgen.verification.verify import verify
+from tests.conftest import paper_controller
+from tests.controllers import simple
+
+ARITHMETICS = ("q31", "q15", "f32")
+SAMPLES = 3000
+
+
+@dataclass(frozen=True)
+class Fault:
+    """``pattern`` in ``file`` becomes ``by``; "@" stands for the controller's name. ``where``: arithmetics that have it."""
+
+    name: str
+    file: str
+    pattern: str
+    by: str
+    where: tuple[str, ...] = ARITHMETICS
+
+    def __str__(self) -> str:
+        return self.name
+
+
+FIXED = ("q31", "q15")
+_SHIFT = r"\(x \+ \(\(\(int(\d\d)_t\)1 << n\) >> 1\)\) >> n"
+
+EITHER = (
+    Fault("ring wraps a slot early", "foc_rt.h", r"now \+ 1u < size", "now + 2u < size"),
+    Fault("history read from the wrong slot", "foc_rt.h", r"now - lag : size", "now - lag + (lag > 2u) : size"),
+    Fault("newest tap lost after the wrap", "foc_rt.h", r"for \(; i < taps; i\+\+\)", "for (; i + 1u < taps; i++)"),
+    Fault("a tap left out", "@.c", r"(foc_dot_f32\(@_numerator), (\d+)", r"\1, \2 - 1", ("f32",)),
+    Fault("off-by-one tap", "@.c", r"(foc_dot_f32\(@_numerator.*), (\d+)\);", r"\1, \2 - 1);", ("f32",)),
+    Fault("off-by-one tap", "@.c", r"\{7, 4, (\d+)\}", r"{6, 4, \1}", FIXED),
+    Fault("a block's scale", "@.c", r"\{7, 4, (\d+)\}", r"{7, 4, \1 + 1}", FIXED),
+    Fault("shift truncates", "foc_rt.h", _SHIFT, "x >> n", FIXED),
+    Fault("shift rounds halves down", "foc_rt.h", _SHIFT, r"(x + ((((int\1_t)1 << n) - 1) >> 1)) >> n", FIXED),
+    Fault("sums in double", "foc_rt.h", r"float sum = 0\.0f;", "double sum = 0.0;", ("f32",)),
+    Fault("input clamp lost", "@.c", r"m = foc_clamp\d\d\(meas,.*\);", "m = meas;", FIXED),
+    Fault("swapped input limits", "@.c", r"@_MEAS_MIN, @_MEAS_MAX", "@_MEAS_MAX, @_MEAS_MIN", FIXED),
+    Fault("reset forgets the history", "@.c", r"@_settle\(s, .*r.* - m.*\);", "@_settle(s, 0);"),
+    Fault("reset keeps the old history", "@.c", r"s->error\[i\] = e;", "(void)e;"),
+    Fault("flag of the upper end lost", "@.c", r"flags \|= @_FLAG_HIGH", "flags |= 0u"),
+    Fault("flag of the lower end lost", "@.c", r"flags \|= @_FLAG_LOW", "flags |= 0u"),
+    Fault("flag of the inputs lost", "@.c", r"flags \|= @_FLAG_INPUT", "flags |= 0u", FIXED),
+    Fault("a flag's bit moved", "@.h", r"(@_FLAG_LOW +)2u", r"\g<1>16u"),
+    Fault("an output limit moved", "@.h", r"(@_U_MAX +)(\d[\d.]*)", r"\g<1>1 + \2"),
+)
+
+PAPER = (
+    Fault("increment counted twice", "@.c", r"\(d \+ s->increment\)", "(d + d)"),
+    Fault("integral's clamp lost", "@.c", r"s->integral = foc_clamp\w+\((.*), \S+, \S+\);", r"s->integral = \1;"),
+    Fault("integral's limits swapped", "@.c", r"(s->integral = foc_clamp\w+\(s.*), (\S+), (\S+)\);", r"\1, \3, \2);"),
+    Fault("gain at the upper end", "foc_rt.h", r"return gains\[count - 1u\]", "return gains[count - 2u]"),
+    Fault("gain at the lower end", "foc_rt.h", r"return gains\[0\]", "return gains[1]"),
+    Fault("a segment skipped", "foc_rt.h", r"i\+\+;\n    \}\n    return", "i += 1u + (i == 2u);\n    }\n    return"),
+    Fault("slope ignored", "foc_rt.h", r"slopes\[i\] \*", "0 *"),
+    Fault("track ignored", "@.c", r"(_track\(@_state \*s, @_sig u_applied\)\n\{\n).*", r"\1    (void)s, (void)u_applied;"),
+    Fault("track not limited", "@.c", r"foc_clamp\w+\(u_applied, @_U_MIN, @_U_MAX\)", "u_applied"),
+    Fault("reset ignores u0", "@.c", r"@_track\(s, u0\);", "(void)u0;"),
+    Fault("first gain forgotten", "@.c", r"s->starting = 1", "s->starting = 0"),
+    Fault("starting for ever", "@.c", r"s->starting = 0", "s->starting = 1"),
+    Fault("flag of the schedule lost", "@.c", r"flags \|= @_FLAG_SCHEDULE", "flags |= 0u"),
+)
+
+FILTER = (
+    Fault("carry forgotten", "@.c", r"s->carry = x - .*;", "s->carry = 0;", FIXED),
+    Fault("reset keeps the carry", "@.c", r"    s->carry = 0;\n", "", FIXED),
+    Fault("recursion left out", "@.c", r"(-=? )@_denominator_sum\(s\)", r"\g<1>0 * @_denominator_sum(s)"),
+    Fault("trapezoid is a rectangle", "@.c", r"s->inner_input = r;", "s->inner_input = 0;"),
+    Fault("inner clamp lost", "@.c", r"s->inner = foc_clamp\w+\((.*), \S+, \S+\);", r"s->inner = \1;"),
+    Fault("rest of the filtered error", "@.c", r"s->filtered\[i\] = v;", "s->filtered[i] = v + 1;"),
+    Fault("constant gain", "@.c", r"(#define @_GAIN )(\d+)", r"\1(1 + \2)", FIXED),
+    Fault("constant gain", "@.c", r"(#define @_GAIN )(\S+)", r"\1(1.0000002f * \2)", ("f32",)),
+    Fault("output clamp lost", "@.c", r"foc_clamp\w+\(d, @_U_MIN, @_U_MAX\)", "d"),
+    Fault("output limits swapped", "@.c", r"@_U_MIN, @_U_MAX", "@_U_MAX, @_U_MIN"),
+)
+
+
+def filter_controller():
+    """A recursion, a term of negative order and no integrator: what the paper's controller lacks."""
+    transfer = TransferFunction([(0.3, 0.5), (1.0, 0.0), (0.8, -0.7)], [(0.2, 0.9), (1.0, 0.0)])
+    ranges = ControllerRanges((-1.0, 1.0), (-1.0, 1.0), (-3.0, 3.0))
+    return simple(transfer, name="filter", gain=2.5, ranges=ranges, length=24)
+
+
+CONTROLLERS = {"spba": paper_controller(40), "filter": filter_controller()}
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory) -> Path:
+    """Sound folders, CONTROLLER_ARITHMETIC."""
+    folder = tmp_path_factory.mktemp("sound")
+    for name, controller in CONTROLLERS.items():
+        for arithmetic in ARITHMETICS:
+            generate(controller, folder / f"{name}_{arithmetic}", arithmetic)
+    return folder
+
+
+def copied(sound: Path, tmp_path: Path, name: str, arithmetic: str) -> Path:
+    return Path(shutil.copytree(sound / f"{name}_{arithmetic}", tmp_path / "broken"))
+
+
+def sow(folder: Path, name: str, fault: Fault) -> None:
+    """Change the text, and make sure that it has changed."""
+    path = folder / fault.file.replace("@", name)
+    before = path.read_text()
+    after, places = re.subn(fault.pattern.replace("@", name), fault.by.replace("@", name), before)
+    assert places and after != before, f"{fault}: nothing to change"
+    path.write_text(after)
+    if fault.file == "foc_rt.h":
+        rewrite(folder, lambda manifest: manifest["inputs"].update({"foc_rt.h": sha256(after)}))
+
+
+def rewrite(folder: Path, change) -> None:
+    """Change the manifest in place."""
+    path = folder / "manifest.json"
+    manifest = json.loads(path.read_text())
+    change(manifest)
+    path.write_text(json.dumps(manifest))
+
+
+def cases():
+    for name, special in (("spba", PAPER), ("filter", FILTER)):
+        for fault in EITHER + special:
+            for arithmetic in fault.where:
+                yield pytest.param(name, arithmetic, fault, id=f"{name}-{arithmetic}-{fault}")
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_an_untouched_folder_holds(sound, name, arithmetic, capsys):
+    assert main(["verify", str(sound / f"{name}_{arithmetic}"), "--samples", str(SAMPLES), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    host = found["targets"]["host"]
+    assert found["holds"] and host["mismatches"] == 0 and host["samples"] >= SAMPLES and not found["differences"]
+    assert 0.0 < host["max_error"]["operator"] <= host["error_bound"]["operator"]
+
+
+@pytest.mark.parametrize("name, arithmetic, fault", list(cases()))
+def test_a_fault_in_the_c_shows_in_the_samples(sound, tmp_path, name, arithmetic, fault):
+    folder = copied(sound, tmp_path, name, arithmetic)
+    sow(folder, name, fault)
+    found = verify(folder, SAMPLES)
+    assert found.targets["host"].mismatches > 0, found
+    assert found.targets["host"].first and not found.holds and not found.differences
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("place", (0, 20, 40))
+def test_one_weight_wrong_by_its_last_digit(sound, tmp_path, arithmetic, place):
+    """The least change of a weight that the text can hold."""
+    folder = copied(sound, tmp_path, "spba", arithmetic)
+    path = folder / "spba.c"
+    head, table, rest = re.split(r"(spba_numerator\[\d+\] = \{\n[^}]*\};)", path.read_text())
+    numbers = list(re.finditer(r"-?\d[\d.e-]*f?(?=,)", re.sub(r"/\*.*?\*/", lambda m: " " * len(m[0]), table)))
+    assert len(numbers) == 41
+    begin, end = numbers[place].span()
+    path.write_text(head + table[:begin] + neighbour(table[begin:end]) + table[end:] + rest)
+    assert verify(folder, SAMPLES).targets["host"].mismatches > 0
+
+
+def neighbour(text: str) -> str:
+    """The next number of its type, away from zero."""
+    import numpy as np
+
+    if not text.endswith("f"):
+        return str(int(text) + (1 if int(text) >= 0 else -1))
+    value = np.float32(text[:-1])
+    return f"{np.nextafter(value, np.copysign(np.float32(np.inf), value)):.9g}f"
+
+
+@pytest.mark.parametrize("arithmetic", ("q31", "f32"))
+@pytest.mark.parametrize("macro", ("REF_LSB", "U_LSB", "SCHED_LSB", "SAMPLE_TIME"))
+def test_a_scale_of_the_header(sound, tmp_path, arithmetic, macro, capsys):
+    """No sample depends on it, and every program that uses the controller does."""
+    folder = copied(sound, tmp_path, "spba", arithmetic)
+    sow(folder, "spba", Fault(macro, "@.h", rf"(@_{macro} +)([\d.e-]+f?)", r"\1(2.0f * \2)"))
+    assert main(["verify", str(folder), "--samples", "500"]) == 1
+    assert f"spba_{macro}" in capsys.readouterr().out
+
+
+def test_the_command_reports_a_mismatch(sound, tmp_path, capsys):
+    folder = copied(sound, tmp_path, "spba", "q15")
+    sow(folder, "spba", Fault("swapped sign", "@.c", r"\(int16_t\)\(r - m\)\)", "(int16_t)(m - r))"))
+    assert main(["verify", str(folder), "--samples", "500"]) == 1
+    out, err = capsys.readouterr()
+    assert "NOT verified" in out and "first difference" in out and not err
+
+
+def test_another_runtime_is_not_the_one_that_was_proved(sound, tmp_path):
+    """Not a bit changes, and it is not the file of the manifest."""
+    folder = copied(sound, tmp_path, "spba", "q31")
+    with open(folder / "foc_rt.h", "a") as runtime:
+        runtime.write("/* improved */\n")
+    found = verify(folder, 500)
+    assert found.targets["host"].mismatches == 0 and found.differences and not found.holds
+
+
+# ----------------------------------------------------------------------------- the manifest and the controller
+
+
+def doubled(*path):
+    """Multiply one number of the manifest by 2."""
+
+    def change(manifest):
+        entry = manifest
+        for key in path[:-1]:
+            entry = entry[key]
+        entry[path[-1]] = entry[path[-1]] * 2
+
+    return change
+
+
+def halved_bounds(manifest):
+    """A promise that cannot be kept."""
+    for key in ("operator", "output_per_sample"):
+        manifest["error_bound"]["quantisation"][key] *= 0.01
+
+
+DOCTORED = {
+    "bound of the operator": doubled("error_bound", "quantisation", "operator"),
+    "bound of the output": doubled("error_bound", "quantisation", "output_per_sample"),
+    "bound of truncation": doubled("error_bound", "truncation", "operator"),
+    "bounds too tight": halved_bounds,
+    "reference LSB": doubled("REF_LSB"),
+    "output LSB": doubled("U_LSB"),
+    "schedule LSB": doubled("SCHED_LSB"),
+    "a range": doubled("ranges", "output", 1),
+    "bytes": doubled("sizes", "state_bytes"),
+    "sample time": doubled("sample_time"),
+    "longer": doubled("length"),
+    "shorter": lambda manifest: manifest.update(length=39),
+    "a hash": lambda manifest: manifest["inputs"].update({"controller.toml": "0" * 64}),
+    "no proofs": lambda manifest: manifest.update(proofs=[{}]),
+    "more than there is": lambda manifest: manifest.update(certified=True),
+}
+
+
+@pytest.mark.parametrize("doctored", DOCTORED)
+def test_a_doctored_manifest(sound, tmp_path, doctored, capsys):
+    folder = copied(sound, tmp_path, "spba", ARITHMETICS[len(doctored) % 3])
+    rewrite(folder, DOCTORED[doctored])
+    assert main(["verify", str(folder), "--samples", "500", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["differences"]
+
+
+def test_bounds_that_are_exceeded_are_seen_as_such(sound, tmp_path):
+    """What the samples show, whatever the plan says of the bounds."""
+    folder = copied(sound, tmp_path, "spba", "q15")
+    rewrite(folder, halved_bounds)
+    assert not verify(folder, SAMPLES).targets["host"].within
+
+
+def leaves(entry, path=()):
+    """The path of every value in the manifest."""
+    items = entry.items() if isinstance(entry, dict) else enumerate(entry) if isinstance(entry, list) else ()
+    for key, value in items:
+        yield from leaves(value, (*path, key)) if isinstance(value, (dict, list)) else [(*path, key)]
+
+
+@pytest.mark.parametrize("by", (None, "nonsense", -1, 0, float("nan"), [], {}, True), ids=repr)
+def test_no_value_of_the_manifest_may_be_anything_else(sound, tmp_path, by):
+    """Each of them in turn: either a difference, or an error of one line."""
+    folder = copied(sound, tmp_path, "filter", "q15")
+    whole = (folder / "manifest.json").read_text()
+    for path in leaves(json.loads(whole)):
+        entry = manifest = json.loads(whole)
+        for key in path[:-1]:
+            entry = entry[key]
+        if path == ("generator",) or entry[path[-1]] == by:
+            continue
+        entry[path[-1]] = by
+        (folder / "manifest.json").write_text(json.dumps(manifest))
+        try:
+            assert read_folder(folder).differences, path
+        except FocgenError as error:
+            assert "\n" not in str(error)
+
+
+CHANGED = {
+    "order": (r"0\.6\]", "0.61]"),
+    "coefficient": (r"\[\[1\.32,", "[[1.33,"),
+    "a gain": (r"gains = \[\d", "gains = [4"),
+    "a breakpoint": (r"0\.07,", "0.071,"),
+    "sample time": (r"sample_time = 0\.01", "sample_time = 0.02"),
+    "output limits": (r"output = \[0\.0, 10\.0\]", "output = [0.0, 9.0]"),
+    "integrator": (r"integrator = true", "integrator = false"),
+    "a comment": (r"\Z", "# harmless\n"),
+}
+
+
+@pytest.mark.parametrize("what", CHANGED)
+def test_a_doctored_controller(sound, tmp_path, what):
+    folder = copied(sound, tmp_path, "spba", ARITHMETICS[len(what) % 3])
+    sow(folder, "spba", Fault(what, "controller.toml", *CHANGED[what]))
+    assert main(["verify", str(folder), "--samples", "500"]) in ((1,) if what != "integrator" else (1, 2))
+
+
+# ------------------------------------------------------------------------------------------ unusable folders
+
+
+def missing(name):
+    return lambda folder: (folder / name).unlink()
+
+
+def written(name, text):
+    return lambda folder: (folder / name).write_text(text)
+
+
+UNUSABLE = {
+    "no manifest": missing("manifest.json"),
+    "no header": missing("spba.h"),
+    "no source": missing("spba.c"),
+    "no runtime": missing("foc_rt.h"),
+    "no controller": missing("controller.toml"),
+    "broken JSON": written("manifest.json", '{"name": "spba",'),
+    "no object": written("manifest.json", "[1, 2]"),
+    "empty object": written("manifest.json", "{}"),
+    "not text": lambda folder: (folder / "manifest.json").write_bytes(b"\xff\xfe\x00"),
+    "broken TOML": written("controller.toml", "name = \n"),
+    "no name": lambda folder: rewrite(folder, lambda manifest: manifest.pop("name")),
+    "a name that leads outside": lambda folder: rewrite(folder, lambda m: m.update(name="../spba")),
+    "no such arithmetic": lambda folder: rewrite(folder, lambda m: m.update(arithmetic="q7")),
+    "no such length": lambda folder: rewrite(folder, lambda m: m.update(length="long")),
+    "bound in words": lambda folder: rewrite(
+        folder, lambda m: m["error_bound"]["quantisation"].update(operator="small")
+    ),
+    "does not compile": written("spba.c", "this is no C\n"),
+    "everything": lambda folder: shutil.rmtree(folder),
+}
+
+
+@pytest.mark.parametrize("what", UNUSABLE)
+def test_an_unusable_folder_is_an_error_of_one_line(sound, tmp_path, what, capsys):
+    folder = copied(sound, tmp_path, "spba", "q15")
+    UNUSABLE[what](folder)
+    assert main(["verify", str(folder), "--samples", "500"]) == 2
+    out, err = capsys.readouterr()
+    assert not out and re.fullmatch(r"focgen: error: [^\n]+: [^\n]+; [^\n]+\n", err), err
+
+
+@pytest.mark.parametrize("option", (["--samples", "0"], ["--seed", "-1"], ["--target", "z80"], ["--samples", "many"]))
+def test_unusable_options(sound, option, capsys):
+    assert main(["verify", str(sound / "spba_q15"), *option]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
