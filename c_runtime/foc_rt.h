@@ -2,13 +2,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  *
- * Static functions only: nothing to link, and any number of controllers in one program share nothing but this
- * text. C99 and <stdint.h>; the functions named ..._q15 and ..._q31, and all that they call, are free of floating
- * point. None of them allocates, recurses, divides or fails.
+ * Static functions only: nothing to link, and any number of controllers in one program share nothing
+ * but this text. C99 and <stdint.h>; the functions named ..._q15 and ..._q31, and all that they call,
+ * are free of floating point. None of them allocates, recurses, divides or fails.
  *
- * Fixed point: a count x stands for x * lsb, and every lsb is a power of two. There is one rounding rule (half up,
- * foc_shift) and every narrowing saturates. "Proved" below means that manifest.json lists the node with its worst
- * case, for every input there can be.
+ * Fixed point: a count x stands for x * lsb, and every lsb is a power of two. There is one rounding
+ * rule (half up, foc_shift) and every narrowing saturates. "Proved" below means that manifest.json
+ * lists the node with its worst case, for every input there can be.
  */
 #ifndef FOC_RT_H
 #define FOC_RT_H
@@ -18,14 +18,15 @@
 /* Generated files ask for the version they were written for. */
 #define FOC_RT_VERSION 1
 
-/* The rounding shifts need the right shift of a negative number to keep its sign. C leaves that to the compiler;
-   all that we know of do. */
+/* The rounding shifts need the right shift of a negative number to keep its sign. C leaves that to the
+   compiler; all that we know of do. */
 #if (-1 >> 1) != -1
 #error "foc_rt.h: this compiler's >> does not keep the sign of negative numbers"
 #endif
 
-/* Where constant tables live. On most cores const is enough to keep them in flash. An AVR would copy them to RAM;
-   __flash, which avr-gcc has with -std=gnu99, leaves them where they are. Define FOC_ROM yourself for other cores. */
+/* Where constant tables live. On most cores const is enough to keep them in flash. An AVR would copy
+   them to RAM; __flash, which avr-gcc has with -std=gnu99, leaves them where they are. Define FOC_ROM
+   yourself for other cores. */
 #ifndef FOC_ROM
 #ifdef __FLASH
 #define FOC_ROM __flash
@@ -40,7 +41,7 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* --- Clamp and saturate -------------------------------------------------------------------------------------- */
+/* --- Clamp and saturate --------------------------------------------------------------------------- */
 
 /* x, but not below low nor above high; low <= high. */
 static inline int16_t foc_clamp16(int16_t x, int16_t low, int16_t high)
@@ -79,7 +80,7 @@ static inline int32_t foc_sat32(int64_t x)
     return (int32_t)foc_clamp64(x, INT32_MIN, INT32_MAX);
 }
 
-/* --- Rounding shifts ----------------------------------------------------------------------------------------- */
+/* --- Rounding shifts ------------------------------------------------------------------------------ */
 
 /* x / 2^n, rounded to the nearest count, halves up. 0 <= n <= 30; x + 2^(n-1) fits the type (proved). */
 static inline int32_t foc_shift32(int32_t x, uint8_t n)
@@ -93,7 +94,7 @@ static inline int64_t foc_shift64(int64_t x, uint8_t n)
     return (x + (((int64_t)1 << n) >> 1)) >> n;
 }
 
-/* --- Products ------------------------------------------------------------------------------------------------ */
+/* --- Products ------------------------------------------------------------------------------------- */
 
 /* x * y, exact, of at most 48 bits, from two 16 x 16 -> 32 bit products, which cannot overflow:
    |x >> 16| <= 2^15, 0 <= (x & 0xffff) < 2^16 and -2^15 <= y < 2^15. */
@@ -105,10 +106,11 @@ static inline int64_t foc_mul32x16(int32_t x, int16_t y)
     return (int64_t)upper * 65536 + lower;
 }
 
-/* --- History ------------------------------------------------------------------------------------------------- */
+/* --- History -------------------------------------------------------------------------------------- */
 
-/* A history is a ring: sample k, the newest, stands in slot `now`, sample k-1 in the slot before it, and slot 0
-   is preceded by slot size-1. A mirrored copy would save the second loop below, but double the memory. */
+/* A history is a ring: sample k, the newest, stands in slot `now`, sample k-1 in the slot before it,
+   and slot 0 is preceded by slot size-1. A mirrored copy would save the second loop below, but double
+   the memory. */
 
 /* The slot that the next sample takes. 0 <= now < size. */
 static inline uint16_t foc_ring_next(uint16_t now, uint16_t size)
@@ -122,13 +124,13 @@ static inline uint16_t foc_ring_slot(uint16_t now, uint16_t size, uint16_t lag)
     return (uint16_t)(now >= lag ? now - lag : size - (lag - now));
 }
 
-/* Sum of weights[i] * x_(k-oldest+i) for i = 0 ... taps-1, from the oldest sample to the newest, over a ring:
-   first up to the ring's end, then on from its beginning.
+/* Sum of weights[i] * x_(k-oldest+i) for i = 0 ... taps-1, from the oldest sample to the newest, over
+   a ring: first up to the ring's end, then on from its beginning.
 
-   taps <= oldest + 1 <= size. The sum fits its type (proved, block by block); it is exact in fixed point, and has
-   a fixed order in floating point, where each operation is rounded once. */
-static inline int32_t foc_dot_q15(const FOC_ROM int16_t *weights, uint16_t taps, const int16_t *ring, uint16_t size,
-                                  uint16_t now, uint16_t oldest)
+   taps <= oldest + 1 <= size. The sum fits its type (proved, block by block); it is exact in fixed
+   point, and has a fixed order in floating point, where each operation is rounded once. */
+static inline int32_t foc_dot_q15(const FOC_ROM int16_t *weights, uint16_t taps, const int16_t *ring,
+                                  uint16_t size, uint16_t now, uint16_t oldest)
 {
     const uint16_t start = foc_ring_slot(now, size, oldest);
     const uint16_t straight = (uint16_t)(size - start);
@@ -145,8 +147,8 @@ static inline int32_t foc_dot_q15(const FOC_ROM int16_t *weights, uint16_t taps,
     return sum;
 }
 
-static inline int64_t foc_dot_q31(const FOC_ROM int32_t *weights, uint16_t taps, const int32_t *ring, uint16_t size,
-                                  uint16_t now, uint16_t oldest)
+static inline int64_t foc_dot_q31(const FOC_ROM int32_t *weights, uint16_t taps, const int32_t *ring,
+                                  uint16_t size, uint16_t now, uint16_t oldest)
 {
     const uint16_t start = foc_ring_slot(now, size, oldest);
     const uint16_t straight = (uint16_t)(size - start);
@@ -163,8 +165,8 @@ static inline int64_t foc_dot_q31(const FOC_ROM int32_t *weights, uint16_t taps,
     return sum;
 }
 
-static inline float foc_dot_f32(const FOC_ROM float *weights, uint16_t taps, const float *ring, uint16_t size,
-                                uint16_t now, uint16_t oldest)
+static inline float foc_dot_f32(const FOC_ROM float *weights, uint16_t taps, const float *ring,
+                                uint16_t size, uint16_t now, uint16_t oldest)
 {
     const uint16_t start = foc_ring_slot(now, size, oldest);
     const uint16_t straight = (uint16_t)(size - start);
@@ -181,8 +183,8 @@ static inline float foc_dot_f32(const FOC_ROM float *weights, uint16_t taps, con
     return sum;
 }
 
-static inline double foc_dot_f64(const FOC_ROM double *weights, uint16_t taps, const double *ring, uint16_t size,
-                                 uint16_t now, uint16_t oldest)
+static inline double foc_dot_f64(const FOC_ROM double *weights, uint16_t taps, const double *ring,
+                                 uint16_t size, uint16_t now, uint16_t oldest)
 {
     const uint16_t start = foc_ring_slot(now, size, oldest);
     const uint16_t straight = (uint16_t)(size - start);
@@ -199,8 +201,9 @@ static inline double foc_dot_f64(const FOC_ROM double *weights, uint16_t taps, c
     return sum;
 }
 
-/* A table of weights is cut into blocks, each with a scale of its own: Gruenwald-Letnikov weights fall so fast that
-   in one scale most of them would be lost. Blocks stand oldest first, as their weights do. */
+/* A table of weights is cut into blocks, each with a scale of its own: Gruenwald-Letnikov weights fall
+   so fast that in one scale most of them would be lost. Blocks stand oldest first, as their weights
+   do. */
 typedef struct {
     uint16_t oldest; /* lag of the block's oldest tap */
     uint16_t taps;   /* how many weights it has */
@@ -208,8 +211,8 @@ typedef struct {
 } foc_block;
 
 /* Sum of shift(sum of a block, its shift) over all blocks. Total and rounding fit their types (proved). */
-static inline int32_t foc_sum_q15(const FOC_ROM int16_t *weights, const FOC_ROM foc_block *blocks, uint16_t count,
-                                  const int16_t *ring, uint16_t size, uint16_t now)
+static inline int32_t foc_sum_q15(const FOC_ROM int16_t *weights, const FOC_ROM foc_block *blocks,
+                                  uint16_t count, const int16_t *ring, uint16_t size, uint16_t now)
 {
     int32_t total = 0;
     uint16_t b;
@@ -223,8 +226,8 @@ static inline int32_t foc_sum_q15(const FOC_ROM int16_t *weights, const FOC_ROM 
     return total;
 }
 
-static inline int64_t foc_sum_q31(const FOC_ROM int32_t *weights, const FOC_ROM foc_block *blocks, uint16_t count,
-                                  const int32_t *ring, uint16_t size, uint16_t now)
+static inline int64_t foc_sum_q31(const FOC_ROM int32_t *weights, const FOC_ROM foc_block *blocks,
+                                  uint16_t count, const int32_t *ring, uint16_t size, uint16_t now)
 {
     int64_t total = 0;
     uint16_t b;
@@ -238,14 +241,17 @@ static inline int64_t foc_sum_q31(const FOC_ROM int32_t *weights, const FOC_ROM 
     return total;
 }
 
-/* --- Gain schedule ------------------------------------------------------------------------------------------- */
+/* --- Gain schedule -------------------------------------------------------------------------------- */
 
-/* The gain at x: gains[i] + slopes[i] * (x - points[i]) for points[i] <= x < points[i+1], held at the first gain
-   below the first point and at the last gain from the last point on. `points` rise strictly; count >= 2.
+/* The gain at x: gains[i] + slopes[i] * (x - points[i]) for points[i] <= x < points[i+1], held at the
+   first gain below the first point and at the last gain from the last point on. `points` rise
+   strictly; count >= 2.
 
-   Fixed point: the product is shifted by shifts[i], rounding; product and gain fit their types (proved). */
-static inline int16_t foc_schedule_q15(int16_t x, const FOC_ROM int16_t *points, const FOC_ROM int16_t *gains,
-                                       const FOC_ROM int16_t *slopes, const FOC_ROM uint8_t *shifts, uint16_t count)
+   Fixed point: the product is shifted by shifts[i], rounding; product and gain fit their types
+   (proved). */
+static inline int16_t foc_schedule_q15(int16_t x, const FOC_ROM int16_t *points,
+                                       const FOC_ROM int16_t *gains, const FOC_ROM int16_t *slopes,
+                                       const FOC_ROM uint8_t *shifts, uint16_t count)
 {
     uint16_t i = 0;
 
@@ -261,8 +267,9 @@ static inline int16_t foc_schedule_q15(int16_t x, const FOC_ROM int16_t *points,
     return (int16_t)(gains[i] + foc_shift32(slopes[i] * ((int32_t)x - points[i]), shifts[i]));
 }
 
-static inline int32_t foc_schedule_q31(int32_t x, const FOC_ROM int32_t *points, const FOC_ROM int32_t *gains,
-                                       const FOC_ROM int32_t *slopes, const FOC_ROM uint8_t *shifts, uint16_t count)
+static inline int32_t foc_schedule_q31(int32_t x, const FOC_ROM int32_t *points,
+                                       const FOC_ROM int32_t *gains, const FOC_ROM int32_t *slopes,
+                                       const FOC_ROM uint8_t *shifts, uint16_t count)
 {
     uint16_t i = 0;
 
@@ -295,8 +302,9 @@ static inline float foc_schedule_f32(float x, const FOC_ROM float *points, const
     return gains[i] + slopes[i] * (x - points[i]);
 }
 
-static inline double foc_schedule_f64(double x, const FOC_ROM double *points, const FOC_ROM double *gains,
-                                      const FOC_ROM double *slopes, uint16_t count)
+static inline double foc_schedule_f64(double x, const FOC_ROM double *points,
+                                      const FOC_ROM double *gains, const FOC_ROM double *slopes,
+                                      uint16_t count)
 {
     uint16_t i = 0;
 

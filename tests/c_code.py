@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-STRICT = """-std=c99 -pedantic -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Wundef -Wstrict-prototypes
-    -Wmissing-prototypes -Wcast-qual -Werror""".split()
+STRICT = """-std=c99 -pedantic -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Wundef
+    -Wstrict-prototypes -Wmissing-prototypes -Wcast-qual -Werror""".split()
 EXACT = ["-std=c99", "-O2", "-ffp-contract=off"]
 
 

@@ -1,4 +1,4 @@
-"""``focgen generate``: what it refuses, in one line and without a trace left behind; what an installed wheel does."""
+"""``focgen generate``: what it refuses, in one line and without a trace; what an installed wheel does."""
 
 from __future__ import annotations
 
@@ -24,28 +24,31 @@ ROOT = Path(__file__).parents[1]
 FINGER = ROOT / "tests" / "golden" / "finger.toml"
 
 
-@pytest.mark.parametrize(("options", "says"), [
-    (["--length", "0"], "at least 1 sample"),
-    (["--length", "-3"], "at least 1 sample"),
-    (["--length", "many"], "invalid int value"),
-    (["--length", "65535"], "at most 65534"),
-    (["--arithmetic", "q7"], "invalid choice"),
-    (["--memory", "exponential"], "--memory short"),
-    (["--memory", "eternal"], "invalid choice"),
-    (["--target", "cortex-m4"], "--target"),
-    (["--for", "zephyr"], "--for plain"),
-    (["--for", "matlab"], "invalid choice"),
-    (["--tolerance", "1e-3"], "--length"),
-    (["--horizon", "100"], "--length"),
-    (["--name", "while"], "is a keyword"),
-    (["--name", "_x"], "underscore"),
-    (["--name", "my-rig"], "--name my_rig"),
-    (["--name", "7up"], "--name c7up"),
-    (["--name", "stdint"], "hide the header stdint.h"),
-    (["--name", "FOC_RT"], "foc_rt.h"),
-    (["--name", ""], "--name"),
-    (["--name", "größe"], "is no C identifier"),
-])
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--length", "0"], "at least 1 sample"),
+        (["--length", "-3"], "at least 1 sample"),
+        (["--length", "many"], "invalid int value"),
+        (["--length", "65535"], "at most 65534"),
+        (["--arithmetic", "q7"], "invalid choice"),
+        (["--memory", "exponential"], "--memory short"),
+        (["--memory", "eternal"], "invalid choice"),
+        (["--target", "cortex-m4"], "--target"),
+        (["--for", "zephyr"], "--for plain"),
+        (["--for", "matlab"], "invalid choice"),
+        (["--tolerance", "1e-3"], "--length"),
+        (["--horizon", "100"], "--length"),
+        (["--name", "while"], "is a keyword"),
+        (["--name", "_x"], "underscore"),
+        (["--name", "my-rig"], "--name my_rig"),
+        (["--name", "7up"], "--name c7up"),
+        (["--name", "stdint"], "hide the header stdint.h"),
+        (["--name", "FOC_RT"], "foc_rt.h"),
+        (["--name", ""], "--name"),
+        (["--name", "größe"], "is no C identifier"),
+    ],
+)
 def test_unusable_options_are_one_line(options, says, tmp_path, capsys):
     assert main(["generate", str(FINGER), "--out", str(tmp_path / "out"), *options]) == 2
     captured = capsys.readouterr()
@@ -53,27 +56,33 @@ def test_unusable_options_are_one_line(options, says, tmp_path, capsys):
     assert says in captured.err and not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("line", "instead", "says"), [
-    ("sample_time = 0.01", "sample_time = nan", "sample_time"),
-    ("sample_time = 0.01", "sample_time = -1.0", "above 0"),
-    ("length = 40", "length = 0", "length"),
-    ('name = "finger"', 'name = "my finger"', "--name my_finger"),
-    ("num = [[0.4, 0.6], [1.0, 0.0], [0.5, -0.4]]", "num = []", "num"),
-    ("num = [[0.4, 0.6], [1.0, 0.0], [0.5, -0.4]]", "num = [[1.0, -3.0]]", "integrates more than once"),
-    ("den = [[0.05, 0.9], [1.0, 0.0]]", "den = [[-0.05, 0.9], [1.0, 0.0]]", "stable"),
-    ("output = [0.0, 10.0]", "output = [10.0, 0.0]", "low < high"),
-    ("output = [0.0, 10.0]", "output = [1e300, 2e300]", "finger"),
-    ("reference = [0.0, 0.02]", "reference = [1e9, 1.0000001e9]", "counts"),
-    ("gains = [500.0, 420.0, 350.0]", "gains = [500.0, 420.0]", "2 values for 3"),
-    ("integrator = true", "integrater = true", "integrater"),
-    ("integrator = true", 'integrator = true\nmemory = "exponential"', "memory"),
-    ("[gain]", "[gain", "TOML"),
-])
+@pytest.mark.parametrize(
+    ("line", "instead", "says"),
+    [
+        ("sample_time = 0.01", "sample_time = nan", "sample_time"),
+        ("sample_time = 0.01", "sample_time = -1.0", "above 0"),
+        ("length = 40", "length = 0", "length"),
+        ('name = "finger"', 'name = "my finger"', "--name my_finger"),
+        ("num = [[0.4, 0.6], [1.0, 0.0], [0.5, -0.4]]", "num = []", "num"),
+        ("num = [[0.4, 0.6], [1.0, 0.0], [0.5, -0.4]]", "num = [[1.0, -3.0]]", "integrates more than once"),
+        ("den = [[0.05, 0.9], [1.0, 0.0]]", "den = [[-0.05, 0.9], [1.0, 0.0]]", "stable"),
+        ("output = [0.0, 10.0]", "output = [10.0, 0.0]", "low < high"),
+        ("output = [0.0, 10.0]", "output = [1e300, 2e300]", "finger"),
+        ("reference = [0.0, 0.02]", "reference = [1e9, 1.0000001e9]", "counts"),
+        ("gains = [500.0, 420.0, 350.0]", "gains = [500.0, 420.0]", "2 values for 3"),
+        ("integrator = true", "integrater = true", "integrater"),
+        ("integrator = true", 'integrator = true\nmemory = "exponential"', "memory"),
+        ("[gain]", "[gain", "TOML"),
+    ],
+)
 def test_unusable_controllers_are_one_line(line, instead, says, tmp_path, capsys):
     text = FINGER.read_text()
     assert line in text
     (tmp_path / "c.toml").write_text(text.replace(line, instead))
-    assert main(["generate", str(tmp_path / "c.toml"), "--out", str(tmp_path / "out"), "--arithmetic", "q15"]) == 2
+    assert (
+        main(["generate", str(tmp_path / "c.toml"), "--out", str(tmp_path / "out"), "--arithmetic", "q15"])
+        == 2
+    )
     captured = capsys.readouterr()
     assert captured.err.count("\n") == 1 and says in captured.err and not (tmp_path / "out").exists()
 
@@ -106,10 +115,14 @@ def test_json_is_the_manifest(tmp_path, capsys):
     assert manifest["arithmetic"] == "q31" and manifest["length"] == 40 and manifest["memory"] == "short"
     assert manifest["REF_LSB"] < 0.02 / 2**30 and manifest["U_LSB"] < 10.0 / 2**30
     assert {"operator", "output_per_sample"} <= manifest["error_bound"]["quantisation"].keys()
-    assert all(proof["worst"] <= proof["limit"] for proof in manifest["proofs"]) and len(manifest["proofs"]) > 20
+    assert (
+        all(proof["worst"] <= proof["limit"] for proof in manifest["proofs"]) and len(manifest["proofs"]) > 20
+    )
     header = (tmp_path / "finger.h").read_text()
     for key in ("REF_LSB", "SCHED_LSB", "U_LSB"):
-        value = next(line.split()[2] for line in header.splitlines() if line.startswith(f"#define finger_{key}"))
+        value = next(
+            line.split()[2] for line in header.splitlines() if line.startswith(f"#define finger_{key}")
+        )
         assert float(value.rstrip("f")) == manifest[key]
 
 
@@ -127,7 +140,7 @@ def test_names_that_are_fine():
             check_name(name, "here")
 
 
-# ------------------------------------------------------------------------------------------------------ literals
+# --------------------------------------------------------------------------------------------------- literals
 
 
 def test_literals_read_back_as_they_were():
@@ -135,9 +148,20 @@ def test_literals_read_back_as_they_were():
     import numpy as np
 
     rng = np.random.default_rng(0)
-    for value in [0.0, -0.0, 5e-324, 1.7976931348623157e308, 1e22, 0.1, *(rng.normal(size=2000) * 10.0 ** rng.uniform(-300, 300, 2000))]:
+    for value in [
+        0.0,
+        -0.0,
+        5e-324,
+        1.7976931348623157e308,
+        1e22,
+        0.1,
+        *(rng.normal(size=2000) * 10.0 ** rng.uniform(-300, 300, 2000)),
+    ]:
         assert float(literal(float(value), "double")) == value
-    singles = np.array([1e-45, 3.4028235e38, 16777216.0, *(rng.normal(size=2000) * 10.0 ** rng.uniform(-38, 38, 2000))], np.float32)
+    singles = np.array(
+        [1e-45, 3.4028235e38, 16777216.0, *(rng.normal(size=2000) * 10.0 ** rng.uniform(-38, 38, 2000))],
+        np.float32,
+    )
     for value in singles:
         text = literal(float(value), "float")
         assert text.endswith("f") and np.float32(text[:-1]) == value and ("." in text or "e" in text)
@@ -157,10 +181,16 @@ def test_extreme_integers_compile(tmp_path):
         run(*compiler(name), *STRICT, "-c", tmp_path / "x.c", "-o", tmp_path / "x.o")
 
 
-@pytest.mark.parametrize("unit", ["1/mm", "µm/°C", "*/ int x; /*", "a\nb", "\\", "what??/", "Ω²", "\x00\x07", "日"])
+@pytest.mark.parametrize(
+    "unit", ["1/mm", "µm/°C", "*/ int x; /*", "a\nb", "\\", "what??/", "Ω²", "\x00\x07", "日"]
+)
 def test_a_comment_stays_a_comment(unit):
     text = comment(unit)
-    assert text.isascii() and text.isprintable() and not any(bad in text for bad in ("*/", "/*", "\n", "\\", "??"))
+    assert (
+        text.isascii()
+        and text.isprintable()
+        and not any(bad in text for bad in ("*/", "/*", "\n", "\\", "??"))
+    )
 
 
 def test_hostile_names_and_units_compile(tmp_path):
@@ -178,26 +208,50 @@ def test_tables_are_rows_of_eight():
     assert [len(row.split()) for row in rows([0.1] * 9, "double")] == [4, 4, 1]
 
 
-# --------------------------------------------------------------------------------------------------------- wheel
+# ------------------------------------------------------------------------------------------------------ wheel
 
 
 @pytest.mark.long
 def test_an_installed_wheel_generates_the_same_bytes(tmp_path):
-    """Built from the checkout, installed into an environment of its own, run from a folder with nothing in it."""
+    """Built from the checkout, installed into an environment of its own, run from an empty folder."""
     wheels, home, empty = (tmp_path / name for name in ("wheels", "home", "empty"))
     run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", ROOT, "-w", wheels)
     venv.create(home, with_pip=False)
     (wheel,) = wheels.glob("focgen-*.whl")
-    run(sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", home / "focgen-only", wheel)
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--target",
+        home / "focgen-only",
+        wheel,
+    )
     empty.mkdir()
     # the libraries of the environment that tests, the package of the wheel
     libraries = [p for p in sys.path if "site-packages" in p]
     bare = {**os.environ, "PYTHONPATH": os.pathsep.join([str(home / "focgen-only"), *libraries])}
-    code = ("import focgen, sys; from focgen.cli.main import main; "
-            "assert focgen.__file__.startswith(sys.argv[1]), focgen.__file__; sys.exit(main(sys.argv[2:]))")
+    code = (
+        "import focgen, sys; from focgen.cli.main import main; "
+        "assert focgen.__file__.startswith(sys.argv[1]), focgen.__file__; sys.exit(main(sys.argv[2:]))"
+    )
     argv = ["generate", str(FINGER), "--out", "fw", "--arithmetic", "q15"]
-    done = subprocess.run([sys.executable, "-S", "-c", code, str(home), *argv], cwd=empty, env=bare, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", code, str(home), *argv],
+        cwd=empty,
+        env=bare,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     generate(FINGER, tmp_path / "here", "q15")
-    expected = {p.relative_to(tmp_path / "here"): p.read_bytes() for p in (tmp_path / "here").rglob("*") if p.is_file()}
-    assert {p.relative_to(empty / "fw"): p.read_bytes() for p in (empty / "fw").rglob("*") if p.is_file()} == expected
+    expected = {
+        p.relative_to(tmp_path / "here"): p.read_bytes()
+        for p in (tmp_path / "here").rglob("*")
+        if p.is_file()
+    }
+    assert {
+        p.relative_to(empty / "fw"): p.read_bytes() for p in (empty / "fw").rglob("*") if p.is_file()
+    } == expected

@@ -53,18 +53,39 @@ def test_no_floating_point_on_the_fixed_path(arithmetic, tmp_path):
     zig = [*compiler_for_bare_metal(), "-std=c99", "-O2", "-c", folder / "finger.c", "-o", folder / "x.o"]
     run(*zig)
     calls = {name for name in wanted(folder / "x.o") if not name.startswith("__aeabi_unwind")}
-    assert calls <= MEMORY | {"__aeabi_lmul", "__aeabi_llsl", "__aeabi_lasr", "__aeabi_memset", "__aeabi_memclr",
-                              "__aeabi_memclr4", "__aeabi_memclr8", "__aeabi_memset4", "__aeabi_memset8",
-                              "__aeabi_memcpy", "__aeabi_memcpy4"}
+    assert calls <= MEMORY | {
+        "__aeabi_lmul",
+        "__aeabi_llsl",
+        "__aeabi_lasr",
+        "__aeabi_memset",
+        "__aeabi_memclr",
+        "__aeabi_memclr4",
+        "__aeabi_memclr8",
+        "__aeabi_memset4",
+        "__aeabi_memset8",
+        "__aeabi_memcpy",
+        "__aeabi_memcpy4",
+    }
     folder = folder_of("f32", tmp_path / "float")
     run(*zig[:-3], folder / "finger.c", "-o", folder / "x.o")
-    assert any(name.startswith("__aeabi_f") for name in wanted(folder / "x.o")), "the check sees float operations"
+    assert any(name.startswith("__aeabi_f") for name in wanted(folder / "x.o")), (
+        "the check sees float operations"
+    )
 
 
 def compiler_for_bare_metal() -> list[str]:
     pytest.importorskip("ziglang", reason="ziglang (extra `targets`) is not installed")
-    return [sys.executable, "-m", "ziglang", "cc", "-target", "thumb-freestanding-eabi", "-mcpu=cortex_m0plus",
-            "-ffreestanding", "-fno-sanitize=undefined"]
+    return [
+        sys.executable,
+        "-m",
+        "ziglang",
+        "cc",
+        "-target",
+        "thumb-freestanding-eabi",
+        "-mcpu=cortex_m0plus",
+        "-ffreestanding",
+        "-fno-sanitize=undefined",
+    ]
 
 
 @pytest.mark.parametrize("arithmetic", ["q31", "q15"])
@@ -78,8 +99,10 @@ def test_the_source_of_the_fixed_path_names_no_floating_type(arithmetic, tmp_pat
 def test_the_state_is_as_large_as_the_manifest_says(arithmetic, tmp_path):
     folder = folder_of(arithmetic, tmp_path)
     size = json.loads((folder / "manifest.json").read_text())["sizes"]
-    (folder / "size.c").write_text('#include <stdio.h>\n#include "finger.h"\n'
-                                   'int main(void) { printf("%d", (int)sizeof(finger_state)); return 0; }\n')
+    (folder / "size.c").write_text(
+        '#include <stdio.h>\n#include "finger.h"\n'
+        'int main(void) { printf("%d", (int)sizeof(finger_state)); return 0; }\n'
+    )
     run(*compiler("gcc"), "-std=c99", folder / "size.c", "-o", folder / "size.exe")
     assert int(run(folder / "size.exe")) == size["state_bytes"]
     run(*compiler("gcc"), "-std=c99", "-O0", "-c", folder / "finger.c", "-o", folder / "x.o")
@@ -122,9 +145,18 @@ int main(void)
     return 0;
 }
 """
-_SOME = {"int16_t": "(chance() & 0xffffu)", "int32_t": "(chance() << 8)", "float": "chance() * 1e-8f", "double": "chance() * 1e-8"}
-_ENDS = {"int16_t": ("INT16_MAX", "INT16_MIN"), "int32_t": ("INT32_MAX", "INT32_MIN"), "float": ("1e30f", "-1e30f"),
-         "double": ("1e300", "-1e300")}
+_SOME = {
+    "int16_t": "(chance() & 0xffffu)",
+    "int32_t": "(chance() << 8)",
+    "float": "chance() * 1e-8f",
+    "double": "chance() * 1e-8",
+}
+_ENDS = {
+    "int16_t": ("INT16_MAX", "INT16_MIN"),
+    "int32_t": ("INT32_MAX", "INT32_MIN"),
+    "float": ("1e30f", "-1e30f"),
+    "double": ("1e300", "-1e300"),
+}
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
@@ -136,12 +168,22 @@ def test_no_input_leads_to_undefined_behaviour(arithmetic, tmp_path):
     (folder / "wild.c").write_text(_WILD % {"top": top, "bottom": bottom, "some": _SOME[ctype]})
     sanitisers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     program = folder / "wild.exe"
-    run(*compiler("gcc"), "-std=c99", "-O1", "-g", *sanitisers, folder / "wild.c", folder / "finger.c", "-o", program)
+    run(
+        *compiler("gcc"),
+        "-std=c99",
+        "-O1",
+        "-g",
+        *sanitisers,
+        folder / "wild.c",
+        folder / "finger.c",
+        "-o",
+        program,
+    )
     assert run(program) == "clean\n"
 
 
 def test_two_controllers_live_in_one_program(tmp_path):
-    """Another arithmetic and name, in one program and in one translation unit; each answers as it does alone."""
+    """Another arithmetic and name, in one program or in one translation unit: each as it is alone."""
     folder_of("q15", tmp_path, "left"), folder_of("f32", tmp_path, "right")
     alone = [trace(tmp_path, [name]) for name in ("left", "right")]
     assert trace(tmp_path, ["left", "right"]) == "".join(alone)
@@ -151,11 +193,22 @@ def test_two_controllers_live_in_one_program(tmp_path):
 
 def trace(folder: Path, names: list[str], one_unit: bool = False) -> str:
     """The first outputs of controllers stepped in turn, grouped by controller."""
-    calls = [f"{n}_init(&{n}); for (k = 0; k < 50; k++) printf(\"%.9g\\n\", "
-             f"(double){n}_step(&{n}, ({n}_sig)(0.01 / {n}_REF_LSB), 0, ({n}_sig)(0.1 / {n}_SCHED_LSB)));" for n in names]
+    calls = [
+        f'{n}_init(&{n}); for (k = 0; k < 50; k++) printf("%.9g\\n", '
+        f"(double){n}_step(&{n}, ({n}_sig)(0.01 / {n}_REF_LSB), 0, ({n}_sig)(0.1 / {n}_SCHED_LSB)));"
+        for n in names
+    ]
     ends = "c" if one_unit else "h"
-    text = "\n".join(["#include <stdio.h>", *(f'#include "{n}.{ends}"' for n in names),
-                      *(f"static {n}_state {n};" for n in names), "int main(void) { int k;", *calls, "return 0; }"])
+    text = "\n".join(
+        [
+            "#include <stdio.h>",
+            *(f'#include "{n}.{ends}"' for n in names),
+            *(f"static {n}_state {n};" for n in names),
+            "int main(void) { int k;",
+            *calls,
+            "return 0; }",
+        ]
+    )
     (folder / "main.c").write_text(text)
     sources = [] if one_unit else [folder / f"{n}.c" for n in names]
     run(*compiler("gcc"), *EXACT, folder / "main.c", *sources, "-o", folder / "main.exe")
@@ -185,13 +238,24 @@ def test_on_avr_the_tables_stay_in_flash(tmp_path):
     run(*avr, "-c", folder / "finger.c", "-o", folder / "x.o")
     tables = [line for line in run("avr-nm", folder / "x.o").splitlines() if "finger_numerator" in line]
     sections = run("avr-objdump", "-h", folder / "x.o")
-    assert tables and ".progmem" in sections and not re.search(r"^ +\d+ \.(rodata|data) +0*[1-9a-f]", sections, re.M)
+    assert (
+        tables
+        and ".progmem" in sections
+        and not re.search(r"^ +\d+ \.(rodata|data) +0*[1-9a-f]", sections, re.M)
+    )
 
 
-@pytest.mark.parametrize("changes, absent, present", [
-    (dict(), ("inner", "feedback", "carry", "filtered["), ("schedule", "integral")),
-    (dict(integrator=False), ("integral", "starting", "resting", "increment ="), ("(void)u0", "(void)u_applied")),
-])
+@pytest.mark.parametrize(
+    "changes, absent, present",
+    [
+        (dict(), ("inner", "feedback", "carry", "filtered["), ("schedule", "integral")),
+        (
+            dict(integrator=False),
+            ("integral", "starting", "resting", "increment ="),
+            ("(void)u0", "(void)u_applied"),
+        ),
+    ],
+)
 def test_what_a_controller_lacks_leaves_no_code(changes, absent, present, tmp_path):
     controller = replace(seed_controller(50), **changes)
     plan = build_plan(controller, "q31")
@@ -202,13 +266,23 @@ def test_what_a_controller_lacks_leaves_no_code(changes, absent, present, tmp_pa
 
 
 def test_without_a_schedule_step_takes_two_signals(tmp_path):
-    controller = replace(seed_controller(50), gain=300.0, ranges=replace(seed_controller().ranges, schedule=None))
+    controller = replace(
+        seed_controller(50), gain=300.0, ranges=replace(seed_controller().ranges, schedule=None)
+    )
     files = folder_files(build_plan(controller, "q15"), controller_text(controller).encode())
     assert "spba_sig spba_step(spba_state *s, spba_sig ref, spba_sig meas);" in files["spba.h"]
     assert "sched" not in files["spba.h"].lower() and "sched" not in files["spba.c"].lower()
     write_files(tmp_path, files)
-    run(*compiler("gcc"), *EXACT, "-I", tmp_path, tmp_path / "example" / "main.c", tmp_path / "spba.c",
-        "-o", tmp_path / "main.exe")
+    run(
+        *compiler("gcc"),
+        *EXACT,
+        "-I",
+        tmp_path,
+        tmp_path / "example" / "main.c",
+        tmp_path / "spba.c",
+        "-o",
+        tmp_path / "main.exe",
+    )
 
 
 def test_the_controller_in_the_folder_is_the_one_that_was_given(tmp_path):

@@ -11,27 +11,49 @@ from cffi import FFI
 from focgen.compiler import compile_shared
 from focgen.resources import shipped
 
-# Loops over arrays, so that millions of values take no time; each prototype is also what cffi is told.
-_LOOPS = {
-    "void clamp16(const int16_t *x, int32_t n, int16_t low, int16_t high, int16_t *y)": "foc_clamp16(x[i], low, high)",
-    "void sat16(const int32_t *x, int32_t n, int16_t *y)": "foc_sat16(x[i])",
-    "void sat32(const int64_t *x, int32_t n, int32_t *y)": "foc_sat32(x[i])",
-    "void clamp32(const int32_t *x, int32_t n, int32_t low, int32_t high, int32_t *y)": "foc_clamp32(x[i], low, high)",
-    "void clamp64(const int64_t *x, int32_t n, int64_t low, int64_t high, int64_t *y)": "foc_clamp64(x[i], low, high)",
-    "void shift32(const int32_t *x, int32_t n, uint8_t by, int32_t *y)": "foc_shift32(x[i], by)",
-    "void shift64(const int64_t *x, int32_t n, uint8_t by, int64_t *y)": "foc_shift64(x[i], by)",
-    "void mul32x16(const int32_t *x, int32_t n, int16_t by, int64_t *y)": "foc_mul32x16(x[i], by)",
-    "void next(const uint16_t *x, int32_t n, uint16_t size, uint16_t *y)": "foc_ring_next(x[i], size)",
-    "void slot(const uint16_t *x, int32_t n, uint16_t size, uint16_t lag, uint16_t *y)": "foc_ring_slot(x[i], size, lag)",
-}
-_SUMS = ("int32_t dot_q15(const int16_t *, uint16_t, const int16_t *, uint16_t, uint16_t, uint16_t)",
-         "int64_t dot_q31(const int32_t *, uint16_t, const int32_t *, uint16_t, uint16_t, uint16_t)",
-         "float dot_f32(const float *, uint16_t, const float *, uint16_t, uint16_t, uint16_t)",
-         "double dot_f64(const double *, uint16_t, const double *, uint16_t, uint16_t, uint16_t)")
-_GAINS = ("int16_t schedule_q15(int16_t, const int16_t *, const int16_t *, const int16_t *, const uint8_t *, uint16_t)",
-          "int32_t schedule_q31(int32_t, const int32_t *, const int32_t *, const int32_t *, const uint8_t *, uint16_t)",
-          "float schedule_f32(float, const float *, const float *, const float *, uint16_t)",
-          "double schedule_f64(double, const double *, const double *, const double *, uint16_t)")
+
+def _loop(function: str, x: str, y: str, *parameters: str) -> tuple[str, str]:
+    """Prototype and C of a function over arrays, so that millions of values take no time."""
+    name = function.removeprefix("foc_").removeprefix("ring_")
+    prototype = f"void {name}({', '.join([f'const {x} *x', 'int32_t n', *parameters, f'{y} *y'])})"
+    arguments = ", ".join(["x[i]", *(parameter.split()[-1] for parameter in parameters)])
+    return prototype, f"{prototype} {{ int32_t i; for (i = 0; i < n; i++) y[i] = {function}({arguments}); }}"
+
+
+_LOOPS = (
+    _loop("foc_clamp16", "int16_t", "int16_t", "int16_t low", "int16_t high"),
+    _loop("foc_clamp32", "int32_t", "int32_t", "int32_t low", "int32_t high"),
+    _loop("foc_clamp64", "int64_t", "int64_t", "int64_t low", "int64_t high"),
+    _loop("foc_sat16", "int32_t", "int16_t"),
+    _loop("foc_sat32", "int64_t", "int32_t"),
+    _loop("foc_shift32", "int32_t", "int32_t", "uint8_t by"),
+    _loop("foc_shift64", "int64_t", "int64_t", "uint8_t by"),
+    _loop("foc_mul32x16", "int32_t", "int64_t", "int16_t by"),
+    _loop("foc_ring_next", "uint16_t", "uint16_t", "uint16_t size"),
+    _loop("foc_ring_slot", "uint16_t", "uint16_t", "uint16_t size", "uint16_t lag"),
+)
+
+
+def _sum(arithmetic: str, x: str, total: str) -> str:
+    return f"{total} dot_{arithmetic}(const {x} *, uint16_t, const {x} *, uint16_t, uint16_t, uint16_t)"
+
+
+def _schedule(arithmetic: str, x: str, shifts: str = "") -> str:
+    return f"{x} schedule_{arithmetic}({x}, const {x} *, const {x} *, const {x} *, {shifts}uint16_t)"
+
+
+_SUMS = (
+    _sum("q15", "int16_t", "int32_t"),
+    _sum("q31", "int32_t", "int64_t"),
+    _sum("f32", "float", "float"),
+    _sum("f64", "double", "double"),
+)
+_GAINS = (
+    _schedule("q15", "int16_t", "const uint8_t *, "),
+    _schedule("q31", "int32_t", "const uint8_t *, "),
+    _schedule("f32", "float"),
+    _schedule("f64", "double"),
+)
 
 I16, I32, I64 = (np.iinfo(kind) for kind in (np.int16, np.int32, np.int64))
 
@@ -41,20 +63,20 @@ def _forwarded(prototype: str) -> str:
     head, _, arguments = prototype.partition("(")
     kinds = arguments.rstrip(")").split(", ")
     named = ", ".join(f"{kind} a{i}" for i, kind in enumerate(kinds))
-    return f"{head}({named}) {{ return foc_{head.split()[-1]}({', '.join(f'a{i}' for i in range(len(kinds)))}); }}"
+    passed = ", ".join(f"a{i}" for i in range(len(kinds)))
+    return f"{head}({named}) {{ return foc_{head.split()[-1]}({passed}); }}"
 
 
 @pytest.fixture(scope="module")
 def c(tmp_path_factory):
     """The runtime as a library: (ffi, library)."""
     folder = tmp_path_factory.mktemp("runtime")
-    loops = [f"{head} {{ int32_t i; for (i = 0; i < n; i++) y[i] = {body}; }}" for head, body in _LOOPS.items()]
-    text = "\n".join(['#include "foc_rt.h"', *loops, *map(_forwarded, _SUMS + _GAINS)])
+    text = "\n".join(['#include "foc_rt.h"', *(code for _, code in _LOOPS), *map(_forwarded, _SUMS + _GAINS)])
     (folder / "rt.c").write_text(text)
     flags = ["-std=c99", "-O1", "-ffp-contract=off"]
     compile_shared([folder / "rt.c"], folder / "rt.so", flags, [shipped("c_runtime")])
     ffi = FFI()
-    ffi.cdef("".join(f"{prototype};" for prototype in (*_LOOPS, *_SUMS, *_GAINS)))
+    ffi.cdef("".join(f"{prototype};" for prototype in (*(head for head, _ in _LOOPS), *_SUMS, *_GAINS)))
     return ffi, ffi.dlopen(str(folder / "rt.so"))
 
 
@@ -81,7 +103,9 @@ def edges(info, kind: type) -> np.ndarray:
 @pytest.mark.parametrize("low, high", [(-32768, 32767), (0, 0), (-5, 7), (100, 32767), (-32768, -32768)])
 def test_clamp16_over_every_value(c, low, high):
     x = everything16()
-    assert np.array_equal(mapped(c, "clamp16", x, low, high, out=np.int16), [min(max(v, low), high) for v in x.tolist()])
+    assert np.array_equal(
+        mapped(c, "clamp16", x, low, high, out=np.int16), [min(max(v, low), high) for v in x.tolist()]
+    )
 
 
 def test_saturation_to_16_bits_over_every_value_and_beyond(c):
@@ -92,11 +116,17 @@ def test_saturation_to_16_bits_over_every_value_and_beyond(c):
 
 def test_saturation_and_clamps_of_the_wide_types(c):
     x64, x32 = edges(I64, np.int64), edges(I32, np.int32)
-    assert mapped(c, "sat32", x64, out=np.int32).tolist() == [min(max(v, I32.min), I32.max) for v in x64.tolist()]
+    assert mapped(c, "sat32", x64, out=np.int32).tolist() == [
+        min(max(v, I32.min), I32.max) for v in x64.tolist()
+    ]
     for low, high in ((I64.min, I64.max), (-(1 << 40), 1 << 33), (5, 5)):
-        assert mapped(c, "clamp64", x64, low, high, out=np.int64).tolist() == [min(max(v, low), high) for v in x64.tolist()]
+        assert mapped(c, "clamp64", x64, low, high, out=np.int64).tolist() == [
+            min(max(v, low), high) for v in x64.tolist()
+        ]
     for low, high in ((I32.min, I32.max), (-70000, 3), (5, 5)):
-        assert mapped(c, "clamp32", x32, low, high, out=np.int32).tolist() == [min(max(v, low), high) for v in x32.tolist()]
+        assert mapped(c, "clamp32", x32, low, high, out=np.int32).tolist() == [
+            min(max(v, low), high) for v in x32.tolist()
+        ]
 
 
 @pytest.mark.parametrize("by", range(17))
@@ -112,7 +142,9 @@ def test_shift_rounds_half_up_over_every_16_bit_value(c, by):
 def test_shift_of_64_bits(c, by):
     half = (1 << by) >> 1
     x = np.array([v for v in edges(I64, np.int64).tolist() if v + half <= I64.max], np.int64)
-    assert mapped(c, "shift64", x, by, out=np.int64).tolist() == [(2 * v + (1 << by)) // (1 << (by + 1)) for v in x.tolist()]
+    assert mapped(c, "shift64", x, by, out=np.int64).tolist() == [
+        (2 * v + (1 << by)) // (1 << (by + 1)) for v in x.tolist()
+    ]
 
 
 def test_the_split_product_is_exact(c):
@@ -127,10 +159,17 @@ def test_ring_slots(c, size):
     now = np.unique(np.array([0, 1, size // 2, size - 2, size - 1]) % size).astype(np.uint16)
     assert mapped(c, "next", now, size, out=np.uint16).tolist() == [(n + 1) % size for n in now.tolist()]
     for lag in {0, 1 % size, size // 3, size - 1}:
-        assert mapped(c, "slot", now, size, lag, out=np.uint16).tolist() == [(n - lag) % size for n in now.tolist()]
+        assert mapped(c, "slot", now, size, lag, out=np.uint16).tolist() == [
+            (n - lag) % size for n in now.tolist()
+        ]
 
 
-_KINDS = {"q15": (np.int16, "int16_t"), "q31": (np.int32, "int32_t"), "f32": (np.float32, "float"), "f64": (np.float64, "double")}
+_KINDS = {
+    "q15": (np.int16, "int16_t"),
+    "q31": (np.int32, "int32_t"),
+    "f32": (np.float32, "float"),
+    "f64": (np.float64, "double"),
+}
 
 
 @pytest.mark.parametrize("arithmetic", _KINDS)
@@ -141,7 +180,11 @@ def test_sums_over_a_ring_at_every_place(c, arithmetic):
     rng = np.random.default_rng(3)
     for size in range(1, 8):
         ring = rng.integers(-30000, 30000, size).astype(kind) * kind(0.37 if kind(0.5) else 1)
-        weights = rng.integers(-900, 900, size).astype(kind) / kind(7) if kind(0.5) else rng.integers(-900, 900, size).astype(kind)
+        weights = (
+            rng.integers(-900, 900, size).astype(kind) / kind(7)
+            if kind(0.5)
+            else rng.integers(-900, 900, size).astype(kind)
+        )
         w, x = (ffi.cast(f"{ctype} *", a.ctypes.data) for a in (weights, ring))
         for now in range(size):
             for oldest in range(size):
@@ -195,7 +238,9 @@ def test_the_schedule_in_floating_point(c, arithmetic):
     slopes = np.diff(gains) / np.diff(points)
     pointers = [ffi.cast(f"{ctype} *", a.ctypes.data) for a in (points, gains, slopes)]
     call = getattr(library, f"schedule_{arithmetic}")
-    assert call(-5.0, *pointers, 3) == gains[0] and call(3.0, *pointers, 3) == gains[2] == call(1e9, *pointers, 3)
+    assert call(-5.0, *pointers, 3) == gains[0] and call(3.0, *pointers, 3) == gains[2] == call(
+        1e9, *pointers, 3
+    )
     for x in np.random.default_rng(1).uniform(-1.0, 3.0, 500).astype(kind):
         i = 0 if x < points[1] else 1
         assert call(float(x), *pointers, 3) == gains[i] + slopes[i] * (x - points[i])

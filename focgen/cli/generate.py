@@ -18,11 +18,15 @@ EXAMPLE = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The command's arguments."""
-    parser.add_argument("controller", metavar="CONTROLLER", help="controller.toml, designed or written by hand")
+    parser.add_argument(
+        "controller", metavar="CONTROLLER", help="controller.toml, designed or written by hand"
+    )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the C and its manifest")
     parser.add_argument("--arithmetic", choices=ARITHMETICS, help="default: the controller's")
     parser.add_argument("--memory", choices=MEMORIES, help="form of the memory; default: the controller's")
-    parser.add_argument("--length", type=int, metavar="L", help="past samples that take part; default: the controller's")
+    parser.add_argument(
+        "--length", type=int, metavar="L", help="past samples that take part; default: the controller's"
+    )
     parser.add_argument("--tolerance", type=float, metavar="E", help="of the exponential memory")
     parser.add_argument("--horizon", type=int, metavar="N", help="of the exponential memory, in samples")
     parser.add_argument("--target", metavar="CORE", help="use a core's own kernels (same bits)")
@@ -33,8 +37,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Outcome:
     """Generate and say what was written."""
     made = generate(
-        args.controller, args.out, args.arithmetic, args.memory, args.length, args.name, args.target, args.package,
-        args.tolerance, args.horizon,
+        args.controller,
+        args.out,
+        args.arithmetic,
+        args.memory,
+        args.length,
+        args.name,
+        args.target,
+        args.package,
+        args.tolerance,
+        args.horizon,
     )
     return Outcome(made.manifest, _text(made))
 
@@ -43,14 +55,18 @@ def _text(made: Generated) -> str:
     plan, manifest = made.plan, made.manifest
     bound, size, unit = plan.error_bound, manifest["sizes"], plan.controller.units.output
     rate = f"{unit}/s" if plan.integrator and unit else unit
+    ahead = "integrator" if plan.integrator else "limits"
     truncation = "no bound" if bound.truncation is None else f"{bound.truncation:.3g} {rate}".rstrip()
     lines = [
         f"{plan.name}: {plan.arithmetic}, {plan.length} past samples, {size['state_bytes']} bytes of state,"
         f" {size['table_bytes']} bytes of tables",
-        f"error ahead of the {'integrator' if plan.integrator else 'limits'}: at most {bound.operator:.3g} {rate}".rstrip()
+        f"error ahead of the {ahead}: at most {bound.operator:.3g} {rate}".rstrip()
         + f"; by short memory at most {truncation}",
-        *(f"short memory: {b['coefficient']:.6g} s^{b['order']:g} is {b['bias']:.3g} at rest instead of 0"
-          for b in manifest["memory_bias"] if b["bias"]),
+        *(
+            f"short memory: {b['coefficient']:.6g} s^{b['order']:g} is {b['bias']:.3g} at rest instead of 0"
+            for b in manifest["memory_bias"]
+            if b["bias"]
+        ),
         f"wrote {', '.join(made.files)} to {made.folder}",
         f"next: focgen verify {made.folder}",
     ]

@@ -77,7 +77,9 @@ def readme_context(plan: Plan, title: str) -> ReadmeContext:
         tightest=_tightest(plan),
         operator=_quantity(bound.operator, operator_unit),
         output_per_sample=_quantity(bound.output_per_sample, unit),
-        truncation="none can be given" if bound.truncation is None else _quantity(bound.truncation, operator_unit),
+        truncation="none can be given"
+        if bound.truncation is None
+        else _quantity(bound.truncation, operator_unit),
         biases=_biases(plan),
         unit=unit,
     )

@@ -57,7 +57,8 @@ def weights_about(plan: Plan, terms: Polynomial, table: Sum, what: str, half_ste
         factor += f" over {normaliser:.6g}, the denominator's weight of lag 0"
     lags = f"lags {table.last} ... {table.first}" if table.last > table.first else f"lag {table.first} only"
     formula = (
-        f"Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = {quantity(plan.sample_time, 's')};"
+        "Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov),"
+        f" h = {quantity(plan.sample_time, 's')};"
         f" the weight of lag j is their sum{factor}. Oldest first, {lags}."
     )
     return [f"{what}: {polynomial_text(terms)}.", *wrapped(formula.split(" "))]

@@ -49,11 +49,12 @@ def generate(
 ) -> Generated:
     """Write C for a controller into the folder ``out``, whole or not at all.
 
-    ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15), ``memory``,
-    ``length`` (past samples) and ``name`` (a C identifier) default to the controller's own.
+    ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15),
+    ``memory``, ``length`` (past samples) and ``name`` (a C identifier) default to the controller's own.
 
-    Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised in this
-    arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be written.
+    Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
+    in this arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be
+    written.
     """
     _refuse_what_is_missing(memory, target, package, tolerance, horizon)
     text, made, where = _source(controller)
@@ -99,7 +100,9 @@ def _check(arithmetic: str | None, memory: str | None, length: int) -> None:
     if not isinstance(length, int) or isinstance(length, bool) or length < 1:
         raise InputError("--length", f"is {length!r}", "give a memory length of at least 1 sample")
     if length > _LONGEST:
-        raise InputError("--length", f"is {length}, more than the ring in C can count", f"give at most {_LONGEST}")
+        raise InputError(
+            "--length", f"is {length}, more than the ring in C can count", f"give at most {_LONGEST}"
+        )
 
 
 def _refuse_what_is_missing(memory, target, package, tolerance, horizon) -> None:
@@ -107,11 +110,19 @@ def _refuse_what_is_missing(memory, target, package, tolerance, horizon) -> None
     if memory == "exponential":
         raise InputError("--memory", "exponential is not available in this version", "use --memory short")
     if target is not None:
-        raise InputError("--target", f"{target} has no kernels of its own in this version", "leave it out: the C runs there")
+        raise InputError(
+            "--target",
+            f"{target} has no kernels of its own in this version",
+            "leave it out: the C runs there",
+        )
     if package not in PACKAGES:
         raise InputError("--for", f"is {package!r}", f"choose one of {', '.join(PACKAGES)}")
     if package != "plain":
-        raise InputError("--for", f"{package} is not available in this version", "use --for plain and add the three files")
+        raise InputError(
+            "--for", f"{package} is not available in this version", "use --for plain and add the three files"
+        )
     for option, value in (("--tolerance", tolerance), ("--horizon", horizon)):
         if value is not None:
-            raise InputError(option, "belongs to --memory exponential, which this version lacks", "use --length")
+            raise InputError(
+                option, "belongs to --memory exponential, which this version lacks", "use --length"
+            )

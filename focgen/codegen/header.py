@@ -72,8 +72,15 @@ def _scales(plan: Plan) -> list[Define]:
     units = plan.controller.units
     return [
         Define("REF_LSB", _lsb(plan.error), _unit(units.measurement, "of reference and measurement")),
-        *([Define("SCHED_LSB", _lsb(plan.schedule.signal), _unit(units.schedule, "of the scheduling signal"))]
-          if plan.schedule else []),
+        *(
+            [
+                Define(
+                    "SCHED_LSB", _lsb(plan.schedule.signal), _unit(units.schedule, "of the scheduling signal")
+                )
+            ]
+            if plan.schedule
+            else []
+        ),
         Define("U_LSB", _lsb(plan.output), _unit(units.output, "of the output")),
     ]
 

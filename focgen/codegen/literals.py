@@ -8,13 +8,14 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-_WIDTH = 112  # of a line
+_WIDTH = 106  # of a line
 
 
 def literal(value: int | float, ctype: str) -> str:
     """A constant of type ``ctype`` that reads back as exactly ``value``.
 
-    Integers stand as they are: C99 gives a decimal constant the first of int, long and long long that holds it.
+    Integers stand as they are: C99 gives a decimal constant the first of int, long and long long that holds
+    it.
     """
     if ctype == "double":
         return _pointed(f"{value:.17g}", value)
@@ -46,7 +47,7 @@ def rows(values: Sequence[int | float], ctype: str) -> list[str]:
     """A table's values in aligned rows, eight to a line where they fit, each followed by a comma."""
     texts = [literal(v, ctype) for v in values]
     width = max(map(len, texts))
-    per_row = 8 if 8 * (width + 2) <= _WIDTH - 4 else 4
+    per_row = 8 if 8 * (width + 2) <= _WIDTH else 4
     lines = [texts[i : i + per_row] for i in range(0, len(texts), per_row)]
     return [" ".join(f"{text:>{width}}," for text in line) for line in lines]
 

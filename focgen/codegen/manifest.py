@@ -52,14 +52,23 @@ def _ranges(plan: Plan) -> dict[str, list[float]]:
 def proof_entry(proof: Proof) -> dict[str, Any]:
     """One node: its worst case and limit in counts, the margin in bits, and how it was proved."""
     margin = None if math.isinf(proof.margin_bits) else round(proof.margin_bits, 3)
-    return {"node": proof.node, "worst": proof.worst, "type": proof.ctype, "limit": proof.limit,
-            "margin_bits": margin, "how": proof.how}
+    return {
+        "node": proof.node,
+        "worst": proof.worst,
+        "type": proof.ctype,
+        "limit": proof.limit,
+        "margin_bits": margin,
+        "how": proof.how,
+    }
 
 
 def bound_entry(bound: ErrorBound) -> dict[str, Any]:
     """The two parts of the error bound, in physical units."""
-    quantisation = {"operator": bound.operator, "output_per_sample": bound.output_per_sample,
-                    "parts": dict(bound.parts)}
+    quantisation = {
+        "operator": bound.operator,
+        "output_per_sample": bound.output_per_sample,
+        "parts": dict(bound.parts),
+    }
     if bound.operator_per_sample:
         quantisation["operator_per_sample"] = bound.operator_per_sample
     return {"quantisation": quantisation, "truncation": {"operator": bound.truncation}}

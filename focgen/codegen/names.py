@@ -31,10 +31,15 @@ _HEADERS = """
 
 
 def check_name(name: str, where: str) -> str:
-    """Return ``name`` if it can prefix C identifiers and name a header, else raise InputError with one that can."""
+    """Return ``name`` if it can prefix C identifiers and name a header.
+
+    Raises InputError, with a name that can, otherwise.
+    """
     fault = _fault(name)
     if fault:
-        raise InputError(where, f"the name {name!r} {fault}", f"give --name, for example --name {suggestion(name)}")
+        raise InputError(
+            where, f"the name {name!r} {fault}", f"give --name, for example --name {suggestion(name)}"
+        )
     return name
 
 

@@ -9,12 +9,11 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from focgen.resources import shipped
 
-
-_WIDTH = 112
+_WIDTH = 104
 
 
 def broken(code: str, indent: int = 0) -> str:
-    """One line of C, broken after a comma where it is too long; what follows stands below the first argument."""
+    """One line of C, broken after a comma where it is too long; the rest stands below the first argument."""
     start = code.find("(") + 1
     lines, line = [], code
     while indent + len(line) > _WIDTH:

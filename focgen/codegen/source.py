@@ -64,7 +64,8 @@ class GainText:
 class SourceContext:
     """Everything ``controller.c.jinja`` asks for. None and empty strings leave their part of the text out.
 
-    Types: ``signal`` of inputs and output, ``filtered`` of v, ``wide`` of x, ``gain_type`` of g, ``increment`` of d.
+    Types: ``signal`` of inputs and output, ``filtered`` of v, ``wide`` of x, ``gain_type`` of g,
+    ``increment`` of d.
     """
 
     name: str
@@ -141,7 +142,9 @@ def _narrowed(plan: Plan, x: str) -> str:
 
 def _at_rest(plan: Plan) -> str:
     """v for a constant e where there is no recursion."""
-    return _narrowed(plan, f"{plan.name}_numerator_sum(s)") if plan.direct else literal(0, plan.filtered.ctype)
+    return (
+        _narrowed(plan, f"{plan.name}_numerator_sum(s)") if plan.direct else literal(0, plan.filtered.ctype)
+    )
 
 
 def _numerator(plan: Plan) -> SumText | None:

@@ -34,7 +34,11 @@ def members(plan: Plan) -> tuple[Member, ...]:
 
 def _histories(plan: Plan) -> list[Member]:
     error = Member(
-        plan.error.ctype, "error", f"ring of ref - meas{_counts(plan.error)}", plan.error_lags + 1, f"{plan.name}_ERRORS"
+        plan.error.ctype,
+        "error",
+        f"ring of ref - meas{_counts(plan.error)}",
+        plan.error_lags + 1,
+        f"{plan.name}_ERRORS",
     )
     slots = [error, Member("uint16_t", "error_now", "slot of the latest error")]
     if plan.feedback:
@@ -49,7 +53,11 @@ def _inner(plan: Plan) -> list[Member]:
     if plan.inner is None:
         return []
     return [
-        Member(plan.inner.state.ctype, "inner", f"integral of the terms of negative order{_counts(plan.inner.state)}"),
+        Member(
+            plan.inner.state.ctype,
+            "inner",
+            f"integral of the terms of negative order{_counts(plan.inner.state)}",
+        ),
         Member(plan.inner.rest.total.ctype, "inner_input", "what was added to it last, half a trapezoid"),
     ]
 
@@ -64,12 +72,19 @@ def _integral(plan: Plan) -> list[Member]:
     if plan.integrator is None:
         return []
     found = [
-        Member(plan.integrator.state.ctype, "integral", f"the output before rounding{_counts(plan.integrator.state)}"
-               if not plan.floating else "the output"),
+        Member(
+            plan.integrator.state.ctype,
+            "integral",
+            f"the output before rounding{_counts(plan.integrator.state)}"
+            if not plan.floating
+            else "the output",
+        ),
         Member(plan.increment.ctype, "increment", "half a trapezoid, of the latest sample"),
     ]
     if plan.schedule:
-        found.append(Member(plan.filtered.ctype, "resting", "filtered error that reset has left, until a step"))
+        found.append(
+            Member(plan.filtered.ctype, "resting", "filtered error that reset has left, until a step")
+        )
     return found
 
 

@@ -79,7 +79,10 @@ def _block_about(plan: Plan, block: Block) -> str:
 
 
 def _blocks(table: Sum, blocks: list[Block], name: str) -> TableText:
-    about = [f"Its blocks, whose sums meet at counts of {scale(table.total.lsb)}; beside each the most its sum can be."]
+    about = [
+        f"Its blocks, whose sums meet at counts of {scale(table.total.lsb)};"
+        " beside each the most its sum can be."
+    ]
     lines = []
     for block in blocks:
         shifted("", block.sum.ctype, block.align)  # refuses what is too long
@@ -132,7 +135,12 @@ def _columns(plan: Plan) -> list[tuple[str, str, str, tuple]]:
         named = ("points", schedule.breakpoints), ("gains", schedule.gains), ("slopes", schedule.slopes)
         return [("", ctype, key, values) for key, values in named]
     return [
-        (f"counts of {scale(schedule.signal.lsb, schedule.signal.unit)}", ctype, "points", schedule.breakpoints),
+        (
+            f"counts of {scale(schedule.signal.lsb, schedule.signal.unit)}",
+            ctype,
+            "points",
+            schedule.breakpoints,
+        ),
         (f"counts of {scale(plan.gain.lsb)}", ctype, "gains", schedule.gains),
         ("from each breakpoint to the next, before its shift", ctype, "slopes", schedule.slopes),
         ("", "uint8_t", "shifts", schedule.slope_shifts),

@@ -23,8 +23,8 @@
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
 static const FOC_ROM float finger_f32_numerator[41] = {
     -0.00114191452f, -0.00118949427f, -0.00124038174f, -0.00129490392f,
     -0.00135343068f, -0.00141638098f, -0.00148423156f, -0.00155752688f,
@@ -40,8 +40,8 @@ static const FOC_ROM float finger_f32_numerator[41] = {
 };
 
 /* What 1/s integrates: numerator terms of negative order times s: 0.5 s^0.6.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum times h/2 over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum times h/2 over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
 static const FOC_ROM float finger_f32_integrand[41] = {
     -7.13696545e-06f, -7.43433884e-06f,  -7.7523855e-06f, -8.09314952e-06f,
     -8.45894192e-06f, -8.85238114e-06f, -9.27644669e-06f, -9.73454371e-06f,
@@ -57,8 +57,8 @@ static const FOC_ROM float finger_f32_integrand[41] = {
 };
 
 /* Denominator: 0.05 s^0.9 + 1.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 1. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 1. */
 static const FOC_ROM float finger_f32_denominator[40] = {
     -6.63440733e-05f, -6.96525749e-05f, -7.32196859e-05f, -7.70733532e-05f,
     -8.12454164e-05f, -8.57722844e-05f, -9.06957721e-05f, -9.60640537e-05f,
@@ -96,7 +96,8 @@ static float finger_f32_integrand_sum(const finger_f32_state *s)
 
 static float finger_f32_denominator_sum(const finger_f32_state *s)
 {
-    return foc_dot_f32(finger_f32_denominator, 40, s->filtered, finger_f32_FILTERED, s->filtered_now, 40);
+    return foc_dot_f32(finger_f32_denominator, 40, s->filtered, finger_f32_FILTERED, s->filtered_now,
+                       40);
 }
 
 /* Take the error of one more sample; return the filtered error v. */
@@ -166,7 +167,8 @@ void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig me
 finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas,
                                finger_f32_sig sched)
 {
-    const float gain = foc_schedule_f32(sched, finger_f32_points, finger_f32_gains, finger_f32_slopes, 3);
+    const float gain = foc_schedule_f32(sched, finger_f32_points, finger_f32_gains, finger_f32_slopes,
+                                        3);
     const float v = finger_f32_filter(s, ref - meas);
     const float d = finger_f32_increment(gain, v);
     unsigned flags = 0;

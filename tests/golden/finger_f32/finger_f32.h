@@ -38,8 +38,9 @@ typedef float finger_f32_sig;
 #define finger_f32_ERRORS   41 /* the present error and those before it */
 #define finger_f32_FILTERED 41 /* the same of the filtered error */
 
-/* One controller. It belongs to the caller: one for each loop, 356 bytes each. Its members may change
-   without notice. Not to be shared between an interrupt and a task, or two tasks, without a lock. */
+/* One controller. It belongs to the caller: one for each loop, 356 bytes each. Its members may
+   change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
+   lock. */
 typedef struct {
     float integral;                      /* the output */
     float increment;                     /* half a trapezoid, of the latest sample */
@@ -64,7 +65,8 @@ void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig me
 finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas,
                                finger_f32_sig sched);
 
-/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling step. */
+/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling
+   step. */
 void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied);
 
 /* finger_f32_FLAG_... of the latest step, 0 after init and reset. */

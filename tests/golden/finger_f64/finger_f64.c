@@ -23,8 +23,8 @@
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
 static const FOC_ROM double finger_f64_numerator[41] = {
      -0.001141914462653519, -0.0011894942319307491, -0.0012403816857031876, -0.0012949039576022289,
     -0.0013534306901492221, -0.0014163809548073257, -0.0014842315394687543, -0.0015575269241338782,
@@ -40,8 +40,8 @@ static const FOC_ROM double finger_f64_numerator[41] = {
 };
 
 /* What 1/s integrates: numerator terms of negative order times s: 0.5 s^0.6.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum times h/2 over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum times h/2 over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
 static const FOC_ROM double finger_f64_integrand[41] = {
     -7.1369653915844942e-06, -7.4343389495671816e-06, -7.7523855356449227e-06, -8.0931497350139305e-06,
     -8.4589418134326394e-06, -8.8523809675457851e-06, -9.2764471216797134e-06, -9.7345432758367374e-06,
@@ -57,8 +57,8 @@ static const FOC_ROM double finger_f64_integrand[41] = {
 };
 
 /* Denominator: 0.05 s^0.9 + 1.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 1. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 1. */
 static const FOC_ROM double finger_f64_denominator[40] = {
     -6.6344076014771924e-05,  -6.965257324385503e-05, -7.3219686159308522e-05, -7.7073353851903696e-05,
     -8.1245415741322972e-05, -8.5772286413126903e-05, -9.0695771131705174e-05, -9.6064056650404237e-05,
@@ -96,7 +96,8 @@ static double finger_f64_integrand_sum(const finger_f64_state *s)
 
 static double finger_f64_denominator_sum(const finger_f64_state *s)
 {
-    return foc_dot_f64(finger_f64_denominator, 40, s->filtered, finger_f64_FILTERED, s->filtered_now, 40);
+    return foc_dot_f64(finger_f64_denominator, 40, s->filtered, finger_f64_FILTERED, s->filtered_now,
+                       40);
 }
 
 /* Take the error of one more sample; return the filtered error v. */
@@ -112,7 +113,8 @@ static double finger_f64_filter(finger_f64_state *s, double e)
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
     r = finger_f64_integrand_sum(s);
-    s->inner = foc_clamp_f64(s->inner + (r + s->inner_input), (-0.68767497540566225), 0.68767497540566225);
+    s->inner = foc_clamp_f64(s->inner + (r + s->inner_input), (-0.68767497540566225),
+                             0.68767497540566225);
     s->inner_input = r;
     x += s->inner;
 
@@ -166,7 +168,8 @@ void finger_f64_reset(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig me
 finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig meas,
                                finger_f64_sig sched)
 {
-    const double gain = foc_schedule_f64(sched, finger_f64_points, finger_f64_gains, finger_f64_slopes, 3);
+    const double gain = foc_schedule_f64(sched, finger_f64_points, finger_f64_gains, finger_f64_slopes,
+                                         3);
     const double v = finger_f64_filter(s, ref - meas);
     const double d = finger_f64_increment(gain, v);
     unsigned flags = 0;

@@ -38,8 +38,9 @@ typedef double finger_f64_sig;
 #define finger_f64_ERRORS   41 /* the present error and those before it */
 #define finger_f64_FILTERED 41 /* the same of the filtered error */
 
-/* One controller. It belongs to the caller: one for each loop, 704 bytes each. Its members may change
-   without notice. Not to be shared between an interrupt and a task, or two tasks, without a lock. */
+/* One controller. It belongs to the caller: one for each loop, 704 bytes each. Its members may
+   change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
+   lock. */
 typedef struct {
     double integral;                      /* the output */
     double increment;                     /* half a trapezoid, of the latest sample */
@@ -64,7 +65,8 @@ void finger_f64_reset(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig me
 finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig meas,
                                finger_f64_sig sched);
 
-/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling step. */
+/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling
+   step. */
 void finger_f64_track(finger_f64_state *s, finger_f64_sig u_applied);
 
 /* finger_f64_FLAG_... of the latest step, 0 after init and reset. */

@@ -23,8 +23,8 @@
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
 static const FOC_ROM int16_t finger_q15_numerator[41] = {
     /* lags 40 ... 32: counts of 2^-22 */
     -4790, -4989, -5203, -5431, -5677, -5941, -6225, -6533,
@@ -57,8 +57,8 @@ static const FOC_ROM foc_block finger_q15_numerator_blocks[7] = {
 };
 
 /* What 1/s integrates: numerator terms of negative order times s: 0.5 s^0.6.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum times h/2 over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum times h/2 over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
 static const FOC_ROM int16_t finger_q15_integrand[41] = {
     /* lags 40 ... 32: counts of 2^-29 */
     -3832, -3991, -4162, -4345, -4541, -4753, -4980, -5226,
@@ -91,8 +91,8 @@ static const FOC_ROM foc_block finger_q15_integrand_blocks[7] = {
 };
 
 /* Denominator: 0.05 s^0.9 + 1.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 1. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 1. */
 static const FOC_ROM int16_t finger_q15_denominator[40] = {
     /* lags 40 ... 32: counts of 2^-26 */
     -4452, -4674, -4914, -5172, -5452, -5756, -6086, -6447,
@@ -142,15 +142,15 @@ static const FOC_ROM uint8_t finger_q15_shifts[2] = {
 static int32_t finger_q15_numerator_sum(const finger_q15_state *s)
 {
     /* |sum| <= 19644721 < 2^31, counts of 2^-28 */
-    return foc_sum_q15(finger_q15_numerator, finger_q15_numerator_blocks, 7, s->error, finger_q15_ERRORS,
-                       s->error_now);
+    return foc_sum_q15(finger_q15_numerator, finger_q15_numerator_blocks, 7, s->error,
+                       finger_q15_ERRORS, s->error_now);
 }
 
 static int32_t finger_q15_integrand_sum(const finger_q15_state *s)
 {
     /* |sum| <= 923125016 < 2^31, counts of 2^-41 */
-    return foc_sum_q15(finger_q15_integrand, finger_q15_integrand_blocks, 7, s->error, finger_q15_ERRORS,
-                       s->error_now);
+    return foc_sum_q15(finger_q15_integrand, finger_q15_integrand_blocks, 7, s->error,
+                       finger_q15_ERRORS, s->error_now);
 }
 
 static int32_t finger_q15_denominator_sum(const finger_q15_state *s)

@@ -19,7 +19,8 @@ extern "C" {
 
 #define finger_q15_SAMPLE_TIME 0.01f /* s: call step this often */
 
-/* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest integer. */
+/* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest
+   integer. */
 typedef int16_t finger_q15_sig;
 
 #define finger_q15_REF_LSB   9.5367431640625e-07f /* 1/mm, of reference and measurement */
@@ -45,8 +46,9 @@ typedef int16_t finger_q15_sig;
 #define finger_q15_ERRORS   41 /* the present error and those before it */
 #define finger_q15_FILTERED 41 /* the same of the filtered error */
 
-/* One controller. It belongs to the caller: one for each loop, 200 bytes each. Its members may change
-   without notice. Not to be shared between an interrupt and a task, or two tasks, without a lock. */
+/* One controller. It belongs to the caller: one for each loop, 200 bytes each. Its members may
+   change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
+   lock. */
 typedef struct {
     int64_t inner;                         /* integral of the terms of negative order, counts of 2^-41 */
     int32_t integral;                      /* the output before rounding, counts of 2^-26 V */
@@ -72,7 +74,8 @@ void finger_q15_reset(finger_q15_state *s, finger_q15_sig ref, finger_q15_sig me
 finger_q15_sig finger_q15_step(finger_q15_state *s, finger_q15_sig ref, finger_q15_sig meas,
                                finger_q15_sig sched);
 
-/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling step. */
+/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling
+   step. */
 void finger_q15_track(finger_q15_state *s, finger_q15_sig u_applied);
 
 /* finger_q15_FLAG_... of the latest step, 0 after init and reset. */

@@ -23,8 +23,8 @@
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
 static const FOC_ROM int32_t finger_q31_numerator[41] = {
     /* lags 40 ... 32: counts of 2^-38 */
     -313887057, -326965685, -340953522, -355940490, -372028195, -389331832, -407982459, -428129741,
@@ -57,8 +57,8 @@ static const FOC_ROM foc_block finger_q31_numerator_blocks[7] = {
 };
 
 /* What 1/s integrates: numerator terms of negative order times s: 0.5 s^0.6.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum times h/2 over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum times h/2 over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 0. */
 static const FOC_ROM int32_t finger_q31_integrand[41] = {
     /* lags 40 ... 32: counts of 2^-45 */
     -251109646, -261572548, -272762817, -284752392, -297622556, -311465466, -326385967, -342503793,
@@ -91,8 +91,8 @@ static const FOC_ROM foc_block finger_q31_integrand_blocks[7] = {
 };
 
 /* Denominator: 0.05 s^0.9 + 1.
-   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag j is
-   their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 1. */
+   Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov), h = 0.01 s; the weight of lag
+   j is their sum over 4.15479, the denominator's weight of lag 0. Oldest first, lags 40 ... 1. */
 static const FOC_ROM int32_t finger_q31_denominator[40] = {
     /* lags 40 ... 32: counts of 2^-42 */
     -291784332, -306335257, -322023585, -338972195, -357321117, -377230505, -398884220, -422494189,
@@ -142,15 +142,15 @@ static const FOC_ROM uint8_t finger_q31_shifts[2] = {
 static int64_t finger_q31_numerator_sum(const finger_q31_state *s)
 {
     /* |sum| <= 84371486439132197 < 2^63, counts of 2^-60 */
-    return foc_sum_q31(finger_q31_numerator, finger_q31_numerator_blocks, 7, s->error, finger_q31_ERRORS,
-                       s->error_now);
+    return foc_sum_q31(finger_q31_numerator, finger_q31_numerator_blocks, 7, s->error,
+                       finger_q31_ERRORS, s->error_now);
 }
 
 static int64_t finger_q31_integrand_sum(const finger_q31_state *s)
 {
     /* |sum| <= 3871708892624219 < 2^63, counts of 2^-63 */
-    return foc_sum_q31(finger_q31_integrand, finger_q31_integrand_blocks, 7, s->error, finger_q31_ERRORS,
-                       s->error_now);
+    return foc_sum_q31(finger_q31_integrand, finger_q31_integrand_blocks, 7, s->error,
+                       finger_q31_ERRORS, s->error_now);
 }
 
 static int64_t finger_q31_denominator_sum(const finger_q31_state *s)
@@ -175,7 +175,8 @@ static int32_t finger_q31_filter(finger_q31_state *s, int32_t e)
     /* The trapezoid: half a step of this sample and half a step of the one before. */
     r = finger_q31_integrand_sum(s);
     /* |sum| <= 6350425556386629306 < 2^63 */
-    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-6342682138601380864), 6342682138601380864);
+    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-6342682138601380864),
+                           6342682138601380864);
     s->inner_input = r;
     x += foc_shift64(s->inner, 3);
 

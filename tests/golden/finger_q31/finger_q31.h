@@ -19,7 +19,8 @@ extern "C" {
 
 #define finger_q31_SAMPLE_TIME 0.01f /* s: call step this often */
 
-/* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest integer. */
+/* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest
+   integer. */
 typedef int32_t finger_q31_sig;
 
 #define finger_q31_REF_LSB   1.4551915228366852e-11f /* 1/mm, of reference and measurement */
@@ -45,8 +46,9 @@ typedef int32_t finger_q31_sig;
 #define finger_q31_ERRORS   41 /* the present error and those before it */
 #define finger_q31_FILTERED 41 /* the same of the filtered error */
 
-/* One controller. It belongs to the caller: one for each loop, 384 bytes each. Its members may change
-   without notice. Not to be shared between an interrupt and a task, or two tasks, without a lock. */
+/* One controller. It belongs to the caller: one for each loop, 384 bytes each. Its members may
+   change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
+   lock. */
 typedef struct {
     int64_t integral;                      /* the output before rounding, counts of 2^-58 V */
     int64_t increment;                     /* half a trapezoid, of the latest sample */
@@ -72,7 +74,8 @@ void finger_q31_reset(finger_q31_state *s, finger_q31_sig ref, finger_q31_sig me
 finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q31_sig meas,
                                finger_q31_sig sched);
 
-/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling step. */
+/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling
+   step. */
 void finger_q31_track(finger_q31_state *s, finger_q31_sig u_applied);
 
 /* finger_q31_FLAG_... of the latest step, 0 after init and reset. */

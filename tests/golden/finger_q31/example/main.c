@@ -2,8 +2,7 @@
  *
  *   cc -std=c99 -O2 -ffp-contract=off -I.. main.c ../finger_q31.c -o main && ./main
  *
- * The plant here is nothing but a wire: the measurement stays where it is. Read your sensor where this program
- * prints.
+ * There is no plant: the measurement stays where it is. Read your sensor where this program prints.
  *
  * SPDX-License-Identifier: 0BSD
  */
