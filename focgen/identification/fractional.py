@@ -16,6 +16,7 @@ from focgen.identification.noise import ResidualModel, covariance, half_width, r
 _ALPHAS = (0.05, 1.95)
 _LONGEST = 60.0  # |log τ|, τ in s
 _STARTS = (0.75, 0.95)  # of α; T starts at the experiment's own rise
+_DOUBTFUL = 0.6  # residual over spread (1 − GOF) from which on a fit is repeated from the other start
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +40,10 @@ class FractionalFit:
 
 def fit_fractional(experiments: Sequence[Excitation]) -> FractionalFit:
     """Fit K and an offset to each experiment, T and α to all. Raises FitError where the data do not determine them."""
-    best = min((_fit_from(experiments, alpha) for alpha in _STARTS), key=lambda run: run.cost)
+    problem = _Problem(experiments)
+    best = _best(problem)
     _check(experiments, best)
-    return _finished(experiments, _Problem(experiments), best.x)
+    return _finished(experiments, problem, best.x)
 
 
 class _Problem:
@@ -78,6 +80,14 @@ class _Problem:
                  for i, (e, r, w) in enumerate(zip(self.experiments, self._kept(x), self.weights))]
         return np.concatenate(parts)
 
+    def cost(self, x: np.ndarray) -> float:
+        """Sum of squares of :meth:`residual`."""
+        return float(np.sum(self.residual(x) ** 2))
+
+    def explains(self, x: np.ndarray) -> bool:
+        """Whether ``x`` makes sense and leaves little, so that no other start is worth its time."""
+        return _ALPHAS[0] < x[1] < _ALPHAS[1] and self.cost(x) < _DOUBTFUL**2 * sum(map(len, self.experiments))
+
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Derivatives of :meth:`residual`, (samples, parameters)."""
         blocks = []
@@ -89,21 +99,31 @@ class _Problem:
         return np.vstack(blocks)
 
 
-def _fit_from(experiments: Sequence[Excitation], alpha: float):
-    problem = _Problem(experiments)
-    start = _start(experiments, problem, alpha)
+def _best(problem: _Problem):
+    """The fit from the better start; from the other one as well where that one leaves doubt."""
+    starts = sorted((_start(problem, alpha) for alpha in _STARTS), key=problem.cost)
+    runs = []
+    for start in starts:
+        runs.append(_fit_from(problem, start))
+        if runs[-1].success and problem.explains(runs[-1].x):
+            break
+    return min(runs, key=lambda run: run.cost)
+
+
+def _fit_from(problem: _Problem, start: np.ndarray):
     try:
         return least_squares(problem.residual, start, problem.jacobian, method="lm", x_scale="jac",
                              xtol=1e-10, ftol=1e-12, max_nfev=200)
     except (ValueError, FloatingPointError, np.linalg.LinAlgError) as reason:
-        raise FitError(experiments[0].name, f"the fit does not converge ({reason})", "look at the log") from None
+        name = problem.experiments[0].name
+        raise FitError(name, f"the fit does not converge ({reason})", "look at the log") from None
 
 
-def _start(experiments: Sequence[Excitation], problem: _Problem, alpha: float) -> np.ndarray:
+def _start(problem: _Problem, alpha: float) -> np.ndarray:
     """τ such that the slope of the measured signal's rise is met roughly; K and offset by linear least squares."""
-    log_tau = float(np.median([np.log(_rise_time(e)) for e in experiments]))
+    log_tau = float(np.median([np.log(_rise_time(e)) for e in problem.experiments]))
     x = [log_tau, alpha]
-    for e, r in zip(experiments, problem.responses(log_tau, alpha)):
+    for e, r in zip(problem.experiments, problem.responses(log_tau, alpha)):
         x += list(np.linalg.lstsq(np.column_stack([r[0], np.ones(len(e))]), e.measured, rcond=None)[0])
     return np.array(x)
 

@@ -25,7 +25,7 @@ SHAPES = tuple((poles, zeros) for poles in (1, 2, 3) for zeros in range(poles))
 _STARTS = {1: (0.1,), 2: (0.02, 0.12, 0.6), 3: (0.015, 0.08, 0.5)}  # time constants, times the length
 _FASTEST, _SLOWEST = 3.0, 30.0  # a pole's rate: per sample, and times the length
 _APART = 1e-6  # relative distance of two poles, nearer than which they are taken apart
-_ROUNDS = 25  # of Levenberg–Marquardt
+_FIRST_ROUNDS, _ROUNDS = 8, 25  # of Levenberg–Marquardt: from every start, and from the best
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +67,23 @@ def fit_integer_models(experiment: Excitation) -> tuple[IntegerFit, ...]:
 
 
 def _best(problem: _Projected, starts: list[np.ndarray]) -> np.ndarray:
-    runs = []
-    for start in starts:
-        try:
-            runs.append(least_squares(problem.residual, start, method="lm", xtol=1e-6, ftol=1e-8,
-                                      max_nfev=_ROUNDS * (len(start) + 1)))
-        except (ValueError, np.linalg.LinAlgError):
-            continue
-    if not runs:
+    """A few rounds from every start, then the best of them to its end."""
+    runs = [run for start in starts if (run := _run(problem, start, _FIRST_ROUNDS)) is not None]
+    best = min(runs, key=lambda run: run.cost, default=None)
+    if best is not None and not best.success:
+        best = _run(problem, best.x, _ROUNDS) or best
+    if best is None:
         name = shape_name(problem.poles, problem.zeros)
         raise FitError(problem.experiment.name, f"no {name} model converges", "look at the log")
-    return min(runs, key=lambda run: run.cost).x
+    return best.x
+
+
+def _run(problem: _Projected, start: np.ndarray, rounds: int):
+    try:
+        return least_squares(problem.residual, start, method="lm", xtol=1e-6, ftol=1e-8,
+                             max_nfev=rounds * (len(start) + 1))
+    except (ValueError, np.linalg.LinAlgError):
+        return None
 
 
 def _starts(experiment: Excitation, poles: int, zeros: int, optima: dict) -> list[np.ndarray]:
@@ -130,8 +136,8 @@ class _Projected:
         poles = _apart(_poles(self.poles, self.inside(x)))
         single = [_respond(p, self.experiment) for p in poles]
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
-        rows = [sum(p**k / d * r for p, d, r in zip(poles, slopes, single)).real for k in range(self.zeros, -1, -1)]
-        return np.column_stack([*rows, np.ones(len(self.experiment))])
+        weights = poles ** np.arange(self.zeros, -1, -1)[:, None] / np.array(slopes)
+        return np.column_stack([*(weights @ np.array(single)).real, np.ones(len(self.experiment))])
 
     def best(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Basis and the linear coefficients that fit best."""
@@ -165,10 +171,12 @@ def _apart(poles: np.ndarray) -> np.ndarray:
 
 def _respond(pole: complex, experiment: Excitation) -> np.ndarray:
     """1/(s − pole) at the samples, exactly for the input's hold; time in samples."""
+    if pole.imag == 0.0:
+        pole = pole.real  # half the work
     drive, decay = experiment.drives[0], np.exp(pole)
     mean = np.expm1(pole) / pole
     if experiment.hold == "zero":
-        return lfilter([0.0, mean], [1.0, -decay], drive.astype(complex))
+        return lfilter([0.0, mean], [1.0, -decay], drive.astype(type(decay)))
     late = (mean - 1.0) / pole if abs(pole) > 1e-4 else 0.5 + pole / 6.0  # weight of a sample's end
-    first = lfilter([late, mean - late], [1.0, -decay], drive.astype(complex))
+    first = lfilter([late, mean - late], [1.0, -decay], drive.astype(type(decay)))
     return first - late * drive[0] * decay ** np.arange(len(drive)) if drive[0] else first

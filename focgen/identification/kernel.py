@@ -100,10 +100,11 @@ def _polar_images(s: np.ndarray, log_tau: float, alpha: float) -> tuple:
 def _oscillation(log_tau: float, alpha: float, t: np.ndarray, span: float) -> np.ndarray:
     """The poles' share at ``t``, or its mean over the ``span`` before it; shape (3, n)."""
     pole, by_log_tau, by_alpha = _pole(log_tau, alpha)
-    back, weights = 0.5 * span * (_GAUSS[0] - 1.0), 0.5 * _GAUSS[1]
-    decay = weights * np.exp(pole * back)
-    single = np.exp(pole * t)
-    double = single * (t * decay.sum() + (decay * back).sum())  # t e^{pt}
-    single = single * decay.sum()
+    places, weights = _GAUSS if span else ([1.0], [1.0])
+    single, double = np.zeros(len(t), complex), np.zeros(len(t), complex)  # e^{pt} and t e^{pt}
+    for place, weight in zip(places, weights):
+        at = t + 0.5 * span * (place - 1.0)
+        decayed = weight / np.sum(weights) * np.exp(pole * at)
+        single, double = single + decayed, double + at * decayed
     rows = (-single / alpha, -by_log_tau / alpha * double, single / alpha**2 - by_alpha / alpha * double)
     return 2.0 * np.array(rows).real
