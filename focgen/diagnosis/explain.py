@@ -100,7 +100,7 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     last = rankings[-1]
     best, ar = last.base, last.ar
     best = _dropped(best, Weighing(ar), threshold)
-    nominal = fit(problem, rankings[0].base.vector, Weighing(ar))
+    nominal = fit(problem, rankings[0].base.vector[: len(given)], Weighing(ar))
     causes = _causes(best, nominal, rankings, clues, Weighing(ar))
     response = problem.references.clocks["response"]
     return Explanation(segment, given, nominal, best, ar, causes,
