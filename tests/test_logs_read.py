@@ -1,274 +1,313 @@
-"""Logs: every kind of file gives the same experiments, and every fault is named with its place and remedy."""
+"""Logs of every kind: what is read, in which order, on which clock, and how malformed ones are refused."""
 
 import gzip
 
 import numpy as np
 import pytest
 
+from focgen.cli.main import main
 from focgen.errors import LogError
 from focgen.logs import read_logs
+from focgen.rig.files import write_rig
 from focgen.rig.model import Signals
+from tests.conftest import paper_rig
 
-SIGNALS = Signals("t_s", "y", command="u", pressure="p", curvature="kappa", reference="ref", run="run")
-STEP = 0.01
-
-
-def columns(count=40, begin=0.0) -> dict[str, np.ndarray]:
-    time = begin + STEP * np.arange(count)
-    return {"t_s": time, "u": 1.0 * (time >= begin + 0.1), "p": np.sqrt(np.arange(count)), "kappa": np.sin(time),
-            "y": np.cos(time)}
+STEP, COUNT = 0.01, 60
+SIGNALS = Signals("t_s", "kappa_per_mm", "u_V", "p_bar", "kappa_cam_per_mm", "ref_per_mm", "run")
+LIMITS = {"command": (0.0, 10.0), "pressure": (0.0, 0.25), "output": (0.0, 0.02)}
 
 
-def text(table: dict, separator=",") -> str:
-    rows = zip(*(column if isinstance(column, list) else [repr(float(c)) for c in column] for column in table.values()))
-    return "\n".join([separator.join(table), *(separator.join(row) for row in rows)]) + "\n"
+def table(count=COUNT, **changes) -> dict[str, np.ndarray]:
+    """Columns of a log: a step of pressure at 0.1 s."""
+    time = STEP * np.arange(count)
+    up = time >= 0.1
+    columns = {"t_s": time, "u_V": 1.5 * up, "p_bar": 0.15 * up, "kappa_cam_per_mm": 0.008 * up * time,
+               "kappa_per_mm": 0.0079 * up * time}
+    return {**columns, **changes}
 
 
-def csv_file(path, table):
-    path.write_text(table if isinstance(table, str) else text(table), encoding="utf-8")
-    return path
+def csv_text(columns) -> str:
+    rows = zip(*columns.values())
+    cells = (",".join(str(cell) if isinstance(cell, str) else repr(float(cell)) for cell in row) for row in rows)
+    return "\n".join([",".join(columns), *cells]) + "\n"
 
 
-def read(path, **options):
-    return read_logs(path if isinstance(path, list) else [path], options.pop("signals", SIGNALS), STEP, **options)
+def write_csv(path, columns):
+    path.write_text(csv_text(columns))
 
 
-def write_gz(path, table):
-    path.write_bytes(gzip.compress(text(table).encode()))
+def write_csv_gz(path, columns):
+    path.write_bytes(gzip.compress(csv_text(columns).encode()))
 
 
-def write_parquet(path, table):
+def write_parquet(path, columns):
     pyarrow = pytest.importorskip("pyarrow")
     import pyarrow.parquet
 
-    pyarrow.parquet.write_table(pyarrow.table(table), path)
+    pyarrow.parquet.write_table(pyarrow.table({k: np.asarray(v) for k, v in columns.items()}), path)
 
 
-def write_mat(path, table):
+def write_mat(path, columns):
     from scipy.io import savemat
 
-    savemat(path, {name: column[:, None] for name, column in table.items()})
+    savemat(path, {"log": {k: np.asarray(v) for k, v in columns.items()}, "gain": 3.0})
 
 
-def write_mat_structure(path, table):
-    from scipy.io import savemat
-
-    savemat(path, {"rate": 100.0, "log": dict(table)})
-
-
-def write_tdms(path, table):
+def write_tdms(path, columns):
     nptdms = pytest.importorskip("nptdms")
-    with nptdms.TdmsWriter(path) as writer:
-        writer.write_segment([nptdms.ChannelObject("log", name, column) for name, column in table.items()])
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment([nptdms.ChannelObject("log", k, np.asarray(v)) for k, v in columns.items()])
 
 
-WRITERS = {".csv": csv_file, ".csv.gz": write_gz, ".parquet": write_parquet, ".mat": write_mat,
-           "-structure.mat": write_mat_structure, ".tdms": write_tdms}
+WRITERS = {"csv": write_csv, "csv.gz": write_csv_gz, "parquet": write_parquet, "mat": write_mat, "tdms": write_tdms,
+           "CSV": write_csv}
 
 
-@pytest.mark.parametrize("ending", WRITERS)
-def test_every_kind_of_file_gives_the_same_experiment(tmp_path, ending):
-    table, path = columns(), tmp_path / f"log{ending}"
-    WRITERS[ending](path, table)
-    (experiment,) = read(path)
-    assert experiment.name == path.name.removesuffix(".gz").rpartition(".")[0] and experiment.sample_time == STEP
-    roles = {"command": "u", "pressure": "p", "curvature": "kappa", "output": "y"}
-    assert set(experiment.signals) == set(roles)
-    for role, name in roles.items():
-        assert np.array_equal(experiment[role], table[name])
-    assert np.array_equal(experiment.raw_time, table["t_s"])
+def read(*paths, signals=SIGNALS, sample_time=STEP, **options):
+    return read_logs(paths, signals, sample_time, **options)
 
 
-@pytest.mark.parametrize("ending", WRITERS)
-def test_a_damaged_or_missing_file_is_refused(tmp_path, ending):
-    path = tmp_path / f"log{ending}"
-    with pytest.raises(LogError, match="cannot be read"):
-        read(path)
-    path.write_bytes(b"\x00\xff\xfenot what it says\n\x81" * 9)
-    with pytest.raises(LogError):
-        read(path)
-    path.write_bytes(b"")
-    with pytest.raises(LogError):
-        read(path)
+def read_columns(tmp_path, columns, **options):
+    path = tmp_path / "log.csv"
+    write_csv(path, columns)
+    return read(path, **options)
 
 
-def test_time_stamps_of_a_clock_become_seconds(tmp_path):
-    pyarrow = pytest.importorskip("pyarrow")
-    import pyarrow.parquet
-
-    table = columns()
-    stamps = np.datetime64("2026-03-01T12:00:00", "us") + np.round(table["t_s"] * 1e6).astype("timedelta64[us]")
-    pyarrow.parquet.write_table(pyarrow.table({**table, "t_s": stamps}), tmp_path / "log.parquet")
-    (experiment,) = read(tmp_path / "log.parquet")
-    assert experiment.sample_time == STEP and not experiment.notes
-
-
-def runs(*named) -> dict:
-    """Runs one after the other; ``named``: (name, columns)."""
-    table = {"run": [name for name, part in named for _ in part["t_s"]]}
-    return table | {key: np.concatenate([part[key] for _, part in named]) for key in named[0][1]}
+@pytest.mark.parametrize("kind", WRITERS)
+def test_every_kind_carries_the_same_numbers(tmp_path, kind):
+    path = tmp_path / f"steps.{kind}"
+    WRITERS[kind](path, table())
+    (log,) = read(path, limits=LIMITS)
+    assert log.name == "steps" and log.sample_time == STEP and len(log) == COUNT
+    for role, column in SIGNALS.columns().items():
+        if role != "reference":
+            assert np.array_equal(log[role], table()[column])
+    assert "reference" not in log
 
 
-def test_runs_keep_the_order_of_the_file_where_each_starts_at_0(tmp_path):
-    path = csv_file(tmp_path / "log.csv", runs(("b", columns()), ("a", columns(30)), ("c", columns())))
-    found = read(path)
-    assert [e.name for e in found] == ["b", "a", "c"] and [len(e) for e in found] == [40, 30, 40]
-    assert [e.start for e in found] == pytest.approx([0.0, 0.4, 0.7])
+@pytest.mark.parametrize("kind", WRITERS)
+def test_runs_are_experiments_in_the_order_of_their_times(tmp_path, kind):
+    """The second run was logged first; numbers serve as names of runs as well as words."""
+    both = {name: np.concatenate([column, 2.0 * column]) for name, column in table().items()}
+    both["t_s"] = np.concatenate([table()["t_s"] + 500.0, table()["t_s"]])
+    both["run"] = np.repeat([7.0, 12.0], COUNT)
+    path = tmp_path / f"steps.{kind}"
+    WRITERS[kind](path, both)
+    logs = read(path)
+    assert [log.name.removesuffix(".0") for log in logs] == ["12", "7"]
+    assert [log.start for log in logs] == [0.0, 500.0]
+    assert logs[0]["pressure"].max() == 0.3 and logs[1]["pressure"].max() == 0.15
 
 
-def test_a_session_is_ordered_by_its_clock(tmp_path):
-    late, early = (csv_file(tmp_path / f"{name}.csv", columns(begin=begin)) for name, begin in (("a", 500.0), ("b", 20.0)))
-    found = read([late, early])
-    assert [e.name for e in found] == ["b", "a"] and [e.start for e in found] == pytest.approx([20.0, 500.0])
+def test_words_name_runs_that_are_interleaved(tmp_path):
+    columns = table(t_s=STEP * (np.arange(COUNT) // 2), run=["up", "down"] * (COUNT // 2))
+    logs = read_columns(tmp_path, columns)
+    assert [log.name for log in logs] == ["up", "down"] and all(len(log) == COUNT // 2 for log in logs)
+    assert np.array_equal(logs[1]["pressure"], table()["p_bar"][1::2])
 
 
-def test_like_names_are_told_apart_by_their_files(tmp_path):
-    (tmp_path / "x").mkdir()
-    paths = [csv_file(tmp_path / name, runs(("1", columns()))) for name in ("a.csv", "b.csv", "x/a.csv")]
-    assert [e.name for e in read(paths[:2])] == ["a/1", "b/1"]
-    assert len({e.name for e in read(paths)}) == 3
-    with pytest.raises(LogError, match="given twice"):
-        read([paths[0], paths[0]])
+def test_files_that_start_at_0_keep_the_order_given(tmp_path):
+    for name in ("b", "a"):
+        write_csv(tmp_path / f"{name}.csv", table())
+    logs = read(tmp_path / "b.csv", tmp_path / "a.csv")
+    assert [log.name for log in logs] == ["b", "a"]
+    assert logs[0].start == 0.0 and logs[1].start == pytest.approx(COUNT * STEP)
 
 
-def test_an_empty_column_means_absent_in_that_run_only(tmp_path):
-    table = runs(("1", columns()), ("2", columns()))
-    table["kappa"] = [""] * 40 + [repr(float(v)) for v in table["kappa"][40:]]
-    first, second = read(csv_file(tmp_path / "log.csv", table))
-    assert "curvature" not in first and "curvature" in second
+def test_names_that_repeat_are_told_apart(tmp_path):
+    for folder in ("x", "y"):
+        (tmp_path / folder).mkdir()
+        write_csv(tmp_path / folder / "log.csv", table())
+    names = [log.name for log in read(tmp_path / "x" / "log.csv", tmp_path / "y" / "log.csv")]
+    assert len(set(names)) == 2
+    with pytest.raises(LogError, match="twice"):
+        read(tmp_path / "x" / "log.csv", tmp_path / "x" / "log.csv")
 
 
-def test_signals_that_a_log_lacks_are_said(tmp_path):
-    table = columns()
-    table["Kappa"] = table.pop("kappa")
-    (experiment,) = read(csv_file(tmp_path / "log.csv", table))
-    assert "curvature" not in experiment
-    assert experiment.notes == ("no column 'kappa': curvature taken as not logged (is it 'Kappa'?)",)
+def test_time_stamps_with_jitter_are_resampled_and_said(tmp_path):
+    """A ramp survives linear interpolation exactly; a held command keeps its two values."""
+    time = STEP * (np.arange(COUNT) + np.random.default_rng(3).uniform(-0.4, 0.4, COUNT))
+    ramp = 0.3 * time
+    (log,) = read_columns(tmp_path, table(t_s=time, kappa_per_mm=ramp))
+    assert any("not uniform" in note and "resampled every 0.01 s" in note for note in log.notes)
+    assert log["output"] == pytest.approx(0.3 * (time[0] + log.time), abs=1e-12)
+    assert set(log["command"]) == {0.0, 1.5} and log.sample_time == STEP
+    assert np.array_equal(log.raw_time, time)
+    rising = time[0] + log.time[int(np.argmax(log["command"] > 0.0))]
+    assert 0.0 <= rising - time[10] < STEP
 
 
-def test_a_window_is_time_within_each_experiment(tmp_path):
-    path = csv_file(tmp_path / "log.csv", runs(("1", columns(begin=7.0)), ("2", columns(begin=9.0))))
-    for experiment, begin in zip(read(path, first=0.05, last=0.2), (7.05, 9.05)):
-        assert len(experiment) == 16 and experiment.start == pytest.approx(begin)
-        assert experiment.raw_time[[0, -1]] == pytest.approx([begin, begin + 0.15])
+def test_rounded_time_stamps_are_uniform(tmp_path):
+    (log,) = read_columns(tmp_path, table(t_s=np.round(STEP * np.arange(COUNT), 2)))
+    assert log.notes == ("no column 'ref_per_mm': reference taken as not logged",) or log.notes == ()
+    assert np.array_equal(log["output"], table()["kappa_per_mm"])
 
 
-def test_a_gap_outside_the_window_does_no_harm(tmp_path):
-    table = columns()
-    table["y"][35:] = np.nan
-    path = csv_file(tmp_path / "log.csv", text(table).replace("nan", ""))
-    assert len(read(path, last=0.3)[0]) == 31
-    with pytest.raises(LogError, match="output is empty.* in line 37 and 4 more"):
-        read(path)
+def test_another_rate_is_kept_and_said(tmp_path):
+    (log,) = read_columns(tmp_path, table(), sample_time=0.004)
+    assert log.sample_time == STEP and any("0.01 s" in note and "0.004 s" in note for note in log.notes)
 
 
-def test_uniform_logs_keep_their_rate(tmp_path):
-    table = columns()
-    table["t_s"] = np.round(table["t_s"] * 4.0, 3)
-    (experiment,) = read(csv_file(tmp_path / "log.csv", table))
-    assert experiment.sample_time == pytest.approx(0.04) and "kept so" in experiment.notes[0]
-    assert np.array_equal(experiment["output"], table["y"])
+@pytest.mark.parametrize("kind", ["csv", "parquet", "mat"])
+def test_a_column_empty_in_a_run_is_absent_there(tmp_path, kind):
+    both = {name: np.tile(column, 2) for name, column in table().items()}
+    both["run"] = np.repeat([1.0, 2.0], COUNT)
+    both["p_bar"] = np.concatenate([table()["p_bar"], np.full(COUNT, np.nan)])
+    path = tmp_path / f"log.{kind}"
+    WRITERS[kind](path, both)
+    first, second = read(path)
+    assert "pressure" in first and "pressure" not in second and "command" in second
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_jittered_logs_are_resampled(tmp_path, seed):
-    """Between the stamps signals are linear, commands held: a line stays a line, a staircase has no new values."""
-    rng = np.random.default_rng(seed)
-    time = np.cumsum(rng.uniform(0.2, 1.8, 300) * STEP)
-    table = {"t_s": time, "u": np.floor(time * 4.0), "p": 2.0 + 3.0 * time, "y": -time}
-    (experiment,) = read(csv_file(tmp_path / "log.csv", table))
-    assert experiment.sample_time == STEP and any("resampled every 0.01 s" in note for note in experiment.notes)
-    instants = time[0] + experiment.time
-    assert experiment["pressure"] == pytest.approx(2.0 + 3.0 * instants) and experiment["output"] == pytest.approx(-instants)
-    last = np.searchsorted(time, instants + 1e-12, side="right") - 1
-    assert np.array_equal(experiment["command"], table["u"][last])
-    assert np.array_equal(experiment.raw_time, time)
+def test_empty_cells_of_csv_are_absent_too(tmp_path):
+    (log,) = read_columns(tmp_path, table(kappa_cam_per_mm=[""] * COUNT))
+    assert "curvature" not in log and "output" in log
 
 
-def faulty(change) -> str:
-    return change(text(columns()))
+def test_a_column_that_is_not_there_is_said(tmp_path):
+    columns = table()
+    columns["kappa_cam"] = columns.pop("kappa_cam_per_mm")
+    (log,) = read_columns(tmp_path, columns)
+    assert "curvature" not in log
+    assert any("kappa_cam_per_mm" in note and "is it 'kappa_cam'" in note for note in log.notes)
 
 
-def line_changed(number, cells):
-    def change(whole):
-        lines = whole.split("\n")
-        lines[number - 1] = cells(lines[number - 1].split(","))
-        return "\n".join(lines)
+def test_from_and_to_cut_each_experiment(tmp_path):
+    """Both ends included, in the experiment's own time; what lies outside may be damaged."""
+    damaged = table(t_s=table()["t_s"] + 100.0)
+    damaged["p_bar"][:5] = np.nan
+    (log,) = read_columns(tmp_path, damaged, first=0.1, last=0.4)
+    assert len(log) == 31 and log.start == pytest.approx(100.1)
+    assert np.array_equal(log["output"], table()["kappa_per_mm"][10:41])
 
-    return change
+
+def _text(edit):
+    return lambda path: path.write_text(edit(csv_text(table())))
 
 
-FAULTS = {
-    "empty": (lambda w: "", "is empty"),
-    "header only": (lambda w: w.split("\n")[0], "no samples"),
-    "one sample": (lambda w: "\n".join(w.split("\n")[:2]), "has 1 samples"),
-    "no header": (lambda w: w.partition("\n")[2], "instead of a header"),
-    "semicolons": (lambda w: w.replace(",", ";"), "separates its columns by ';'"),
-    "tabs": (lambda w: w.replace(",", "\t"), "separates its columns by tabs"),
-    "decimal commas": (line_changed(5, lambda c: ",".join(v.replace(".", ",") for v in c)), "line 5 has 10 cells"),
-    "quoted decimal comma": (line_changed(5, lambda c: ",".join([c[0], '"0,5"', *c[2:]])), "decimals with a point"),
-    "cut off": (lambda w: w[:-30], "cells, the header 5"),
-    "units below the header": (line_changed(2, lambda c: "s,V,bar,1/mm,1/mm"), "'V' in line 2"),
-    "thousands": (line_changed(3, lambda c: ",".join(["1_0", *c[1:]])), "'1_0' in line 3"),
-    "infinite": (line_changed(9, lambda c: ",".join([*c[:4], "inf"])), "infinite in line 9"),
-    "no stamp": (line_changed(9, lambda c: ",".join(["", *c[1:]])), "no time stamp in line 9"),
-    "time stands": (line_changed(9, lambda c: ",".join(["0.06", *c[1:]])), "line 9: time has to increase"),
-    "gap": (line_changed(9, lambda c: ",".join([*c[:4], "nan"])), "output is empty or not a number in line 9"),
-    "doubled column": (lambda w: w.replace("kappa", "y", 1), "'y' twice"),
-    "misspelt output": (lambda w: w.replace(",y\n", ",yy\n", 1), r"no column 'y' \(output\), there are: t_s, u, p, kappa, yy"),
-    "no input": (lambda w: w.replace("u,p,", "a,b,", 1), r"no column 'u' \(command\)"),
-    "no time": (lambda w: w.replace("t_s", "T_s", 1), "write time = 'T_s'"),
+def _table(**changes):
+    return lambda path: write_csv(path, table(**changes))
+
+
+def _with(column, row, value):
+    cells = list(table()[column])
+    cells[row] = value
+    return _table(**{column: cells})
+
+
+def _without(column, renamed=None):
+    def write(path):
+        columns = table()
+        values = columns.pop(column)
+        write_csv(path, {**columns, **({renamed: values} if renamed else {})})
+
+    return write
+
+
+def _only_output(path):
+    write_csv(path, {name: table()[name] for name in ("t_s", "kappa_per_mm", "kappa_cam_per_mm")})
+
+
+MALFORMED = {
+    "NaN": (_with("p_bar", 7, np.nan), "pressure is empty or not a number in line 9"),
+    "empty cell": (_with("kappa_per_mm", 3, ""), "output is empty or not a number in line 5"),
+    "infinite": (_with("p_bar", 3, np.inf), "infinite in line 5"),
+    "no output": (_without("kappa_per_mm", "kappa_permm"), "no column 'kappa_per_mm'.*output = 'kappa_permm'"),
+    "no time": (_without("t_s", "t_ms"), "no column 't_s'.*time = 't_ms'"),
+    "no input": (_only_output, "no column 'u_V'"),
+    "one sample": (lambda path: write_csv(path, table(1)), "1 samples"),
+    "too few": (lambda path: write_csv(path, table(5)), "5 samples"),
+    "no sample": (_text(lambda text: text.splitlines()[0] + "\n"), "no samples"),
+    "time back": (_with("t_s", 20, 0.01), "line 22: time has to increase"),
+    "time twice": (_with("t_s", 20, 0.19), "line 22: time has to increase"),
+    "no time stamp": (_with("t_s", 20, np.nan), "no time stamp in line 22"),
+    "milliseconds": (_table(t_s=1e3 * table()["t_s"]), r"milliseconds\?.*give time in seconds"),
+    "microseconds": (_table(t_s=1e6 * table()["t_s"]), r"microseconds\?"),
+    "words": (_with("p_bar", 8, "low"), "'low' in line 10"),
+    "underscore": (_with("p_bar", 8, "0_1"), "'0_1' in line 10"),
+    "semicolons": (_text(lambda text: text.replace(",", ";")), "';'"),
+    "semicolons, comma": (_text(lambda text: text.replace(",", ";").replace(".", ",")), "';'"),
+    "tabs": (_text(lambda text: text.replace(",", "\t")), "tabs"),
+    "decimal comma": (_with("p_bar", 8, '"0,15"'), "'0,15' in line 10.*point"),
+    "cells missing": (_text(lambda text: text[: text.rindex(",")] + "\n"), "line 61 has 4 cells, the header 5"),
+    "empty file": (_text(lambda text: ""), "is empty"),
+    "blank lines": (_text(lambda text: "\n\n"), "is empty"),
+    "no header": (_text(lambda text: text.partition("\n")[2]), "instead of a header"),
+    "a column twice": (_text(lambda text: text.replace("p_bar", "u_V", 1)), "'u_V' twice"),
+    "not UTF-8": (lambda path: path.write_bytes(csv_text(table()).replace("u_V", "µ_V").encode("latin-1")), "UTF-8"),
+    "UTF-16": (lambda path: path.write_bytes(csv_text(table()).encode("utf-16")), "UTF-8"),
+    "binary": (lambda path: path.write_bytes(b"t_s,\x00\x00\n" * 9), "log.csv"),
+    "in mbar": (_table(p_bar=1e3 * table()["p_bar"]), "pressure reaches 150 .* range is 0 to 0.25"),
+    "in m": (_table(kappa_per_mm=1e-3 * table()["kappa_per_mm"]), "output reaches .* range is 0 to 0.02"),
+    "constant output": (_table(kappa_cam_per_mm=np.full(COUNT, 0.004)), "0.004 throughout"),
+    "rest": (_table(p_bar=np.zeros(COUNT)), "pressure of 0 throughout"),
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faults_are_named(tmp_path, fault):
-    change, what = FAULTS[fault]
-    path = csv_file(tmp_path / "log.csv", faulty(change))
-    with pytest.raises(LogError, match=what) as caught:
-        read(path)
-    assert str(caught.value).startswith(str(path)) and caught.value.remedy and "\n" not in str(caught.value)
+@pytest.fixture
+def rig(tmp_path):
+    path = tmp_path / "rig.toml"
+    write_rig(paper_rig(), path)
+    return path
 
 
-def test_text_in_another_encoding_is_refused(tmp_path):
-    (tmp_path / "log.csv").write_bytes(text(columns()).replace("kappa", "κ").encode("iso-8859-7"))
-    with pytest.raises(LogError, match=r"not UTF-8 text \(line 1\)"):
-        read(tmp_path / "log.csv")
+def refusal(log, rig, tmp_path, capsys, *more) -> str:
+    """The one line with which ``focgen identify`` refuses a log; nothing may be written."""
+    before = set(tmp_path.rglob("*"))
+    new = tmp_path / "new"
+    argv = ["identify", str(log), "--rig", str(rig), "--out", str(new / "rig.toml"), "--report", str(new / "pictures")]
+    assert main([*argv, *more]) == 2
+    printed = capsys.readouterr()
+    lines = [line for line in printed.err.splitlines() if line.startswith("focgen: error: ")]
+    assert len(lines) == 1 and printed.err.rstrip().endswith(lines[0]) and "Traceback" not in printed.err
+    assert printed.out == "" and set(tmp_path.rglob("*")) == before
+    assert lines[0].count("; ") == 1, "where: what; remedy"
+    return lines[0]
 
 
-def test_a_byte_order_mark_and_windows_lines_are_fine(tmp_path):
-    (tmp_path / "log.csv").write_bytes(b"\xef\xbb\xbf" + text(columns()).replace("\n", "\r\n").encode() + b"\r\n")
-    assert len(read(tmp_path / "log.csv")[0]) == 40
+@pytest.mark.parametrize("fault", MALFORMED)
+def test_malformed_logs_are_refused_in_one_line(tmp_path, rig, capsys, fault):
+    write, message = MALFORMED[fault]
+    write(tmp_path / "log.csv")
+    line = refusal(tmp_path / "log.csv", rig, tmp_path, capsys)
+    with pytest.raises(LogError, match=message):
+        raise LogError(line, "", "")
+    if fault not in ("constant output", "rest"):
+        with pytest.raises(LogError, match=message):
+            read(tmp_path / "log.csv", limits=LIMITS)
 
 
-@pytest.mark.parametrize("factor, hint", [(1e3, "milliseconds"), (1e6, "microseconds"), (1e-3, "seconds")])
-def test_time_in_another_unit_is_refused(tmp_path, factor, hint):
-    table = columns()
-    table["t_s"] = table["t_s"] * factor
-    with pytest.raises(LogError, match=hint):
-        read(csv_file(tmp_path / "log.csv", table))
+@pytest.mark.parametrize("name", ["log.xlsx", "log", "missing.csv", "missing.parquet", "missing.mat", "missing.tdms"])
+def test_unknown_and_missing_files_are_refused(tmp_path, rig, capsys, name):
+    if not name.startswith("missing"):
+        write_csv(tmp_path / name, table())
+    assert name in refusal(tmp_path / name, rig, tmp_path, capsys)
 
 
-@pytest.mark.parametrize("factor", [100.0, 1e-3])
-def test_signals_in_another_unit_are_refused(tmp_path, factor):
-    table = columns()
-    path = csv_file(tmp_path / "log.csv", {**table, "p": table["p"] * factor})
-    limits = {"pressure": (0.0, 8.0), "output": (-1.0, 1.0)}
-    with pytest.raises(LogError, match="pressure reaches .* range is 0 to 8"):
-        read(path, limits=limits)
-    assert read(csv_file(path, table), limits=limits)
+@pytest.mark.parametrize("name", ["log.csv.gz", "log.parquet", "log.mat", "log.tdms"])
+@pytest.mark.parametrize("content", ["empty", "text", "cut"])
+def test_damaged_files_are_refused(tmp_path, rig, capsys, name, content):
+    path = tmp_path / name
+    WRITERS[name.partition(".")[2]](path, table())
+    whole = path.read_bytes()
+    path.write_bytes({"empty": b"", "text": csv_text(table()).encode(), "cut": whole[: len(whole) // 2]}[content])
+    assert name in refusal(path, rig, tmp_path, capsys)
 
 
-def test_an_unknown_kind_of_file_is_refused(tmp_path):
-    with pytest.raises(LogError, match="give one of .csv"):
-        read(tmp_path / "log.xlsx")
-    with pytest.raises(LogError, match="at least one"):
-        read([])
+def test_vectors_of_different_lengths_are_refused(tmp_path, rig, capsys):
+    for kind in ("mat", "tdms"):
+        path = tmp_path / f"log.{kind}"
+        WRITERS[kind](path, table(p_bar=np.ones(COUNT - 1)))
+        assert "different lengths" in refusal(path, rig, tmp_path, capsys)
 
 
-def test_vectors_of_different_lengths_are_refused(tmp_path):
-    from scipy.io import savemat
+def test_a_window_outside_the_log_is_refused(tmp_path, rig, capsys):
+    write_csv(tmp_path / "log.csv", table())
+    line = refusal(tmp_path / "log.csv", rig, tmp_path, capsys, "--from", "30")
+    assert "0 samples" in line and "0.59 s" in line
+    refusal(tmp_path / "log.csv", rig, tmp_path, capsys, "--from", "0.4", "--to", "0.2")
 
-    savemat(tmp_path / "log.mat", {**columns(), "y": np.zeros(7)})
-    with pytest.raises(LogError, match="y 7"):
-        read(tmp_path / "log.mat")
+
+def test_a_run_without_a_name_is_refused(tmp_path, rig, capsys):
+    write_csv(tmp_path / "log.csv", table(run=["a"] * (COUNT - 1) + [""]))
+    assert "line 61" in refusal(tmp_path / "log.csv", rig, tmp_path, capsys)

@@ -137,7 +137,8 @@ class _Projected:
         single = [_respond(p, self.experiment) for p in poles]
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
         weights = poles ** np.arange(self.zeros, -1, -1)[:, None] / np.array(slopes)
-        return np.column_stack([*(weights @ np.array(single)).real, np.ones(len(self.experiment))])
+        rows = np.einsum("kp,pn->kn", weights, np.array(single)).real  # too little for BLAS to share among threads
+        return np.column_stack([*rows, np.ones(len(self.experiment))])
 
     def best(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Basis and the linear coefficients that fit best."""

@@ -63,19 +63,20 @@ def _experiments(path, signals: Roles, sample_time: float, window) -> Iterator[t
 def _present(table: LogTable, signals: Roles) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     """The columns that are there, by role, and notes on those that are not."""
     wanted = signals.columns()
+    taken = {signals.time, signals.run, *wanted.values()}
     if signals.time not in table.columns:
-        raise table.missing("time", signals.time)
+        raise table.missing("time", signals.time, taken)
     columns = {role: table.numbers(name) for role, name in wanted.items() if name in table.columns}
     inputs = [role for role in ("command", "pressure") if role in wanted]
     for role in ["output"] + inputs[: 0 if any(role in columns for role in inputs) else 1]:
         if role not in columns:
-            raise table.missing(role, wanted[role])
+            raise table.missing(role, wanted[role], taken)
     absent = [(role, name) for role, name in wanted.items() if role not in columns and role != "reference"]
-    return columns, tuple(_absence(table, role, name) for role, name in absent)
+    return columns, tuple(_absence(table, role, name, taken) for role, name in absent)
 
 
-def _absence(table: LogTable, role: str, name: str) -> str:
-    near = table.closest(name)
+def _absence(table: LogTable, role: str, name: str, taken: set) -> str:
+    near = table.closest(name, taken)
     return f"no column {name!r}: {role} taken as not logged" + (f" (is it {near!r}?)" if near else "")
 
 

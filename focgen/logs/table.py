@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -37,15 +37,15 @@ class LogTable:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
-    def closest(self, name: str) -> str | None:
-        """The column whose name is nearest to ``name``, or None where none is near."""
-        lowered = {column.lower(): column for column in self.columns}
+    def closest(self, name: str, taken: Collection[str] = ()) -> str | None:
+        """The column, not one of those ``taken``, whose name is nearest to ``name``, or None where none is near."""
+        lowered = {column.lower(): column for column in self.columns if column not in taken}
         near = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
         return lowered[near[0]] if near else None
 
-    def missing(self, role: str, name: str) -> LogError:
-        """The error for a column that is needed and not there."""
-        near = self.closest(name)
+    def missing(self, role: str, name: str, taken: Collection[str] = ()) -> LogError:
+        """The error for a column that is needed and not there; those ``taken`` have another role."""
+        near = self.closest(name, taken)
         there = ", ".join(self.columns)
         hint = f"write {role} = {near!r} in the rig's [signals]" if near else f"set {role} in the rig's [signals]"
         return LogError(self.path, f"has no column {name!r} ({role}); there are: {there}".replace(";", ","), hint)
