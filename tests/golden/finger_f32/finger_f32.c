@@ -148,7 +148,7 @@ static void finger_f32_settle(finger_f32_state *s, float e)
     s->inner_input = finger_f32_integrand_sum(s);
     s->increment = 0.0f;
     s->resting = v;
-    s->starting = 1; /* its gain is not known before the next step */
+    s->starting = 1; /* the first step completes it: only then the gain is known */
     s->flags = 0;
 }
 

@@ -8,8 +8,8 @@
  *
  * SPDX-License-Identifier: 0BSD
  */
-#ifndef FOC_finger_f32_H
-#define FOC_finger_f32_H
+#ifndef FOC_finger_f32_INCLUDED
+#define FOC_finger_f32_INCLUDED
 
 #include <stdint.h>
 

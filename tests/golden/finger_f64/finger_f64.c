@@ -149,7 +149,7 @@ static void finger_f64_settle(finger_f64_state *s, double e)
     s->inner_input = finger_f64_integrand_sum(s);
     s->increment = 0.0;
     s->resting = v;
-    s->starting = 1; /* its gain is not known before the next step */
+    s->starting = 1; /* the first step completes it: only then the gain is known */
     s->flags = 0;
 }
 

@@ -8,8 +8,8 @@
  *
  * SPDX-License-Identifier: 0BSD
  */
-#ifndef FOC_finger_f64_H
-#define FOC_finger_f64_H
+#ifndef FOC_finger_f64_INCLUDED
+#define FOC_finger_f64_INCLUDED
 
 #include <stdint.h>
 

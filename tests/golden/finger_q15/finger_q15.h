@@ -8,8 +8,8 @@
  *
  * SPDX-License-Identifier: 0BSD
  */
-#ifndef FOC_finger_q15_H
-#define FOC_finger_q15_H
+#ifndef FOC_finger_q15_INCLUDED
+#define FOC_finger_q15_INCLUDED
 
 #include <stdint.h>
 

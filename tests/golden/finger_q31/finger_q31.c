@@ -214,7 +214,7 @@ static void finger_q31_settle(finger_q31_state *s, int32_t e)
     s->inner_input = finger_q31_integrand_sum(s);
     s->increment = 0;
     s->resting = v;
-    s->starting = 1; /* its gain is not known before the next step */
+    s->starting = 1; /* the first step completes it: only then the gain is known */
     s->flags = 0;
 }
 

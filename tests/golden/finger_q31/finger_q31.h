@@ -8,8 +8,8 @@
  *
  * SPDX-License-Identifier: 0BSD
  */
-#ifndef FOC_finger_q31_H
-#define FOC_finger_q31_H
+#ifndef FOC_finger_q31_INCLUDED
+#define FOC_finger_q31_INCLUDED
 
 #include <stdint.h>
 
