@@ -1,4 +1,4 @@
-"""``demo``: the whole chain on the example logs, from CSV to verified C, with a report."""
+"""``demo``: the whole chain on the example logs, from CSV to verified C, and a sealed case diagnosed; with a report."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 
 from focgen.codegen.generate import Generated, generate
 from focgen.control.controller import ARITHMETICS
+from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.model import Diagnosis
 from focgen.identification.identify import identify
 from focgen.identification.model import Identification
 from focgen.loop.design import Design, design
@@ -18,11 +20,19 @@ from focgen.report.control import design_pictures, simulation_pictures
 from focgen.report.demo_page import demo_page
 from focgen.report.identification import identification_pictures
 from focgen.resources import shipped
+from focgen.trials.make import make
+from focgen.trials.sealing import unseal
 from focgen.verification.verify import Verification, verify
+
+_SEED = 5  # of the sealed case
+
 
 @dataclass(frozen=True, eq=False)
 class Demo:
-    """Everything the demo found, and the ``folder`` and ``report`` where it stands."""
+    """Everything the demo found, and the ``folder`` and ``report`` where it stands.
+
+    ``diagnosis`` is of a rig whose effects were sealed; ``sealed`` are their names, opened afterwards.
+    """
 
     folder: Path
     report: Path
@@ -31,6 +41,8 @@ class Demo:
     simulation: Simulation
     generated: dict[str, Generated]
     verified: dict[str, Verification]
+    diagnosis: Diagnosis
+    sealed: tuple[str, ...]
 
     @property
     def holds(self) -> bool:
@@ -39,7 +51,7 @@ class Demo:
 
 
 def demo(out: str | Path) -> Demo:
-    """Identify, design, simulate, generate in four arithmetics and verify, into the folder ``out``.
+    """Identify, design, simulate, generate in four arithmetics, verify, and diagnose, into the folder ``out``.
 
     Raises InputError where ``out`` cannot be written, MissingExtra where matplotlib is not installed.
     """
@@ -52,24 +64,37 @@ def demo(out: str | Path) -> Demo:
         (scratch / "pictures").mkdir()
         for name, content in _pictures(made).items():
             (scratch / "pictures" / name).write_bytes(content)
-        page = demo_page(made.identification, made.design, made.simulation, made.generated, made.verified)
+        page = demo_page(made.identification, made.design, made.simulation, made.generated, made.verified,
+                         made.diagnosis, made.sealed)
         (scratch / "report.html").write_text(page.html(), encoding="utf-8")
     return replace(made, folder=Path(out), report=Path(out) / "report.html")
 
 
 def _chain(folder: Path) -> Demo:
     rig, controller = folder / "identified.toml", folder / "controller.toml"
-    say("1/5  identify: a fractional model from six steps of pressure, and six integer-order ones beside it")
+    say("1/6  identify: a fractional model from six steps of pressure, and six integer-order ones beside it")
     found = identify([folder / "logs/steps.csv"], folder / "rig.toml", rig, unseen=[folder / "logs/sines.csv"])
-    say("2/5  design: the model inverted, and a gain schedule as quick as the loop allows")
+    say("2/6  design: the model inverted, and a gain schedule as quick as the loop allows")
     designed = design(rig, controller)
-    say("3/5  simulate: the closed loop at seven set points, bit for bit as it will run")
+    say("3/6  simulate: the closed loop at seven set points, bit for bit as it will run")
     simulated = simulate(rig, controller)
-    say(f"4/5  generate: C in {', '.join(ARITHMETICS)}")
+    say(f"4/6  generate: C in {', '.join(ARITHMETICS)}")
     generated = {a: generate(controller, folder / "firmware" / a, a) for a in ARITHMETICS}
-    say("5/5  verify: the C against the Python reference, sample for sample")
+    say("5/6  verify: the C against the Python reference, sample for sample")
     verified = {a: verify(folder / "firmware" / a) for a in ARITHMETICS}
-    return Demo(folder, folder / "report.html", found, designed, simulated, generated, verified)
+    say("6/6  diagnose: another rig, whose logs hold an effect that its model lacks, under seal")
+    diagnosis, sealed = _blind(folder / "diagnosis")
+    return Demo(folder, folder / "report.html", found, designed, simulated, generated, verified, diagnosis, sealed)
+
+
+def _blind(folder: Path) -> tuple[Diagnosis, tuple[str, ...]]:
+    """Diagnose one sealed case, then break its seal."""
+    made = make(folder, cases=1, seed=_SEED, signals="C", suite="short", kinds=("single",))
+    number, committed = next(iter(made.commitments.items()))
+    case, seal = folder / "cases" / number, folder / "sealed" / number
+    found = diagnose(case / "rig.toml", sorted((case / "logs").glob("*.csv")), out=folder / "found")
+    label = unseal(seal / "label.json", committed, seal / "unseen")
+    return found, tuple(effect["effect"] for effect in label["truth"])
 
 
 def _pictures(made: Demo) -> dict[str, bytes]:

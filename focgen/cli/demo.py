@@ -6,10 +6,10 @@ from argparse import ArgumentParser, Namespace
 
 from focgen.cli.outcome import Outcome
 from focgen.demo import Demo, demo
-from focgen.report.demo_page import demo_lead, firmware_table
+from focgen.report.demo_page import demo_lead, diagnosis_sentence, firmware_table
 from focgen.report.page import text_table
 
-HELP = "all of it on the example logs: model, controller, C in four arithmetics, verified, with a report"
+HELP = "all of it on the example logs: model, controller, verified C, and a sealed case diagnosed; with a report"
 EXAMPLE = """example:
   focgen demo --out build/demo
 
@@ -36,11 +36,14 @@ def _payload(made: Demo) -> dict:
         "design": {"settling_s": designed.settling_s, "overshoot_pct": designed.overshoot_pct, "holds": designed.holds},
         "simulate": {"settling_s": [s.settling_s for s in made.simulation.setpoints], "holds": made.simulation.holds},
         "verify": {a: v.targets for a, v in made.verified.items()},
+        "diagnose": {"verdict": made.diagnosis.verdict, "sealed": made.sealed,
+                     "found": [[c.effect for c in cause.candidates] for cause in made.diagnosis.causes]},
         "holds": made.holds,
     }
 
 
 def _text(made: Demo) -> str:
     lead = demo_lead(made.identification, made.design, made.verified)
-    return (f"\n{lead}\n\n{text_table(firmware_table(made.generated, made.verified))}\n\nlook at  {made.report}\n"
+    return (f"\n{lead}\n\n{text_table(firmware_table(made.generated, made.verified))}\n\n"
+            f"{diagnosis_sentence(made.diagnosis, made.sealed)}\n\nlook at  {made.report}\n"
             f"         {made.folder / 'pictures'}\nread     {made.folder / 'firmware' / 'q31'}")

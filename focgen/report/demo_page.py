@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from focgen.codegen.generate import Generated
+from focgen.diagnosis.model import Diagnosis
 from focgen.identification.model import Identification
 from focgen.loop.design import Design
 from focgen.loop.simulate import Simulation
@@ -13,9 +14,11 @@ from focgen.verification.verify import Verification
 
 
 def demo_page(identification: Identification, design: Design, simulation: Simulation,
-              generated: dict[str, Generated], verified: dict[str, Verification]) -> Page:
-    """The page; its pictures are in ``pictures/``, the C in ``firmware/``, beside it."""
-    sections = (_model(identification), _controller(design), _loop(simulation), _firmware(generated, verified))
+              generated: dict[str, Generated], verified: dict[str, Verification], diagnosis: Diagnosis,
+              sealed: tuple[str, ...]) -> Page:
+    """The page; its pictures are in ``pictures/``, the C in ``firmware/``, the sealed case in ``diagnosis/``."""
+    sections = (_model(identification), _controller(design), _loop(simulation), _firmware(generated, verified),
+                _diagnosis(diagnosis, sealed))
     return Page("From step tests to a verified fractional-order controller",
                 demo_lead(identification, design, verified), sections)
 
@@ -61,6 +64,24 @@ def _firmware(generated: dict[str, Generated], verified: dict[str, Verification]
     return Section("C", ("Every sample of the C is compared with a reference that shares no code with it: output, "
                          "increment and flags, in every bit. The error is against the same controller in float64.",),
                    (table,), (), files)
+
+
+def _diagnosis(found: Diagnosis, sealed: tuple[str, ...]) -> Section:
+    shown = {"ladder.png": "Where the gap is: measured signals put in place of simulated ones, stage by stage",
+             "candidates.png": "Which effect: the candidates, and how far each is behind the best",
+             "waterfall.png": "How far: what parameters, effect and noise account for"}
+    pictures = tuple(Picture(f"diagnosis/found/{name}", caption) for name, caption in shown.items())
+    return Section("A diagnosis, blind", (diagnosis_sentence(found, sealed),), (), pictures,
+                   ("diagnosis/found/diagnosis.json", "diagnosis/found/augmented.toml"))
+
+
+def diagnosis_sentence(found: Diagnosis, sealed: tuple[str, ...]) -> str:
+    """What the diagnosis says of the sealed rig, and what the seal says."""
+    causes = [" or ".join(f"{c.effect} ({c.confidence:.0%})" for c in cause.candidates) for cause in found.causes]
+    gof = found.gap.gof
+    return (f"A rig with a sealed effect: the diagnosis says {' and '.join(causes) or found.verdict}, and takes the "
+            f"goodness of fit from {gof['refitted']:.3f} to {gof['explained']:.3f} of a possible {gof['possible']:.3f}. "
+            f"The seal says {', '.join(sealed) or 'nothing'}.")
 
 
 def firmware_table(generated: dict[str, Generated], verified: dict[str, Verification]) -> TableOf:
