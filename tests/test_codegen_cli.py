@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import venv
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -218,6 +219,12 @@ def test_an_installed_wheel_generates_the_same_bytes(tmp_path):
     run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", ROOT, "-w", wheels)
     venv.create(home, with_pip=False)
     (wheel,) = wheels.glob("focgen-*.whl")
+    inside = set(zipfile.ZipFile(wheel).namelist())
+    for folder in ("templates", "c_runtime", "examples"):
+        files = [p.relative_to(ROOT).as_posix() for p in (ROOT / folder).rglob("*") if p.is_file()]
+        assert files and {f"focgen/_shipped/{name}" for name in files} <= inside
+    c = {p.relative_to(ROOT).as_posix() for p in (ROOT / "focgen").rglob("*.[ch]")}
+    assert "focgen/rig/kernels.c" in c and len(c) > 5 and c <= inside
     run(
         sys.executable,
         "-m",
