@@ -6,9 +6,10 @@ from argparse import ArgumentParser, Namespace
 
 from focgen.cli.outcome import Outcome
 from focgen.identification.identify import identify
-from focgen.output import write_files
+from focgen.output import new_folder, write_file
 from focgen.report.identification import identification_pictures
 from focgen.report.identification_summary import identification_payload, identification_text
+from focgen.rig.files import rig_text
 
 HELP = "fit K(p)/(T s^alpha + 1) to logs of a rig, and integer-order models beside it"
 EXAMPLE = """example:
@@ -30,10 +31,15 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> Outcome:
-    found = identify(args.logs, args.rig, args.out, args.first, args.last, args.gain_degree, args.unseen)
-    text = f"{identification_text(found)}\n\nwrote {args.out}"
+    found = identify(args.logs, args.rig, None, args.first, args.last, args.gain_degree, args.unseen)
+    text = f"{identification_text(found)}\n\nwrote {args.out}\n"
     if args.report:
-        write_files(args.report, identification_pictures(found))
-        text += f"\npictures in {args.report}"
-    return Outcome(identification_payload(found) | {"new_rig": args.out}, f"{text}\nnext: focgen design {args.out} --out "
-                   "controller.toml")
+        with new_folder(args.report) as folder:  # pictures and rig, or neither
+            for name, picture in identification_pictures(found).items():
+                (folder / name).write_bytes(picture)
+            write_file(args.out, rig_text(found.rig))
+        text += f"pictures in {args.report}\n"
+    else:
+        write_file(args.out, rig_text(found.rig))
+    text += f"next: focgen design {args.out} --out controller.toml"
+    return Outcome(identification_payload(found) | {"new_rig": args.out}, text)

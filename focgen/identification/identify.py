@@ -25,6 +25,7 @@ from focgen.rig.files import read_rig, rig_text
 from focgen.rig.model import Actuator, LinearActuator, Rig
 
 _STEADY = 0.1  # of the step: nearer to its level than this, the input is at it
+_STEEPEST = 5  # degree of K(p); beyond it a polynomial through a few levels means nothing
 _STAY = 0.15  # of the experiment: a step's input stays at its level at least so long
 
 
@@ -47,8 +48,11 @@ def identify(
 
     Raises LogError, RigError or FitError; nothing is written then.
     """
+    if not 0 <= gain_degree <= _STEEPEST:
+        raise FitError("--gain-degree", f"is {gain_degree}", f"give 0 to {_STEEPEST}; 1 is the line of eq. (5)")
     nominal = rig if isinstance(rig, Rig) else read_rig(rig)
     experiments = _read(logs, nominal, first, last)
+    others = _read(unseen, nominal, None, None) if unseen else ()
     excitations = [_prepared(e, nominal, gain_degree + 1) for e in experiments]
     fits = tuple(_fit(x) for x in track(excitations, "fitting experiment"))
     steps = [x for x, fit in zip(excitations, fits) if fit.step]
@@ -57,7 +61,7 @@ def identify(
     pooled, notes = _pooled(steps, gain_degree)
     found = replace(nominal, actuator=Actuator(pooled.T, pooled.alpha, pooled.gain), effects=())
     pooled = replace(pooled, simulated={x.name: _through_rig(x, found.actuator) for x in excitations})
-    shown = _shown(_read(unseen, nominal, None, None) if unseen else (), found)
+    shown = _shown(others, found)
     result = _compared(excitations, fits, pooled, found, notes + _notes(excitations, fits, nominal), shown)
     if out is not None:
         write_file(out, rig_text(found))
