@@ -31,14 +31,15 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
     }
 }
 
-/* First-order lag whose factor differs up and down: y += (1 - a) (x - y); the mean of x over the step drives it. */
-void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, double keep_up, double keep_down)
+/* First-order lag, x linear between samples, whose coefficients {a, of the past x, of the present x} differ up and down:
+ * up where x lies above y. */
+void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const double *down)
 {
     double now = 0.0, past = 0.0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) now = past = 0.0;
-        double to = 0.5 * (past + x[k]);
-        now = to + (now - to) * (to > now ? keep_up : keep_down);
+        const double *c = 0.5 * (past + x[k]) > now ? up : down;
+        now = c[0] * now + c[1] * past + c[2] * x[k];
         past = x[k];
         y[k] = now;
     }
@@ -52,7 +53,7 @@ void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest
     for (int k = 0; k < n; k++) {
         if (rest[k]) now = past = 0.0;
         for (int j = 0; j < sub; j++) {
-            double to = past + (x[k] - past) * (j + 0.5) / sub, gap = to - now;
+            double to = past + (x[k] - past) * (j + 1.0) / sub, gap = to - now;
             double root = sqrt(fabs(gap) * scale), share;
             double time = (gap > 0.0 ? tau : vent) * (root / scale + 0.02);
             share = time > 0.0 ? -expm1(-step / time) : 1.0;

@@ -7,24 +7,20 @@ starts at rest; it returns a new array of shape (n,).
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
-import sys
 import tempfile
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
+from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 
 _SOURCE = Path(__file__).with_name("kernels.c")
 _DECLARATIONS = """
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0, const double *b1,
                   const double *pair, double through, int switching, double *z);
-void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, double keep_up, double keep_down);
+void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const double *down);
 void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau, double vent, double scale, int sub);
 void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, double h, double rate, double tau, int soft, int sub);
 void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double start);
@@ -33,16 +29,7 @@ void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *res
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *a,
                    double *w);
 """
-_FLAGS = ["-O3", "-shared", "-fPIC", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
-
-
-def _compiler() -> list[str]:
-    for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
-        if name and shutil.which(name.split()[0]):
-            return name.split()
-    if find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
-    raise BuildError("the simulator", "no C compiler was found", "install gcc, or pip install 'focgen[targets]'")
+_FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
 
 
 @cache
@@ -53,12 +40,11 @@ def _library():
     ffi.cdef(_DECLARATIONS)
     with tempfile.TemporaryDirectory(prefix="focgen-") as folder:
         target = str(Path(folder) / "kernels.so")
-        for native in (["-march=native"], []):
-            done = subprocess.run([*_compiler(), *_FLAGS, *native, "-o", target, str(_SOURCE), "-lm"],
-                                  capture_output=True, text=True)
-            if done.returncode == 0:
-                return ffi, ffi.dlopen(target)
-    raise BuildError("the simulator", f"the compiler refused it: {done.stderr.strip()[-200:]}", "set CC to another one")
+        try:
+            compile_shared([_SOURCE], target, [*_FLAGS, "-march=native"])
+        except BuildError:
+            compile_shared([_SOURCE], target, _FLAGS)
+        return ffi, ffi.dlopen(target)
 
 
 def _call(name: str, x: np.ndarray, rest: np.ndarray, *others) -> np.ndarray:
@@ -82,8 +68,17 @@ def modes(x, rest, a, b0, b1, pair, through: float, switching: bool) -> np.ndarr
 
 def lag(x, rest, h: float, up: float, down: float) -> np.ndarray:
     """A first-order lag with time constants ``up`` while rising and ``down`` while falling, s (0: none)."""
-    keep = [float(np.exp(-h / t)) if t > 1e-4 * h else 0.0 for t in (up, down)]
-    return _call("focgen_lag", x, rest, *keep)
+    ffi, _ = _library()
+    rows = [np.array(_lag(h, float(t))) for t in (up, down)]
+    return _call("focgen_lag", x, rest, *(ffi.from_buffer("double[]", row) for row in rows))
+
+
+def _lag(h: float, tau: float) -> tuple[float, float, float]:
+    if tau < 1e-4 * h:
+        return 0.0, 0.0, 1.0
+    a = np.exp(-h / tau)
+    mean = -np.expm1(-h / tau) * tau / h
+    return a, mean - a, 1.0 - mean
 
 
 def orifice(x, rest, h: float, fill: float, vent: float, scale: float) -> np.ndarray:

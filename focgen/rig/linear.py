@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import cont2discrete
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import kernels
@@ -56,9 +55,45 @@ def single_lag(transfer: TransferFunction) -> tuple[float, float, float] | None:
 
 @lru_cache(maxsize=512)
 def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Numerator and denominator in powers of z^-1, exact at the samples: the modes one by one, put together again."""
     num, den = _coefficients(transfer.num), _coefficients(transfer.den)
     if len(den) == 1:
         return num / den[0], np.ones(1)
+    through = num[0] / den[0] if len(num) == len(den) else 0.0
+    poles = np.roots(den).astype(complex)
+    if _coincide(poles):
+        return _by_exponential(num, den, h, held)
+    residues = np.polyval(num, poles) / (den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)]))
+    a = np.exp(poles * h)
+    gain = np.where(poles == 0, h, (a - 1) / np.where(poles == 0, 1, poles))  # of a step over one sample
+    past = residues * gain if held else residues * h * _ramp(poles * h, a)
+    now = np.zeros_like(past) if held else residues * gain - past
+    whole = np.poly(a)
+    b = through * whole.astype(complex)
+    for i in range(len(poles)):
+        rest = np.atleast_1d(np.poly(np.delete(a, i)))
+        b[: len(rest)] += now[i] * rest
+        b[1: len(rest) + 1] += past[i] * rest
+    return b.real, whole.real
+
+
+def _ramp(q: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """∫ (1 − t) e^{q (1 − t)} dt over 0 … 1: what the past sample of a linear input counts."""
+    small = np.abs(q) < 1e-3
+    safe = np.where(small, 1.0, q)
+    return np.where(small, 0.5 + q / 3 + q * q / 8, (a * (safe - 1) + 1) / safe**2)
+
+
+def _coincide(poles: np.ndarray) -> bool:
+    """Whether two poles are so close that their residues would cancel."""
+    distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(len(poles), np.inf))
+    return bool(np.any(distance < 1e-3 * np.maximum(np.abs(poles)[:, None], 1e-12)))
+
+
+def _by_exponential(num: np.ndarray, den: np.ndarray, h: float, held: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The same from the matrix exponential, which repeated poles do not trouble, but which takes longer."""
+    from scipy.signal import cont2discrete
+
     scale = abs(den[-1] / den[0]) ** (1 / (len(den) - 1)) or 1.0  # time in units of 1/scale: well conditioned
     powers = scale ** np.arange(len(den) - 1, -1, -1.0)
     num, den = num * powers[-len(num):], den * powers

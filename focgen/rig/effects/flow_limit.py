@@ -24,7 +24,7 @@ EFFECT = Effect(
     forms=[
         Form("hard", "supply", (_RATE,), _hard),
         Form("saturating", "supply", (
-            _RATE, Parameter("lag", time=1, lower=0.0, upper=5.0, starts=(0.05, 0.05, 0.1)),
+            _RATE, Parameter("lag", time=1, lower=0.0, upper=5.0, starts=(0.05, 0.05, 0.1), zero=0.0),
         ), _soft),
     ],
 )

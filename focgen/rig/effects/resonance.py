@@ -18,7 +18,7 @@ def _parallel(x, values, run):
 
 
 _PERIOD = Parameter("period", time=1, lower=0.002, upper=30.0, starts=(0.1, 0.5, 2.0), log=True)
-_DAMPING = Parameter("damping", lower=0.005, upper=0.7, starts=(0.2, 0.2, 0.2), log=True)
+_DAMPING = Parameter("damping", lower=0.005, upper=0.5, starts=(0.2, 0.2, 0.2), log=True)
 
 EFFECT = Effect(
     name="resonance",

@@ -1,7 +1,6 @@
 """A sensor slower than nominal: a filter, exposure, a slow front end."""
 
 from focgen.rig import kernels
-from focgen.rig.effects._delay import delayed
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 _LAG = (Parameter("lag", time=1, lower=0.0, upper=20.0, starts=(0.02, 0.2), zero=0.0),)
@@ -9,10 +8,6 @@ _LAG = (Parameter("lag", time=1, lower=0.0, upper=20.0, starts=(0.02, 0.2), zero
 
 def _one(x, values, run):
     return kernels.lag(x, run.rest, run.h, values[0], values[0])
-
-
-def _late(x, values, run):
-    return delayed(_one(x, values[:1], run), values[1], run)
 
 
 def _two(x, values, run):
@@ -29,8 +24,5 @@ EFFECT = Effect(
     forms=[
         Form("one_lag", "strain", _LAG, _one),
         Form("two_lags", "strain", _LAG, _two),
-        Form("lag_and_delay", "strain", (
-            *_LAG, Parameter("delay", time=1, lower=0.0, upper=3.0, starts=(0.02, 0.02), zero=0.0),
-        ), _late),
     ],
 )

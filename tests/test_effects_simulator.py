@@ -1,0 +1,101 @@
+"""The compiled chain against independent truth: Laplace inversion, scipy, and hand-made loops."""
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig import kernels, linear
+from focgen.rig.effects import Run, form_of
+from focgen.rig.engine import Chain, Placed
+from focgen.rig.model import Actuator, Rig, Signals
+from focgen.rig.modes import respond
+
+
+def rest(*lengths):
+    return Run.of(lengths, [0.0] * len(lengths), 1.0).rest
+
+
+def ramp_response(transfer, t, h):
+    """The exact response at t to a step that takes the time h to rise, by inversion of its Laplace transform."""
+    f = lambda s: transfer(s) / s**2 * (1 - mpmath.exp(-s * h)) / h  # noqa: E731
+    return float(mpmath.invertlaplace(f, t, method="talbot", degree=24))
+
+
+@pytest.mark.parametrize("T, alpha", [(1.32, 0.6), (1.0, 0.3), (2.0, 0.9), (2.0, 1.0), (2.0, 1.04), (1.0, 1.6), (50.0, 0.5)])
+def test_fractional_lag_from_the_first_sample_to_the_last(T, alpha):
+    h, n = 0.02, 20_000
+    x = np.r_[0.0, np.ones(n)]
+    y = respond(x, rest(n + 1), h, T, alpha, n * h)
+    for k in (5, 50, 500, 20_000):
+        exact = ramp_response(lambda s: 1 / (T * s**alpha + 1), k * h, h) if k < 500 else None
+        if exact is None:  # the rise no longer matters: a step half a sample earlier, to h²
+            exact = float(mpmath.invertlaplace(lambda s: 1 / (s * (T * s**alpha + 1)), (k - 0.5) * h, method="talbot"))
+        assert abs(y[k] - exact) < 3e-5
+
+
+def test_initial_rest_leaves_no_trace():
+    y = respond(np.r_[np.zeros(5000), np.ones(5000)], rest(10_000), 0.01, 1.32, 0.6, 100.0)
+    z = respond(np.r_[0.0, np.ones(4999)], rest(5000), 0.01, 1.32, 0.6, 100.0)
+    np.testing.assert_array_equal(y[:5000], 0.0)
+    np.testing.assert_allclose(y[4999:9999], z, atol=1e-12)
+
+
+@pytest.mark.parametrize("num, den", [([3.0], [0.2, 1.0]), ([152.48], [1, 53.39, 1528]), ([1, 2], [1, 2, 1]), ([2, 1, 3], [1, 2, 5])])
+def test_whole_orders_agree_with_scipy(num, den):
+    h, n = 0.03, 400
+    x = np.random.default_rng(3).normal(size=n)
+    x[0] = 0.0
+    transfer = TransferFunction([(c, len(num) - 1 - i) for i, c in enumerate(num)],
+                                [(c, len(den) - 1 - i) for i, c in enumerate(den)])
+    _, exact, _ = lsim((num, den), x, np.arange(n) * h, interp=True)
+    np.testing.assert_allclose(linear.run(transfer, x, rest(n), h, n * h), exact, atol=1e-9)
+
+
+def test_general_fractional_transfer_function():
+    transfer = TransferFunction([(1.0, 0.0)], [(1.0, 1.5), (0.8, 0.7), (1.0, 0.0)])
+    h, n = 0.05, 400
+    y = linear.run(transfer, np.r_[0.0, np.ones(n)], rest(n + 1), h, n * h)
+    for k in (10, 40, 200, 400):
+        exact = float(mpmath.invertlaplace(lambda s: 1 / (s * (s**1.5 + 0.8 * s**0.7 + 1)), (k - 0.5) * h, method="talbot"))
+        assert abs(y[k] - exact) < 2e-3
+
+
+def test_each_experiment_starts_at_rest_and_history_carries_on():
+    rig = Rig("r", 0.05, Signals("t", "y", "u"), Actuator(1.0, 0.7, (2.0,)))
+    u = np.r_[np.zeros(5), np.ones(100)]
+    both, one = Run.of([105, 105], [0.0, 50.0], 0.05), Run.of([105], [0.0], 0.05)
+    plain = Chain(rig).run(np.r_[u, u], "regulator", "sensor", both)
+    np.testing.assert_allclose(plain[105:], Chain(rig).run(u, "regulator", "sensor", one), atol=1e-12)
+    soft = Placed("softening", form_of("softening", "largest"), "actuator", (0.3, 2.0))
+    y = Chain(rig, (soft,)).run(np.r_[u, 0.5 * u], "regulator", "sensor", both)
+    fresh = Chain(rig, (soft,)).run(0.5 * u, "regulator", "sensor", one)
+    assert y[-1] > 1.1 * fresh[-1]
+
+
+def test_play_against_a_loop_in_python():
+    x = np.cumsum(np.random.default_rng(0).normal(size=500))
+    now, expected = 0.0, []
+    for value in x:
+        now = min(max(now, value - 0.7), value + 0.7)
+        expected.append(now)
+    np.testing.assert_array_equal(kernels.play(x, rest(500), 0.7), expected)
+
+
+def test_bouc_wen_loop_does_not_vanish_with_frequency():
+    areas = []
+    for n in (400, 4000):
+        x = np.sin(np.linspace(0, 6 * np.pi, n))
+        z = kernels.bouc_wen(x, rest(n), 0.1)
+        last = slice(2 * n // 3, n)
+        areas.append(abs(np.trapezoid(z[last], x[last])))
+    assert areas[0] > 2.0 and abs(areas[0] / areas[1] - 1) < 0.1
+
+
+def test_unloading_speed_acts_only_when_unloading():
+    x = np.r_[0.0, np.ones(200), np.zeros(200)]
+    slow = respond(x, rest(401), 0.05, 1.0, 0.8, 20.0, unloading=0.5)
+    plain = respond(x, rest(401), 0.05, 1.0, 0.8, 20.0)
+    np.testing.assert_allclose(slow[:200], plain[:200], atol=1e-12)
+    assert np.all(slow[205:300] > plain[205:300] + 0.01)
