@@ -36,7 +36,7 @@ def compile_shared(sources: Sequence[str | Path], target: str | Path, flags: Seq
                    include: Sequence[str | Path] = ()) -> None:
     """Compile C files into the shared library ``target``. Raises BuildError with the compiler's first complaint."""
     folders = [part for folder in include for part in ("-I", str(folder))]
-    command = [*find_compiler(), *flags, "-shared", "-fPIC", *folders, *map(str, sources), "-o", str(target)]
+    command = [*find_compiler(), *flags, "-shared", "-fPIC", *folders, *map(str, sources), "-o", str(target), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise BuildError(str(sources[0]), f"does not compile: {_first_complaint(done.stderr)}",

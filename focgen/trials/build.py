@@ -5,32 +5,15 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
-import shlex
-import shutil
-import subprocess
-import sys
 import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 
 import cffi
 
-from focgen.errors import BuildError
+from focgen.compiler import compile_shared
 
 _SOURCES = Path(__file__).parent / "c"
-_FLAGS = ("-O2", "-std=c11", "-D_GNU_SOURCE", "-ffp-contract=off", "-shared", "-fPIC")
-
-
-def _compiler() -> list[str]:
-    """The command of a C compiler: $CC, the system's, or the pip-installable one. Raises BuildError."""
-    if os.environ.get("CC"):
-        return shlex.split(os.environ["CC"])
-    for name in ("cc", "gcc", "clang"):
-        if shutil.which(name):
-            return [name]
-    if find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
-    raise BuildError("trial", "finds no C compiler", "install gcc, or pip install 'focgen[targets]'")
+_FLAGS = ("-O2", "-std=c11", "-D_GNU_SOURCE", "-ffp-contract=off")
 
 
 def _cache() -> Path:
@@ -44,15 +27,8 @@ def _cache() -> Path:
 
 
 def _compile(target: Path) -> None:
-    sources = [str(p) for p in sorted(_SOURCES.glob("*.c"))]
     part = target.with_suffix(f".{os.getpid()}.part")
-    command = [*_compiler(), *_FLAGS, *sources, "-o", str(part), "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        fault = (done.stderr.strip().splitlines() or ["no message"])[0]
-        raise BuildError(
-            "trial", f"the compiler refused the generator: {fault}", "try another compiler through CC"
-        )
+    compile_shared(sorted(_SOURCES.glob("*.c")), part, _FLAGS)
     os.replace(part, target)
 
 
