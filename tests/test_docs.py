@@ -1,0 +1,29 @@
+"""The pages: every link leads somewhere, every command named exists, nothing of one machine stands in them."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from focgen.cli.main import commands
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").glob("*.md")])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_leads_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
+        assert target.startswith("http") or (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_command_named_exists(page):
+    lines = re.findall(r"^focgen ([a-z]+)", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(lines) <= set(commands())
+
+
+def test_readme_begins_with_what_it_is_and_how_to_start():
+    screen = "\n".join((ROOT / "README.md").read_text(encoding="utf-8").splitlines()[:30])
+    for piece in ("make demo", "make test", "What it does not do", ".png", "microcontroller"):
+        assert piece in screen
