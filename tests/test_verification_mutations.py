@@ -69,8 +69,8 @@ EITHER = (
 
 PAPER = (
     Fault("increment counted twice", "@.c", r"\(d \+ s->increment\)", "(d + d)"),
-    Fault("integral's clamp lost", "@.c", r"s->integral = foc_clamp\w+\((.*), \S+, \S+\);", r"s->integral = \1;"),
-    Fault("integral's limits swapped", "@.c", r"(s->integral = foc_clamp\w+\(s.*), (\S+), (\S+)\);", r"\1, \3, \2);"),
+    Fault("integral's clamp lost", "@.c", r"s->integral = foc_clamp\w+\((.*),\s+\S+,\s+\S+\);", r"s->integral = \1;"),
+    Fault("integral's limits swapped", "@.c", r"(s->integral = foc_clamp\w+\(s.*),\s+(\S+),\s+(\S+)\);", r"\1, \3, \2);"),
     Fault("gain at the upper end", "foc_rt.h", r"return gains\[count - 1u\]", "return gains[count - 2u]"),
     Fault("gain at the lower end", "foc_rt.h", r"return gains\[0\]", "return gains[1]"),
     Fault("a segment skipped", "foc_rt.h", r"i\+\+;\n    \}\n    return", "i += 1u + (i == 2u);\n    }\n    return"),
@@ -88,7 +88,7 @@ FILTER = (
     Fault("reset keeps the carry", "@.c", r"    s->carry = 0;\n", "", FIXED),
     Fault("recursion left out", "@.c", r"(-=? )@_denominator_sum\(s\)", r"\g<1>0 * @_denominator_sum(s)"),
     Fault("trapezoid is a rectangle", "@.c", r"s->inner_input = r;", "s->inner_input = 0;"),
-    Fault("inner clamp lost", "@.c", r"s->inner = foc_clamp\w+\((.*), \S+, \S+\);", r"s->inner = \1;"),
+    Fault("inner clamp lost", "@.c", r"s->inner = foc_clamp\w+\((.*),\s+\S+,\s+\S+\);", r"s->inner = \1;"),
     Fault("rest of the filtered error", "@.c", r"s->filtered\[i\] = v;", "s->filtered[i] = v + 1;"),
     Fault("constant gain", "@.c", r"(#define @_GAIN )(\d+)", r"\1(1 + \2)", FIXED),
     Fault("constant gain", "@.c", r"(#define @_GAIN )(\S+)", r"\1(1.0000002f * \2)", ("f32",)),
@@ -206,6 +206,16 @@ def test_the_command_reports_a_mismatch(sound, tmp_path, capsys):
     assert main(["verify", str(folder), "--samples", "500"]) == 1
     out, err = capsys.readouterr()
     assert "NOT verified" in out and "first difference" in out and not err
+
+
+def test_c_that_crashes_is_a_mismatch_too(sound, tmp_path, capsys):
+    """It must not take the caller with it."""
+    folder = copied(sound, tmp_path, "spba", "q15")
+    sow(folder, "spba", Fault("null", "@.c", r"s->error_now = 0;", "s = 0; s->error_now = 0;"))
+    assert main(["verify", str(folder), "--samples", "500"]) == 1
+    assert "crashed" in capsys.readouterr().out
+    assert main(["verify", str(folder), "--samples", "500", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["targets"]["host"]["mismatches"] == 1
 
 
 def test_another_runtime_is_not_the_one_that_was_proved(sound, tmp_path):

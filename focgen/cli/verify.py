@@ -41,6 +41,8 @@ def verification_text(found: Verification) -> str:
 def _result(result: TargetResult) -> str:
     if result.skipped:
         return f"skipped: {result.skipped}"
+    if result.max_error is None:
+        return result.first
     bound, error = result.error_bound, result.max_error
     lines = [f"{result.samples - result.mismatches} of {result.samples} samples equal in every bit"]
     if result.first:

@@ -12,6 +12,7 @@ from focgen.errors import InputError
 from focgen.plan.execute import execute
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace, to_raw
+from focgen.verification.apart import Crashed, apart
 from focgen.verification.errors_seen import ErrorsSeen, MaxError, errors_seen
 from focgen.verification.folder import GeneratedFolder, read_folder
 from focgen.verification.host import Library, header_scales
@@ -62,7 +63,7 @@ def verify(folder: str | Path, samples: int = 10_000, seed: int = 0,
     """Compile the C of a generated folder and compare it with the bit-true reference.
 
     ``samples`` of mixed inputs, from ``seed``, besides the worst case of every node. ``target``: a name of ``TARGETS``,
-    several, or "all". Raises InputError for a folder that is none, BuildError where the C does not compile.
+    several, or "all". The C runs in a process of its own; where it crashes, that is a mismatch. Raises InputError for a folder that is none, BuildError where the C does not compile.
     """
     if not isinstance(samples, int) or samples < 1:
         raise InputError("--samples", f"is {samples!r}", "give at least 1")
@@ -85,7 +86,10 @@ def _on(name: str, read: GeneratedFolder, samples: int, seed: int) -> TargetResu
     if name != "host":
         return TargetResult(skipped="emulated targets are not part of this version")
     library = Library([read.plan], [read.path])
-    return compare(read.plan, library, samples, seed, read)
+    try:
+        return apart(compare, read.plan, library, samples, seed, read)
+    except Crashed as how:
+        return TargetResult(mismatches=1, within=False, first=f"the C crashed ({how})")
 
 
 def compare(plan: Plan, library: Library, samples: int, seed: int, read: GeneratedFolder | None = None) -> TargetResult:

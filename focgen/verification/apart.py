@@ -1,0 +1,54 @@
+"""A computation in a process of its own: C that crashes takes nothing with it."""
+
+from __future__ import annotations
+
+import faulthandler
+import multiprocessing
+import os
+import signal
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+
+class Crashed(Exception):
+    """The process ended without an answer; the message says how."""
+
+
+def apart(function: Callable[..., Any], *arguments: Any) -> Any:
+    """``function(*arguments)``, computed in a forked process; in this one where the system cannot fork.
+
+    Raises what the function raises, and Crashed where its process dies.
+    """
+    if not hasattr(os, "fork"):
+        return function(*arguments)
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_answer, args=(sender, function, arguments), daemon=True)
+    with warnings.catch_warnings():  # of threads, such as BLAS's, which know how to fork
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process.start()
+    sender.close()
+    try:
+        result, error = receiver.recv()
+    except EOFError:
+        process.join()
+        raise Crashed(_ending(process.exitcode)) from None
+    process.join()
+    if error is not None:
+        raise error
+    return result
+
+
+def _answer(sender, function: Callable[..., Any], arguments: tuple) -> None:
+    faulthandler.disable()  # the parent tells of it, in one line
+    try:
+        answer = function(*arguments), None
+    except Exception as error:  # noqa: BLE001 - raised again in the parent
+        answer = None, error
+    sender.send(answer)
+    sender.close()
+
+
+def _ending(exitcode: int) -> str:
+    return signal.Signals(-exitcode).name if exitcode < 0 else f"exit status {exitcode}"
