@@ -14,7 +14,8 @@ from focgen.codegen.generate import folder_files, generate
 from focgen.control.files import controller_text, read_controller
 from focgen.output import write_files
 from focgen.plan.build import build_plan
-from tests.c_code import EXACT, compiler, run
+from focgen.resources import shipped
+from tests.c_code import EXACT, STRICT, compiler, run
 from tests.controllers import seed_controller
 
 FINGER = Path(__file__).parent / "golden" / "finger.toml"
@@ -213,6 +214,17 @@ def trace(folder: Path, names: list[str], one_unit: bool = False) -> str:
     sources = [] if one_unit else [folder / f"{n}.c" for n in names]
     run(*compiler("gcc"), *EXACT, folder / "main.c", *sources, "-o", folder / "main.exe")
     return run(folder / "main.exe")
+
+
+def test_the_example_closes_its_loop(tmp_path):
+    """It takes over from manual without a bump, and settles; its exit status says so."""
+    examples = shipped("examples")
+    generate(examples / "controller.toml", tmp_path)
+    sources = [examples / "main.c", tmp_path / "spba.c"]
+    run(*compiler("gcc"), *STRICT, *EXACT, "-I", tmp_path, *sources, "-o", tmp_path / "loop.exe")
+    rows = [line.split() for line in run(tmp_path / "loop.exe").splitlines()[1:]]
+    before, after = (float(row[1]) for row in rows[1:3])
+    assert before == after == 1.0 and abs(float(rows[-1][2]) - 0.008) < 1e-4
 
 
 def test_the_handshake_refuses_another_runtime(tmp_path):
