@@ -88,10 +88,12 @@ def _parameters(found: Identification) -> bytes:
                      label=f"K(p), R² = {pooled.gain_r2:.4f}")
         for ax, key in zip(axes[1:], ("T", "alpha")):
             ax.axhspan(*pooled.ci95[key], color=COLOURS["band"])
-            ax.axhline(getattr(pooled, key), color=COLOURS["ideal"], label=f"pooled {getattr(pooled, key):.4g}, 95 %")
-        for ax, label in zip(axes, ("K", "T (s^α)", "α")):
+            ax.axhline(getattr(pooled, key), color=COLOURS["ideal"], label=f"pooled {getattr(pooled, key):.4g}, 95 %", zorder=1)
+        for ax, label in zip(axes, ("K", r"T ($\mathrm{s}^\alpha$)", "α")):
+            low, high = ax.get_ylim()
+            ax.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
             ax.set_ylabel(label)
-            ax.legend()
+            ax.legend(loc="upper left", ncols=2)
         axes[-1].set_xlabel("level of the step")
         axes[0].set_title("Parameters of the fractional model over the level")
         return png(fig)
@@ -109,7 +111,7 @@ def _loops(found: Identification) -> bytes:
         for ax, (name, pressure, measured, simulated) in zip(axes.flat, swings):
             late = slice(int(len(pressure) * (1.0 - _LAST)), None)
             ax.plot(pressure[late], measured[late], color=GREY, lw=0.7, label="log")
-            ax.plot(pressure[late], simulated[late], color=COLOURS["model"], lw=1.2, label="model")
+            ax.plot(pressure[late], simulated[late], color=COLOURS["model"], lw=0.9, label="identified rig")
             ax.set_title(name)
         for ax in axes[-1]:
             ax.set_xlabel("pressure")
