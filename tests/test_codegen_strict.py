@@ -1,4 +1,4 @@
-"""Many controllers, not one: strict compilation by gcc and clang, and tables that read back as the plan's weights."""
+"""Many controllers: strict compilation by gcc and clang, and tables that read back as the plan's weights."""
 
 from __future__ import annotations
 
@@ -80,7 +80,11 @@ def test_tables_read_back_as_the_weights(plans, folder):
     for plan in plans:
         text = (folder / f"{plan.name}.c").read_text()
         inner = plan.inner and plan.inner.rest
-        sums = {"numerator": plan.direct, "integrand": inner, "denominator": plan.feedback and plan.feedback.table}
+        sums = {
+            "numerator": plan.direct,
+            "integrand": inner,
+            "denominator": plan.feedback and plan.feedback.table,
+        }
         read = {"f64": float, "f32": lambda t: float(np.float32(t.rstrip("f")))}.get(plan.arithmetic, int)
         for name, one in sums.items():
             if one is not None:
@@ -108,7 +112,7 @@ def test_no_sentence_is_cut_short_where_there_are_no_units(tmp_path):
 
 
 def test_an_unstable_memory_names_one_that_works(tmp_path, capsys):
-    """10 s^1.2 + 1 at 10 ms, cut off after 64 samples, diverges: refused, with a length that is then accepted."""
+    """10 s^1.2 + 1 at 10 ms, cut off after 64 samples, diverges: refused, with a length that works."""
     controller = simple(TransferFunction([(1.0, 0.0)], [(10.0, 1.2), (1.0, 0.0)]), name="slow", length=64)
     (tmp_path / "slow.toml").write_text(controller_text(controller))
     command = ["generate", str(tmp_path / "slow.toml"), "--out", str(tmp_path / "out"), "--arithmetic", "f64"]

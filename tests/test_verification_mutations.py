@@ -1,7 +1,7 @@
 """Whatever is broken in a generated folder, ``verify`` says so: one fault at a time, sown into the text.
 
-Faults in foc_rt.h come with a manifest that knows the broken file's hash, so that the comparison of samples must find
-them. A lost saturation of a *narrowing* is not among them: it is proved that none is ever reached
+Faults in foc_rt.h come with a manifest that knows the broken file's hash: the comparison of samples must
+find them. A lost saturation of a *narrowing* is not among them: it is proved that none is ever reached
 (test_codegen_c.py tries those functions by themselves); a lost clamp of an input or of the integral is.
 """
 
@@ -30,7 +30,7 @@ SAMPLES = 3000
 
 @dataclass(frozen=True)
 class Fault:
-    """``pattern`` in ``file`` becomes ``by``; "@" stands for the controller's name. ``where``: arithmetics that have it."""
+    """``pattern`` in ``file`` becomes ``by``; "@" is the controller; ``where``: arithmetics that have it."""
 
     name: str
     file: str
@@ -47,14 +47,23 @@ _SHIFT = r"\(x \+ \(\(\(int(\d\d)_t\)1 << n\) >> 1\)\) >> n"
 
 EITHER = (
     Fault("ring wraps a slot early", "foc_rt.h", r"now \+ 1u < size", "now + 2u < size"),
-    Fault("history read from the wrong slot", "foc_rt.h", r"now - lag : size", "now - lag + (lag > 2u) : size"),
-    Fault("newest tap lost after the wrap", "foc_rt.h", r"for \(; i < taps; i\+\+\)", "for (; i + 1u < taps; i++)"),
+    Fault(
+        "history read from the wrong slot", "foc_rt.h", r"now - lag : size", "now - lag + (lag > 2u) : size"
+    ),
+    Fault(
+        "newest tap lost after the wrap",
+        "foc_rt.h",
+        r"for \(; i < taps; i\+\+\)",
+        "for (; i + 1u < taps; i++)",
+    ),
     Fault("a tap left out", "@.c", r"(foc_dot_f32\(@_numerator), (\d+)", r"\1, \2 - 1", ("f32",)),
     Fault("off-by-one tap", "@.c", r"(foc_dot_f32\(@_numerator.*), (\d+)\);", r"\1, \2 - 1);", ("f32",)),
     Fault("off-by-one tap", "@.c", r"\{7, 4, (\d+)\}", r"{6, 4, \1}", FIXED),
     Fault("a block's scale", "@.c", r"\{7, 4, (\d+)\}", r"{7, 4, \1 + 1}", FIXED),
     Fault("shift truncates", "foc_rt.h", _SHIFT, "x >> n", FIXED),
-    Fault("shift rounds halves down", "foc_rt.h", _SHIFT, r"(x + ((((int\1_t)1 << n) - 1) >> 1)) >> n", FIXED),
+    Fault(
+        "shift rounds halves down", "foc_rt.h", _SHIFT, r"(x + ((((int\1_t)1 << n) - 1) >> 1)) >> n", FIXED
+    ),
     Fault("sums in double", "foc_rt.h", r"float sum = 0\.0f;", "double sum = 0.0;", ("f32",)),
     Fault("input clamp lost", "@.c", r"m = foc_clamp\d\d\(meas,.*\);", "m = meas;", FIXED),
     Fault("swapped input limits", "@.c", r"@_MEAS_MIN, @_MEAS_MAX", "@_MEAS_MAX, @_MEAS_MIN", FIXED),
@@ -69,13 +78,33 @@ EITHER = (
 
 PAPER = (
     Fault("increment counted twice", "@.c", r"\(d \+ s->increment\)", "(d + d)"),
-    Fault("integral's clamp lost", "@.c", r"s->integral = foc_clamp\w+\((.*),\s+\S+,\s+\S+\);", r"s->integral = \1;"),
-    Fault("integral's limits swapped", "@.c", r"(s->integral = foc_clamp\w+\(s.*),\s+(\S+),\s+(\S+)\);", r"\1, \3, \2);"),
+    Fault(
+        "integral's clamp lost",
+        "@.c",
+        r"s->integral = foc_clamp\w+\((.*),\s+\S+,\s+\S+\);",
+        r"s->integral = \1;",
+    ),
+    Fault(
+        "integral's limits swapped",
+        "@.c",
+        r"(s->integral = foc_clamp\w+\(s.*),\s+(\S+),\s+(\S+)\);",
+        r"\1, \3, \2);",
+    ),
     Fault("gain at the upper end", "foc_rt.h", r"return gains\[count - 1u\]", "return gains[count - 2u]"),
     Fault("gain at the lower end", "foc_rt.h", r"return gains\[0\]", "return gains[1]"),
-    Fault("a segment skipped", "foc_rt.h", r"i\+\+;\n    \}\n    return", "i += 1u + (i == 2u);\n    }\n    return"),
+    Fault(
+        "a segment skipped",
+        "foc_rt.h",
+        r"i\+\+;\n    \}\n    return",
+        "i += 1u + (i == 2u);\n    }\n    return",
+    ),
     Fault("slope ignored", "foc_rt.h", r"slopes\[i\] \*", "0 *"),
-    Fault("track ignored", "@.c", r"(_track\(@_state \*s, @_sig u_applied\)\n\{\n).*", r"\1    (void)s, (void)u_applied;"),
+    Fault(
+        "track ignored",
+        "@.c",
+        r"(_track\(@_state \*s, @_sig u_applied\)\n\{\n).*",
+        r"\1    (void)s, (void)u_applied;",
+    ),
     Fault("track not limited", "@.c", r"foc_clamp\w+\(u_applied, @_U_MIN, @_U_MAX\)", "u_applied"),
     Fault("reset ignores u0", "@.c", r"@_track\(s, u0\);", "(void)u0;"),
     Fault("first gain forgotten", "@.c", r"s->starting = 1", "s->starting = 0"),
@@ -153,7 +182,9 @@ def test_an_untouched_folder_holds(sound, name, arithmetic, capsys):
     assert main(["verify", str(sound / f"{name}_{arithmetic}"), "--samples", str(SAMPLES), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     host = found["targets"]["host"]
-    assert found["holds"] and host["mismatches"] == 0 and host["samples"] >= SAMPLES and not found["differences"]
+    assert (
+        found["holds"] and host["mismatches"] == 0 and host["samples"] >= SAMPLES and not found["differences"]
+    )
     assert 0.0 < host["max_error"]["operator"] <= host["error_bound"]["operator"]
 
 
@@ -173,7 +204,9 @@ def test_one_weight_wrong_by_its_last_digit(sound, tmp_path, arithmetic, place):
     folder = copied(sound, tmp_path, "spba", arithmetic)
     path = folder / "spba.c"
     head, table, rest = re.split(r"(spba_numerator\[\d+\] = \{\n[^}]*\};)", path.read_text())
-    numbers = list(re.finditer(r"-?\d[\d.e-]*f?(?=,)", re.sub(r"/\*.*?\*/", lambda m: " " * len(m[0]), table)))
+    numbers = list(
+        re.finditer(r"-?\d[\d.e-]*f?(?=,)", re.sub(r"/\*.*?\*/", lambda m: " " * len(m[0]), table))
+    )
     assert len(numbers) == 41
     begin, end = numbers[place].span()
     path.write_text(head + table[:begin] + neighbour(table[begin:end]) + table[end:] + rest)
@@ -289,7 +322,9 @@ def leaves(entry, path=()):
         yield from leaves(value, (*path, key)) if isinstance(value, (dict, list)) else [(*path, key)]
 
 
-@pytest.mark.parametrize("arithmetic, by", [("q15", 0), *(("f32", by) for by in (None, "x", -1, float("nan"), []))])
+@pytest.mark.parametrize(
+    "arithmetic, by", [("q15", 0), *(("f32", by) for by in (None, "x", -1, float("nan"), []))]
+)
 def test_no_value_of_the_manifest_may_be_anything_else(sound, tmp_path, arithmetic, by):
     """Each of them in turn: either a difference, or an error of one line."""
     folder = copied(sound, tmp_path, "filter", arithmetic)
@@ -370,7 +405,9 @@ def test_an_unusable_folder_is_an_error_of_one_line(sound, tmp_path, what, capsy
     assert not out and re.fullmatch(r"focgen: error: [^\n]+: [^\n]+; [^\n]+\n", err), err
 
 
-@pytest.mark.parametrize("option", (["--samples", "0"], ["--seed", "-1"], ["--target", "z80"], ["--samples", "many"]))
+@pytest.mark.parametrize(
+    "option", (["--samples", "0"], ["--seed", "-1"], ["--target", "z80"], ["--samples", "many"])
+)
 def test_unusable_options(sound, option, capsys):
     assert main(["verify", str(sound / "spba_q15"), *option]) == 2
     assert capsys.readouterr().err.count("\n") == 1

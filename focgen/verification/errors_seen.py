@@ -13,7 +13,7 @@ from focgen.plan.scenario import Scenario, Trace, physical_trace
 
 @dataclass(frozen=True)
 class MaxError:
-    """The largest errors seen, in physical units: of the signal ahead of the integrator, and of the output."""
+    """The largest errors seen, in physical units: of the signal ahead of the integrator and of the output."""
 
     operator: float
     output: float
@@ -34,7 +34,7 @@ class ErrorsSeen:
 
 
 def errors_seen(plan: Plan, physical: Scenario, trace: Trace, bound: ErrorBound) -> ErrorsSeen:
-    """Compare a raw ``trace`` of the plan's controller with the same memory in float64 on the same physical inputs.
+    """Compare a raw ``trace`` of the plan's controller with the same memory in float64 on the same inputs.
 
     Without an integrator only the clamped output is seen, which errs no more than what is clamped.
     """
@@ -60,5 +60,3 @@ def _samples_since_reset(scenario: Scenario) -> np.ndarray:
     for r in sorted(scenario.resets, key=lambda r: r.sample):
         count[r.lane, r.sample :] = np.arange(1, scenario.samples - r.sample + 1)
     return count
-
-

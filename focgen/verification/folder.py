@@ -1,4 +1,4 @@
-"""A generated folder read back: its plan, made anew from the controller it carries, and what its manifest claims."""
+"""A generated folder read back: its plan, made anew from its controller, and what its manifest claims."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _AGAIN = "run focgen generate again"
 
 @dataclass(frozen=True, eq=False)
 class GeneratedFolder:
-    """``plan`` from the folder's own controller.toml; ``bound`` as the manifest claims it; ``differences`` between what
-    the manifest says and what the plan gives.
+    """``plan`` from the folder's own controller.toml; ``bound`` as the manifest claims it; ``differences``
+    between what the manifest says and what the plan gives.
     """
 
     path: Path
@@ -39,7 +39,9 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     except KeyError as reason:
         raise InputError(str(path / "manifest.json"), f"lacks {reason}", _AGAIN) from None
     except (TypeError, ValueError) as reason:
-        raise InputError(str(path / "manifest.json"), f"is not as it was written ({reason})", _AGAIN) from None
+        raise InputError(
+            str(path / "manifest.json"), f"is not as it was written ({reason})", _AGAIN
+        ) from None
     for name in (f"{plan.name}.h", f"{plan.name}.c", "foc_rt.h"):
         if not (path / name).is_file():
             raise InputError(str(path), f"lacks {name}", _AGAIN)
@@ -54,7 +56,9 @@ def _manifest(path: Path) -> dict[str, Any]:
     try:
         manifest = json.loads((path / "manifest.json").read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputError(str(path), "has no manifest.json", "name a folder that focgen generate has written") from None
+        raise InputError(
+            str(path), "has no manifest.json", "name a folder that focgen generate has written"
+        ) from None
     except (OSError, ValueError) as reason:
         raise InputError(str(path / "manifest.json"), f"cannot be read ({reason})", _AGAIN) from None
     if not isinstance(manifest, dict):
@@ -64,8 +68,12 @@ def _manifest(path: Path) -> dict[str, Any]:
 
 def _claimed(bound: dict[str, Any]) -> ErrorBound:
     quantisation, truncation = bound["quantisation"], bound["truncation"]["operator"]
-    return ErrorBound(float(quantisation["operator"]), float(quantisation["output_per_sample"]), truncation,
-                      float(quantisation.get("operator_per_sample", 0.0)))
+    return ErrorBound(
+        float(quantisation["operator"]),
+        float(quantisation["output_per_sample"]),
+        truncation,
+        float(quantisation.get("operator_per_sample", 0.0)),
+    )
 
 
 def _differences(expected: Any, found: Any, place: str):

@@ -19,7 +19,13 @@ from focgen.plan.scenario import Scenario, Trace
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 """Bit equality of the floating forms needs contraction off."""
 
-_DTYPES = {"double": np.float64, "float": np.float32, "int64_t": np.int64, "int32_t": np.int32, "int16_t": np.int16}
+_DTYPES = {
+    "double": np.float64,
+    "float": np.float32,
+    "int64_t": np.int64,
+    "int32_t": np.int32,
+    "int16_t": np.int16,
+}
 _RESET, _TRACK = 1, 2
 
 
@@ -36,8 +42,14 @@ class DriverContext:
 
 def driver(plan: Plan) -> str:
     """C that runs a plan's controller over arrays."""
-    scheduled, integral, scales = plan.schedule is not None, plan.integrator is not None, tuple(header_scales(plan))
-    return render("driver.c.jinja", DriverContext(plan.name, plan.increment.ctype, scheduled, integral, scales))
+    scheduled, integral, scales = (
+        plan.schedule is not None,
+        plan.integrator is not None,
+        tuple(header_scales(plan)),
+    )
+    return render(
+        "driver.c.jinja", DriverContext(plan.name, plan.increment.ctype, scheduled, integral, scales)
+    )
 
 
 def header_scales(plan: Plan) -> dict[str, float]:
@@ -89,7 +101,13 @@ class Library:
         u, flags = np.empty(count, signal), np.empty(count, np.uint8)
         d = np.zeros(count, _DTYPES[plan.increment.ctype])
         arrays = [*inputs, event, given, u, d, flags]
-        types = [plan.output.ctype] * 3 + ["uint8_t", plan.output.ctype, plan.output.ctype, plan.increment.ctype, "uint8_t"]
+        types = [plan.output.ctype] * 3 + [
+            "uint8_t",
+            plan.output.ctype,
+            plan.output.ctype,
+            plan.increment.ctype,
+            "uint8_t",
+        ]
         pointers = [self._ffi.cast(f"{ctype} *", a.ctypes.data) for ctype, a in zip(types, arrays)]
         getattr(self._library, f"{plan.name}_run")(count, *pointers)
         return u, d, flags
@@ -97,9 +115,12 @@ class Library:
 
 def _declaration(plan: Plan) -> str:
     signal = plan.output.ctype
-    return (f"void {plan.name}_scales(double *); "
-            f"void {plan.name}_run(uint32_t, const {signal} *, const {signal} *, const {signal} *, const uint8_t *, "
-            f"const {signal} *, {signal} *, {plan.increment.ctype} *, uint8_t *);")
+    return (
+        f"void {plan.name}_scales(double *); "
+        f"void {plan.name}_run(uint32_t, const {signal} *, const {signal} *, const {signal} *, "
+        "const uint8_t *, "
+        f"const {signal} *, {signal} *, {plan.increment.ctype} *, uint8_t *);"
+    )
 
 
 def _events(scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np.ndarray]:

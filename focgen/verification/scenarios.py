@@ -16,9 +16,9 @@ _BEYOND = 0.15  # of a range: how far lanes that leave their ranges go beyond th
 
 
 def mixed(controller: Controller, samples: int, seed: int, beyond: bool = False) -> Scenario:
-    """Physical inputs: each lane another kind of signal, with resets and tracks at random; ``beyond`` leaves the ranges.
+    """Physical inputs: each lane another kind of signal, with resets and tracks at random.
 
-    ``samples`` are in all, split among the lanes.
+    ``beyond`` leaves the ranges. ``samples`` are in all, split among the lanes.
     """
     rng = np.random.default_rng([seed, int(beyond)])
     each = -(-samples // LANES)
@@ -67,7 +67,9 @@ _KINDS = (_noise, _steps, _extremes, _sine, _wander, _held)
 
 def _resets(rng, controller: Controller, count: int) -> tuple[Reset, ...]:
     spans = controller.ranges.reference, controller.ranges.measurement, controller.ranges.output
-    places = [(lane, int(at)) for lane in range(1, LANES) for at in rng.choice(count, min(2, count), replace=False)]
+    places = [
+        (lane, int(at)) for lane in range(1, LANES) for at in rng.choice(count, min(2, count), replace=False)
+    ]
     return tuple(Reset(lane, at, *(float(rng.uniform(*span)) for span in spans)) for lane, at in places)
 
 
@@ -75,13 +77,16 @@ def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:
     low, high = controller.ranges.output
     margin = 0.3 * (high - low)  # an outer limiter may well be wider
     places = {(lane, int(rng.integers(count))) for lane in range(0, LANES, 2) for _ in range(6)}
-    return tuple(Track(lane, at, float(rng.uniform(low - margin, high + margin))) for lane, at in sorted(places))
+    return tuple(
+        Track(lane, at, float(rng.uniform(low - margin, high + margin))) for lane, at in sorted(places)
+    )
 
 
 def worst_cases(plan: Plan) -> Scenario:
-    """Raw inputs that take each node to its proved worst case, two lanes a node, up and down, in the order of the proofs.
+    """Raw inputs that take each node to its proved worst case, two lanes a node, up and down.
 
-    The floating forms have no proofs; theirs take the filtered error to its largest.
+    They stand in the order of the proofs. The floating forms have no proofs; theirs take the filtered error
+    to its largest.
     """
     nodes = ["v"] if plan.floating else [proof.node for proof in plan.proofs]
     return side_by_side([worst_case_input(plan, node) for node in nodes])
@@ -107,13 +112,20 @@ def _prolonged(values: np.ndarray, samples: int) -> np.ndarray:
 
 def raw_scenarios(plan: Plan, samples: int, seed: int) -> dict[str, Scenario]:
     """Everything a plan is compared in, by name; raw inputs."""
-    inside, outside = mixed(plan.controller, samples, seed), mixed(plan.controller, max(samples // 8, 1), seed, True)
-    found = {"mixed": to_raw(plan, inside), "beyond the ranges": to_raw(plan, outside), "worst cases": worst_cases(plan)}
+    inside, outside = (
+        mixed(plan.controller, samples, seed),
+        mixed(plan.controller, max(samples // 8, 1), seed, True),
+    )
+    found = {
+        "mixed": to_raw(plan, inside),
+        "beyond the ranges": to_raw(plan, outside),
+        "worst cases": worst_cases(plan),
+    }
     return {**found, "breakpoints": at_breakpoints(plan)} if plan.schedule else found
 
 
 def at_breakpoints(plan: Plan) -> Scenario:
-    """Raw inputs: the schedule at each breakpoint and next to it on either side; an error up, down and small."""
+    """Raw inputs: the schedule at each breakpoint and next to it on both sides; an error up, down, small."""
     form, points = plan.schedule.signal, np.asarray(plan.schedule.breakpoints)
     if plan.floating:
         points = points.astype(np.float32 if form.ctype == "float" else np.float64)

@@ -1,4 +1,4 @@
-"""``verify``: generated C against the Python reference, sample for sample, and its errors against its manifest."""
+"""``verify``: generated C against the Python reference, sample for sample, and its errors against bounds."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ TARGETS = ("host", "cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7", "rv32
 
 @dataclass(frozen=True)
 class TargetResult:
-    """One target. ``mismatches``: samples whose output, increment or flags differ from the reference in any bit.
+    """One target. ``mismatches``: samples whose output, increment or flags differ in a bit.
 
-    ``max_error`` of the C against the same memory in float64, ``error_bound`` as the manifest has it, ``within`` whether
-    it holds. ``first`` describes the first mismatch, ``header`` every scale of the header that is not the manifest's.
-    ``skipped``: why the target was not run; the rest is None then.
+    ``max_error`` of the C against the same memory in float64, ``error_bound`` as the manifest has it,
+    ``within`` whether it holds. ``first`` describes the first mismatch, ``header`` every scale of the header
+    that is not the manifest's. ``skipped``: why the target was not run; the rest is None then.
     """
 
     samples: int = 0
@@ -42,8 +42,8 @@ class TargetResult:
 
 @dataclass(frozen=True)
 class Verification:
-    """``targets`` by name; ``differences`` between the manifest and what its controller gives; ``holds``: all is well,
-    and something was run.
+    """``targets`` by name; ``differences`` between the manifest and what its controller gives; ``holds``: all
+    is well, and something was run.
     """
 
     name: str
@@ -55,15 +55,22 @@ class Verification:
     def holds(self) -> bool:
         """Whether everything that ran agrees and stays within its bounds, and something ran."""
         ran = [t for t in self.targets.values() if t.skipped is None]
-        return bool(ran) and not self.differences and all(t.within and not t.mismatches and not t.header for t in ran)
+        return (
+            bool(ran)
+            and not self.differences
+            and all(t.within and not t.mismatches and not t.header for t in ran)
+        )
 
 
-def verify(folder: str | Path, samples: int = 10_000, seed: int = 0,
-           target: str | Sequence[str] = "host") -> Verification:
+def verify(
+    folder: str | Path, samples: int = 10_000, seed: int = 0, target: str | Sequence[str] = "host"
+) -> Verification:
     """Compile the C of a generated folder and compare it with the bit-true reference.
 
-    ``samples`` of mixed inputs, from ``seed``, besides the worst case of every node. ``target``: a name of ``TARGETS``,
-    several, or "all". The C runs in a process of its own; where it crashes, that is a mismatch. Raises InputError for a folder that is none, BuildError where the C does not compile.
+    ``samples`` of mixed inputs, from ``seed``, besides the worst case of every node. ``target``: a name of
+    ``TARGETS``, several, or "all". The C runs in a process of its own; where it crashes, that is a mismatch.
+
+    Raises InputError for a folder that is none, BuildError where the C does not compile.
     """
     if not isinstance(samples, int) or samples < 1:
         raise InputError("--samples", f"is {samples!r}", "give at least 1")
@@ -92,8 +99,10 @@ def _on(name: str, read: GeneratedFolder, samples: int, seed: int) -> TargetResu
         return TargetResult(mismatches=1, within=False, first=f"the C crashed ({how})")
 
 
-def compare(plan: Plan, library: Library, samples: int, seed: int, read: GeneratedFolder | None = None) -> TargetResult:
-    """Run a plan's C and its reference over everything and compare; the bound is the folder's, else the plan's."""
+def compare(
+    plan: Plan, library: Library, samples: int, seed: int, read: GeneratedFolder | None = None
+) -> TargetResult:
+    """Run a plan's C and its reference over everything; the bound is the folder's, else the plan's."""
     bound = plan.error_bound if read is None else read.bound
     total, mismatches, first = 0, 0, None
     for label, scenario in raw_scenarios(plan, samples, seed).items():
@@ -105,14 +114,19 @@ def compare(plan: Plan, library: Library, samples: int, seed: int, read: Generat
             first = _described(label, scenario, seen, expected, wrong)
     errors = _errors(plan, library, samples, seed, bound)
     limits = {"operator": bound.operator, "output_per_sample": bound.output_per_sample}
-    return TargetResult(total, mismatches, errors.largest, limits, errors.within, first, _header(plan, library))
+    return TargetResult(
+        total, mismatches, errors.largest, limits, errors.within, first, _header(plan, library)
+    )
 
 
 def _header(plan: Plan, library: Library) -> tuple[str, ...]:
-    """The header's scales that are wrong; no sample depends on them, but every program that uses the controller."""
+    """The header's scales that are wrong: no sample depends on them, but every program that uses it does."""
     expected, found = header_scales(plan), library.scales(plan)
-    return tuple(f"{plan.name}_{key} is {found[key]!r}, the controller gives {value!r}"
-                 for key, value in expected.items() if found[key] != value)
+    return tuple(
+        f"{plan.name}_{key} is {found[key]!r}, the controller gives {value!r}"
+        for key, value in expected.items()
+        if found[key] != value
+    )
 
 
 def _differs(plan: Plan, seen: Trace, expected: Trace) -> np.ndarray:
@@ -132,8 +146,10 @@ def _bits(values: np.ndarray) -> np.ndarray:
 def _described(label: str, scenario: Scenario, seen: Trace, expected: Trace, wrong: np.ndarray) -> str:
     lane, sample = (int(i) for i in np.argwhere(wrong)[np.argmin(np.argwhere(wrong)[:, 1])])
     at = lane, sample
-    return (f"{label}, run {lane}, sample {sample}: C gives u = {seen.u[at]}, flags {seen.flags[at]}; the reference "
-            f"u = {expected.u[at]}, flags {expected.flags[at]} (ref {scenario.ref[at]}, meas {scenario.meas[at]})")
+    return (
+        f"{label}, run {lane}, sample {sample}: C gives u = {seen.u[at]}, flags {seen.flags[at]}; "
+        f"the reference u = {expected.u[at]}, flags {expected.flags[at]} (ref {scenario.ref[at]}, meas {scenario.meas[at]})"
+    )
 
 
 def _errors(plan: Plan, library: Library, samples: int, seed: int, bound) -> ErrorsSeen:
