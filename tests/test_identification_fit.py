@@ -12,6 +12,7 @@ from focgen.identification import identify as module
 from focgen.identification.excitation import prepare
 from focgen.identification.fractional import fit_fractional
 from focgen.identification.integer import SHAPES, fit_integer_models
+from focgen.identification.kernel import step_means, step_responses
 from focgen.identification.quality import gof
 from focgen.logs.experiment import Experiment
 from tests.conftest import paper_rig
@@ -150,3 +151,11 @@ def test_useless_logs_are_refused():
     with pytest.raises((FitError, LogError)):
         wandering = {"pressure": noise, "curvature": np.roll(noise, 5)}
         module.identify([Experiment("noise", 0.02, wandering)], paper_rig())
+
+
+def test_kernels_stay_finite_where_a_pole_dies_within_a_sample():
+    """Levenberg–Marquardt wanders to such time constants; a warning would be an error here."""
+    for log_tau in (-12.0, -40.0, -60.0):
+        for kernel in (step_responses, step_means):
+            response = kernel(log_tau, 1.4, 0.05, 50)[0]
+            assert np.all(np.isfinite(response)) and response[1:] == pytest.approx(1.0, abs=1e-4)
