@@ -34,11 +34,20 @@ def run(args: Namespace) -> Outcome:
     payload = {
         "name": found.name,
         "arithmetic": found.arithmetic,
-        "targets": found.targets,
+        "targets": {name: _entry(result) for name, result in found.targets.items()},
         "differences": list(found.differences),
         "holds": found.holds,
     }
     return Outcome(payload, verification_text(found), found.holds)
+
+
+def _entry(result: TargetResult) -> dict[str, Any]:
+    """A target in JSON: why it was skipped and nothing else, or what was seen there."""
+    if result.skipped is not None:
+        return {"skipped": result.skipped}
+    entry = plain(result)
+    del entry["skipped"]
+    return entry
 
 
 def verification_text(found: Verification) -> str:
