@@ -2,7 +2,7 @@
 
 Faults in foc_rt.h come with a manifest that knows the broken file's hash: the comparison of samples must
 find them. A lost saturation of a *narrowing* is not among them: it is proved that none is ever reached
-(test_codegen_c.py tries those functions by themselves); a lost clamp of an input or of the integral is.
+(test_codegen_runtime.py tries those functions by themselves); a lost clamp of an input or of the integral is.
 """
 
 import json
@@ -260,7 +260,7 @@ def test_another_runtime_is_not_the_one_that_was_proved(sound, tmp_path):
     assert found.targets["host"].mismatches == 0 and found.differences and not found.holds
 
 
-# ----------------------------------------------------------------------------- the manifest and the controller
+# ------------------------------------------------------------------- the manifest and the controller
 
 
 def doubled(*path):
@@ -403,6 +403,16 @@ def test_an_unusable_folder_is_an_error_of_one_line(sound, tmp_path, what, capsy
     assert main(["verify", str(folder), "--samples", "500"]) == 2
     out, err = capsys.readouterr()
     assert not out and re.fullmatch(r"focgen: error: [^\n]+: [^\n]+; [^\n]+\n", err), err
+
+
+def test_a_target_that_is_not_there_is_skipped_and_says_why(sound, capsys):
+    """With nothing that ran there is nothing that holds."""
+    assert main(["verify", str(sound / "spba_q15"), "--samples", "100", "--target", "all", "--json"]) == 0
+    targets = json.loads(capsys.readouterr().out)["targets"]
+    assert "skipped" not in targets.pop("host") and len(targets) == 6
+    assert all(list(entry) == ["skipped"] and entry["skipped"] for entry in targets.values())
+    assert main(["verify", str(sound / "spba_q15"), "--target", "avr"]) == 1
+    assert "skipped: " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
