@@ -148,7 +148,8 @@ def _described(label: str, scenario: Scenario, seen: Trace, expected: Trace, wro
     at = lane, sample
     return (
         f"{label}, run {lane}, sample {sample}: C gives u = {seen.u[at]}, flags {seen.flags[at]}; "
-        f"the reference u = {expected.u[at]}, flags {expected.flags[at]} (ref {scenario.ref[at]}, meas {scenario.meas[at]})"
+        f"the reference u = {expected.u[at]}, flags {expected.flags[at]} "
+        f"(ref {scenario.ref[at]}, meas {scenario.meas[at]})"
     )
 
 
