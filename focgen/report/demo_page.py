@@ -38,7 +38,7 @@ def demo_lead(identification: Identification, design: Design, verified: dict[str
 
 
 def _model(found: Identification) -> Section:
-    pictures = [Picture("pictures/fits.png", "Six steps and releases, and the fractional model of each (as Fig. 5)"),
+    pictures = [Picture("pictures/fits.png", "Six steps, and the fractional model of each (as Fig. 5)"),
                 Picture("pictures/gof.png", "Goodness of fit of the fractional and the integer-order models (Table I)"),
                 Picture("pictures/models.png", "One step, four models, and what each leaves (as Fig. 6)"),
                 Picture("pictures/parameters.png", "The parameters over the level, with 95 % intervals (as Fig. 7)"),
