@@ -24,7 +24,7 @@ _DEPTH = 4
 _MENDING = 0.6  # of the best further family's evidence: a form of a family found already then goes first
 _WHOLE = 0.5  # of what inputs foretell of a residual: a further family has to explain as much
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
-_VISIBLE = (0.03, 0.05)  # of the remaining mean square, the first effect and any further: below, one is of no use
+_VISIBLE = (0.015, 0.05)  # of the remaining mean square, the first effect and any further: below, one is of no use
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,9 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     rankings: list[Ranking] = []
     base, vector = _seen(problem, given, clues)
     while len(rankings) < _DEPTH:
-        ranking = rank(base, vector, _worth_trying(base, vector, [c for c in clues if c not in base.clues]))
+        ranking = rank(base, vector, _worth_trying(base, vector, [c for c in clues if c not in base.clues and not c.form.seen]))
         rankings.append(ranking)
-        best = _chosen(ranking, {c.effect for c in base.clues}, threshold, len(rankings) > 1)
+        best = _chosen(ranking, {c.effect for c in base.clues}, threshold, bool(base.clues))
         if best is None:
             break
         base, vector = best.problem, best.vector
@@ -113,7 +113,7 @@ def _seen(problem: Problem, given: np.ndarray, clues: Sequence[Clue]) -> tuple[P
     base, vector = problem, given
     for clue in clues:
         values = clue.form.seen(problem.segment.y) if clue.form.seen else None
-        if values is not None:
+        if values is not None and clue.effect not in {c.effect for c in base.clues}:
             slot = slot_in(clue.form, clue.stage)
             scaled = [v / problem.references.scale(p, slot) for p, v in zip(clue.form.parameters, values)]
             base, vector = base.with_clues([*base.clues, clue]), np.r_[vector, scaled]
@@ -138,10 +138,10 @@ def weighed(of: Fit) -> np.ndarray:
 
 
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
-    """All clues where inputs foretell something of the residual, else those that it could not show."""
+    """All clues where inputs foretell something of the residual, else none."""
     ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
     share = foretold(base.segment, weighed(ground), base.references.clocks["response"])
-    return clues if share > _TELLING else [c for c in clues if library()[c.effect].noiselike]
+    return clues if share > _TELLING else []
 
 
 def _chosen(ranking: Ranking, already: set[str], threshold: float, further: bool) -> Fit | None:
@@ -171,9 +171,13 @@ def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
     """Without the effects that the later ones made needless."""
     while len(best.problem.clues) > 1:
         found = []
-        for i in range(len(best.problem.clues)):
+        for i, clue in enumerate(best.problem.clues):
+            if clue.form.seen:
+                continue
             without = _without(best, [best.problem.clues[i]], weighing)
             found.append((evidence(best, without), without))
+        if not found:
+            break
         least, without = min(found, key=lambda pair: pair[0])
         if least > threshold:
             break
@@ -201,6 +205,8 @@ def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tup
         first = rankings[0].base.problem.clues == without.problem.clues
         ranking = rankings[0] if first else rank(without.problem, without.vector, [c for c in clues if c.effect != name and c.form.seen is None])
         rivals = [Rival(name, own[0].stage, 0.0, evidence(best, without), best)]
+        if own[0].form.seen:  # read off the signal itself: nothing else makes such steps
+            ranking = replace(ranking, best={})
         for other, candidate in ranking.best.items():
             if other != name and other not in {c.effect for c in without.problem.clues}:
                 again = fit(candidate.problem, candidate.vector, weighing, 6)

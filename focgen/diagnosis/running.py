@@ -22,7 +22,8 @@ from focgen.plan.scenario import Scenario, physical_trace, to_raw
 
 _LENGTHS = (10, 20, 35, 50, 75, 100, 150, 250, 400, 700, 1000, 2000)
 _GOOD = 0.5  # of the command's mean square departure that a cause has to explain
-_RESOLVED = 1e-3  # of the command's range: departures below are the log's resolution
+_RESOLVED = 5e-5  # of the command's range: departures below are the log's resolution
+_STEADY = 0.2  # what a departure that stays counts beside one from sample to sample
 _JITTER = 0.03  # of a sample, standard deviation of the raw time stamps
 _FREE = 0.02  # of the samples at one end of the range make a limit
 
@@ -60,14 +61,16 @@ def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
     before = _departure(command, best)
     span = max(float(np.ptp(np.concatenate(command))), 1e-300)
     stamps = list(_stamps(logged))
-    if np.sqrt(before) < _RESOLVED * span and not stamps:
-        return Running(float(np.sqrt(before)), False, ())
+    away = max(float(np.sqrt(np.mean((a - b) ** 2))) for a, b in zip(command, best))
+    resolved = max(np.sqrt(before), _STEADY * away) >= _RESOLVED * span
+    if not resolved:
+        return Running(float(np.sqrt(before)), False, tuple(stamps))
     found = []
     for departure, made in _rivals(controller, logged, command, best):
         after = _departure(command, made)
         found.append(replace(departure, share=float(1.0 - after / before) if before > 0 else 0.0))
     found = sorted((d for d in found if d.share > _GOOD), key=lambda d: -d.share)[:1]
-    return Running(float(np.sqrt(before)), np.sqrt(before) >= _RESOLVED * span, (*stamps, *found))
+    return Running(float(np.sqrt(before)), True, (*stamps, *found))
 
 
 def _scenario(controller: Controller, log: Experiment) -> Scenario:

@@ -1,5 +1,7 @@
 """Rate-independent memory, shared by the families that have it."""
 
+import numpy as np
+
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Form, Parameter
 
@@ -27,6 +29,13 @@ def _wide(x, values, run):
     return x + narrow * (kernels.play(x, run.rest, width) - x) + broad * (kernels.play(x, run.rest, 4.0 * width) - x)
 
 
+def _widening(x, values, run):
+    even, growing, width, scale = values
+    square = x * np.abs(x) / scale
+    loops = even * (kernels.play(x, run.rest, width) - x)
+    return x + loops + growing * (kernels.play(square, run.rest, width) - square)
+
+
 def forms(slot):
     """The forms of a hysteresis at ``slot``."""
     return [
@@ -39,4 +48,9 @@ def forms(slot):
             Parameter("narrow", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0),
             Parameter("broad", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0), _WIDTH,
         ), _wide),
+        Form("widening", slot, (
+            Parameter("even", lower=0.0, upper=0.9, starts=(0.1, 0.1), zero=0.0),
+            Parameter("growing", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0), _WIDTH,
+            Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
+        ), _widening),
     ]

@@ -1,0 +1,80 @@
+"""Diagnoses of rigs simulated apart from the library."""
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.rig.files import read_rig
+from focgen.rig.replay import replay
+from tests.diagnosis_rig import RIG, session
+
+
+def named(diagnosis):
+    return [[c.effect for c in f.candidates] for f in diagnosis.causes]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_gap(seed):
+    found = diagnose(RIG, session(seed))
+    assert found.verdict in ("none", "parameters") and not found.causes
+    assert found.shrink is None and found.where.stage is None
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_parameters_only(seed):
+    found = diagnose(RIG, session(seed, T=1.6, alpha=0.55, gain=(0.0025, 0.3)))
+    assert found.verdict == "parameters"
+    assert found.gap.refitted < 0.6 * found.gap.as_given
+
+
+@pytest.mark.parametrize("effect, stage, case", [
+    ("transport_delay", "regulator", {"delay": 4}),
+    ("valve_asymmetry", "regulator", {"vent": 0.8}),
+    ("dead_zone", "actuator", {"zone": 0.045}),
+    ("hysteresis", "actuator", {"slip": 0.35}),
+    ("gain_drift", "actuator", {"drift": 6e-4}),
+    ("sensor_nonlinearity", "sensor", {"bend": 20.0}),
+])
+def test_one_effect_is_named_in_its_stage(effect, stage, case):
+    found = diagnose(RIG, session(11, **case))
+    assert found.verdict == "named" and named(found) == [[effect]]
+    assert found.where.stage == stage and not found.where.inferred
+    assert found.gap.explained < found.gap.refitted <= found.gap.as_given * 1.02
+    assert found.shrink > 0.8
+
+
+def test_the_promise_holds_on_new_experiments(tmp_path):
+    found = diagnose(RIG, session(3, slip=0.35)[:4], tmp_path / "out")
+    unseen = session(3, slip=0.35)[4:]
+    floor = session(3, slip=0.35, noise=0.0)[4:]
+    noise = np.mean((unseen[0]["output"] - floor[0]["output"]) ** 2)
+    squares = [next(iter(replay(tmp_path / "out" / name, unseen).logs.values())).rmse ** 2
+               for name in (found.refitted_rig, found.augmented_rig)]
+    achieved = (squares[0] - squares[1]) / (squares[0] - noise)
+    assert abs(achieved - found.shrink) < 0.1
+    assert found.shrink_interval[0] <= achieved <= found.shrink_interval[1] + 0.02
+
+
+def test_missing_signals_make_the_stage_an_inference():
+    found = diagnose(RIG, session(5, vent=0.8, roles=()))
+    assert found.where.inferred
+    assert "valve_asymmetry" in {c.effect for f in found.causes for c in f.candidates}
+
+
+def test_units_do_not_matter():
+    logs = session(11, zone=0.045)
+    from dataclasses import replace
+
+    from focgen.rig.model import Actuator
+
+    rig = replace(RIG, actuator=Actuator(1.3, 0.6, (2e-5, 3.4e-5)),
+                  regulator=type(RIG.regulator)([(10.0, 0.0)], RIG.regulator.den))  # p in mbar·10, curvature as before
+    scaled = [replace(log, signals={r: s * {"pressure": 100.0}.get(r, 1.0) for r, s in log.signals.items()}) for log in logs]
+    assert named(diagnose(rig, scaled)) == [["dead_zone"]]
+
+
+def test_session_state_carries_on(tmp_path):
+    diagnose(RIG, session(11, drift=6e-4), tmp_path)
+    rig = read_rig(tmp_path / "augmented.toml")
+    assert [e["name"] for e in rig.effects] == ["gain_drift"]
+    assert rig.effects[0]["clock"] > 300
