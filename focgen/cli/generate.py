@@ -60,7 +60,7 @@ def _text(made: Generated) -> str:
     lines = [
         f"{plan.name}: {plan.arithmetic}, {plan.length} past samples, {size['state_bytes']} bytes of state,"
         f" {size['table_bytes']} bytes of tables",
-        f"error ahead of the {ahead}: at most {bound.operator:.3g} {rate}".rstrip()
+        f"error ahead of the {ahead}: {_growth(bound.operator_per_sample)}at most {bound.operator:.3g} {rate}".rstrip()
         + f"; by short memory at most {truncation}",
         *(
             f"short memory: {b['coefficient']:.6g} s^{b['order']:g} is {b['bias']:.3g} at rest instead of 0"
@@ -71,3 +71,8 @@ def _text(made: Generated) -> str:
         f"next: focgen verify {made.folder}",
     ]
     return "\n".join(lines)
+
+
+def _growth(per_sample: float) -> str:
+    """What an inner integral adds to the bound in words; nothing where there is none."""
+    return f"grows by at most {per_sample:.3g} a sample, to " if per_sample else ""

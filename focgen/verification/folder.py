@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from focgen.plan.build import build_plan
 from focgen.plan.model import ErrorBound, Plan
 
 _AGAIN = "run focgen generate again"
+_ROUNDING = 1e-9  # relative
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +92,15 @@ def _differences(expected: Any, found: Any, place: str):
     elif isinstance(expected, list) and isinstance(found, list) and len(expected) == len(found):
         for i, (one, other) in enumerate(zip(expected, found)):
             yield from _differences(one, other, f"{place}[{i}]")
-    elif expected != found:
+    elif not _same(expected, found):
         yield f"manifest.json: {place} is {_short(found)}, the controller gives {_short(expected)}"
+
+
+def _same(expected: Any, found: Any) -> bool:
+    """Equal; floating figures to within what another processor's transforms may change."""
+    if isinstance(expected, float) and isinstance(found, float):
+        return math.isclose(expected, found, rel_tol=_ROUNDING)
+    return type(expected) is type(found) and expected == found
 
 
 def _short(value: Any) -> str:
