@@ -85,7 +85,8 @@ def check_stable(controller: Controller, tables: Tables, length: int) -> None:
     if not outside:
         what = "the recursion is so near to instability that nothing bounds it"
         raise PlanError(controller.name, what, "check the signs in den, or lengthen sample_time")
-    what = f"the recursion cut off at length {length} is unstable ({outside} pole{'s' * (outside != 1)} outside the unit circle)"
+    poles = f"{outside} pole{'s' * (outside != 1)} outside the unit circle"
+    what = f"the recursion cut off at length {length} is unstable ({poles})"
     raise PlanError(controller.name, what, _remedy(controller, length))
 
 
