@@ -27,7 +27,7 @@ class Excitation:
     ``pressure`` (n,) is the input of the actuator, measured or through the regulator; ``before`` its constant value
     ahead of the first sample; ``level`` the value it is stepped to. ``drives`` (powers, n) are pressure^m − before^m,
     m = 1, 2, …, through the sensor where its output is fitted. ``hold`` says what they do between samples,
-    ``sensor_gain`` is the sensor's at rest (1 where the curvature is fitted).
+    ``sensor_gain`` is the sensor's at rest (1 where the curvature is fitted). ``has_offset``: whether fits have one.
     """
 
     name: str
@@ -42,6 +42,7 @@ class Excitation:
     fitted_role: str
     sensor_gain: float
     notes: tuple[str, ...] = ()
+    has_offset: bool = True
 
     def __len__(self) -> int:
         return len(self.measured)

@@ -132,13 +132,14 @@ class _Projected:
         return np.clip(x, *self.edges)
 
     def basis(self, x: np.ndarray) -> np.ndarray:
-        """Responses to the input of s^zeros/den, …, 1/den, and 1 for the offset; (n, zeros + 2)."""
+        """Responses to the input of s^zeros/den, …, 1/den, and 1 for an offset; (n, zeros + 1 or 2)."""
         poles = _apart(_poles(self.poles, self.inside(x)))
         single = [_respond(p, self.experiment) for p in poles]
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
         weights = poles ** np.arange(self.zeros, -1, -1)[:, None] / np.array(slopes)
         rows = np.einsum("kp,pn->kn", weights, np.array(single)).real  # too little for BLAS to share among threads
-        return np.column_stack([*rows, np.ones(len(self.experiment))])
+        constant = [np.ones(len(self.experiment))] * self.experiment.has_offset
+        return np.column_stack([*rows, *constant])
 
     def best(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Basis and the linear coefficients that fit best."""
@@ -157,8 +158,9 @@ class _Projected:
         basis, linear = self.best(x)
         den = np.poly(_apart(_poles(self.poles, self.inside(x)))).real
         scale = self.experiment.step ** -np.arange(self.poles + 1.0)  # per sample → per second
-        num = linear[:-1] * scale[self.poles - self.zeros : self.poles + 1]
-        return IntegerFit(self.poles, self.zeros, num, den * scale, float(linear[-1]), basis @ linear)
+        num = linear[: self.zeros + 1] * scale[self.poles - self.zeros : self.poles + 1]
+        offset = float(linear[-1]) if self.experiment.has_offset else 0.0
+        return IntegerFit(self.poles, self.zeros, num, den * scale, offset, basis @ linear)
 
 
 def _apart(poles: np.ndarray) -> np.ndarray:
