@@ -27,7 +27,8 @@ class Excitation:
     ``pressure`` (n,) is the input of the actuator, measured or through the regulator; ``before`` its constant value
     ahead of the first sample; ``level`` the value it is stepped to. ``drives`` (powers, n) are pressure^m − before^m,
     m = 1, 2, …, through the sensor where its output is fitted. ``hold`` says what they do between samples,
-    ``sensor_gain`` is the sensor's at rest (1 where the curvature is fitted). ``has_offset``: whether fits have one.
+    ``sensor_gain`` is the sensor's at rest (1 where the curvature is fitted). ``rest_shown``: whether
+    the log begins before the first step, so that it shows the output's zero.
     """
 
     name: str
@@ -42,7 +43,7 @@ class Excitation:
     fitted_role: str
     sensor_gain: float
     notes: tuple[str, ...] = ()
-    has_offset: bool = True
+    rest_shown: bool = True
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -92,7 +93,7 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
         gain, drives, hold = _through_sensor(rig.sensor, drives, experiment.sample_time, hold)
     return Excitation(
         experiment.name, experiment.sample_time, pressure, experiment[fitted], drives, hold, level_before,
-        _level(pressure, level_before), role, fitted, gain, experiment.notes,
+        _level(pressure, level_before), role, fitted, gain, experiment.notes, before is None,
     )
 
 

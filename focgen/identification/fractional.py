@@ -24,7 +24,8 @@ class FractionalFit:
     """A fit of one experiment or several, which share T and α.
 
     ``K`` and ``offset`` (experiments,), ``T`` in s^alpha. ``half`` maps "T", "alpha" to half a 95 % interval and "K",
-    "offset" to those of each experiment (experiments,). ``K_covariance`` (experiments, experiments). ``simulated``: the model's outputs.
+    "offset" to those of each experiment (experiments,). ``K_covariance`` (experiments, experiments). ``simulated``:
+    the model's outputs.
     """
 
     K: np.ndarray
@@ -49,14 +50,12 @@ def fit_fractional(experiments: Sequence[Excitation]) -> FractionalFit:
 class _Problem:
     """Residuals and their exact derivatives in (log τ, α, K₁, c₁, K₂, c₂, …); T = τ^α.
 
-    Each experiment is scaled by its own spread, so that all weigh alike. ``free`` marks the parameters that are fitted:
-    all but the offsets of experiments that have none.
+    Each experiment is scaled by its own spread, so that all weigh alike.
     """
 
     def __init__(self, experiments: Sequence[Excitation]):
         self.experiments = experiments
         self.weights = [1.0 / np.std(e.measured) for e in experiments]
-        self.free = np.array([True, True, *(flag for e in experiments for flag in (True, e.has_offset))])
         self._at: tuple | None = None
 
     def responses(self, log_tau: float, alpha: float) -> list[np.ndarray]:
@@ -75,12 +74,6 @@ class _Problem:
         if self._at is None or self._at[0] != key:
             self._at = key, self.responses(*key)
         return self._at[1]
-
-    def full(self, fitted: np.ndarray) -> np.ndarray:
-        """All parameters from those that are fitted."""
-        x = np.zeros(len(self.free))
-        x[self.free] = fitted
-        return x
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """Model − measured, scaled, of all experiments in a row."""
@@ -120,14 +113,11 @@ def _best(problem: _Problem):
 
 def _fit_from(problem: _Problem, start: np.ndarray):
     try:
-        run = least_squares(lambda v: problem.residual(problem.full(v)), start[problem.free],
-                            lambda v: problem.jacobian(problem.full(v))[:, problem.free], method="lm", x_scale="jac",
-                            xtol=1e-10, ftol=1e-12, max_nfev=200)
+        return least_squares(problem.residual, start, problem.jacobian, method="lm", x_scale="jac",
+                             xtol=1e-10, ftol=1e-12, max_nfev=200)
     except (ValueError, FloatingPointError, np.linalg.LinAlgError) as reason:
         name = problem.experiments[0].name
         raise FitError(name, f"the fit does not converge ({reason})", "look at the log") from None
-    run.x = problem.full(run.x)
-    return run
 
 
 def _start(problem: _Problem, alpha: float) -> np.ndarray:
@@ -135,7 +125,7 @@ def _start(problem: _Problem, alpha: float) -> np.ndarray:
     log_tau = float(np.median([np.log(_rise_time(e)) for e in problem.experiments]))
     x = [log_tau, alpha]
     for e, r in zip(problem.experiments, problem.responses(log_tau, alpha)):
-        x += list(np.linalg.lstsq(np.column_stack([r[0], np.full(len(e), e.has_offset)]), e.measured, rcond=None)[0])
+        x += list(np.linalg.lstsq(np.column_stack([r[0], np.ones(len(e))]), e.measured, rcond=None)[0])
     return np.array(x)
 
 
@@ -160,9 +150,8 @@ def _finished(experiments, problem: _Problem, x: np.ndarray) -> FractionalFit:
     residual, jacobian = problem.residual(x), problem.jacobian(x)
     ends = np.cumsum([len(e) for e in experiments])
     models = [residual_model(part) for part in np.split(residual, ends[:-1])]
-    spread = np.zeros((len(x), len(x)))
     try:
-        spread[np.ix_(problem.free, problem.free)] = covariance(jacobian[:, problem.free], models)
+        spread = covariance(jacobian, models)
     except np.linalg.LinAlgError:
         raise FitError(experiments[0].name, "the log does not determine K, T and alpha", "hold the step longer") from None
     return _with_intervals(experiments, problem, x, spread, models)
@@ -174,7 +163,7 @@ def _with_intervals(experiments, problem, x, spread, models) -> FractionalFit:
     slope = np.zeros(len(x))
     slope[:2] = T * alpha, T * log_tau  # of T = exp(α log τ)
     effective = sum(m.effective for m in models)
-    wide = lambda variance: half_width(variance, effective, int(problem.free.sum()))  # noqa: E731
+    wide = lambda variance: half_width(variance, effective, len(x))  # noqa: E731
     gains = slice(2, None, 2)
     half = {"T": float(wide(slope @ spread @ slope)), "alpha": float(wide(spread[1, 1])),
             "K": wide(np.diag(spread)[gains]), "offset": wide(np.diag(spread)[3::2])}

@@ -26,6 +26,7 @@ from focgen.rig.model import Actuator, LinearActuator, Rig
 
 _STEADY = 0.1  # of the step: nearer to its level than this, the input is at it
 _STEEPEST = 5  # degree of K(p); beyond it a polynomial through a few levels means nothing
+_CLEAR = 1.5  # half 95 % intervals, beyond which an offset is there (one in 300 by chance)
 _NO_OFFSET = 1e-3  # of the measured reach: an offset below this is none
 _STAY = 0.15  # of the experiment: a step's input stays at its level at least so long
 
@@ -78,20 +79,10 @@ def _read(logs, rig: Rig, first, last) -> tuple[Experiment, ...]:
 
 def _prepared(experiment: Experiment, rig: Rig, powers: int) -> Excitation:
     """The experiment at rest before its first sample in the way that fits better."""
-    candidates = {before: prepare(experiment, rig, powers, before) for before in possible_rests(experiment)}
-    if list(candidates) == [None]:
-        return candidates[None]
-    fits = {before: fit_fractional([x]) for before, x in candidates.items()}
-    best = max(candidates, key=lambda before: gof(candidates[before].measured, fits[before].simulated[0]))
-    return candidates[best] if best is None else _begun_with_step(candidates[best], fits[best])
-
-
-def _begun_with_step(x: Excitation, fit: FractionalFit) -> Excitation:
-    """A log that shows no rest. An offset would let slow models jump, so it has one only where it is needed."""
-    needless = abs(fit.offset[0]) <= fit.half["offset"][0] + _NO_OFFSET * np.ptp(x.measured)
-    taken = "taken as 0" if needless else "fitted"
-    note = f"begins with the step, so that no rest is on record: offset {taken}"
-    return replace(x, has_offset=not needless, notes=(*x.notes, note))
+    candidates = [prepare(experiment, rig, powers, before) for before in possible_rests(experiment)]
+    if len(candidates) == 1:
+        return candidates[0]
+    return min(candidates, key=lambda x: -gof(x.measured, fit_fractional([x]).simulated[0]))
 
 
 def _fit(x: Excitation) -> ExperimentFit:
@@ -103,8 +94,17 @@ def _fit(x: Excitation) -> ExperimentFit:
         ci95={key: (found[key] - half[key], found[key] + half[key]) for key in found},
         gof=gof(x.measured, fit.simulated[0]), fitted=x.fitted_role, driven_by=x.input_role,
         time=np.arange(len(x)) * x.step, pressure=x.pressure, measured=x.measured, simulated=fit.simulated[0],
-        integer=fit_integer_models(x), step=is_step(x),
+        integer=fit_integer_models(x, _needs_offset(x, fit)), step=is_step(x),
     )
+
+
+def _needs_offset(x: Excitation, fit: FractionalFit) -> bool:
+    """Whether integer-order models are given an offset: not where no rest is on record and none is seen.
+
+    There it would only let a slow model jump at the step.
+    """
+    seen = _CLEAR * fit.half["offset"][0] + _NO_OFFSET * np.ptp(x.measured)
+    return x.rest_shown or bool(abs(fit.offset[0]) > seen)
 
 
 def is_step(x: Excitation) -> bool:
@@ -142,12 +142,12 @@ def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
 
 
 def _through_rig(x: Excitation, actuator: Actuator) -> np.ndarray:
-    """The pooled rig's answer, with K(p) p as its drive and, where it has one, the offset that fits best."""
+    """The pooled rig's answer, with K(p) p as its drive and the offset that fits best."""
     log_tau, held = np.log(actuator.T) / actuator.alpha, x.hold == "zero"
     steps = step_responses(log_tau, actuator.alpha, x.step, len(x)) if held or x.jumps else None
     means = None if held else step_means(log_tau, actuator.alpha, x.step, len(x))
     response = np.tensordot(actuator.gain, x.respond(steps, means)[0, : len(actuator.gain)], 1)
-    return response + x.has_offset * np.mean(x.measured - response)
+    return response + np.mean(x.measured - response)
 
 
 def _compared(excitations, fits, pooled: Pooled, rig: Rig, notes, shown) -> Identification:
@@ -160,8 +160,7 @@ def _compared(excitations, fits, pooled: Pooled, rig: Rig, notes, shown) -> Iden
     measured = {f.name: f.measured for f in fits}
     quality = {model: _with_mean({n: gof(measured[n], y) for n, y in runs.items()}) for model, runs in models.items()}
     effective = {f.name: effective_samples(f.measured - f.simulated) for f in fits}
-    offsets = {x.name: int(x.has_offset) for x in excitations}
-    criterion = {model: _with_mean({n: bic(measured[n], models[model][n], counts[model] + offsets[n], effective[n])
+    criterion = {model: _with_mean({n: bic(measured[n], models[model][n], counts[model] + 1, effective[n])
                                     for n in measured}) for model in counts}
     return Identification(fits, pooled, rig, quality, criterion, warnings_of(excitations, fits), notes, shown)
 
@@ -172,6 +171,8 @@ def _with_mean(values: dict[str, float]) -> dict[str, float]:
 
 def _notes(excitations, fits, nominal: Rig) -> tuple[str, ...]:
     said = [f"{x.name}: {note}" for x in excitations for note in x.notes]
+    said += [f"{f.name}: begins with the step, and shows no offset: integer-order models have none"
+             for x, f in zip(excitations, fits) if not x.rest_shown and not any(m.offset for m in f.integer)]
     said += [f"{f.name}: not a step; fitted by itself, left out of T, alpha and K(p)" for f in fits if not f.step]
     if isinstance(nominal.actuator, LinearActuator):
         said.append("the rig's actuator was a transfer function; the identified one is K(p) p through 1/(T s^alpha + 1)")

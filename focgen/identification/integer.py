@@ -55,12 +55,15 @@ def shape_name(poles: int, zeros: int) -> str:
     return f"{poles}p{zeros}z" if zeros else f"{poles}p"
 
 
-def fit_integer_models(experiment: Excitation) -> tuple[IntegerFit, ...]:
-    """Fit every shape of ``SHAPES`` to an experiment. Raises FitError where one does not converge from any start."""
+def fit_integer_models(experiment: Excitation, has_offset: bool = True) -> tuple[IntegerFit, ...]:
+    """Fit every shape of ``SHAPES`` to an experiment, with an offset or without.
+
+    Raises FitError where one does not converge from any start.
+    """
     made: dict[tuple[int, int], IntegerFit] = {}
     optima: dict[tuple[int, int], np.ndarray] = {}
     for poles, zeros in SHAPES:
-        problem = _Projected(experiment, poles, zeros)
+        problem = _Projected(experiment, poles, zeros, has_offset)
         optima[poles, zeros] = x = _best(problem, _starts(experiment, poles, zeros, optima))
         made[poles, zeros] = problem.finished(x)
     return tuple(made.values())
@@ -120,8 +123,8 @@ def _poles(count: int, x: np.ndarray) -> np.ndarray:
 class _Projected:
     """The residual after the best numerator and offset, as a function of the denominator; time in samples."""
 
-    def __init__(self, experiment: Excitation, poles: int, zeros: int):
-        self.experiment, self.poles, self.zeros = experiment, poles, zeros
+    def __init__(self, experiment: Excitation, poles: int, zeros: int, has_offset: bool):
+        self.experiment, self.poles, self.zeros, self.has_offset = experiment, poles, zeros, has_offset
         self.spread = float(np.std(experiment.measured))
         slow, fast = np.log(1.0 / (_SLOWEST * len(experiment))), np.log(_FASTEST)
         self.edges = np.array({1: [(slow, fast)], 2: [(slow, fast + 1), (2 * slow, 2 * fast)],
@@ -138,7 +141,7 @@ class _Projected:
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
         weights = poles ** np.arange(self.zeros, -1, -1)[:, None] / np.array(slopes)
         rows = np.einsum("kp,pn->kn", weights, np.array(single)).real  # too little for BLAS to share among threads
-        constant = [np.ones(len(self.experiment))] * self.experiment.has_offset
+        constant = [np.ones(len(self.experiment))] * self.has_offset
         return np.column_stack([*rows, *constant])
 
     def best(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -159,7 +162,7 @@ class _Projected:
         den = np.poly(_apart(_poles(self.poles, self.inside(x)))).real
         scale = self.experiment.step ** -np.arange(self.poles + 1.0)  # per sample → per second
         num = linear[: self.zeros + 1] * scale[self.poles - self.zeros : self.poles + 1]
-        offset = float(linear[-1]) if self.experiment.has_offset else 0.0
+        offset = float(linear[-1]) if self.has_offset else 0.0
         return IntegerFit(self.poles, self.zeros, num, den * scale, offset, basis @ linear)
 
 
