@@ -38,7 +38,7 @@ def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out
     logs = _usable(experiments(rig, logs, first, last))
     ran = running(read_controller(controller), logs) if controller is not None else None
     explanations = explain_all(rig, logs, THRESHOLD)
-    rigs, diagnosis, evidence = verdict.reach(rig, logs, compose.compose(rig, explanations), explanations, ran)
+    rigs, diagnosis, evidence = verdict.reach(rig, logs, compose.compose(rig, explanations, logs), explanations, ran)
     if out is not None:
         from focgen.diagnosis.write import write
 
@@ -69,5 +69,5 @@ def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float) -> tuple
         found.append(explain(rig, segment, logs, threshold))
         best = found[-1].best
         response = best.problem.references.clocks["response"]
-        x = freed(segment, best.problem.simulate(best.vector), response, found[-1].left.share)
+        x = freed(segment, best.problem.simulate(best.vector), response, max(e.left.share for e in found))
     return tuple(found)

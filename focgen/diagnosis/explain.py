@@ -21,6 +21,7 @@ from focgen.rig.engine import fits_in, slot_in
 from focgen.rig.model import Rig
 
 _DEPTH = 4
+_MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of other stages are tried too
 _MENDING = 0.6  # of the best further family's evidence: a form of a family found already then goes first
 _WHOLE = 0.5  # of what inputs foretell of a residual: a further family has to explain as much
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
@@ -67,13 +68,30 @@ class Explanation:
 
 
 def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
-    """Every form that may act in this segment."""
-    single = is_single(rig)
-    found = []
-    for effect in library().values():
-        stages = [owner(rig)] if single else [s for s in segment.stages if s == effect.stage]
-        found += [Clue(effect.name, form, s) for s in stages for form in effect.forms if fits_in(form, s, rig)]
-    return found
+    """Every form that may act in this segment. In a rig of one stage every family may, but of those that share a formula
+    only the one at home there."""
+    if not is_single(rig):
+        return [Clue(e.name, form, e.stage) for e in library().values() if e.stage in segment.stages
+                for form in e.forms if fits_in(form, e.stage, rig)]
+    stage, found = owner(rig), {}
+    for effect in sorted(library().values(), key=lambda e: e.stage != stage):
+        for form in effect.forms:
+            if fits_in(form, stage, rig):
+                found.setdefault(form.act, Clue(effect.name, form, stage))
+    return list(found.values())
+
+
+def guests_in(segment: Segment, rig: Rig) -> list[Clue]:
+    """Forms that are at home in another stage and may sit in this one: tried where those at home leave much."""
+    if is_single(rig):
+        return []
+    return [Clue(e.name, form, stage) for e in library().values() for stage in e.also if stage in segment.stages
+            and e.stage not in segment.stages for form in e.forms if fits_in(form, stage, rig)]
+
+
+def _much_left(base: Fit) -> bool:
+    """Whether inputs foretell most of what is left."""
+    return foretold(base.problem.segment, weighed(base), base.problem.references.clocks["response"]) > _MUCH
 
 
 def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
@@ -90,10 +108,14 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     segment, given = problem.segment, problem.nominal()
     rankings: list[Ranking] = []
     base, vector = _seen(problem, given, clues)
+    guests = guests_in(segment, rig)
     while len(rankings) < _DEPTH:
         ranking = rank(base, vector, _worth_trying(base, vector, [c for c in clues if c not in base.clues and not c.form.seen]))
         rankings.append(ranking)
         best = _chosen(ranking, {c.effect for c in base.clues}, threshold, bool(base.clues))
+        if best is None and guests and _much_left(ranking.base):
+            clues, guests = clues + guests, []
+            continue
         if best is None:
             break
         base, vector = best.problem, best.vector
@@ -152,9 +174,12 @@ def _chosen(ranking: Ranking, already: set[str], threshold: float, further: bool
     winner = ranking.best[ranking.winner]
     known = [ranking.best[name] for name in already if name in ranking.best]
     again = max(known, key=lambda f: evidence(f, ranking.base), default=None)
+    mended = again if again is not None and evidence(again, ranking.base) > threshold and _mends(
+        ranking.base, again, _VISIBLE[1], 0.0) else None
     if again is not None and evidence(again, ranking.base) > _MENDING * ranking.gain[ranking.winner]:
-        return again if _mends(ranking.base, again, _VISIBLE[1], 0.0) else None
-    return winner if _mends(ranking.base, winner, _VISIBLE[further], _WHOLE * further) else None
+        return mended
+    whole = _mends(ranking.base, winner, _VISIBLE[further], _WHOLE * further)
+    return winner if whole else mended
 
 
 def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:

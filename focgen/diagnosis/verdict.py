@@ -8,6 +8,7 @@ import numpy as np
 
 from focgen.diagnosis import compose
 from focgen.diagnosis.confidence import confidences, tied
+from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.explain import Cause, Explanation, problem_residual, weighed
 from focgen.diagnosis.fit import Weighing, fit
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, Where
@@ -22,7 +23,7 @@ from focgen.rig.model import Rig
 from focgen.rig.replay import goodness
 
 UNEXPLAINED = 0.5  # of what could be explained: beyond it no effect of the library is the cause
-LEFT = 0.04  # of a residual's mean square foretold by inputs: beyond it something is there
+LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it something is there
 _PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
 
 
@@ -63,12 +64,21 @@ def _departures(controller: Running | None) -> tuple[Found, ...]:
 
 
 def is_unknown(e: Explanation) -> bool:
-    """Whether most of what inputs foretell of the nominal residual is still there after the effects."""
+    """Whether most of what inputs foretell of the nominal residual is still there after the effects, or without any the
+    residual is not just noise."""
+    if not e.causes and (disturbed(e).bursts or disturbed(e).swings):
+        return True
     if e.left.share < LEFT:
         return False
     before, after = (float(np.mean(weighed(f) ** 2)) for f in (e.nominal, e.best))
     noise = after * (1 - e.left.share)
     return bool(after - noise > UNEXPLAINED * (before - noise))
+
+
+def disturbed(e: Explanation) -> Disturbance:
+    """What is left of a segment, as a disturbance."""
+    response = e.nominal.problem.references.clocks["response"]
+    return disturbance(e.segment.parts(weighed(e.best)), e.segment.run.h, response)
 
 
 def _without(rigs: compose.Rigs, causes, unknown) -> compose.Rigs:
@@ -174,7 +184,8 @@ def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
     """What the residual that no effect explains depends on."""
     found = {}
     for e in unknown:
-        parts = {k: v for k, v in e.left_nominal.depends.items() if v > 0.02}
+        parts, noise = {k: v for k, v in e.left_nominal.depends.items() if v > 0.02}, disturbed(e)
         found[f"{e.segment.entry} to {e.segment.exit}"] = {
-            "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"], "share": e.left_nominal.share}
+            "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"], "share": e.left_nominal.share,
+            "bursts": noise.bursts, "slow_swings": noise.swings}
     return found

@@ -36,6 +36,7 @@ EFFECT = Effect(
     reveals="six or more levels, up and down, in mixed order: the residual depends on level only",
     confused_with=("dead_zone", "contact", "softening", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
+    also=("regulator",),
     forms=[
         Form("cubic", "drive", (Parameter("size", lower=-0.9, upper=5.0, starts=(0.1, -0.1), zero=0.0), _ONE), _cubic),
         Form("exponential", "drive", (

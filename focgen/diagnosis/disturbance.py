@@ -1,0 +1,66 @@
+"""Whether what is left is more than noise although nothing that was done to the rig foretells it.
+
+Noise of sensors is steady and forgets within a response of the rig. A loose plug comes in bursts, a room's temperature in
+slow swings: neither depends on the input, and both are there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+
+from focgen.diagnosis.noise import autocovariance, whiten
+
+BURSTS = 15.0  # kurtosis of the innovations; 3 for noise
+LOUD = 10.0  # loudest stretch of a response over the usual one
+SWINGS = 8.0  # power at periods beyond eight responses over that between one and four; 1 for noise
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """``kurtosis`` and ``loudest`` of the innovations, ``slow``: the ratio of slow power to that about the response."""
+
+    kurtosis: float
+    loudest: float
+    slow: float
+
+    @property
+    def bursts(self) -> bool:
+        """Whether it comes and goes."""
+        return self.kurtosis > BURSTS and self.loudest > LOUD
+
+    @property
+    def swings(self) -> bool:
+        """Whether it is slower than noise is."""
+        return self.slow > SWINGS
+
+
+def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturbance:
+    """Of a residual by experiment, sampled every ``h`` s, of a rig that responds in ``response`` s."""
+    parts = [p for p in parts if len(p) > 20] or parts
+    r = autocovariance(parts, 2)
+    ar = np.r_[1.0, -solve_toeplitz(r[:2], r[1:3])] if r[0] > 0 and min(map(len, parts)) > 20 else np.ones(1)
+    quiet = [whiten(p, ar)[len(ar):] for p in parts]
+    joined = np.concatenate(quiet)
+    variance = max(float(np.mean(joined**2)), 1e-300)
+    count = max(10, int(response / h))
+    local = np.array([np.mean(s**2) for p in quiet for s in np.array_split(p, max(1, len(p) // count))])
+    loudest = float(np.max(local) / max(np.median(local), 1e-300))
+    return Disturbance(float(np.mean(joined**4) / variance**2), loudest, _slow(parts, h, response))
+
+
+def _slow(parts: list[np.ndarray], h: float, response: float) -> float:
+    """Mean power density at periods beyond eight responses over that at one to four; 1 where there is too little."""
+    low, low_count, near, near_count = 0.0, 0, 0.0, 0
+    for p in parts:
+        power = np.abs(np.fft.rfft((p - p.mean()) * np.hanning(len(p)))) ** 2 / len(p)
+        period = len(p) * h / np.maximum(np.arange(len(power)), 1e-9)
+        inside = np.arange(len(power)) > 0
+        slow, about = inside & (period > 8 * response), inside & (period > response) & (period < 4 * response)
+        low, low_count = low + float(power[slow].sum()), low_count + int(slow.sum())
+        near, near_count = near + float(power[about].sum()), near_count + int(about.sum())
+    if low_count < 6 or near_count < 6 or near <= 0:
+        return 1.0
+    return (low / low_count) / (near / near_count)
