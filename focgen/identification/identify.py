@@ -17,6 +17,7 @@ from focgen.identification.kernel import step_means, step_responses
 from focgen.identification.line import distinct_levels, fit_line
 from focgen.identification.model import ExperimentFit, Identification, Pooled, Unseen
 from focgen.identification.quality import bic, effective_samples, gof
+from focgen.identification.reach import seen_ranges
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import read_logs
 from focgen.output import write_file
@@ -61,10 +62,11 @@ def identify(
     if not steps:
         raise FitError("logs", "none is a step of the input", "add step logs; K(p), T and alpha come from them")
     pooled, notes = _pooled(steps, gain_degree)
-    found = replace(nominal, actuator=Actuator(pooled.T, pooled.alpha, pooled.gain), effects=())
+    ranges, told = seen_ranges(nominal.ranges, experiments)
+    found = replace(nominal, actuator=Actuator(pooled.T, pooled.alpha, pooled.gain), ranges=ranges, effects=())
     pooled = replace(pooled, simulated={x.name: _through_rig(x, found.actuator) for x in excitations})
     shown = _shown(others, found)
-    result = _compared(excitations, fits, pooled, found, notes + _notes(excitations, fits, nominal), shown)
+    result = _compared(excitations, fits, pooled, found, notes + _notes(excitations, fits, nominal) + told, shown)
     if out is not None:
         write_file(out, rig_text(found))
     return result
