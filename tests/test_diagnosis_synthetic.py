@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.errors import FocgenError
 from focgen.rig.files import read_rig
 from focgen.rig.replay import replay
 from tests.diagnosis_rig import RIG, session
@@ -53,6 +54,21 @@ def test_the_promise_holds_on_new_experiments(tmp_path):
     achieved = (squares[0] - squares[1]) / (squares[0] - noise)
     assert abs(achieved - found.shrink) < 0.1
     assert found.shrink_interval[0] <= achieved <= found.shrink_interval[1] + 0.02
+
+
+def test_told_the_effect_it_considers_nothing_else():
+    found = diagnose(RIG, session(11, vent=0.8), only=("sensor_lag", "valve_asymmetry"))
+    assert {c.effect for f in found.causes for c in f.candidates} <= {"sensor_lag", "valve_asymmetry"}
+    assert found.causes[0].candidates[0].effect == "valve_asymmetry"
+    assert {f.effect for f in found.fits} <= {"sensor_lag", "valve_asymmetry"}
+    with pytest.raises(FocgenError, match="valve_asymetry"):
+        diagnose(RIG, session(11, vent=0.8), only=("valve_asymetry",))
+
+
+def test_the_plain_fits_rank_the_true_effect_first():
+    found = diagnose(RIG, session(11, drift=6e-4))
+    assert found.fits[0].effect == "gain_drift" and found.fits[0].error < 0.7
+    assert [f.error for f in found.fits] == sorted(f.error for f in found.fits)
 
 
 def test_missing_signals_make_the_stage_an_inference():

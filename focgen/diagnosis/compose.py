@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.diagnosis.explain import Explanation, problem_of
-from focgen.diagnosis.fit import Weighing, fit
+from focgen.diagnosis.explain import Explanation
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.model import Rig
 from focgen.rig.replay import effect_tables, simulate_session
-from focgen.diagnosis.segments import cuts, make, session
+from focgen.diagnosis.segments import session
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class Rigs:
 
 def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> Rigs:
     """Own parameters from the segment that has them, effects from all. Where that refit brings the output no closer,
-    because the gap lies in a stage that is not refitted, the refitted rig's are those that do."""
+    because the gap lies in a stage that is not refitted, the refitted rig keeps the parameters given."""
     refitted = fitted = rig
     placed: list[Placed] = []
     for e in explanations:
@@ -45,26 +44,14 @@ def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experi
         if problem.own.stage is not None and len(problem.own_start):
             refitted, fitted = e.nominal.problem.rig(e.nominal.vector), problem.rig(e.best.vector)
         placed += problem.placed(e.best.vector)
-    if len(explanations) > 1 and _gap(refitted, logs) > _gap(replace(rig, effects=()), logs):
-        refitted = _refitted(rig, refitted, logs)
-    return Rigs(replace(refitted, effects=()), replace(fitted, effects=()), tuple(placed))
+    refitted, fitted, given = (replace(r, effects=()) for r in (refitted, fitted, rig))
+    if len(explanations) > 1 and _gap(refitted, logs) > _gap(given, logs):
+        refitted = given
+    return Rigs(refitted, fitted, tuple(placed))
 
 
 def _gap(rig: Rig, logs: Sequence[Experiment]) -> float:
     return mean_square(logs, simulated(rig, (), logs))
-
-
-def _refitted(rig: Rig, stagewise: Rig, logs: Sequence[Experiment]) -> Rig:
-    """Own parameters that bring the output closest to the logged one from the first logged signal on."""
-    segment = make(logs, cuts(logs)[0], "output")
-    fits = []
-    for start in (rig, stagewise):
-        problem = problem_of(start, segment, logs)
-        if not len(problem.own_start):
-            return stagewise
-        fits.append(fit(problem, problem.nominal(), Weighing(np.ones(1), max(1, len(segment.y) // 8000)), 15))
-    best = min(fits, key=lambda f: f.sse)
-    return best.problem.rig(best.vector)
 
 
 def simulated(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> list[dict[str, np.ndarray]]:

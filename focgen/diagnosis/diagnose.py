@@ -10,34 +10,38 @@ import numpy as np
 from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.explain import Explanation, explain
 from focgen.diagnosis.model import Diagnosis
-from focgen.diagnosis.running import running
+from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
 from focgen.diagnosis.segments import cuts, make
 from focgen.diagnosis.smooth import freed
 from focgen.control.files import read_controller
-from focgen.errors import LogError
+from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.progress import say
+from focgen.rig.effects import library
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.rig.replay import experiments
 
+EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
 
 def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out: str | Path | None = None,
              controller: str | Path | None = None, first: float | None = None, last: float | None = None,
-             bootstrap: int = 0) -> Diagnosis:
+             bootstrap: int = 0, only: Sequence[str] | None = None) -> Diagnosis:
     """Diagnose the gap between the nominal rig and its logs, one session of one rig.
 
     ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures; ``controller``: of
     closed-loop logs, whose own departures are then looked for too; ``first``, ``last``: s within each experiment;
     ``bootstrap``: sessions simulated from the nominal rig to set the threshold of evidence by (0: the built-in one).
-    Raises RigError, LogError, ControllerError for files that cannot be used.
+    ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how strong it is.
+    Raises RigError, LogError, ControllerError for files that cannot be used, FocgenError for an unknown effect.
     """
+    _check(only)
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
     logs = _usable(experiments(rig, logs, first, last))
     ran = running(read_controller(controller), logs) if controller is not None else None
-    explanations = explain_all(rig, logs, THRESHOLD)
+    explanations = explain_all(rig, logs, THRESHOLD, only)
     rigs, diagnosis, evidence = verdict.reach(rig, logs, compose.compose(rig, explanations, logs), explanations, ran)
     if out is not None:
         from focgen.diagnosis.write import write
@@ -60,14 +64,21 @@ def _usable(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     return tuple(logs)
 
 
-def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float) -> tuple[Explanation, ...]:
+def _check(only: Sequence[str] | None) -> None:
+    for name in only or ():
+        if name not in EFFECTS:
+            raise FocgenError(name, "is no effect of the library", f"known: {', '.join(sorted(EFFECTS))}")
+
+
+def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float,
+                only: Sequence[str] | None = None) -> tuple[Explanation, ...]:
     """Explain segment after segment, each on what the one before it gives freed of noise."""
     roles, x, found = cuts(logs), None, []
     for entry, exit in zip(roles, roles[1:]):
         segment = make(logs, entry, exit, x)
         say(f"{entry} to {exit}")
-        found.append(explain(rig, segment, logs, threshold))
+        found.append(explain(rig, segment, logs, threshold, only))
         best = found[-1].best
         response = best.problem.references.clocks["response"]
-        x = freed(segment, best.problem.simulate(best.vector), response, max(e.left.share for e in found))
+        x = freed(segment, best.problem.simulate(best.vector), response, found[-1].left.share)
     return tuple(found)

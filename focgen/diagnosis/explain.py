@@ -50,7 +50,8 @@ class Cause:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A segment explained. ``nominal``: its own parameters refitted; ``best``: with the effects."""
+    """A segment explained. ``nominal``: its own parameters refitted; ``best``: with the effects; ``errors``: by family,
+    the root-mean-square residual with that effect alone, as a share of the refitted nominal's."""
 
     segment: Segment
     given: np.ndarray
@@ -60,6 +61,7 @@ class Explanation:
     causes: tuple[Cause, ...]
     left: Leftover
     left_nominal: Leftover
+    errors: dict[str, float]
 
     @property
     def stage(self) -> str | None:
@@ -102,13 +104,18 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     return Problem(segment, Own(rig, stage, load, response), scales)
 
 
-def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: float) -> Explanation:
-    """Find the segment's effects; ``threshold``: nats of evidence that noise alone does not reach."""
-    problem, clues = _held(rig, segment, logs), clues_for(segment, rig)
+def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: float,
+            only: Sequence[str] | None = None) -> Explanation:
+    """Find the segment's effects; ``threshold``: nats of evidence that noise alone does not reach.
+
+    ``only``: the effects to consider, of which each that finds anything to mend is taken.
+    """
+    problem, clues, guests = _held(rig, segment, logs), clues_for(segment, rig), guests_in(segment, rig)
+    if only is not None:
+        clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
     segment, given = problem.segment, problem.nominal()
     rankings: list[Ranking] = []
     base, vector = _seen(problem, given, clues)
-    guests = guests_in(segment, rig)
     while len(rankings) < _DEPTH:
         ranking = rank(base, vector, _worth_trying(base, vector, [c for c in clues if c not in base.clues and not c.form.seen]))
         rankings.append(ranking)
@@ -127,7 +134,7 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     response = problem.references.clocks["response"]
     return Explanation(segment, given, nominal, best, ar, causes,
                        leftover(segment, weighed(best), response),
-                       leftover(segment, weighed(nominal), response))
+                       leftover(segment, weighed(nominal), response), rankings[0].errors)
 
 
 def _seen(problem: Problem, given: np.ndarray, clues: Sequence[Clue]) -> tuple[Problem, np.ndarray]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from focgen.diagnosis.noise import whiten
 from focgen.diagnosis.problem import Problem
+from focgen.rig.kernels import products
 
 _STEP = 1e-4
 
@@ -57,16 +58,21 @@ def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing) -> np.
     return np.where(np.isfinite(found), np.clip(found, -1e3, 1e3), 1e3)
 
 
-def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int = 12, tolerance: float = 1e-4) -> Fit:
-    """Least squares from ``start`` within the problem's bounds; stops when the gain is below ``tolerance`` nats."""
+def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int = 12, tolerance: float = 1e-4,
+        known: np.ndarray | None = None) -> Fit:
+    """Least squares from ``start`` within the problem's bounds; stops when the gain is below ``tolerance`` nats.
+
+    ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a little off.
+    """
     low, high = problem.bounds()
     vector = np.clip(start, low, high)
     now = innovations(problem, vector, weighing)
     sse, damping = float(now @ now), 1e-3
     normal = np.eye(len(vector))
     for _ in range(iterations):
-        jacobian = _jacobian(problem, vector, now, weighing, low, high)
-        normal, slope = jacobian.T @ jacobian, jacobian.T @ now
+        rows = jacobian(problem, vector, now, weighing, low, high, known)
+        product = products(np.vstack([rows, now]))
+        normal, slope = product[:-1, :-1], product[:-1, -1]
         gained, before = False, sse
         for _ in range(6):
             trial = np.clip(vector - _step(normal, slope, damping, vector, low, high), low, high)
@@ -81,14 +87,16 @@ def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int
     return Fit(problem, vector, now, sse, normal)
 
 
-def _jacobian(problem, vector, now, weighing, low, high) -> np.ndarray:
-    columns = []
-    for i in range(len(vector)):
+def jacobian(problem: Problem, vector: np.ndarray, now: np.ndarray, weighing: Weighing, low, high,
+             known: np.ndarray | None = None) -> np.ndarray:
+    """Rows (k, n): the innovations' derivatives, by differences."""
+    rows = [] if known is None else list(known)
+    for i in range(len(rows), len(vector)):
         step = _STEP if vector[i] + _STEP <= high[i] else -_STEP
         moved = vector.copy()
         moved[i] += step
-        columns.append((innovations(problem, moved, weighing) - now) / step)
-    return np.stack(columns, axis=1)
+        rows.append((innovations(problem, moved, weighing) - now) / step)
+    return np.stack(rows)
 
 
 def _step(normal, slope, damping, vector, low, high) -> np.ndarray:

@@ -62,6 +62,15 @@ class Where:
 
 
 @dataclass(frozen=True)
+class PlainFit:
+    """What one effect alone does for its segment of the chain: ``error`` is the root-mean-square residual with its best
+    form, as a share of the refitted nominal's. A plain fit says nothing about certainty."""
+
+    effect: str
+    error: float
+
+
+@dataclass(frozen=True)
 class NextExperiment:
     """What would tell the rivals apart; ``expected_separation`` in standard deviations."""
 
@@ -87,6 +96,7 @@ class Diagnosis:
     unexplained: dict[str, object]
     tied: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
+    fits: tuple[PlainFit, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
 from focgen.plan.scenario import Scenario, physical_trace, to_raw
 
+CONTROLLER_EFFECTS = ("short_memory", "fixed_point", "sample_jitter", "missed_samples", "output_saturation")
 _LENGTHS = (10, 20, 35, 50, 75, 100, 150, 250, 400, 700, 1000, 2000)
 _GOOD = 0.5  # of the command's mean square departure that a cause has to explain
 _RESOLVED = 5e-5  # of the command's range: departures below are the log's resolution

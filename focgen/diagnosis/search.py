@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.diagnosis.fit import Fit, Weighing, fit, means
+from focgen.diagnosis.fit import Fit, Weighing, fit, jacobian, means
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 
 _COARSE = 5000  # samples of the first, coarse pass
 _DEEP = 5  # how many forms are fitted to the end beside the families' best
+_QUICK = 0.3  # of the best quick fit's fall in the sum of squares: forms below are left at that
 _NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
 _FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
 _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
@@ -22,13 +23,15 @@ _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is drop
 class Ranking:
     """``base`` and what each family adds to it, all under the same noise model ``ar``; ``best`` by family, likeliest first.
 
-    ``gain`` are nats of evidence over ``base``: half the log-likelihood ratio's worth less half k ln n.
+    ``errors``: by family, the root-mean-square residual with its best form, over that of ``base`` (a quick fit's where no
+    more was worth while). ``gain`` are nats of evidence over ``base``: half the log-likelihood ratio's worth less half k ln n.
     """
 
     base: Fit
     ar: np.ndarray
     best: dict[str, Fit]
     gain: dict[str, float]
+    errors: dict[str, float]
 
     @property
     def winner(self) -> str | None:
@@ -48,25 +51,50 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue], ar: np.ndarr
     coarse = max(1, len(problem.segment.y) // _COARSE)
     rough = Weighing(np.ones(1), coarse)
     ground = fit(problem, base, rough)
-    tried = [t for clue in clues if (t := best_start(problem, ground.vector, clue, rough)) is not None]
+    known = jacobian(problem, ground.vector, ground.innovations, rough, *problem.bounds())
+    tried = [t for clue in clues if (t := best_start(problem, ground.vector, clue, rough, known)) is not None]
+    errors = _errors(tried, ground)
+    tried = _promising(tried, ground)
     leader = min([ground, *tried], key=lambda t: t.sse)
     rough = Weighing(fit_ar([means(p, coarse) for p in leader.residual()]), coarse)
     ground = fit(problem, ground.vector, rough, 6)
     tried = sorted((fit(t.problem, t.vector, rough, 5) for t in tried), key=lambda t: -evidence(t, ground))
     top = evidence(tried[0], ground) if tried else 0.0
     if top < _NOTHING:
-        return finish(ground, tried[:2])
-    return finish(ground, [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR])
+        return finish(ground, tried[:2], errors)
+    return finish(ground, [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR], errors)
+
+
+def _promising(tried: Sequence[Fit], ground: Fit) -> list[Fit]:
+    """Without the forms that a quick fit shows to be far behind, each family's best kept."""
+    tried = sorted(tried, key=lambda t: t.sse)
+    best = ground.sse - tried[0].sse if tried else 0.0
+    near = [t for t in tried if ground.sse - t.sse > _QUICK * best]
+    return near + [t for t in _firsts(tried) if t not in near]
+
+
+def _firsts(tried: Sequence[Fit]) -> list[Fit]:
+    """The first of every family."""
+    seen: set[str] = set()
+    return [t for t in tried if not (family(t) in seen or seen.add(family(t)))]
 
 
 def _chosen(tried: Sequence[Fit]) -> list[Fit]:
     """The best form of every family, and the best forms altogether."""
-    seen: set[str] = set()
-    first = [t for t in tried if not (family(t) in seen or seen.add(family(t)))]
+    first = _firsts(tried)
     return first + [t for t in tried[:_DEEP] if t not in first]
 
 
-def finish(ground: Fit, tried: Sequence[Fit]) -> Ranking:
+def _errors(tried: Sequence[Fit], ground: Fit) -> dict[str, float]:
+    """Each family's least root mean square over the ground's."""
+    found: dict[str, float] = {}
+    for t in tried:
+        error = float(np.sqrt(t.sse / max(ground.sse, 1e-300)))
+        found[family(t)] = min(found.get(family(t), error), error)
+    return found
+
+
+def finish(ground: Fit, tried: Sequence[Fit], errors: dict[str, float]) -> Ranking:
     """Fit on every sample, in the colour of what the best one leaves."""
     leader = min([ground, *tried], key=lambda t: t.sse)
     for iterations in (3, 6):
@@ -76,14 +104,14 @@ def finish(ground: Fit, tried: Sequence[Fit]) -> Ranking:
         tried = sorted(tried, key=lambda t: t.sse)
         leader = min([ground, *tried], key=lambda t: t.sse)
         tried = [t for t in tried if t.sse < leader.sse * _HOPELESS or t is leader] or tried[:1]
-    return _ranking(ground, weighing.ar, tried)
+    return _ranking(ground, weighing.ar, tried, errors)
 
 
-def _ranking(ground: Fit, ar: np.ndarray, tried: Sequence[Fit]) -> Ranking:
+def _ranking(ground: Fit, ar: np.ndarray, tried: Sequence[Fit], errors: dict[str, float]) -> Ranking:
     families: dict[str, Fit] = {}
     for one in sorted(tried, key=lambda t: -evidence(t, ground)):
         families.setdefault(family(one), one)
-    return Ranking(ground, ar, families, {name: evidence(f, ground) for name, f in families.items()})
+    return Ranking(ground, ar, families, {name: evidence(f, ground) for name, f in families.items()}, errors)
 
 
 def family(of: Fit) -> str:
@@ -91,12 +119,13 @@ def family(of: Fit) -> str:
     return of.problem.clues[-1].effect
 
 
-def best_start(problem: Problem, base: np.ndarray, clue: Clue, weighing: Weighing) -> Fit | None:
+def best_start(problem: Problem, base: np.ndarray, clue: Clue, weighing: Weighing,
+               known: np.ndarray) -> Fit | None:
     """The best of the fits from the clue's start values, a few iterations each."""
     extended = problem.with_clues([*problem.clues, clue])
     fits = []
     for start in extended.starts(clue):
-        found = fit(extended, np.r_[base, start], weighing, 4, tolerance=0.1)
+        found = fit(extended, np.r_[base, start], weighing, 5, tolerance=0.1, known=known)
         if np.isfinite(found.sse):
             fits.append(found)
     return min(fits, key=lambda f: f.sse, default=None)

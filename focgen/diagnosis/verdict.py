@@ -11,7 +11,7 @@ from focgen.diagnosis.confidence import confidences, tied
 from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.explain import Cause, Explanation, problem_residual, weighed
 from focgen.diagnosis.fit import Weighing, fit
-from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, Where
+from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit, Where
 from focgen.diagnosis.next_experiment import propose
 from focgen.diagnosis.running import Running
 from focgen.diagnosis.search import evidence as nats
@@ -49,8 +49,15 @@ def reach(rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations
         word, locate(explanations, shares, found, unknown, word), found, _gap(rig, logs, made, squares, floor),
         total.value if total else None, total.interval if total else None, "refitted.toml", "augmented.toml",
         propose(rig, logs, explanations, found),
-        _description(unknown), (), tuple(note for log in logs for note in log.notes))
+        _description(unknown), (), tuple(note for log in logs for note in log.notes),
+        _plain_fits(explanations))
     return rigs, diagnosis, Evidence(made, tuple(explanations))
+
+
+def _plain_fits(explanations: Sequence[Explanation]) -> tuple[PlainFit, ...]:
+    """Every family's error alone, the lowest first."""
+    fits = [PlainFit(name, error) for e in explanations for name, error in e.errors.items()]
+    return tuple(sorted(fits, key=lambda f: f.error))
 
 
 def _departures(controller: Running | None) -> tuple[Found, ...]:

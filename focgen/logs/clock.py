@@ -53,7 +53,7 @@ def on_grid(
     """
     step = uniform_step(time)
     if step is not None:
-        same = abs(step / sample_time - 1.0) < _SAME_RATE
+        same = abs(step / sample_time - 1.0) < max(_SAME_RATE, 2.0 * _JITTER / (len(time) - 1))  # jitter of both ends
         step = sample_time if same else float(f"{step:.6g}")
         notes = () if same else (f"sampled every {step:g} s and kept so, though the rig runs at {sample_time:g} s",)
         return step, dict(signals), notes

@@ -141,3 +141,14 @@ void focgen_filter(int n, const double *x, double *y, const unsigned char *rest,
         y[k] = out;
     }
 }
+
+/* m[i][j] = sum over samples of r[i] r[j], for the k rows of n samples; one thread, for the rows are few and the calls many. */
+void focgen_products(int n, int k, const double *r, double *m)
+{
+    for (int i = 0; i < k; i++) for (int j = 0; j <= i; j++) {
+        const double *a = r + (long)i * n, *b = r + (long)j * n;
+        double sum = 0.0;
+        for (int t = 0; t < n; t++) sum += a[t] * b[t];
+        m[i * k + j] = m[j * k + i] = sum;
+    }
+}

@@ -28,6 +28,7 @@ void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, 
 void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width, double power, double beta);
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *a,
                    double *w);
+void focgen_products(int n, int k, const double *r, double *m);
 """
 _FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
 
@@ -113,3 +114,12 @@ def rational(x, rest, b, a) -> np.ndarray:
     tables = [np.ascontiguousarray(np.pad(t, (0, order + 1 - len(t))), float) for t in (b, a)]
     scratch = np.zeros(order + 1)
     return _call("focgen_filter", x, rest, order, *(ffi.from_buffer("double[]", t) for t in (*tables, scratch)))
+
+
+def products(rows: np.ndarray) -> np.ndarray:
+    """Every row's product with every other, (k, k), of ``rows`` (k, n); unlike ``rows @ rows.T`` in one thread."""
+    ffi, library = _library()
+    rows = np.ascontiguousarray(rows, float)
+    found = np.empty((len(rows), len(rows)))
+    library.focgen_products(rows.shape[1], len(rows), ffi.from_buffer("double[]", rows), ffi.from_buffer("double[]", found))
+    return found
