@@ -4,7 +4,7 @@ VENV   := .venv
 RUN    := $(VENV)/bin/python
 JOBS   ?= 2
 
-.PHONY: help demo test test-long bench clean
+.PHONY: help demo test test-long bench trials trial-cases trial-report clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -34,6 +34,29 @@ $(VENV)/ready-bench: $(VENV)/ready-test
 
 bench: $(VENV)/ready-bench     ## speed and bias, side by side with their rivals
 	$(RUN) -m tests.bench
+
+# The diagnosis judged blind. CASES a set, SUITES, SIGNALS and SEED may be given; `make trials MINUTES=50` stops
+# beginning cases after 50 minutes, a further `make trials` goes on, and the table says how many were counted.
+CASES   ?= 200
+SEED    ?= 1000
+SIGNALS ?= C B A
+SUITES  ?= full short closed
+MINUTES ?= 100000
+TRIALS  := build/trials
+SETS     = $(foreach suite,$(SUITES),$(foreach s,$(SIGNALS),$(TRIALS)/$(s)_$(suite)))
+
+$(TRIALS)/%/trial.json: | $(VENV)/ready
+	$(RUN) -m focgen trial make $(TRIALS)/$* --signals $(firstword $(subst _, ,$*)) \
+	  --suite $(lastword $(subst _, ,$*)) --cases $(CASES) --seed $(SEED)
+
+trial-cases: $(addsuffix /trial.json,$(SETS))  ## sealed cases for `make trials`, into build/trials/
+
+trials: trial-cases            ## sealed cases diagnosed blind, then the table of scores (hours; can be resumed)
+	-$(RUN) -m focgen trial run $(SETS) --jobs $(JOBS) --minutes $(MINUTES)
+	$(MAKE) trial-report
+
+trial-report: $(VENV)/ready    ## the table of what `make trials` has diagnosed so far
+	$(RUN) -m focgen trial score $(SETS) --partial --oracle --jobs $(JOBS) --out $(TRIALS)/table
 
 clean:                         ## remove everything that was built
 	rm -rf $(VENV) build

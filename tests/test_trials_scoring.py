@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 import focgen
+from focgen.errors import InputError
 from focgen.rig.files import write_rig
 from focgen.rig.model import Actuator, Rig, Signals
 from focgen.trials.achieved import shrink
 from focgen.trials.judging import judge
 from focgen.trials.machine import Machine, simulate
 from focgen.trials.recording import as_csv
-from focgen.trials.rows import rows, table
+from focgen.trials.rows import rows
 from focgen.trials.run import outcome_of
-from focgen.trials.statistics import calibration_error, interval, reliability
+from focgen.trials.statistics import calibration_error, interval, reliability, reliability_bins
+from focgen.trials.tables import full_text, markdown, table
 
 STAGES = {
     "hysteresis": "actuator",
@@ -129,6 +131,31 @@ def test_promises():
     assert found["achieved shrink over the oracle's"].value == pytest.approx(2.25 / 3.0)
 
 
+def test_others_stand_beside():
+    """Each other method names one effect a case; its figures are over the cases in which it did."""
+    judged = [
+        one("single", ["leak"], said("named", {"leak": 0.9}), baseline="creep", best_fit="leak"),
+        one("single", ["leak"], said("named", {"leak": 0.9}), baseline="leak", best_fit="leak"),
+        one("single", ["creep"], said("unknown", stage="actuator"), baseline="hysteresis"),
+        judge("7", label("single", "leak", visible=False), DONE, said("none"), baseline="leak"),
+    ]
+    found = by_name(judged)
+    assert found["top-1 effect"].beside == {"correlation": pytest.approx(1 / 3), "best fit": 1.0}
+    assert found["stage right"].beside["correlation"] == pytest.approx(2 / 3)
+    assert found["named one effect, wrongly"].beside["correlation"] == pytest.approx(2 / 3)
+    assert found["false alarm on none or parameter error"].beside == {}
+    judged[0] = one("single", ["leak"], said("named", {"leak": 0.9}), achieved=0.6, oracle=0.8)
+    mean = by_name(judged)["achieved shrink, mean"]
+    assert mean.value == pytest.approx(0.6) and mean.beside == {"oracle": pytest.approx(0.8)}
+
+
+def test_pairs_are_split_by_stage():
+    within = one("pair", ["hysteresis", "creep"], said("named", {"creep": 0.9}, {"hysteresis": 0.9}))
+    across = one("pair", ["hysteresis", "leak"], said("named", {"leak": 0.9}))
+    found = by_name([within, across])
+    assert found["within one stage"].value == 1.0 and found["across stages"].value == 0.0
+
+
 def test_achieved_shrink_by_hand(tmp_path):
     """Gains 10 % and 5 % off leave mean squares as 4 to 1: three quarters of the gap are closed."""
     signals = Signals("t", "y", command="u")
@@ -175,6 +202,14 @@ def test_reliability_accepts_calibrated_and_refuses_overconfident():
     assert sum(accepted) >= 20  # 95 % of 24, less two and a half standard deviations
 
 
+def test_reliability_bins_by_hand():
+    found = reliability_bins([0.2, 0.2, 0.9, 0.9, 0.9, 0.9], [False, True, True, True, True, True], 2)
+    (c1, r1, _, _, n1), (c2, r2, low, high, n2) = found
+    assert (c1, r1, n1) == (pytest.approx((0.2 + 0.2 + 0.9) / 3), pytest.approx(2 / 3), 3)
+    assert (c2, r2, n2) == (pytest.approx(0.9), 1.0, 3)
+    assert low <= 2 / 3 and high == 1.0  # two or three of three, at 0.9 each, in 97 % of draws
+
+
 def test_interval_covers_as_often_as_it_says():
     covered = 0
     for seed in range(200):
@@ -182,6 +217,14 @@ def test_interval_covers_as_often_as_it_says():
         low, high = interval(hits, draws=300)
         covered += low <= 0.7 <= high
     assert 168 <= covered <= 192  # 90 % of 200, within three standard deviations
+    low, high = interval([1.0] * 20)
+    assert high == 1.0 and 0.9 < low < 0.93  # not "surely 1": the 5 % quantile of Beta(20.5, 0.5) is 0.910
+    covered = sum(a <= 0.5 <= b for a, b in (_median_interval(seed) for seed in range(100)))
+    assert 80 <= covered <= 98
+
+
+def _median_interval(seed):
+    return interval(np.random.default_rng(seed).random(60), np.median, draws=300)
 
 
 def test_failed_diagnosis_is_noted_and_not_repeated(tmp_path):
@@ -189,12 +232,36 @@ def test_failed_diagnosis_is_noted_and_not_repeated(tmp_path):
     focgen.trial("make", folder, cases=1, seed=5, suite="short", kinds=("none",))
     (folder / "cases" / "0001" / "rig.toml").write_text("nonsense = [")
     ran = focgen.trial("run", folder, jobs=1)
-    assert (ran.now, ran.before, ran.failed) == (1, 0, 1)
+    assert (ran.now, ran.before, ran.failed, ran.waiting) == (1, 0, 1, 0)
     assert "RigError" in outcome_of(folder / "runs" / "0001")["fault"]
     again = focgen.trial("run", folder, jobs=1)
     assert (again.now, again.before, again.failed) == (0, 1, 1)
-    scores = focgen.trial("score", folder, baseline=False)
+    scores = focgen.trial("score", folder, baseline=False).sets[0]
     assert scores.failed == 1 and json.loads((folder / "scores.json").read_text())["scores"]["failed"] == 1
     assert "missed" in table(scores.rows)
     shutil.rmtree(folder / "runs")
-    assert focgen.trial("score", folder, baseline=False).failed == 1
+    assert focgen.trial("score", folder, baseline=False).sets[0].failed == 1
+    assert focgen.trial("run", folder, jobs=1, minutes=0).waiting == 1  # no time left: none is begun
+    partial = focgen.trial("score", folder, baseline=False, partial=True).sets[0]
+    assert (partial.cases, partial.waiting, partial.failed) == (0, 1, 0)
+
+
+def test_several_trials_in_one_table(tmp_path):
+    """Trials take turns, are scored by one command, and stand side by side."""
+    folders = [tmp_path / signals for signals in "CA"]
+    for folder in folders:
+        focgen.trial("make", folder, cases=2, seed=5, suite="short", signals=folder.name, kinds=("none",))
+        for case in sorted((folder / "cases").iterdir()):
+            (case / "rig.toml").write_text("nonsense = [")
+    assert focgen.trial("run", *folders, jobs=1).now == 4
+    begun = {p: (p / "outcome.json").stat().st_mtime_ns for f in folders for p in (f / "runs").iterdir()}
+    order = [f"{p.parent.parent.name}{p.name}" for p in sorted(begun, key=begun.get)]
+    assert order == ["C0001", "A0001", "C0002", "A0002"]
+    summary = focgen.trial("score", *folders, baseline=False)
+    assert [s.signals for s in summary.sets] == ["C", "A"] and not summary.reached
+    text, page = full_text(summary.sets), markdown(summary.sets)
+    assert "C short" in text and "A short" in text and "1.000 (≤ 0.02) !" in text
+    row = next(line for line in page.splitlines() if line.startswith("| false alarm"))
+    assert row.count("**1.000** †") == 2 and row.count("n = 2") == 2
+    with pytest.raises(InputError):
+        focgen.trial("make", *folders)

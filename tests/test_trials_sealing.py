@@ -87,7 +87,7 @@ def test_tampering_shows(made, tmp_path, tamper):
 def test_untampered_unrun_trial_scores_as_misses(made, tmp_path):
     folder = tmp_path / "t"
     shutil.copytree(made, folder)
-    scores = score(folder, baseline=False)
+    scores = score(folder, baseline=False).sets[0]
     assert scores.failed == 3 and not scores.reached
     rows = {row.name: row for row in scores.rows}
     assert rows["false alarm on none or parameter error"].value == 1.0

@@ -6,16 +6,18 @@ import argparse
 import os
 
 from focgen.cli.outcome import Outcome
+from focgen.output import write_files
 from focgen.trials.plan import KINDS
-from focgen.trials.rows import table
+from focgen.trials.tables import full_text, markdown
 from focgen.trials.trial import ACTIONS, trial
 
 HELP = "sealed cases: make them, diagnose them blind, unseal and score"
 
 EXAMPLE = """examples:
   focgen trial make trials/c --signals C --cases 200 --seed 1000
-  focgen trial run trials/c
-  focgen trial score trials/c
+  focgen trial make trials/b --signals B --cases 200 --seed 1000
+  focgen trial run trials/c trials/b
+  focgen trial score trials/c trials/b --oracle --out trials/table
 Seeds below 1000 are for tuning, from 1000 on for reporting.
 """
 
@@ -23,7 +25,7 @@ Seeds below 1000 are for tuning, from 1000 on for reporting.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("action", choices=tuple(ACTIONS))
-    parser.add_argument("folder", metavar="DIR")
+    parser.add_argument("folder", metavar="DIR", nargs="+", help="run, score: also several")
     parser.add_argument(
         "--signals",
         choices=("C", "B", "A"),
@@ -42,10 +44,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jobs", type=int, metavar="N", help="run, score: processes at a time (default: the cores)"
     )
+    parser.add_argument(
+        "--minutes", type=float, metavar="M", help="run: begin no case after M minutes; a later run goes on"
+    )
     parser.add_argument("--oracle", action="store_true", help="score: also diagnose knowing the effect")
     parser.add_argument(
         "--no-baseline", action="store_true", help="score: leave the residual correlation out"
     )
+    parser.add_argument(
+        "--partial",
+        action="store_true",
+        help="score: leave out what has not been run instead of counting it missed",
+    )
+    parser.add_argument("--out", metavar="OUT", help="score: also write the table and pictures there")
 
 
 def run(args: argparse.Namespace) -> Outcome:
@@ -57,7 +68,7 @@ def _make(args: argparse.Namespace) -> Outcome:
     kinds = tuple(args.kinds.split(",")) if args.kinds else None
     made = trial(
         "make",
-        args.folder,
+        *args.folder,
         cases=args.cases,
         seed=args.seed,
         signals=args.signals,
@@ -68,21 +79,24 @@ def _make(args: argparse.Namespace) -> Outcome:
 
 
 def _run(args: argparse.Namespace) -> Outcome:
-    ran = trial("run", args.folder, jobs=args.jobs)
-    text = f"{ran.now} cases diagnosed, {ran.before} had been before; {ran.failed} failed"
-    return Outcome(ran, text, holds=ran.failed == 0)
+    ran = trial("run", *args.folder, jobs=args.jobs, minutes=args.minutes)
+    text = f"{ran.now} cases diagnosed, {ran.before} had been before; {ran.failed} failed, {ran.waiting} wait"
+    return Outcome(ran, text, holds=ran.failed == 0 and ran.waiting == 0)
 
 
 def _score(args: argparse.Namespace) -> Outcome:
-    scores = trial(
+    summary = trial(
         "score",
-        args.folder,
+        *args.folder,
         oracle=args.oracle,
         baseline=not args.no_baseline,
+        partial=args.partial,
         jobs=args.jobs or os.cpu_count() or 1,
     )
-    head = (
-        f"{scores.cases} cases, signals {scores.signals}, suite {scores.suite}, seed {scores.seed}; "
-        f"{scores.failed} without a diagnosis"
-    )
-    return Outcome(scores, f"{head}\n{table(scores.rows)}", holds=scores.reached)
+    text = full_text(summary.sets)
+    if args.out:
+        from focgen.report.trials import pictures
+
+        write_files(args.out, {"scores.md": markdown(summary.sets), **pictures(summary.sets)})
+        text += f"\ntable and pictures in {args.out}"
+    return Outcome(summary, text, holds=summary.reached)

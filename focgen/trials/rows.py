@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from focgen.trials.judging import Judged
 from focgen.trials.statistics import interval, reliability
+from focgen.trials.vocabulary import stage_of
+
+BESIDE = ("correlation", "best fit", "oracle")
+"""What a figure stands beside: the look of the residual (:mod:`focgen.trials.baselines`), the effect of the
+lowest error on the given logs without any penalty, and the diagnosis that is told the effects."""
 
 
 @dataclass(frozen=True)
 class Row:
     """One figure: ``value`` with its 90 % ``interval`` over ``cases``; ``target`` and whether it is
-    ``reached`` (None: none).
+    ``reached`` (None: none); ``beside``: the same figure of others, by their names in :data:`BESIDE`.
     """
 
     name: str
@@ -23,6 +28,7 @@ class Row:
     cases: int
     target: str
     reached: bool | None
+    beside: dict[str, float] = field(default_factory=dict)
 
 
 _SIGNALS = "CBA"
@@ -32,7 +38,7 @@ _AT_LEAST, _AT_MOST = "≥", "≤"
 @dataclass(frozen=True)
 class _Measure:
     """``of`` gives a case's number; ``who`` the cases that count; ``target``: sense and limit, one or one for
-    C, B, A.
+    C, B, A. ``guessed``: the number of a case for which another method names one effect.
     """
 
     name: str
@@ -41,6 +47,7 @@ class _Measure:
     sense: str = _AT_LEAST
     limits: tuple[float, ...] = ()
     figure: Callable = np.mean
+    guessed: Callable[[Judged, str], float] | None = None
 
 
 def _visible(j: Judged) -> bool:
@@ -67,21 +74,41 @@ def _covered(j: Judged) -> bool:
     return j.promise_interval is not None and j.promise_interval[0] <= j.achieved <= j.promise_interval[1]
 
 
-def _baselined(j: Judged) -> bool:
-    return _visible(j) and j.baseline is not None
+def _hit(j: Judged, guess: str) -> bool:
+    return guess in j.effects
 
 
-def _fitted(j: Judged) -> bool:
-    return _visible(j) and j.best_fit is not None
+def _staged(j: Judged, guess: str) -> bool:
+    return stage_of(guess) in j.stages
+
+
+def _severe(severity: str) -> Callable[[Judged], bool]:
+    return lambda j: _visible(j) and j.severity == severity
+
+
+def _one_stage(j: Judged) -> bool:
+    return len(set(j.stages)) == 1
+
+
+def _pair(j: Judged) -> bool:
+    return j.kind == "pair" and j.visible
 
 
 ROWS = (
-    _Measure("top-1 effect", _visible, lambda j: j.top_right, limits=(0.92, 0.80, 0.72)),
-    _Measure("  … by residual correlation", _baselined, lambda j: j.baseline in j.effects),
-    _Measure("  … by plain best fit", _fitted, lambda j: j.best_fit in j.effects),
-    _Measure("stage right", _visible, lambda j: j.stage_right, limits=(0.98, 0.92, 0.88)),
-    _Measure("named one effect, wrongly", _visible, lambda j: j.wrongly_named, _AT_MOST, (0.02, 0.03, 0.03)),
-    _Measure("truth in the reported set", _reporting, lambda j: j.in_set, limits=(0.97,)),
+    _Measure("top-1 effect", _visible, lambda j: j.top_right, limits=(0.92, 0.80, 0.72), guessed=_hit),
+    _Measure("  … high severity", _severe("high"), lambda j: j.top_right, guessed=_hit),
+    _Measure("  … mid severity", _severe("mid"), lambda j: j.top_right, guessed=_hit),
+    _Measure("  … low severity", _severe("low"), lambda j: j.top_right, guessed=_hit),
+    _Measure("stage right", _visible, lambda j: j.stage_right, limits=(0.98, 0.92, 0.88), guessed=_staged),
+    _Measure(
+        "named one effect, wrongly",
+        _visible,
+        lambda j: j.wrongly_named,
+        _AT_MOST,
+        (0.02, 0.03, 0.03),
+        guessed=lambda j, guess: not _hit(j, guess),
+    ),
+    _Measure("truth in the reported set", _reporting, lambda j: j.in_set, limits=(0.97,), guessed=_hit),
     _Measure("  … its mean size", _reporting, lambda j: len(j.reported), _AT_MOST, (1.3, 2.0, 2.4)),
     _Measure(
         "false alarm on none or parameter error",
@@ -94,16 +121,10 @@ ROWS = (
     _Measure(
         "known wrongly abstained", _visible, lambda j: j.verdict in ("unknown", "failed"), _AT_MOST, (0.06,)
     ),
-    _Measure(
-        "pairs: both found", lambda j: j.kind == "pair" and j.visible, lambda j: j.found, limits=(0.88,)
-    ),
-    _Measure(
-        "pairs: false extras per case",
-        lambda j: j.kind == "pair" and j.visible,
-        lambda j: j.extras,
-        _AT_MOST,
-        (0.12,),
-    ),
+    _Measure("pairs: both found", _pair, lambda j: j.found, limits=(0.88,)),
+    _Measure("  … within one stage", lambda j: _pair(j) and _one_stage(j), lambda j: j.found),
+    _Measure("  … across stages", lambda j: _pair(j) and not _one_stage(j), lambda j: j.found),
+    _Measure("pairs: false extras per case", _pair, lambda j: j.extras, _AT_MOST, (0.12,)),
     _Measure("singles: false extras per case", _visible, lambda j: j.extras, _AT_MOST),
     _Measure("promised shrink: median error", _promised, _error, _AT_MOST, (0.04,), np.median),
     _Measure("promised shrink: within 0.10", _promised, lambda j: _error(j) <= 0.10, limits=(0.85,)),
@@ -131,7 +152,7 @@ ROWS = (
 def rows(judged: Sequence[Judged], signals: str) -> tuple[Row, ...]:
     """Every row of the table; one without cases has no value."""
     plain = [_row(measure, judged, signals) for measure in ROWS]
-    return (*plain, *_oracle(judged), *_reliability(judged))
+    return (*plain, *_achieved(judged), *_reliability(judged))
 
 
 def _row(measure: _Measure, judged: Sequence[Judged], signals: str) -> Row:
@@ -147,7 +168,21 @@ def _row(measure: _Measure, judged: Sequence[Judged], signals: str) -> Row:
         len(values),
         target,
         _reaches(value, measure, signals),
+        _beside(measure, judged),
     )
+
+
+def _beside(measure: _Measure, judged: Sequence[Judged]) -> dict[str, float]:
+    """The figure of those that always name one effect, over the cases in which they did."""
+    if measure.guessed is None:
+        return {}
+    guesses = {"correlation": lambda j: j.baseline, "best fit": lambda j: j.best_fit}
+    found = {}
+    for name, guess in guesses.items():
+        values = [float(measure.guessed(j, guess(j))) for j in judged if measure.who(j) and guess(j)]
+        if values:
+            found[name] = float(measure.figure(values))
+    return found
 
 
 def _limit(measure: _Measure, signals: str) -> float:
@@ -171,27 +206,36 @@ def _reaches(value: float, measure: _Measure, signals: str) -> bool | None:
     return value >= limit - 1e-9 if measure.sense == _AT_LEAST else value <= limit + 1e-9
 
 
-def _oracle(judged: Sequence[Judged]) -> list[Row]:
-    """Achieved shrink over the oracle's: the ratio of the means over visible cases that have both.
+def _achieved(judged: Sequence[Judged]) -> list[Row]:
+    """Achieved shrink beside the oracle's, and the ratio of the means, over visible cases that have both.
 
     A case without a promise achieves nothing: its model is the refitted nominal.
     """
     pairs = np.array([(j.achieved or 0.0, j.oracle) for j in judged if j.visible and j.oracle is not None])
     name, target = "achieved shrink over the oracle's", "≥ 0.97"
     if len(pairs) == 0:
-        return [Row(name, None, None, 0, target, None)]
-    value = float(pairs[:, 0].mean() / pairs[:, 1].mean())
-    picks = np.random.default_rng(0).integers(0, len(pairs), (2000, len(pairs)))
-    drawn = [pairs[p, 0].mean() / pairs[p, 1].mean() for p in picks]
-    low, high = np.quantile(drawn, (0.05, 0.95))
-    return [Row(name, value, (float(low), float(high)), len(pairs), target, value >= 0.97)]
+        return [Row("achieved shrink, mean", None, None, 0, "", None), Row(name, None, None, 0, target, None)]
+    ours, count = pairs[:, 0], len(pairs)
+    value = float(ours.mean() / pairs[:, 1].mean())
+    picks = np.random.default_rng(0).integers(0, count, (2000, count))
+    low, high = np.quantile([ours[p].mean() / pairs[p, 1].mean() for p in picks], (0.05, 0.95))
+    mean = Row(
+        "achieved shrink, mean",
+        float(ours.mean()),
+        interval(ours),
+        count,
+        "",
+        None,
+        {"oracle": float(pairs[:, 1].mean())},
+    )
+    return [mean, Row(name, value, (float(low), float(high)), count, target, value >= 0.97)]
 
 
 def _reliability(judged: Sequence[Judged]) -> list[Row]:
     """Of the first candidate of every cause, in all cases: how often it is there against how often it should
     be.
     """
-    stated = [first for j in judged for first in j.first_confidences()]
+    stated = stated_in(judged)
     found = reliability([c for c, _ in stated], [r for _, r in stated])
     if not stated:
         return [Row("confidences: calibration error", None, None, 0, "", None)]
@@ -203,12 +247,6 @@ def _reliability(judged: Sequence[Judged]) -> list[Row]:
     ]
 
 
-def table(found: Sequence[Row]) -> str:
-    """The rows as text."""
-    lines = [f"{'score':46s} {'value':>7s}  {'90 % interval':17s} {'cases':>5s}  reach"]
-    for row in found:
-        value = "–" if row.value is None else f"{row.value:.3f}"
-        spread = f"[{row.interval[0]:.3f}, {row.interval[1]:.3f}]" if row.interval else ""
-        mark = {True: "", False: "  missed", None: ""}[row.reached]
-        lines.append(f"{row.name:46s} {value:>7s}  {spread:17s} {row.cases:5d}  {row.target}{mark}")
-    return "\n".join(lines)
+def stated_in(judged: Sequence[Judged]) -> list[tuple[float, bool]]:
+    """(confidence, whether it is so) of the first candidate of every cause named in any case."""
+    return [first for j in judged for first in j.first_confidences()]

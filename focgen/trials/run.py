@@ -12,6 +12,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,12 +28,15 @@ _ONE_THREAD = {
 
 @dataclass(frozen=True)
 class Ran:
-    """What ``trial run`` did: the folder, how many cases were diagnosed now, before, and failed in all."""
+    """What ``trial run`` did: the folders, how many cases were diagnosed now and before, failed in all, and
+    were left ``waiting`` when the time was up.
+    """
 
-    folder: str
+    folders: tuple[str, ...]
     now: int
     before: int
     failed: int
+    waiting: int
 
 
 def facts_of(folder: Path) -> dict:
@@ -42,28 +47,48 @@ def facts_of(folder: Path) -> dict:
         raise InputError(str(folder), "holds no trial", "make one by `focgen trial make`") from None
 
 
-def run(folder: str | Path, *, jobs: int | None = None, limit: float = 900.0) -> Ran:
-    """Diagnose every case that has not been; ``jobs`` processes at a time (default: the cores), ``limit`` s
-    for each.
+def run(
+    *folders: str | Path, jobs: int | None = None, limit: float = 900.0, minutes: float | None = None
+) -> Ran:
+    """Diagnose every case that has not been, of several trials in turn; ``jobs`` at a time (default:
+    the cores), ``limit`` s for each; after ``minutes`` none is begun any more.
 
-    Raises InputError where the folder holds no trial.
+    Raises InputError where a folder holds no trial.
     """
-    folder = Path(folder)
-    numbers = list(facts_of(folder)["commitments"])
-    open_ones = [n for n in numbers if not (folder / "runs" / n / "outcome.json").exists()]
+    places = [Path(folder) for folder in folders]
+    cases = _in_turn([[(place, n) for n in facts_of(place)["commitments"]] for place in places])
+    waiting = [(place, n) for place, n in cases if not ran(place / "runs" / n)]
+    begun = time.monotonic()
+
+    def one(place: Path, number: str) -> bool:
+        if minutes is not None and time.monotonic() - begun > 60.0 * minutes:
+            return False
+        diagnose_case(place / "cases" / number, place / "runs" / number, limit)
+        return True
+
     with ThreadPoolExecutor(jobs or os.cpu_count() or 1) as pool:
-        waiting = [
-            pool.submit(diagnose_case, folder / "cases" / n, folder / "runs" / n, limit) for n in open_ones
-        ]
-        for _ in track(as_completed(waiting), "trial run", len(waiting)):
-            pass
-    failed = [n for n in numbers if outcome_of(folder / "runs" / n)["status"] != "done"]
+        asked = [pool.submit(one, *case) for case in waiting]
+        now = sum(job.result() for job in track(as_completed(asked), "trial run", len(asked)))
+    failed = [
+        place / "runs" / n for place, n in cases if ran(place / "runs" / n) and not _done(place / "runs" / n)
+    ]
     if failed:
-        say(
-            f"trial run: {len(failed)} failed, the first being case {failed[0]}: "
-            f"{outcome_of(folder / 'runs' / failed[0])['fault']}"
-        )
-    return Ran(str(folder), len(open_ones), len(numbers) - len(open_ones), len(failed))
+        say(f"trial run: {len(failed)} failed, the first being {failed[0]}: {outcome_of(failed[0])['fault']}")
+    return Ran(tuple(map(str, places)), now, len(cases) - len(waiting), len(failed), len(waiting) - now)
+
+
+def _in_turn(rows: Sequence[Sequence]) -> list:
+    """The first of each row, then the second of each …"""
+    return [row[i] for i in range(max(map(len, rows), default=0)) for row in rows if i < len(row)]
+
+
+def ran(folder: Path) -> bool:
+    """Whether a case has been diagnosed, successfully or not."""
+    return (folder / "outcome.json").exists()
+
+
+def _done(folder: Path) -> bool:
+    return outcome_of(folder)["status"] == "done"
 
 
 def outcome_of(folder: Path) -> dict:

@@ -1,8 +1,8 @@
 """``focgen trial score``: unseal, verify, and score every row of the table beside its target.
 
 Which cases a row counts, and what counts as right, is said by the row itself
-(:data:`focgen.trials.rows.ROWS`) and by :mod:`focgen.trials.judging`. Intervals are 90 % bootstrap intervals
-over cases. A case without a diagnosis counts as a miss in every row.
+(:data:`focgen.trials.rows.ROWS`) and by :mod:`focgen.trials.judging`. Intervals are 90 % intervals
+over cases. A case without a diagnosis counts as a miss in every row; one not yet run may be left out.
 """
 
 from __future__ import annotations
@@ -17,16 +17,19 @@ from focgen.output import write_file
 from focgen.progress import say, track
 from focgen.trials import achieved, baselines
 from focgen.trials.judging import Judged, judge
-from focgen.trials.rows import Row, rows
-from focgen.trials.run import diagnose_case, facts_of, outcome_of
+from focgen.trials.rows import Row, rows, stated_in
+from focgen.trials.run import diagnose_case, facts_of, outcome_of, ran
 from focgen.trials.sealing import unseal
 from focgen.trials.worker import oracle_possible
 
 
 @dataclass(frozen=True)
 class Scores:
-    """The table: ``rows`` with figures, intervals and targets; ``confusions`` truth → called → count (visible
-    singles).
+    """The table of one trial: ``rows`` with figures, intervals and targets.
+
+    ``cases`` were scored, ``failed`` of them without a diagnosis; ``waiting`` were left out.
+    ``confusions`` truth → called → count (visible singles); ``stated``: (confidence, whether it is so) of the
+    first candidate of every cause.
     """
 
     folder: str
@@ -35,8 +38,10 @@ class Scores:
     seed: int
     cases: int
     failed: int
+    waiting: int
     rows: tuple[Row, ...]
     confusions: dict[str, dict[str, int]]
+    stated: tuple[tuple[float, bool], ...]
 
     @property
     def reached(self) -> bool:
@@ -44,16 +49,39 @@ class Scores:
         return all(row.reached is not False for row in self.rows)
 
 
-def score(folder: str | Path, *, oracle: bool = False, baseline: bool = True, jobs: int = 1) -> Scores:
-    """Score a trial that has been run; ``oracle``: also diagnose the singles and pairs knowing the effect.
+@dataclass(frozen=True)
+class Summary:
+    """The scores of several trials, in the order they were given."""
 
-    Writes DIR/scores.json. Raises InputError where a label, a case or an unseen log is not what was committed
-    to.
+    sets: tuple[Scores, ...]
+
+    @property
+    def reached(self) -> bool:
+        """Whether every set reaches all its targets."""
+        return all(scores.reached for scores in self.sets)
+
+
+def score(
+    *folders: str | Path, oracle: bool = False, baseline: bool = True, partial: bool = False, jobs: int = 1
+) -> Summary:
+    """Score trials that have been run.
+
+    ``oracle``: also diagnose the singles and pairs knowing the effects; ``baseline``: also ask the residual
+    correlation; ``partial``: leave cases out that have not been diagnosed yet, instead of counting them as
+    misses; ``jobs``: processes.
+
+    Writes scores.json into each folder. Raises InputError where a label, a case or an unseen log is not what
+    was committed to.
     """
-    folder = Path(folder)
+    return Summary(tuple(_scored(Path(folder), oracle, baseline, partial, jobs) for folder in folders))
+
+
+def _scored(folder: Path, oracle: bool, baseline: bool, partial: bool, jobs: int) -> Scores:
     facts = facts_of(folder)
     labels = {
-        number: _unsealed(folder, number, committed) for number, committed in facts["commitments"].items()
+        number: _unsealed(folder, number, committed)
+        for number, committed in facts["commitments"].items()
+        if not partial or ran(folder / "runs" / number)
     }
     if oracle:
         _ask_oracle(folder, labels, jobs)
@@ -67,8 +95,10 @@ def score(folder: str | Path, *, oracle: bool = False, baseline: bool = True, jo
         facts["seed"],
         len(judged),
         sum(j.verdict == "failed" for j in judged),
+        len(facts["commitments"]) - len(judged),
         rows(judged, facts["signals"]),
         confusions(judged),
+        tuple(stated_in(judged)),
     )
     content = {"scores": asdict(scores), "cases": [asdict(j) for j in judged]}
     write_file(folder / "scores.json", json.dumps(content, indent=1) + "\n")

@@ -5,19 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.special import betaincinv
 
 
 def interval(
     values: Sequence[float], figure: Callable = np.mean, draws: int = 2000, seed: int = 0
 ) -> tuple[float, float]:
-    """90 % percentile bootstrap interval of ``figure`` of the values; NaN where there are none."""
+    """90 % interval of ``figure`` of the values; NaN where there are none.
+
+    Jeffreys' interval for a share of hits, which has a width even where all hit or none does (L. D. Brown,
+    T. T. Cai and A. DasGupta, Statistical Science 16, 2001); the percentile bootstrap for any other figure.
+    """
     values = np.asarray(values, float)
     if len(values) == 0:
         return float("nan"), float("nan")
+    if figure is np.mean and np.all((values == 0.0) | (values == 1.0)):
+        return _jeffreys(int(values.sum()), len(values))
     rng = np.random.default_rng(seed)
     picks = rng.integers(0, len(values), (draws, len(values)))
     low, high = np.quantile([figure(values[p]) for p in picks], (0.05, 0.95))
     return float(low), float(high)
+
+
+def _jeffreys(hits: int, count: int) -> tuple[float, float]:
+    low, high = betaincinv(hits + 0.5, count - hits + 0.5, (0.05, 0.95))
+    return 0.0 if hits == 0 else float(low), 1.0 if hits == count else float(high)
 
 
 def calibration_error(confidence: np.ndarray, right: np.ndarray, bins: int = 10) -> float:
@@ -41,3 +53,18 @@ def reliability(confidence: Sequence[float], right: Sequence[bool], draws: int =
     drawn = np.array([calibration_error(c, (rng.random(len(c)) < c).astype(float)) for _ in range(draws)])
     p = (1.0 + np.sum(drawn >= error - 1e-12)) / (1.0 + draws)
     return {"error": error, "perfect": float(drawn.mean()), "p": float(p), "cases": len(c)}
+
+
+def reliability_bins(
+    confidence: Sequence[float], right: Sequence[bool], bins: int = 10
+) -> list[tuple[float, float, float, float, int]]:
+    """(mean confidence, hit rate, 5 % and 95 % quantile under perfect calibration, cases) of bins of equal
+    count, in rising confidence."""
+    c, r = np.clip(np.asarray(confidence, float), 0.0, 1.0), np.asarray(right, float)
+    order, rng = np.argsort(c, kind="stable"), np.random.default_rng(0)
+    found = []
+    for g in np.array_split(order, max(1, min(bins, len(order)))):
+        drawn = (rng.random((4000, len(g))) < c[g]).mean(axis=1)
+        low, high = np.quantile(drawn, (0.05, 0.95))
+        found.append((float(c[g].mean()), float(r[g].mean()), float(low), float(high), len(g)))
+    return found

@@ -16,6 +16,11 @@ VOCABULARY: dict[str, tuple[str, tuple[Form, ...]]] = {
 }
 
 
+def stage_of(effect: str) -> str | None:
+    """The stage of an effect of the vocabulary; None of any other name."""
+    return VOCABULARY[effect][0] if effect in VOCABULARY else None
+
+
 def draw_form(effect: str, rng: np.random.Generator, spans: Spans, name: str | None = None) -> Drawn:
     """One of the effect's forms, ``name`` or at random, all but its amplitude fixed."""
     stage, forms = VOCABULARY.get(effect) or OUTSIDE[effect]
