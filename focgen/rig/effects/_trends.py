@@ -1,6 +1,7 @@
 """Slow functions of the session's time, shared by the families that drift."""
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from focgen.rig.effects._effect import Form, Parameter
 
@@ -20,6 +21,12 @@ def _bending(x, values, run):
     return t * (first + second * t)
 
 
+def _wandering(x, values, run):
+    *sizes, spacing = values
+    knots = spacing * np.arange(len(sizes) + 1)
+    return CubicSpline(knots, [0.0, *sizes], bc_type="natural")(np.minimum(run.clock, knots[-1]))
+
+
 def forms(slot, level, onto):
     """The forms of a trend; ``onto(x, trend)`` applies it, ``level`` is the power of the level in its unit."""
     def act(trend):
@@ -36,4 +43,8 @@ def forms(slot, level, onto):
             Parameter("rate", time=-1, starts=(0.1,), **size),
             Parameter("acceleration", time=-2, starts=(0.05,), **size),
         ), act(_bending)),
+        Form("wandering", slot, (  # a spline through values at equal times, the last one kept
+            *(Parameter(name, starts=(0.01,), **size) for name in ("first", "second", "third", "fourth")),
+            Parameter("spacing", time=1, clock="session", lower=0.2, upper=0.5, starts=(0.25,), log=True),
+        ), act(_wandering)),
     ]
