@@ -34,12 +34,17 @@ class Own:
         return np.zeros(0)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds of the vector."""
+        """Lower and upper bounds of the vector.
+
+        A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead zone.
+        """
         start = self.start()
         low, high = start - 50.0, start + 50.0
         if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
             low[0], high[0] = start[0] - 5.0, start[0] + 5.0
             low[1], high[1] = 0.08, 1.9
+            if start[2] > 0.0:
+                low[2] = 0.0
         elif self.stage is not None:
             count = len(self._logs(self._transfer_of()))
             low[:count], high[:count] = start[:count] - 8.0, start[:count] + 8.0
