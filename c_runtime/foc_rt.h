@@ -80,6 +80,37 @@ static inline int32_t foc_sat32(int64_t x)
     return (int32_t)foc_clamp64(x, INT32_MIN, INT32_MAX);
 }
 
+/* --- Usable numbers ------------------------------------------------------------------------------- */
+
+/* 1 where a controller can compute with x: |x| < 2^48, which neither NaN nor infinity is. Asked of the
+   bits, which grow with |x|: a comparison of floating values is what -ffast-math may take for granted. */
+static inline uint8_t foc_usable_f32(float x)
+{
+    union {
+        float value;
+        uint32_t bits;
+    } view;
+
+    view.value = x;
+    return (uint8_t)((view.bits & 0x7fffffffu) < 0x57800000u);
+}
+
+/* The same for |x| < 2^512. Where double has 32 bits, as it may on an AVR, it is a float. */
+static inline uint8_t foc_usable_f64(double x)
+{
+#if defined(__SIZEOF_DOUBLE__) && __SIZEOF_DOUBLE__ == 4
+    return foc_usable_f32((float)x);
+#else
+    union {
+        double value;
+        uint64_t bits;
+    } view;
+
+    view.value = x;
+    return (uint8_t)((view.bits & 0x7fffffffffffffffu) < 0x5ff0000000000000u);
+#endif
+}
+
 /* --- Rounding shifts ------------------------------------------------------------------------------ */
 
 /* x / 2^n, rounded to the nearest count, halves up. 0 <= n <= 30; x + 2^(n-1) fits the type (proved). */

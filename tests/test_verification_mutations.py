@@ -76,7 +76,22 @@ EITHER = (
     Fault("an output limit moved", "@.h", r"(@_U_MAX +)(\d[\d.]*)", r"\g<1>1 + \2"),
 )
 
+FLOAT = ("f32",)
+UNUSABLE = (
+    Fault("a bad reference gets in", "@.c", r"if \(!foc_usable_f32\(ref\) \|\| ", "if (", FLOAT),
+    Fault("a bad measurement gets in", "@.c", r" \|\| !foc_usable_f32\(meas\)", "", FLOAT),
+    Fault("only NaN is refused", "foc_rt.h", r"0x57800000u", "0x7f800001u", FLOAT),
+    Fault("the largest usable input is refused", "foc_rt.h", r"< 0x57800000u", "< 0x577fffffu", FLOAT),
+    Fault("negative inputs are refused", "foc_rt.h", r"bits & 0x7fffffffu", "bits & 0xffffffffu", FLOAT),
+    Fault("flag of a step left out lost", "@.c", r"@_FLAG_INVALID \| @_ends", "0u | @_ends", FLOAT),
+    Fault("ends of a held output lost", "@.c", r"@_FLAG_INVALID \| @_ends\(u\)", "@_FLAG_INVALID", FLOAT),
+    Fault("reset takes a bad error", "@.c", r"known \? (ref - meas) : 0\.0f", r"\1", FLOAT),
+)
+
 PAPER = (
+    Fault("a bad schedule gets in", "@.c", r" \|\| !foc_usable_f32\(sched\)", "", FLOAT),
+    Fault("bad u0 leaves what was there", "@.c", r"    s->integral = .*u0 cannot be used \*/\n", "", FLOAT),
+    Fault("a bad track gets in", "@.c", r"!foc_usable_f32\(u_applied\)", "0", FLOAT),
     Fault("increment counted twice", "@.c", r"\(d \+ s->increment\)", "(d + d)"),
     Fault(
         "integral's clamp lost",
@@ -102,8 +117,8 @@ PAPER = (
     Fault(
         "track ignored",
         "@.c",
-        r"(_track\(@_state \*s, @_sig u_applied\)\n\{\n).*",
-        r"\1    (void)s, (void)u_applied;",
+        r"s->integral = .*foc_clamp\w+\(u_applied, .*;",
+        r"(void)u_applied;",
     ),
     Fault("track not limited", "@.c", r"foc_clamp\w+\(u_applied, @_U_MIN, @_U_MAX\)", "u_applied"),
     Fault("reset ignores u0", "@.c", r"@_track\(s, u0\);", "(void)u0;"),
@@ -113,6 +128,8 @@ PAPER = (
 )
 
 FILTER = (
+    Fault("output is not kept", "@.c", r"s->output = u;", "(void)u;", FLOAT),
+    Fault("output survives a reset", "@.c", r"s->output = 0\.0f;", "(void)e;", FLOAT),
     Fault("carry forgotten", "@.c", r"s->carry = x - .*;", "s->carry = 0;", FIXED),
     Fault("reset keeps the carry", "@.c", r"    s->carry = 0;\n", "", FIXED),
     Fault("recursion left out", "@.c", r"(-=? )@_denominator_sum\(s\)", r"\g<1>0 * @_denominator_sum(s)"),
@@ -171,7 +188,7 @@ def rewrite(folder: Path, change) -> None:
 
 def cases():
     for name, special in (("spba", PAPER), ("filter", FILTER)):
-        for fault in EITHER + special:
+        for fault in EITHER + UNUSABLE + special:
             for arithmetic in fault.where:
                 yield pytest.param(name, arithmetic, fault, id=f"{name}-{arithmetic}-{fault}")
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import focgen
 from focgen.codegen.formulas import transfer_text
+from focgen.codegen.guard import unusable_text
 from focgen.codegen.literals import comment, quantity
 from focgen.codegen.manifest import sizes
 from focgen.plan.canonical import memory_bias
@@ -34,6 +35,7 @@ class ReadmeContext:
     version: str
     arithmetic: str
     fixed: bool
+    unusable: str
     ctype: str
     transfer: str
     sample_time: str
@@ -63,6 +65,7 @@ def readme_context(plan: Plan, title: str) -> ReadmeContext:
         version=focgen.__version__,
         arithmetic=plan.arithmetic,
         fixed=not plan.floating,
+        unusable=unusable_text(plan) if plan.floating else "",
         ctype=plan.output.ctype,
         transfer=transfer_text(plan),
         sample_time=f"{plan.sample_time:g}",

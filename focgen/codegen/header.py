@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import focgen
 from focgen.codegen.formulas import transfer_text
+from focgen.codegen.guard import unusable_text
 from focgen.codegen.literals import comment, constant, literal, power_of_two, quantity
 from focgen.codegen.state import Member, members, state_bytes
 from focgen.plan.model import Format, Plan
@@ -31,6 +32,7 @@ class HeaderContext:
     sha256: str
     transfer: str
     fixed: bool
+    unusable: str
     signal: str
     sample_time: Define
     scales: list[Define]
@@ -52,6 +54,7 @@ def header_context(plan: Plan, title: str, sha256: str) -> HeaderContext:
         sha256=sha256,
         transfer=comment(transfer_text(plan)),
         fixed=not plan.floating,
+        unusable=unusable_text(plan) if plan.floating else "",
         signal=plan.output.ctype,
         sample_time=Define("SAMPLE_TIME", _sample_time(plan), "s: call step this often"),
         scales=_scales(plan),

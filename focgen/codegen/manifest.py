@@ -9,7 +9,18 @@ from typing import Any
 import focgen
 from focgen.codegen.state import size_of, state_bytes
 from focgen.plan.canonical import memory_bias
-from focgen.plan.model import ErrorBound, Plan, Proof, Sum
+from focgen.plan.model import (
+    FLAG_HIGH,
+    FLAG_INPUT,
+    FLAG_INVALID,
+    FLAG_LOW,
+    FLAG_SCHEDULE,
+    ErrorBound,
+    Plan,
+    Proof,
+    Sum,
+)
+from focgen.plan.usable import EXPONENT
 
 
 def sha256(data: str | bytes) -> str:
@@ -28,6 +39,8 @@ def manifest_of(plan: Plan, inputs: dict[str, str]) -> dict[str, Any]:
         "sample_time": plan.sample_time,
         **lsbs(plan),
         "ranges": _ranges(plan),
+        "flags": flags(plan),
+        **({"usable_below": 2.0 ** EXPONENT[plan.output.ctype]} if plan.floating else {}),
         "proofs": [proof_entry(proof) for proof in plan.proofs],
         "error_bound": bound_entry(plan.error_bound),
         "memory_bias": _bias(plan),
@@ -42,6 +55,14 @@ def lsbs(plan: Plan) -> dict[str, float]:
     if plan.schedule:
         found["SCHED_LSB"] = plan.schedule.signal.lsb
     return found
+
+
+def flags(plan: Plan) -> dict[str, int]:
+    """The bits that NAME_flags can show, under the names the header gives them after FLAG_."""
+    found = {"HIGH": FLAG_HIGH, "LOW": FLAG_LOW}
+    if plan.schedule:
+        found["SCHEDULE"] = FLAG_SCHEDULE
+    return {**found, **({"INVALID": FLAG_INVALID} if plan.floating else {"INPUT": FLAG_INPUT})}
 
 
 def _ranges(plan: Plan) -> dict[str, list[float]]:

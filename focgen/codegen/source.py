@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import focgen
 from focgen.codegen.expressions import CLAMP, LONGEST_SHIFT, bound, converted, saturated, scaled_up, shifted
 from focgen.codegen.formulas import step_formulas, transfer_text, weights_about
+from focgen.codegen.guard import GuardText, guard_text
 from focgen.codegen.literals import comment, constant, literal, quantity, scale
 from focgen.codegen.state import carries, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
@@ -96,6 +97,7 @@ class SourceContext:
     increment_about: str
     product: str
     integral: IntegralText | None
+    guard: GuardText | None
     output: str
 
 
@@ -131,6 +133,7 @@ def source_context(plan: Plan, title: str, sha256: str) -> SourceContext:
         increment_about=_increment_about(plan),
         product=_product(plan),
         integral=_integral(plan),
+        guard=guard_text(plan),
         output=_output(plan),
     )
 

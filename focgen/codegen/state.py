@@ -89,7 +89,8 @@ def _integral(plan: Plan) -> list[Member]:
 
 
 def _bytes(plan: Plan) -> list[Member]:
-    found = [Member("uint8_t", "flags", f"{plan.name}_FLAG_...")]
+    found = [Member(plan.output.ctype, "output", "what the latest step has returned")] if holds(plan) else []
+    found += [Member("uint8_t", "flags", f"{plan.name}_FLAG_...")]
     if starts(plan):
         found.append(Member("uint8_t", "starting", "1 from reset to the first step"))
     return found
@@ -98,6 +99,11 @@ def _bytes(plan: Plan) -> list[Member]:
 def carries(plan: Plan) -> bool:
     """Whether the recursion's rounding leaves anything to carry."""
     return plan.feedback is not None and not plan.floating and plan.narrow > 0
+
+
+def holds(plan: Plan) -> bool:
+    """Whether the output must be kept for steps that are left out; with an integral it is that."""
+    return plan.floating and plan.integrator is None
 
 
 def starts(plan: Plan) -> bool:

@@ -14,6 +14,7 @@ from focgen.plan.formats import WORDS
 from focgen.plan.model import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
 from focgen.plan.stability import check_stable
+from focgen.plan.usable import check_room
 
 _LONGEST = 1_000_000
 
@@ -34,6 +35,7 @@ def build_plan(
     draft = _fixed if arithmetic in WORDS else _floating
     plan = draft(controller, arithmetic, length, name or controller.name, folded)
     _check_at_rest(plan, folded)
+    check_room(plan)
     plan = replace(plan, proofs=prove(plan))
     return replace(plan, error_bound=error_bound(plan, folded))
 

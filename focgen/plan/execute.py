@@ -15,11 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_LOW, FLAG_SCHEDULE, Format, Plan, Schedule, Sum
-from focgen.plan.scenario import Scenario, Trace
+from focgen.plan.scenario import Reset, Scenario, Trace
+from focgen.plan.usable import holding, invalid_samples, usable
 
 
 def execute(plan: Plan, scenario: Scenario) -> Trace:
     """Run a plan on raw inputs; returns raw u and d and the flags, shape (lanes, samples)."""
+    invalid = invalid_samples(plan, scenario)
+    return holding(plan, scenario, invalid, _executed) if invalid.any() else _executed(plan, scenario)
+
+
+def _executed(plan: Plan, scenario: Scenario) -> Trace:
+    """The same where every input of every step can be used."""
     run = _Run(plan, scenario)
     run.sums()
     run.recursion()
@@ -84,14 +91,22 @@ class _Run:
         lanes, samples = self.shape
         starts = {(lane, 0): (self.kind(0), self.kind(0)) for lane in range(lanes)}
         for r in self.scenario.resets:
-            e = self._input(r.ref, self.plan.reference) - self._input(r.meas, self.plan.measurement)
-            starts[r.lane, r.sample] = (self.kind(e), self.kind(r.u0))
+            starts[r.lane, r.sample] = self._start(r)
         order, found = sorted(starts), []
         for (lane, start), after in zip(order, order[1:] + [(-1, 0)]):
             constant, u0 = starts[lane, start]
             stop = after[1] if after[0] == lane else samples
             found.append(_Segment(lane, start, stop, constant, _clamp(u0, self.plan.output)))
         return found
+
+    def _start(self, reset: Reset) -> tuple[np.generic, np.generic]:
+        """The error and the output that a reset starts from; 0 for what cannot be used."""
+        plan, e, u0 = self.plan, 0, 0
+        if usable(reset.ref, plan.reference) and usable(reset.meas, plan.measurement):
+            e = self._input(reset.ref, plan.reference) - self._input(reset.meas, plan.measurement)
+        if usable(reset.u0, plan.output):
+            u0 = reset.u0
+        return self.kind(e), self.kind(u0)
 
     # ------------------------------------------------------------------------------- sums over the error
 
@@ -219,7 +234,8 @@ class _Run:
         total, before = np.zeros(lanes, self.kind), np.zeros(lanes, self.kind)
         tracks: dict[int, list] = {}
         for t in self.scenario.tracks:
-            tracks.setdefault(t.sample, []).append(t)
+            if usable(t.u, plan.output):
+                tracks.setdefault(t.sample, []).append(t)
         for k in range(self.shape[1]):
             for lane in self.starting.get(k, ()):
                 total[lane] = self._wide(self.starts[lane, k].u0)

@@ -32,7 +32,8 @@ Without an integrator u0 is not looked at and track does nothing.
 
 Flags describe the latest step (0 after init and reset; track leaves them): bit 0: u is at its high limit; bit
 1: u is at its low limit; bit 2: the (clamped) schedule is below the first or above the last breakpoint; bit
-3: an input of the step was outside its range and has been clamped (fixed point only).
+3: an input of the step was outside its range and has been clamped (fixed point only); bit 4: an argument
+could not be used (floating point only, below).
 
 Fixed point
 -----------
@@ -65,6 +66,17 @@ Floating point
 The same structure with one block per sum, lsb 1.0 and no shifts: acc = 0; acc = acc + w·x, from the oldest
 sample to the newest, sample k last. Each operation is rounded to the type, none is contracted; brackets are
 as written above. g = gains[i] + slopes[i]·(s − breakpoints[i]).
+
+An argument is usable where its magnitude is below 2^48 (float) or 2^512 (double); NaN and infinity are not
+(:mod:`focgen.plan.usable`). No other ever enters the state:
+
+- A step whose reference, measurement or schedule is not usable is left out: it changes nothing but the flags
+  (bit 4, and bits 0 and 1 of the output it returns) and returns the output that stands. That is I with an
+  integrator, so also what a reset or a track has left there; without one the output of the latest step that
+  was not left out, or 0, clamped, where there has been none since init or reset. The next step whose inputs
+  are usable follows the latest such one as if there had been nothing in between.
+- A reset takes e = 0 where ref or meas is not usable, and u0 = 0 where u0 is not; the flags are bit 4 then.
+- A track of what is not usable raises bit 4 and does nothing else.
 """
 
 from __future__ import annotations
@@ -76,7 +88,7 @@ from focgen.control.controller import Controller
 
 Count = int | float
 
-FLAG_HIGH, FLAG_LOW, FLAG_SCHEDULE, FLAG_INPUT = 1, 2, 4, 8
+FLAG_HIGH, FLAG_LOW, FLAG_SCHEDULE, FLAG_INPUT, FLAG_INVALID = 1, 2, 4, 8, 16
 
 
 @dataclass(frozen=True)

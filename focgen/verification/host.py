@@ -37,6 +37,7 @@ class DriverContext:
     increment: str
     scheduled: bool
     integral: bool
+    held: str
     scales: tuple[str, ...]
 
 
@@ -47,9 +48,9 @@ def driver(plan: Plan) -> str:
         plan.integrator is not None,
         tuple(header_scales(plan)),
     )
-    return render(
-        "driver.c.jinja", DriverContext(plan.name, plan.increment.ctype, scheduled, integral, scales)
-    )
+    held = f"({plan.name}_flags(&state) & {plan.name}_FLAG_INVALID) ? 0 : " if plan.floating else ""
+    context = DriverContext(plan.name, plan.increment.ctype, scheduled, integral, held, scales)
+    return render("driver.c.jinja", context)
 
 
 def header_scales(plan: Plan) -> dict[str, float]:

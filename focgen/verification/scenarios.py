@@ -10,6 +10,7 @@ from focgen.control.controller import Controller
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Reset, Scenario, Track, to_raw
 from focgen.plan.worst import worst_case_input
+from focgen.verification.unusable import strewn
 
 LANES = 8
 _BEYOND = 0.15  # of a range: how far lanes that leave their ranges go beyond them
@@ -121,6 +122,8 @@ def raw_scenarios(plan: Plan, samples: int, seed: int) -> dict[str, Scenario]:
         "beyond the ranges": to_raw(plan, outside),
         "worst cases": worst_cases(plan),
     }
+    if plan.floating:
+        found["unusable inputs"] = strewn(plan, found["beyond the ranges"], seed)
     return {**found, "breakpoints": at_breakpoints(plan)} if plan.schedule else found
 
 

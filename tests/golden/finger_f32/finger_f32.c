@@ -130,6 +130,20 @@ static float finger_f32_increment(float gain, float v)
     return gain * v;
 }
 
+/* The flags of an output at its ends. */
+static uint8_t finger_f32_ends(float u)
+{
+    unsigned flags = 0;
+
+    if (u >= finger_f32_U_MAX) {
+        flags |= finger_f32_FLAG_HIGH;
+    }
+    if (u <= finger_f32_U_MIN) {
+        flags |= finger_f32_FLAG_LOW;
+    }
+    return (uint8_t)flags;
+}
+
 /* As if the error had been e for ever. */
 static void finger_f32_settle(finger_f32_state *s, float e)
 {
@@ -152,6 +166,15 @@ static void finger_f32_settle(finger_f32_state *s, float e)
     s->flags = 0;
 }
 
+/* An input of the step cannot be used: the output stays, and so does everything else. */
+static finger_f32_sig finger_f32_hold(finger_f32_state *s)
+{
+    const float u = s->integral;
+
+    s->flags = (uint8_t)(finger_f32_FLAG_INVALID | finger_f32_ends(u));
+    return u;
+}
+
 void finger_f32_init(finger_f32_state *s)
 {
     finger_f32_settle(s, 0.0f);
@@ -160,13 +183,23 @@ void finger_f32_init(finger_f32_state *s)
 
 void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas, finger_f32_sig u0)
 {
-    finger_f32_settle(s, ref - meas);
+    const int known = foc_usable_f32(ref) && foc_usable_f32(meas);
+
+    finger_f32_settle(s, known ? ref - meas : 0.0f);
+    s->integral = 0.0f; /* where u0 cannot be used */
     finger_f32_track(s, u0);
+    if (!known) {
+        s->flags = finger_f32_FLAG_INVALID;
+    }
 }
 
 finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas,
                                finger_f32_sig sched)
 {
+    if (!foc_usable_f32(ref) || !foc_usable_f32(meas) || !foc_usable_f32(sched)) {
+        return finger_f32_hold(s);
+    }
+
     const float gain = foc_schedule_f32(sched, finger_f32_points, finger_f32_gains, finger_f32_slopes,
                                         3);
     const float v = finger_f32_filter(s, ref - meas);
@@ -185,18 +218,16 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
     if (sched < finger_f32_points[0] || sched > finger_f32_points[2]) {
         flags |= finger_f32_FLAG_SCHEDULE;
     }
-    if (u >= finger_f32_U_MAX) {
-        flags |= finger_f32_FLAG_HIGH;
-    }
-    if (u <= finger_f32_U_MIN) {
-        flags |= finger_f32_FLAG_LOW;
-    }
-    s->flags = (uint8_t)flags;
+    s->flags = (uint8_t)(flags | finger_f32_ends(u));
     return u;
 }
 
 void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied)
 {
+    if (!foc_usable_f32(u_applied)) {
+        s->flags = (uint8_t)(s->flags | finger_f32_FLAG_INVALID);
+        return;
+    }
     s->integral = foc_clamp_f32(u_applied, finger_f32_U_MIN, finger_f32_U_MAX);
 }
 

@@ -131,6 +131,20 @@ static double finger_f64_increment(double gain, double v)
     return gain * v;
 }
 
+/* The flags of an output at its ends. */
+static uint8_t finger_f64_ends(double u)
+{
+    unsigned flags = 0;
+
+    if (u >= finger_f64_U_MAX) {
+        flags |= finger_f64_FLAG_HIGH;
+    }
+    if (u <= finger_f64_U_MIN) {
+        flags |= finger_f64_FLAG_LOW;
+    }
+    return (uint8_t)flags;
+}
+
 /* As if the error had been e for ever. */
 static void finger_f64_settle(finger_f64_state *s, double e)
 {
@@ -153,6 +167,15 @@ static void finger_f64_settle(finger_f64_state *s, double e)
     s->flags = 0;
 }
 
+/* An input of the step cannot be used: the output stays, and so does everything else. */
+static finger_f64_sig finger_f64_hold(finger_f64_state *s)
+{
+    const double u = s->integral;
+
+    s->flags = (uint8_t)(finger_f64_FLAG_INVALID | finger_f64_ends(u));
+    return u;
+}
+
 void finger_f64_init(finger_f64_state *s)
 {
     finger_f64_settle(s, 0.0);
@@ -161,13 +184,23 @@ void finger_f64_init(finger_f64_state *s)
 
 void finger_f64_reset(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig meas, finger_f64_sig u0)
 {
-    finger_f64_settle(s, ref - meas);
+    const int known = foc_usable_f64(ref) && foc_usable_f64(meas);
+
+    finger_f64_settle(s, known ? ref - meas : 0.0);
+    s->integral = 0.0; /* where u0 cannot be used */
     finger_f64_track(s, u0);
+    if (!known) {
+        s->flags = finger_f64_FLAG_INVALID;
+    }
 }
 
 finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig meas,
                                finger_f64_sig sched)
 {
+    if (!foc_usable_f64(ref) || !foc_usable_f64(meas) || !foc_usable_f64(sched)) {
+        return finger_f64_hold(s);
+    }
+
     const double gain = foc_schedule_f64(sched, finger_f64_points, finger_f64_gains, finger_f64_slopes,
                                          3);
     const double v = finger_f64_filter(s, ref - meas);
@@ -186,18 +219,16 @@ finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f
     if (sched < finger_f64_points[0] || sched > finger_f64_points[2]) {
         flags |= finger_f64_FLAG_SCHEDULE;
     }
-    if (u >= finger_f64_U_MAX) {
-        flags |= finger_f64_FLAG_HIGH;
-    }
-    if (u <= finger_f64_U_MIN) {
-        flags |= finger_f64_FLAG_LOW;
-    }
-    s->flags = (uint8_t)flags;
+    s->flags = (uint8_t)(flags | finger_f64_ends(u));
     return u;
 }
 
 void finger_f64_track(finger_f64_state *s, finger_f64_sig u_applied)
 {
+    if (!foc_usable_f64(u_applied)) {
+        s->flags = (uint8_t)(s->flags | finger_f64_FLAG_INVALID);
+        return;
+    }
     s->integral = foc_clamp_f64(u_applied, finger_f64_U_MIN, finger_f64_U_MAX);
 }
 

@@ -34,6 +34,7 @@ typedef double finger_f64_sig;
 #define finger_f64_FLAG_HIGH     1u /* the output is at its upper end */
 #define finger_f64_FLAG_LOW      2u /* the output is at its lower end */
 #define finger_f64_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
+#define finger_f64_FLAG_INVALID  16u /* an input was NaN, infinite or beyond 2^512: the step was left out */
 
 #define finger_f64_ERRORS   41 /* the present error and those before it */
 #define finger_f64_FILTERED 41 /* the same of the filtered error */
@@ -61,7 +62,9 @@ void finger_f64_init(finger_f64_state *s);
 /* Start without a bump: the error has been ref - meas for ever, and the output is at u0. */
 void finger_f64_reset(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig meas, finger_f64_sig u0);
 
-/* One sample: reference, measurement and scheduling signal in, the output back. */
+/* One sample: reference, measurement and scheduling signal in, the output back.
+   An input that is NaN, infinite or beyond 2^512 holds the output and leaves the step out: the next good
+   sample goes on as if there had been nothing in between. */
 finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig meas,
                                finger_f64_sig sched);
 
@@ -69,7 +72,7 @@ finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f
    step. */
 void finger_f64_track(finger_f64_state *s, finger_f64_sig u_applied);
 
-/* finger_f64_FLAG_... of the latest step, 0 after init and reset. */
+/* finger_f64_FLAG_... of the latest step, 0 after init and reset (to usable values). */
 uint8_t finger_f64_flags(const finger_f64_state *s);
 
 #ifdef __cplusplus

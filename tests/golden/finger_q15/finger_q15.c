@@ -194,6 +194,20 @@ static int32_t finger_q15_increment(int16_t gain, int16_t v)
     return (int32_t)gain * v;
 }
 
+/* The flags of an output at its ends. */
+static uint8_t finger_q15_ends(int16_t u)
+{
+    unsigned flags = 0;
+
+    if (u >= finger_q15_U_MAX) {
+        flags |= finger_q15_FLAG_HIGH;
+    }
+    if (u <= finger_q15_U_MIN) {
+        flags |= finger_q15_FLAG_LOW;
+    }
+    return (uint8_t)flags;
+}
+
 /* As if the error had been e for ever. */
 static void finger_q15_settle(finger_q15_state *s, int16_t e)
 {
@@ -260,13 +274,7 @@ finger_q15_sig finger_q15_step(finger_q15_state *s, finger_q15_sig ref, finger_q
     if (at < finger_q15_points[0] || at > finger_q15_points[2]) {
         flags |= finger_q15_FLAG_SCHEDULE;
     }
-    if (u >= finger_q15_U_MAX) {
-        flags |= finger_q15_FLAG_HIGH;
-    }
-    if (u <= finger_q15_U_MIN) {
-        flags |= finger_q15_FLAG_LOW;
-    }
-    s->flags = (uint8_t)flags;
+    s->flags = (uint8_t)(flags | finger_q15_ends(u));
     return u;
 }
 

@@ -195,6 +195,20 @@ static int64_t finger_q31_increment(int32_t gain, int32_t v)
     return (int64_t)gain * v;
 }
 
+/* The flags of an output at its ends. */
+static uint8_t finger_q31_ends(int32_t u)
+{
+    unsigned flags = 0;
+
+    if (u >= finger_q31_U_MAX) {
+        flags |= finger_q31_FLAG_HIGH;
+    }
+    if (u <= finger_q31_U_MIN) {
+        flags |= finger_q31_FLAG_LOW;
+    }
+    return (uint8_t)flags;
+}
+
 /* As if the error had been e for ever. */
 static void finger_q31_settle(finger_q31_state *s, int32_t e)
 {
@@ -261,13 +275,7 @@ finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q
     if (at < finger_q31_points[0] || at > finger_q31_points[2]) {
         flags |= finger_q31_FLAG_SCHEDULE;
     }
-    if (u >= finger_q31_U_MAX) {
-        flags |= finger_q31_FLAG_HIGH;
-    }
-    if (u <= finger_q31_U_MIN) {
-        flags |= finger_q31_FLAG_LOW;
-    }
-    s->flags = (uint8_t)flags;
+    s->flags = (uint8_t)(flags | finger_q31_ends(u));
     return u;
 }
 

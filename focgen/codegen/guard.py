@@ -1,0 +1,42 @@
+"""Floating inputs that cannot be computed with, in C: what is asked of them, and what stands instead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from focgen.codegen.literals import literal
+from focgen.plan.model import Plan
+from focgen.plan.usable import EXPONENT
+
+
+@dataclass(frozen=True)
+class GuardText:
+    """Conditions on the arguments of reset, step and track; ``held``: the output that stands; ``start``: the
+    one before any step.
+    """
+
+    error_usable: str
+    step_unusable: str
+    track_usable: str
+    held: str
+    start: str
+
+
+def guard_text(plan: Plan) -> GuardText | None:
+    """The guard of a floating plan; None where every input can be used."""
+    if not plan.floating:
+        return None
+    ask = f"foc_usable_{plan.arithmetic}"
+    inputs = ["ref", "meas", *(["sched"] if plan.schedule else [])]
+    return GuardText(
+        error_usable=f"{ask}(ref) && {ask}(meas)",
+        step_unusable=" || ".join(f"!{ask}({name})" for name in inputs),
+        track_usable=f"{ask}(u_applied)",
+        held="s->integral" if plan.integrator else "s->output",
+        start=literal(min(max(0.0, plan.output.low), plan.output.high), plan.output.ctype),
+    )
+
+
+def unusable_text(plan: Plan) -> str:
+    """Which inputs a floating plan leaves out."""
+    return f"NaN, infinite or beyond 2^{EXPONENT[plan.output.ctype]}"

@@ -1,0 +1,146 @@
+"""Floating inputs that can be computed with, and what becomes of a run in which some cannot.
+
+NaN and infinity would poison a history for as long as its memory lasts, and an absurdly large input would
+become infinite on its way. An input is usable where its magnitude is below 2^48 (float) or 2^512 (double);
+:func:`check_room` proves that no usable input overflows anywhere in a plan. What a step does with any other
+is told in :mod:`focgen.plan.model`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from focgen.errors import PlanError
+from focgen.plan.model import FLAG_HIGH, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
+from focgen.plan.scenario import Reset, Scenario, Trace, Track
+from focgen.plan.stability import inverse
+
+EXPONENT = {"float": 48, "double": 512}
+"""log2 of the magnitude from which on an input is not used, by type."""
+
+
+def usable(values, form: Format) -> np.ndarray:
+    """Whether raw values can be computed with, any shape; integers always can."""
+    if not form.floating:
+        return np.ones(np.shape(values), bool)
+    return np.abs(np.asarray(values)) < 2.0 ** EXPONENT[form.ctype]
+
+
+# ------------------------------------------------------------------------------------------------ the proof
+
+
+def check_room(plan: Plan) -> None:
+    """Raise PlanError where a range is not usable, or where usable inputs could overflow a floating plan."""
+    if not plan.floating:
+        return
+    limit = 2.0 ** EXPONENT[plan.error.ctype]
+    wide = [f for f in (plan.reference, plan.measurement, _signal(plan)) if f and _largest(f) >= limit]
+    top = float(np.finfo(np.float32 if plan.error.ctype == "float" else np.float64).max)
+    with np.errstate(over="ignore"):
+        if not wide and reach(plan, 2.0 * limit) <= top / 4.0:
+            return
+    remedy = "give [ranges] in units that are nearer to 1" + (", or choose f64" if limit < 2.0**512 else "")
+    what = "a range" if wide else "the gain for an input"
+    raise PlanError(plan.name, f"{what} is too large for {plan.arithmetic}", remedy)
+
+
+def reach(plan: Plan, error: float) -> float:
+    """A bound on every intermediate magnitude of a floating plan for |e| ≤ ``error``, from l1 norms."""
+    p, r, z = _l1(plan.direct) * error, 0.0, 0.0
+    if plan.inner:
+        r, z = _l1(plan.inner.rest) * error, _largest(plan.inner.state)
+    v = after = p + z
+    if plan.feedback:
+        own = inverse(np.concatenate([[1.0], plan.feedback.table.values]))
+        v = max(own.norm * (p + z), abs(plan.feedback.steady) * error) if own else np.inf
+        after = p + z + _l1(plan.feedback.table) * v
+    gain = max(abs(plan.gain.low), abs(plan.gain.high))
+    return max(after, z + 2.0 * r, v, _largest(plan.output) + 2.0 * gain * v)
+
+
+def _l1(table: Sum | None) -> float:
+    return float(np.abs(table.values).sum()) if table else 0.0
+
+
+def _largest(form: Format) -> float:
+    return max(abs(form.low), abs(form.high))
+
+
+def _signal(plan: Plan) -> Format | None:
+    return plan.schedule.signal if plan.schedule else None
+
+
+# -------------------------------------------------------------------------------------------- the reference
+
+
+def invalid_samples(plan: Plan, scenario: Scenario) -> np.ndarray:
+    """Which steps have an input that cannot be used; shape (lanes, samples)."""
+    good = usable(scenario.ref, plan.reference) & usable(scenario.meas, plan.measurement)
+    if plan.schedule:
+        good = good & usable(scenario.sched, plan.schedule.signal)
+    return ~good
+
+
+def holding(
+    plan: Plan, scenario: Scenario, invalid: np.ndarray, execute: Callable[[Plan, Scenario], Trace]
+) -> Trace:
+    """Run a scenario whose ``invalid`` samples are left out, and hold the output there.
+
+    ``execute`` runs a scenario that has none. d is 0 where a step was left out.
+    """
+    order = np.argsort(invalid, axis=1, kind="stable")  # the good ones first, in their order
+    ran = execute(plan, _without(scenario, invalid, order))
+    u, d, flags = (np.zeros_like(part) for part in (ran.u, ran.d, ran.flags))
+    for whole, part in ((u, ran.u), (d, ran.d), (flags, ran.flags)):
+        np.put_along_axis(whole, order, part, axis=1)
+    for lane in np.flatnonzero(invalid.any(axis=1)):
+        _hold(plan, scenario, int(lane), invalid[lane], u[lane])
+    ends = FLAG_HIGH * (u >= u.dtype.type(plan.output.high)) + FLAG_LOW * (u <= u.dtype.type(plan.output.low))
+    flags = np.where(invalid, ends + FLAG_INVALID, flags).astype(np.uint8)
+    return Trace(u, np.where(invalid, d.dtype.type(0), d), flags)
+
+
+def _without(scenario: Scenario, invalid: np.ndarray, order: np.ndarray) -> Scenario:
+    """The good samples of each lane, then zeros; an event comes before the next good sample."""
+    signals = {
+        name: np.take_along_axis(np.where(invalid, values.dtype.type(0), values), order, axis=1)
+        for name in ("ref", "meas", "sched")
+        if (values := getattr(scenario, name)) is not None
+    }
+    place = np.cumsum(~invalid, axis=1) - ~invalid
+    resets: dict[tuple[int, int], Reset] = {}
+    tracks: dict[tuple[int, int], Track] = {}
+    for event in events(scenario):
+        at = event.lane, int(place[event.lane, event.sample])
+        if isinstance(event, Reset):
+            tracks.pop(at, None)  # what was tracked before is forgotten
+        (resets if isinstance(event, Reset) else tracks)[at] = replace(event, sample=at[1])
+    return Scenario(**signals, resets=tuple(resets.values()), tracks=tuple(tracks.values()))
+
+
+def events(scenario: Scenario) -> list[Reset | Track]:
+    """Resets and tracks in the order in which they happen."""
+    found = [*scenario.resets, *scenario.tracks]  # the sort keeps a reset ahead of a track of its sample
+    return sorted(found, key=lambda event: event.sample)
+
+
+def _hold(plan: Plan, scenario: Scenario, lane: int, invalid: np.ndarray, u: np.ndarray) -> None:
+    """Fill in the outputs of steps that were left out, in place."""
+    kind, low, high = u.dtype.type, plan.output.low, plan.output.high
+    start = min(max(kind(0), kind(low)), kind(high))
+    happening: dict[int, list] = {}
+    for event in events(scenario):
+        if event.lane == lane:
+            happening.setdefault(event.sample, []).append(event)
+    now = start
+    for k in range(len(u)):
+        for event in happening.get(k, ()):
+            if isinstance(event, Reset):
+                now = start
+            given = event.u0 if isinstance(event, Reset) else event.u
+            if plan.integrator and usable(given, plan.output):
+                now = min(max(kind(given), kind(low)), kind(high))
+        now = u[k] = now if invalid[k] else u[k]

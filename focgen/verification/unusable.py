@@ -1,0 +1,73 @@
+"""Floating inputs that cannot be used, strewn over a scenario: NaN, infinities and what is just too large."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Scenario
+from focgen.plan.usable import EXPONENT
+
+_SHARE = 0.1  # of the samples of an input
+_LONGEST = 12  # samples in a row
+
+
+def strewn(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
+    """A raw floating scenario in which inputs cannot be used now and then, alone and in rows; nor can an
+    argument of every other reset and track.
+
+    The first lane begins so, and the last holds some of the largest values that can be used.
+    """
+    rng = np.random.default_rng([seed, 48])
+    kind = scenario.ref.dtype.type
+    bad = np.array([np.nan, np.inf, -np.inf, limit(plan), -limit(plan)], kind)
+    signals = {"ref": scenario.ref.copy(), "meas": scenario.meas.copy()}
+    if scenario.sched is not None:
+        signals["sched"] = scenario.sched.copy()
+    for values in signals.values():
+        where = _places(rng, values.shape)
+        values[where] = rng.choice(bad, np.count_nonzero(where))
+    signals["ref"][0, :2] = bad[:2]
+    others = [values[-1] for name, values in signals.items() if name != "meas"]
+    _largest(rng, signals["meas"][-1], others, kind(limit(plan)))
+    return Scenario(**signals, resets=_resets(rng, scenario, bad), tracks=_tracks(rng, scenario, bad))
+
+
+def limit(plan: Plan) -> float:
+    """The least magnitude that cannot be used."""
+    return 2.0 ** EXPONENT[plan.output.ctype]
+
+
+def _places(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
+    """Rows of samples, about ``_SHARE`` of all."""
+    where = np.zeros(shape, bool)
+    for lane in where:
+        for _ in range(max(1, int(_SHARE * lane.size / (_LONGEST / 4)))):
+            begin = int(rng.integers(lane.size))
+            lane[begin : begin + int(_LONGEST ** rng.uniform())] = True
+    return where
+
+
+def _largest(rng: np.random.Generator, values: np.ndarray, others: list[np.ndarray], bound) -> None:
+    """Put a few of the largest usable values in, where the other inputs are good, near the end: they stay in
+    the memory.
+    """
+    good = np.flatnonzero(np.all(np.abs(others) < bound, axis=0))
+    late = good[-(values.size // 4) :]
+    if late.size:
+        places = rng.choice(late, min(3, late.size), replace=False)
+        values[places] = np.nextafter(bound, values.dtype.type(0)) * rng.choice([-1, 1], places.size)
+
+
+def _resets(rng: np.random.Generator, scenario: Scenario, bad: np.ndarray) -> tuple:
+    changed = []
+    for reset in scenario.resets:
+        name = rng.choice(["ref", "meas", "u0"])
+        changed.append(replace(reset, **{name: rng.choice(bad)}) if rng.random() < 0.5 else reset)
+    return tuple(changed)
+
+
+def _tracks(rng: np.random.Generator, scenario: Scenario, bad: np.ndarray) -> tuple:
+    return tuple(replace(t, u=rng.choice(bad)) if rng.random() < 0.5 else t for t in scenario.tracks)
