@@ -136,7 +136,8 @@ def test_the_reference_is_the_run_without_the_bad_samples(arithmetic, scheduled)
     ref = np.where(bad, np.float32(NAN) if arithmetic == "f32" else NAN, scenario.ref)
     seen = execute(plan, Scenario(ref, scenario.meas, scenario.sched))
     for lane, gone in enumerate(bad):
-        kept = [None if s is None else s[lane : lane + 1, ~gone] for s in (ref, scenario.meas, scenario.sched)]
+        inputs = ref, scenario.meas, scenario.sched
+        kept = [None if s is None else s[lane : lane + 1, ~gone] for s in inputs]
         alone = execute(plan, Scenario(*kept))
         latest = np.cumsum(~gone) - 1  # index of the latest good sample
         expected = np.where(latest < 0, 0.0, alone.u[0][np.maximum(latest, 0)])
