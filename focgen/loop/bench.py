@@ -13,6 +13,7 @@ from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, res
 from focgen.control.inversion import Inversion, invert
 from focgen.control.setpoints import default_setpoints
 from focgen.errors import DesignError
+from focgen.loop.linear_effects import linear_part
 from focgen.rig.model import Ranges, Rig
 
 _EXTRAPOLATED = 0.5  # of the span of the operating points: how far beyond it the line K_o(p) is used
@@ -72,10 +73,14 @@ def prepare(
 
 
 def _said(rig: Rig) -> list[str]:
-    notes = []
-    if rig.effects:
-        names = ", ".join(str(effect["name"]) for effect in rig.effects)
-        notes.append(f"the rig's effects ({names}) are left aside: the design is for the nominal chain")
+    if not rig.effects:
+        return []
+    _, inside, others = linear_part(rig)
+    notes = ["the gains are designed for the chain without its effects; beside stands each step with them"]
+    if inside:
+        notes.append(f"in the margins: {', '.join(inside)}")
+    if others:
+        notes.append(f"not linear, so not in the margins: {', '.join(others)}")
     return notes
 
 

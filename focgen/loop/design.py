@@ -21,7 +21,7 @@ from focgen.errors import DesignError
 from focgen.loop.bench import Bench, prepare
 from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
-from focgen.loop.trial import run_steps
+from focgen.loop.trial import Steps, run_steps
 from focgen.loop.tuning import HORIZON, OVERSHOOT, Tuned, Wish, fastest, meeting, tune
 from focgen.output import write_file
 from focgen.plan.build import build_plan
@@ -37,7 +37,8 @@ class OperatingPoint:
     """A step from rest to ``reference``, which ``pressure`` and ``command`` hold.
 
     ``K`` and ``K_o`` at that pressure, ``gain`` = K_o/K from the schedule table. ``ideal``: infinite
-    memory in float64; ``running``: the plan, bit for bit. ``peak_pressure``: the largest on the way.
+    memory in float64; ``running``: the plan, bit for bit; ``effects``: that on the rig with its effects, None
+    where it has none. ``peak_pressure``: the largest on the way.
     """
 
     reference: float
@@ -48,7 +49,13 @@ class OperatingPoint:
     gain: float
     ideal: StepMeasures
     running: StepMeasures
+    effects: StepMeasures | None
     peak_pressure: float
+
+    @property
+    def proof(self) -> StepMeasures:
+        """What counts: the step with the rig's effects, where it has any."""
+        return self.running if self.effects is None else self.effects
 
 
 @dataclass(frozen=True)
@@ -78,7 +85,8 @@ class Design:
     """A controller, the wish it was designed for, and the proof in simulation.
 
     ``settling_s`` (mean over the operating points) and ``overshoot_pct`` (largest) are of the controller
-    as it will run; ``holds`` says whether they keep the wish and every loop is stable.
+    as it will run, on the rig with its effects; ``holds`` says whether they keep the wish and every loop is
+    stable.
     """
 
     controller: Controller
@@ -119,6 +127,9 @@ def design(
 
     Raises DesignError where the rig cannot be inverted or the wish is not feasible (naming what is),
     PlanError where the controller does not fit the arithmetic, RigError where the file cannot be used.
+
+    A rig that carries effects is designed for without them; the margins then hold those that are linear, and
+    the steps that the wish is judged by hold all of them.
     """
     _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance)
     model, source = (rig, None) if isinstance(rig, Rig) else (read_rig(rig), _source(rig))
@@ -248,14 +259,14 @@ def _judged(
     plan = build_plan(controller)
     steps = run_steps(bench, controller, plan, _horizon(tuned, wish))
     points = tuple(
-        _point(equilibrium, tuned, controller, *step) for equilibrium, step in zip(bench.points, steps)
+        _point(equilibrium, tuned, controller, step) for equilibrium, step in zip(bench.points, steps)
     )
     loops = shapes(bench.rig, controller, plan, bench.delay)
     found = tuple(
         margins_at(bench.rig, controller, plan, loops, p) for p in dict.fromkeys(bench.pressures.tolist())
     )
-    settling = float(np.mean([point.running.settling_s for point in points]))
-    over = max(point.running.overshoot_pct for point in points)
+    settling = float(np.mean([point.proof.settling_s for point in points]))
+    over = max(point.proof.overshoot_pct for point in points)
     notes = [*notes, *tuned.inversion.notes, *_remarks(bench, points)]
     kept = settling <= _SLACK * (wish.settling or math.inf) and over <= wish.overshoot + 0.5
     holds = kept and all(m.running.stable for m in found)
@@ -268,14 +279,7 @@ def _horizon(tuned: Tuned, wish: Wish) -> float:
     return HORIZON * max(tuned.mean_settling, wish.settling or 0.0)
 
 
-def _point(
-    at: Equilibrium,
-    tuned: Tuned,
-    controller: Controller,
-    ideal: StepMeasures,
-    running: StepMeasures,
-    peak: float,
-) -> OperatingPoint:
+def _point(at: Equilibrium, tuned: Tuned, controller: Controller, step: Steps) -> OperatingPoint:
     K = float(tuned.inversion.K(at.pressure))
     return OperatingPoint(
         at.output,
@@ -284,9 +288,10 @@ def _point(
         K,
         float(tuned.line(at.pressure)),
         float(controller.gain_at(at.pressure)),
-        ideal,
-        running,
-        peak,
+        step.ideal,
+        step.running,
+        step.effects,
+        step.peak_pressure,
     )
 
 

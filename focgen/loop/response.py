@@ -14,6 +14,7 @@ from focgen.control.controller import Controller
 from focgen.control.equilibrium import actuator_of
 from focgen.control.margins import Curve, Margins, curve, margins
 from focgen.fractional.transfer import TransferFunction
+from focgen.loop.linear_effects import Response, linear_part
 from focgen.plan.canonical import realise, tables
 from focgen.plan.model import Plan
 from focgen.plan.response import designed_response, running_gain, running_response
@@ -38,18 +39,24 @@ def slope_at(rig: Rig, pressure: float) -> float:
     return float(drive.deriv()(pressure))
 
 
-def held_response(transfer: TransferFunction, sample_time: float, omega) -> np.ndarray:
+def held_response(
+    transfer: TransferFunction, sample_time: float, omega, more: Response | None = None
+) -> np.ndarray:
     """The response of hold, ``transfer`` and sampling, at ``omega`` ≤ π/h rad/s: all side bands added up.
 
-    The sample is taken before the hold moves on, so what passes at once arrives one sample late.
+    The sample is taken before the hold moves on, so what passes at once arrives one sample late. ``more``: a
+    factor of the response that is no transfer function, as a delay; beyond 40 bands it is taken to add nothing.
     """
     h, omega = sample_time, np.asarray(omega, dtype=float)
     back = np.exp(-1j * omega * h)
     at_once, rest = _split(transfer)
+    if more is not None:
+        at_once = at_once * more(omega)
     if not rest.num:
         return at_once * back
     bands = omega + 2.0 * math.pi / h * np.arange(-_ALIASES, _ALIASES + 1)[:, None]
-    total = (rest.frequency_response(bands) / (1j * bands)).sum(axis=0) + _far_bands(rest, h, omega)
+    near = rest.frequency_response(bands) * (1.0 if more is None else more(bands))
+    total = (near / (1j * bands)).sum(axis=0) + (_far_bands(rest, h, omega) if more is None else 0.0)
     return (1.0 - back) * total / h + at_once * back
 
 
@@ -120,16 +127,18 @@ class Shapes:
 
 
 def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
-    """Sample the four loops, from 1e-5 of the sampling frequency up."""
+    """Sample the four loops, from 1e-5 of the sampling frequency up; linear effects of the rig are in them."""
     h, transfer = controller.sample_time, chain_transfer(rig)
+    effects, _, _ = linear_part(rig)
     low, nyquist = _LOW * 2.0 * math.pi / h, math.pi / h
     unit = running_gain(plan, _any_schedule(controller))
 
     def held(omega):
-        return held_response(transfer, h, omega) * np.exp(-1j * omega * h * delay)
+        return held_response(transfer, h, omega, effects) * np.exp(-1j * omega * h * delay)
 
     def ideal(omega):
         part = controller.transfer.frequency_response(omega) * transfer.frequency_response(omega)
+        part = part if effects is None else part * effects(omega)
         return part / (1j * omega) if controller.integrator else part
 
     def sampled(length):

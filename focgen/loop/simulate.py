@@ -19,6 +19,7 @@ from focgen.errors import ControllerError, DesignError
 from focgen.loop.chain import chain
 from focgen.loop.frozen import frozen_loop, frozen_margins, frozen_step
 from focgen.loop.plan_stepper import PlanStepper
+from focgen.loop.relaxation import Plant, run_with_effects
 from focgen.loop.run import LoopRun, run_loop
 from focgen.loop.stepper import FloatStepper
 from focgen.plan.build import build_plan
@@ -39,7 +40,9 @@ class SetpointResult:
 
     ``start``: the set point before; ``ideal``: the controller with infinite memory in float64;
     ``frozen``: the continuous linear loop with K held at the set point's ``pressure``, None where that is
-    unstable. ``verdict``: "settles", "oscillates", or "does not settle" within the time simulated.
+    unstable. ``nominal``: the controller as it runs on the rig without its effects, None where it has none;
+    running and ideal meet them, ``frozen`` and ``pressure`` are of the nominal chain. ``verdict``: "settles",
+    "oscillates", or "does not settle" within the time simulated.
     """
 
     reference: float
@@ -52,6 +55,7 @@ class SetpointResult:
     verdict: str
     ideal: StepMeasures
     frozen: StepMeasures | None
+    nominal: StepMeasures | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +64,7 @@ class Simulation:
 
     ``running`` and ``ideal``: one column a set point, or one column in all where they are
     ``consecutive``; each set point lasts ``duration`` s. ``frozen`` (n, set points), None where unstable.
-    ``holds``: all settle.
+    ``nominal``: as ``running``, without the rig's ``effects``; None where it has none. ``holds``: all settle.
     """
 
     rig: Rig
@@ -74,6 +78,8 @@ class Simulation:
     running: LoopRun
     ideal: LoopRun
     frozen: tuple[np.ndarray | None, ...]
+    nominal: LoopRun | None
+    effects: tuple[str, ...]
     holds: bool
     notes: tuple[str, ...]
 
@@ -90,7 +96,7 @@ def simulate(
     length: int | None = None,
 ) -> Simulation:
     """Close the loop and step it to each of ``setpoints``, from rest, or one after the other
-    (``consecutive``).
+    (``consecutive``). A rig that carries effects is simulated with them, from where their session ended.
 
     ``setpoints``: outputs (default: tenths 1 … 7 of the output range, Fig. 10). ``duration``: s a set point
     (default: 8 time constants of the slowest frozen loop). ``delay``: computation delay, 0 or 1 sample.
@@ -154,7 +160,8 @@ def _said(rig: Rig, controller: Controller, path: Path | None) -> list[str]:
     ):
         notes.append(f"the controller was designed from another state of the rig ({source.file})")
     if rig.effects:
-        notes.append("the rig's effects are left aside: this is the nominal chain")
+        names = ", ".join(str(effect["name"]) for effect in rig.effects)
+        notes.append(f"the rig has its effects in it ({names}); beside it stands the loop without them")
     if controller.scheduled and rig.signals.pressure is None:
         notes.append(
             "the rig logs no pressure: the schedule's signal is the command times the regulator's static gain"
@@ -210,17 +217,13 @@ class _Trial:
         count = self.samples(duration)
         reference = self._reference(count)
         total, columns = reference.shape
-        prepared = chain(self.rig, self.controller.sample_time, total)
-        known = self.rig.signals.pressure is not None
-        running, ideal = (
-            run_loop(prepared, stepper, reference, self.start, self.delay, known)
-            for stepper in (
-                PlanStepper(self.plan, columns, self.start.command),
-                FloatStepper(self.controller, total, columns, self.start.command),
-            )
-        )
+        exact = FloatStepper(self.controller, total, columns, self.start.command)
+        running, ideal = (self._run(stepper, reference) for stepper in (self._planned(columns), exact))
+        nominal = self._without_effects(self._planned(columns), reference) if self.rig.effects else None
         frozen = tuple(self._frozen(i, count) for i in range(len(self.points)))
-        results = tuple(self._judged(i, count, running, ideal, frozen[i]) for i in range(len(self.points)))
+        results = tuple(
+            self._judged(i, count, running, ideal, frozen[i], nominal) for i in range(len(self.points))
+        )
         return Simulation(
             self.rig,
             self.controller,
@@ -233,9 +236,27 @@ class _Trial:
             running,
             ideal,
             frozen,
+            nominal,
+            tuple(str(effect["name"]) for effect in self.rig.effects),
             all(r.verdict == "settles" for r in results),
             notes,
         )
+
+    def _planned(self, columns: int) -> PlanStepper:
+        return PlanStepper(self.plan, columns, self.start.command)
+
+    def _run(self, stepper, reference: np.ndarray) -> LoopRun:
+        """The loop with the rig as it is, effects included."""
+        if not self.rig.effects:
+            return self._without_effects(stepper, reference)
+        plant = Plant.of(self.rig, self.controller.sample_time, self.start, len(reference))
+        known = self.rig.signals.pressure is not None
+        return run_with_effects(plant, stepper, reference, self.start, self.delay, known)
+
+    def _without_effects(self, stepper, reference: np.ndarray) -> LoopRun:
+        prepared = chain(self.rig, self.controller.sample_time, len(reference))
+        known = self.rig.signals.pressure is not None
+        return run_loop(prepared, stepper, reference, self.start, self.delay, known)
 
     def _reference(self, count: int) -> np.ndarray:
         targets = np.array([point.output for point in self.points])
@@ -256,7 +277,9 @@ class _Trial:
             run.output[index * count : (index + 1) * count, 0] if self.consecutive else run.output[:, index]
         )
 
-    def _judged(self, index: int, count: int, running: LoopRun, ideal: LoopRun, frozen) -> SetpointResult:
+    def _judged(
+        self, index: int, count: int, running: LoopRun, ideal: LoopRun, frozen, nominal: LoopRun | None
+    ) -> SetpointResult:
         begin, target, h = self._from(index), self.points[index].output, self.controller.sample_time
         part = self._part(running, index, count)
         found = measure_step(part, h, begin, target)
@@ -272,6 +295,7 @@ class _Trial:
             _verdict(found, part, target - begin),
             measure_step(self._part(ideal, index, count), h, begin, target),
             None if frozen is None else measure_step(frozen, h, begin, target),
+            None if nominal is None else measure_step(self._part(nominal, index, count), h, begin, target),
         )
 
 

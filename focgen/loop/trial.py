@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,17 +12,26 @@ from focgen.control.measures import StepMeasures, measure_step
 from focgen.loop.bench import Bench
 from focgen.loop.chain import chain
 from focgen.loop.plan_stepper import PlanStepper
+from focgen.loop.relaxation import Plant, run_with_effects
 from focgen.loop.run import LoopRun, run_loop
 from focgen.loop.stepper import FloatStepper
 from focgen.plan.model import Plan
 
 
-def run_steps(
-    bench: Bench, controller: Controller, plan: Plan, seconds: float
-) -> list[tuple[StepMeasures, StepMeasures, float]]:
-    """Return, for each operating point, what the ideal and what the running controller make of it, and the
-    peak pressure of the latter.
+@dataclass(frozen=True)
+class Steps:
+    """What the step to an operating point does: with the ``ideal`` and the ``running`` controller, and the
+    latter with the rig's ``effects`` (None where it has none); ``peak_pressure`` of the running one.
     """
+
+    ideal: StepMeasures
+    running: StepMeasures
+    effects: StepMeasures | None
+    peak_pressure: float
+
+
+def run_steps(bench: Bench, controller: Controller, plan: Plan, seconds: float) -> list[Steps]:
+    """Step the loop from rest to each operating point and follow it for ``seconds``."""
     samples = max(20, math.ceil(seconds / controller.sample_time))
     prepared, columns = chain(bench.rig, controller.sample_time, samples), len(bench.points)
     reference = np.tile(bench.references, (samples, 1))
@@ -33,7 +43,21 @@ def run_steps(
         run_loop(prepared, stepper, reference, bench.start, bench.delay, bench.pressure_known, False)
         for stepper in steppers
     )
-    return list(zip(_measures(ideal, bench), _measures(running, bench), running.peak_pressure.tolist()))
+    found = (
+        _measures(ideal, bench),
+        _measures(running, bench),
+        _with_effects(bench, controller, plan, reference),
+    )
+    return [Steps(*step) for step in zip(*found, running.peak_pressure.tolist())]
+
+
+def _with_effects(bench: Bench, controller: Controller, plan: Plan, reference) -> list[StepMeasures | None]:
+    if not bench.rig.effects:
+        return [None] * len(bench.points)
+    plant = Plant.of(bench.rig, controller.sample_time, bench.start, len(reference))
+    stepper = PlanStepper(plan, len(bench.points), bench.start.command)
+    run = run_with_effects(plant, stepper, reference, bench.start, bench.delay, bench.pressure_known)
+    return _measures(run, bench)
 
 
 def _measures(run: LoopRun, bench: Bench) -> list[StepMeasures]:

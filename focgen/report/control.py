@@ -24,7 +24,10 @@ def simulation_pictures(simulation: Simulation) -> dict[str, bytes]:
         top.set_ylabel(_label("output", units.measurement))
         bottom.set_ylabel(_label("command", units.output))
         bottom.set_xlabel("time (s)")
-        top.set_title(f"Closed loop as it will run ({simulation.arithmetic}, memory {simulation.length})")
+        effects = f", with {', '.join(simulation.effects)}" if simulation.effects else ""
+        top.set_title(
+            f"Closed loop as it will run ({simulation.arithmetic}, memory {simulation.length}){effects}"
+        )
         low, high = simulation.controller.ranges.output
         for limit in (low, high):
             if _reached(limit, simulation.running.command):
@@ -42,17 +45,25 @@ def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
     for i, result in enumerate(simulation.setpoints):
         colour = CYCLE[i % len(CYCLE)]
         _reference(top, run.time[[0, -1]], result.start, result.reference, colour)
-        if simulation.frozen[i] is not None:
-            top.plot(run.time, simulation.frozen[i], color=colour, lw=0.9, ls=":")
+        _other_loop(top, simulation, i, colour)
         top.plot(run.time, run.output[:, i], color=colour)
         bottom.step(run.time, run.command[:, i], where="post", color=colour, label=f"{result.reference:.4g}")
         _settling(top, run.time, run.output[:, i], result.settling_s, colour)
-    top.plot([], [], color=GREY, lw=0.9, ls=":", label="K frozen, linear")
+    other = "without the effects" if simulation.nominal is not None else "K frozen, linear"
+    top.plot([], [], color=GREY, lw=0.9, ls=":", label=other)
     top.plot([], [], color=GREY, lw=0.8, ls="--", label="set point ±5 %")
     top.plot([], [], "o", color=GREY, mec="white", mew=0.8, label="settled")
     top.legend(ncols=3, loc="lower right")
     top.set_xlim(0.0, _interesting(simulation))
     bottom.legend(title=_label("set point", simulation.controller.units.measurement), ncols=4, loc="best")
+
+
+def _other_loop(axes, simulation: Simulation, index: int, colour) -> None:
+    """What to compare with, dotted: the loop without the rig's effects, or where it has none, the frozen one."""
+    time, frozen = simulation.running.time, simulation.frozen[index]
+    other = frozen if simulation.nominal is None else simulation.nominal.output[:, index]
+    if other is not None:
+        axes.plot(time, other, color=colour, lw=0.9, ls=":")
 
 
 def _interesting(simulation: Simulation) -> float:
@@ -69,6 +80,9 @@ def _draw_consecutive(top, bottom, simulation: Simulation) -> None:
         _reference(top, (begin, end), result.start, result.reference, GREY)
         _settling(top, run.time, run.output[:, 0], begin + result.settling_s, colour)
     top.plot(run.time, run.output[:, 0], color=colour)
+    if simulation.nominal is not None:
+        top.plot(run.time, simulation.nominal.output[:, 0], color=GREY, lw=0.9, label="without the effects")
+        top.legend(loc="lower right")
     bottom.step(run.time, run.command[:, 0], where="post", color=COLOURS["command"])
 
 

@@ -27,8 +27,8 @@ def design_payload(design: Design) -> dict:
         "holds": design.holds,
         "K_o": {"intercept": design.schedule.intercept, "slope": design.schedule.slope},
         "schedule": asdict(design.schedule),
-        "settling_s": {label: point.running.settling_s for label, point in zip(labels, design.points)},
-        "overshoot_pct": {label: point.running.overshoot_pct for label, point in zip(labels, design.points)},
+        "settling_s": {label: point.proof.settling_s for label, point in zip(labels, design.points)},
+        "overshoot_pct": {label: point.proof.overshoot_pct for label, point in zip(labels, design.points)},
         "mean_settling_s": design.settling_s,
         "max_overshoot_pct": design.overshoot_pct,
         "operating_points": [asdict(point) for point in design.points],
@@ -117,7 +117,8 @@ def _memory_line(design: Design) -> str:
 
 def _wish_line(design: Design) -> str:
     wish = "" if design.wish.settling is None else f" of at most {design.wish.settling:.3g} s"
-    verdict = "kept" if design.holds else "NOT kept by the controller as it will run"
+    where = " with the rig's effects" if design.points[0].effects else ""
+    verdict = f"kept{where}" if design.holds else f"NOT kept by the controller as it will run{where}"
     return (
         f"wish: mean settling time{wish}, overshoot of at most {design.wish.overshoot:g} %: {verdict} "
         f"({_seconds(design.settling_s)}, {design.overshoot_pct:.2g} %)"
@@ -137,6 +138,7 @@ def points_table(design: Design) -> TableOf:
         "overshoot (%)",
         "ideal (s)",
         "peak p",
+        *(("with effects (s)", "(%)") if design.points[0].effects else ()),
     )
     rows = tuple(
         (
@@ -149,6 +151,7 @@ def points_table(design: Design) -> TableOf:
             f"{p.running.overshoot_pct:.1f}",
             _number(p.ideal.settling_s),
             f"{p.peak_pressure:.3g}",
+            *((_number(p.effects.settling_s), f"{p.effects.overshoot_pct:.1f}") if p.effects else ()),
         )
         for p in design.points
     )
@@ -201,6 +204,7 @@ def simulation_payload(simulation: Simulation) -> dict:
         "arithmetic": simulation.arithmetic,
         "length": simulation.length,
         "delay_samples": simulation.delay,
+        "effects": list(simulation.effects),
         "notes": list(simulation.notes),
     }
 
@@ -236,6 +240,7 @@ def setpoints_table(simulation: Simulation) -> TableOf:
         f"steady error{unit}",
         "verdict",
         "ideal (s)",
+        *(("without effects (s)", "(%)") if simulation.effects else ()),
         "frozen (s)",
         "peak p",
     )
@@ -245,12 +250,14 @@ def setpoints_table(simulation: Simulation) -> TableOf:
         heads,
         rows,
         f"Steps {order}, in {simulation.arithmetic} with memory {simulation.length}, "
-        f"computation delay {simulation.delay}",
+        f"computation delay {simulation.delay}"
+        + (f"; effects: {', '.join(simulation.effects)}" if simulation.effects else ""),
     )
 
 
 def _setpoint_cells(r: SetpointResult) -> tuple[str, ...]:
     frozen = "unstable" if r.frozen is None else _number(r.frozen.settling_s)
+    bare = () if r.nominal is None else (_number(r.nominal.settling_s), f"{r.nominal.overshoot_pct:.1f}")
     return (
         f"{r.reference:.4g}",
         _number(r.settling_s),
@@ -258,6 +265,7 @@ def _setpoint_cells(r: SetpointResult) -> tuple[str, ...]:
         f"{r.steady_error:.2g}",
         r.verdict,
         _number(r.ideal.settling_s),
+        *bare,
         frozen,
         f"{r.peak_pressure:.3g}",
     )

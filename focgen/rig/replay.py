@@ -108,6 +108,11 @@ def _carried(rig: Rig) -> dict[str, float]:
     return {k: float(v) for table in rig.effects for k, v in table.get("carried", {}).items()}
 
 
+def session_state(rig: Rig) -> tuple[float, dict[str, float]]:
+    """Where the session that the rig's effects were found in ended: its clock, s, and what outlives a rest."""
+    return _clock(rig), _carried(rig)
+
+
 def effect_tables(placed: Sequence[Placed], left: dict[str, dict], clock: float) -> tuple[dict, ...]:
     """Effects as ``[[effects]]`` tables, with what outlives the session: ``left`` by effect, its ``clock`` in s."""
     tables = []

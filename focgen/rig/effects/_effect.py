@@ -82,6 +82,7 @@ class Form:
     In the slot ``dynamics`` it returns the factor by which all rates are multiplied when unloading.
     ``seen(y)`` reads the values off what was measured, (n,), where that can be done at sight; None where it is not there.
     ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of a later session.
+    ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is linear, None where not.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Form:
     act: Act
     seen: Callable[[np.ndarray], tuple[float, ...] | None] | None = None
     leaves: Callable[[np.ndarray, tuple[float, ...], Run], dict[str, float]] | None = None
+    response: Callable[[tuple[float, ...], np.ndarray], np.ndarray] | None = None
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,14 @@ def _two(x, values, run):
     return _one(_one(x, values, run), values, run)
 
 
+def lag_response(tau, s):
+    """1/(tau s + 1)."""
+    return 1.0 / (tau * s + 1.0)
+
+
 def forms(slot):
     """One lag, and two equal ones, at ``slot``."""
-    return [Form("one_lag", slot, _LAG, _one), Form("two_lags", slot, _LAG, _two)]
+    return [
+        Form("one_lag", slot, _LAG, _one, response=lambda values, s: lag_response(values[0], s)),
+        Form("two_lags", slot, _LAG, _two, response=lambda values, s: lag_response(values[0], s) ** 2),
+    ]

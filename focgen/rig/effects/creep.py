@@ -3,7 +3,9 @@
 import numpy as np
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._lags import lag_response
 
+_DECADES = np.geomspace(0.03, 30.0, 7)
 _SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
 
@@ -18,13 +20,27 @@ def _pole(x, values, run):
 
 def _logarithmic(x, values, run):
     share, tau = values
-    times = tau * np.geomspace(0.03, 30.0, 7)
-    return x + share / 7.0 * sum(kernels.lag(x, run.rest, run.h, t, t) for t in times)
+    return x + share / 7.0 * sum(kernels.lag(x, run.rest, run.h, t, t) for t in tau * _DECADES)
 
 
 def _two(x, values, run):
     quick, slow, tau = values
     return x + quick * kernels.lag(x, run.rest, run.h, tau / 5, tau / 5) + slow * kernels.lag(x, run.rest, run.h, tau, tau)
+
+
+def _pole_response(values, s):
+    share, tau = values
+    return 1.0 + share * lag_response(tau, s)
+
+
+def _logarithmic_response(values, s):
+    share, tau = values
+    return 1.0 + share / 7.0 * sum(lag_response(t, s) for t in tau * _DECADES)
+
+
+def _two_response(values, s):
+    quick, slow, tau = values
+    return 1.0 + quick * lag_response(tau / 5, s) + slow * lag_response(tau, s)
 
 
 EFFECT = Effect(
@@ -35,11 +51,12 @@ EFFECT = Effect(
     confused_with=("sensor_relaxation", "sensor_lag", "sensor_drift", "gain_drift", "softening"),
     needs=lambda e: None if e.hold > 8 else "no hold is long beside the rig's response: hold a level longer",
     forms=[
-        Form("pole", "response", (_SHARE, _tau(0.1, 0.5)), _pole),
-        Form("logarithmic", "response", (_SHARE, _tau(0.2, 1.0)), _logarithmic),
+        Form("pole", "response", (_SHARE, _tau(0.1, 0.5)), _pole, response=_pole_response),
+        Form("logarithmic", "response", (_SHARE, _tau(0.2, 1.0)), _logarithmic,
+             response=_logarithmic_response),
         Form("two_poles", "response", (
             Parameter("quick", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0),
             Parameter("slow", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0), _tau(0.2, 0.5),
-        ), _two),
+        ), _two, response=_two_response),
     ],
 )

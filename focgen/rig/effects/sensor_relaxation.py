@@ -2,6 +2,7 @@
 
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._lags import lag_response
 
 _SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1, 0.1), zero=0.0)
 _TIME = Parameter("time", time=1, lower=0.02, upper=100.0, starts=(0.3, 2.0, 10.0), log=True)
@@ -18,6 +19,16 @@ def _spread(x, values, run):
     return x + share * (x - slow)
 
 
+def _one_response(values, s):
+    share, tau = values
+    return 1.0 + share * (1.0 - lag_response(tau, s))
+
+
+def _spread_response(values, s):
+    share, tau = values
+    return 1.0 + share * (1.0 - sum(lag_response(t, s) for t in (tau / 4, tau, 4 * tau)) / 3.0)
+
+
 EFFECT = Effect(
     name="sensor_relaxation",
     stage="sensor",
@@ -26,7 +37,7 @@ EFFECT = Effect(
     confused_with=("creep", "sensor_lag", "sensor_drift", "sensor_hysteresis"),
     needs=lambda e: None if e.hold > 3 else "no hold is long beside the rig's response",
     forms=[
-        Form("one_time", "strain", (_SHARE, _TIME), _one),
-        Form("spread", "strain", (_SHARE, _TIME), _spread),
+        Form("one_time", "strain", (_SHARE, _TIME), _one, response=_one_response),
+        Form("spread", "strain", (_SHARE, _TIME), _spread, response=_spread_response),
     ],
 )

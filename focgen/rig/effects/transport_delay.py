@@ -1,5 +1,7 @@
 """The response starts later by a fixed time: tubing, a bus, a slow converter."""
 
+import numpy as np
+
 from focgen.rig.effects._delay import delayed
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
@@ -18,5 +20,5 @@ EFFECT = Effect(
     single=True,
     forms=[Form("delay", "supply", (
         Parameter("delay", time=1, lower=0.0, upper=5.0, starts=(0.01, 0.05, 0.3), zero=0.0),
-    ), _shift)],
+    ), _shift, response=lambda values, s: np.exp(-values[0] * s))],
 )
