@@ -4,8 +4,8 @@ The effects are functions of whole signals, not of one sample and a state. So th
 window: with a guess of the commands in the window, the rig is replayed from rest to the window's end, the
 controller is run on what it would have seen, and its commands are the next guess (E. Lelarasmee, A. E. Ruehli
 and A. L. Sangiovanni-Vincentelli, IEEE Trans. CAD 1, 1982). What the rig shows at a sample depends on earlier
-commands only, so every pass settles at least one more sample for good, and commands that come out as they went
-in are, bit for bit, those of the loop stepped sample by sample.
+commands only, so every pass settles at least one more sample for good, and commands that come out as they
+went in are, bit for bit, those of the loop stepped sample by sample.
 """
 
 from __future__ import annotations
