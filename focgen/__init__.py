@@ -19,6 +19,7 @@ _FUNCTIONS = {
     "diagnose": "focgen.diagnosis.diagnose",
     "trial": "focgen.trials.trial",
     "replay": "focgen.rig.replay",
+    "study": "focgen.studies.study",
     "demo": "focgen.demo",
     "read_logs": "focgen.logs.read",
     "read_rig": "focgen.rig.files",

@@ -1,0 +1,198 @@
+"""Pictures of a study of the memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from focgen.report.style import BLUE, COLOURS, CYCLE, GREEN, GREY, ORANGE, RED, figure, png
+from focgen.studies.model import Curves, Row, Study
+
+_COLOURS = {"f64": BLUE, "f32": GREEN, "q31": ORANGE, "q15": RED}
+_MOST_LINES = 5
+_LEAST = 1e-5  # % of the step: where the distance from the ideal is cut off
+_SHARES = {"multiplies": "multiplications a step", "cycles": "cycles a step", "ram_bytes": "state (bytes)"}
+
+
+def study_pictures(study: Study) -> dict[str, bytes]:
+    """PNG bytes by file name: ``accuracy``, ``pareto``, and where there are any ``frequency``,
+    ``loops``, ``plant``.
+    """
+    found = {"accuracy.png": accuracy(study), "pareto.png": fronts(study)}
+    if any(curves.omega for curves in study.curves):
+        found["frequency.png"] = frequency(study)
+    if any(curves.time for curves in study.curves):
+        found["loops.png"] = loops(study)
+    if study.plant is not None:
+        found["plant.png"] = plant(study)
+    return found
+
+
+def _own(study: Study) -> list[Row]:
+    h = study.controller.sample_time
+    own = [row for row in study.rows if row.sample_time == h and row.error is not None]
+    return own or [row for row in study.rows if row.error is not None]
+
+
+def accuracy(study: Study) -> bytes:
+    """Error and bound against length, and against the number of exponentials, on one scale."""
+    rows = _own(study)
+    with figure(1, 2, size=(7.6, 3.9), sharey=True, width_ratios=(1.25, 1.0)) as (fig, (left, right)):
+        for memory, axis, place in (("short", left, "length"), ("exponential", right, "states")):
+            for arithmetic, colour in _COLOURS.items():
+                mine = [r for r in rows if r.memory == memory and r.arithmetic == arithmetic]
+                _against(axis, mine, place, colour, arithmetic)
+            axis.set_yscale("log")
+        left.set_xscale("log")
+        left.set_title("Short memory")
+        left.set_xlabel("length L (past samples)")
+        left.set_ylabel("error / largest output")
+        right.set_title("Exponential memory")
+        right.set_xlabel("exponentials")
+        right.xaxis.get_major_locator().set_params(integer=True)
+        right.plot([], [], color=GREY, label="worst error of four inputs")
+        right.plot([], [], color=GREY, ls=":", label="proven bound")
+        right.legend(loc="best")
+        left.legend(loc="lower left")
+        return png(fig)
+
+
+def _against(axis, rows: Sequence[Row], place: str, colour: str, label: str) -> None:
+    rows = sorted((r for r in rows if getattr(r, place) is not None), key=lambda r: getattr(r, place))
+    if not rows:
+        return
+    x = [getattr(r, place) for r in rows]
+    axis.plot(x, [r.error for r in rows], "o-", color=colour, ms=3.5, label=label)
+    axis.plot(x, [np.nan if r.bound is None else r.bound for r in rows], ":", color=colour, lw=1.0)
+
+
+def fronts(study: Study) -> bytes:
+    """Error against cycles (multiplications where no target is named) and against bytes of state."""
+    first = "cycles" if study.pareto.get("cycles") else "multiplies"
+    with figure(1, 2, size=(7.6, 3.9), sharey=True) as (fig, axes):
+        for axis, cost in zip(axes, (first, "ram_bytes")):
+            _front(axis, study, cost)
+            axis.set_xlabel(_SHARES[cost])
+        axes[0].set_ylabel("error / largest output")
+        axes[0].set_title("What accuracy costs")
+        for name, marker in (("short memory", "o"), ("exponential memory", "D")):
+            axes[1].plot([], [], marker, color=GREY, ms=4, label=name)
+        for arithmetic in dict.fromkeys(row.arithmetic for row in _own(study)):
+            axes[1].plot([], [], "s", color=_COLOURS[arithmetic], ms=4, label=arithmetic)
+        axes[1].plot([], [], color=GREY, lw=0.9, label="nothing is better")
+        axes[1].legend(loc="best")
+        return png(fig)
+
+
+def _front(axis, study: Study, cost: str) -> None:
+    for row in _own(study):
+        if getattr(row, cost) is not None:
+            marker = "D" if row.memory == "exponential" else "o"
+            axis.plot(getattr(row, cost), row.error, marker, color=_COLOURS[row.arithmetic], ms=4, alpha=0.85)
+    best = [study.rows[i] for i in study.pareto[cost]]
+    axis.step(
+        [getattr(r, cost) for r in best], [r.error for r in best], where="post", color=GREY, lw=0.9, zorder=1
+    )
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+
+
+def _chosen(study: Study, part: str) -> list[tuple[Row, Curves, str]]:
+    """Rows in the controller's arithmetic to draw, with a colour each: some lengths, and one exponential."""
+    rows = _own(study)
+    wanted = study.controller.arithmetic
+    if not any(r.arithmetic == wanted for r in rows):
+        wanted = rows[0].arithmetic
+    pairs = [
+        (r, c)
+        for r, c in zip(study.rows, study.curves)
+        if r in rows and r.arithmetic == wanted and getattr(c, part)
+    ]
+    short = sorted((p for p in pairs if p[0].memory == "short"), key=lambda p: p[0].length)
+    exponential = sorted((p for p in pairs if p[0].memory == "exponential"), key=lambda p: -p[0].tolerance)
+    places = _spread([row.length for row, _ in short])
+    shown = [short[i] for i in places] + exponential[len(exponential) // 2 :][:1]
+    return [(row, curves, CYCLE[i % len(CYCLE)]) for i, (row, curves) in enumerate(shown)]
+
+
+def _spread(lengths: Sequence[int]) -> list[int]:
+    """Indices of a few lengths, as even in log length as there are."""
+    if not lengths:
+        return []
+    wanted = np.linspace(np.log(lengths[0]), np.log(lengths[-1]), min(_MOST_LINES, len(lengths)))
+    return list(dict.fromkeys(int(np.argmin(np.abs(np.log(lengths) - place))) for place in wanted))
+
+
+def _label(row: Row) -> str:
+    return f"L = {row.length}" if row.memory == "short" else f"{row.states} exponentials"
+
+
+def _style(row: Row) -> dict:
+    return {"ls": "--", "lw": 1.8} if row.memory == "exponential" else {}
+
+
+def frequency(study: Study) -> bytes:
+    """What the memory adds to the controller's phase and magnitude, over the band that matters."""
+    with figure(2, 1, size=(7.0, 5.2), sharex=True) as (fig, (top, bottom)):
+        for row, curves, colour in _chosen(study, "omega"):
+            top.semilogx(curves.omega, curves.phase_deg, color=colour, label=_label(row), **_style(row))
+            bottom.semilogx(curves.omega, curves.magnitude_db, color=colour, **_style(row))
+        top.axhspan(-2.0, 2.0, color=COLOURS["band"], zorder=0, lw=0, label="±2°")
+        for place in (study.band.crossover_low, study.band.crossover_high):
+            if place is not None:
+                for axis in (top, bottom):
+                    axis.axvline(place, color=GREY, lw=0.8, ls=":")
+        if study.band.crossover_high is not None:
+            top.annotate(
+                "crossovers",
+                (study.band.crossover_high, 0.04),
+                xycoords=("data", "axes fraction"),
+                xytext=(4, 0),
+                textcoords="offset points",
+                fontsize=8,
+                color=GREY,
+            )
+        top.set_ylabel("phase error (°)")
+        bottom.set_ylabel("magnitude error (dB)")
+        bottom.set_xlabel("frequency (rad/s)")
+        top.set_title("The controller's response against infinite memory")
+        top.legend(ncols=2)
+        return png(fig)
+
+
+def loops(study: Study) -> bytes:
+    """The step to the middle set point by length, and what it is off the ideal."""
+    at = [ideal.sample_time for ideal in study.ideal].index(_own(study)[0].sample_time)
+    ideal = study.ideal_curves[at]
+    time, perfect = np.array(ideal.time), np.array(ideal.output)
+    unit, lines = study.controller.units.measurement, _chosen(study, "time")
+    with figure(2, 1, size=(7.0, 5.6), sharex=True, height_ratios=(1.4, 1.0)) as (fig, (top, bottom)):
+        for row, curves, colour in lines:
+            off = 100.0 * np.abs(np.array(curves.output) - perfect) / abs(ideal.reference - perfect[0])
+            top.plot(curves.time, curves.output, color=colour, label=_label(row), **_style(row))
+            bottom.semilogy(curves.time, np.maximum(off, _LEAST), color=colour, **_style(row))
+        top.plot(time, perfect, color=COLOURS["ideal"], lw=0.9, label="infinite memory")
+        top.axhline(ideal.reference, color=GREY, lw=0.8, ls="--")
+        top.set_ylabel(f"output ({unit})" if unit else "output")
+        bottom.set_ylim(_LEAST, None)
+        bottom.set_ylabel("off the ideal (% of step)")
+        bottom.set_xlabel("time (s)")
+        top.set_title(f"Closed loop, {lines[0][0].arithmetic}, {lines[0][0].sample_time:g} s")
+        top.legend(loc="lower right", ncols=2)
+        return png(fig)
+
+
+def plant(study: Study) -> bytes:
+    """The plant's step, simulated with each memory in its denominator, over an hour."""
+    found = study.plant
+    with figure(1, 1, size=(7.0, 3.6)) as (fig, axis):
+        for row, colour in zip(found.rows, CYCLE):
+            label = f"L = {row.length}" if row.length else f"{row.states} exponentials"
+            axis.semilogx(found.time, row.output, color=colour, label=label, lw=2.2 if row.states else 1.4)
+        axis.semilogx(found.time, found.exact, color=COLOURS["ideal"], lw=0.9, label="exact")
+        axis.set_xlabel("time after the step (s)")
+        axis.set_ylabel("output")
+        axis.set_title("Short memory in a plant's denominator")
+        axis.legend(loc="best")
+        return png(fig)

@@ -1,0 +1,163 @@
+"""One piece of a study: a pure function of its inputs, so that any machine gives the same answer."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+import focgen
+from focgen.control.files import controller_text
+from focgen.errors import PlanError
+from focgen.plan.build import build_plan
+from focgen.plan.canonical import memory_bias, realise
+from focgen.plan.model import Plan
+from focgen.rig.files import rig_text
+from focgen.studies.closed import Steps, ideal_loop, running_loop
+from focgen.studies.costs import costs
+from focgen.studies.model import Curves, Ideal, Loop, PlantRow, Row, Setup, Variant
+from focgen.studies.operator import fractional_terms, measure, variant_of
+from focgen.studies.plant import plant_of, plant_row
+from focgen.studies.spectrum import Spectrum, memory_spectrum, sampling_spectrum
+from focgen.studies.unplanned import unplanned_row
+
+_FORMAT = 1  # of a stored answer
+
+
+@dataclass(frozen=True)
+class Job:
+    """``kind``: "row", "ideal" or "plant"; what is asked of ``variant``."""
+
+    kind: str
+    setup: Setup
+    variant: Variant
+
+    @property
+    def key(self) -> str:
+        """A hash of everything the answer depends on."""
+        setup = self.setup
+        content = {
+            "format": _FORMAT,
+            "version": focgen.__version__,
+            "kind": self.kind,
+            "variant": asdict(self.variant),
+            "controller": controller_text(setup.controller),
+            "rig": None if setup.rig is None else rig_text(setup.rig),
+            "band": [setup.band.low, setup.band.high],
+            "samples": setup.samples,
+            "setpoints": list(setup.setpoints),
+            "target": setup.target,
+        }
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()
+
+
+def answer(job: Job) -> dict[str, Any]:
+    """Do the job; returns what JSON can carry: ``row``, ``ideal`` or ``plant``, and ``curves``."""
+    return {"row": _row, "ideal": _ideal, "plant": _plant}[job.kind](job.setup, job.variant)
+
+
+def _row(setup: Setup, variant: Variant) -> dict[str, Any]:
+    controller = variant_of(setup.controller, variant)
+    try:
+        plan = build_plan(controller)
+        row, curves = _measured(setup, variant, plan)
+    except PlanError as reason:
+        if variant.memory == "exponential" and variant.arithmetic == "f64":
+            row, curves = unplanned_row(setup, variant, controller, "the operator alone: no plan carries it")
+            return {"row": asdict(row), "curves": asdict(curves)}
+        row, curves = Row(**asdict(variant), note=str(reason)), Curves()
+    return {"row": asdict(row), "curves": asdict(curves)}
+
+
+def _measured(setup: Setup, variant: Variant, plan: Plan) -> tuple[Row, Curves]:
+    controller = plan.controller
+    opened = measure(controller, plan, setup.controller.sample_time, setup.samples)
+    spectrum = memory_spectrum(controller, plan, setup.band)
+    cost = costs(plan, setup.target)
+    base, steps = replace(setup.controller, sample_time=variant.sample_time), None
+    if setup.rig is not None:
+        steps = running_loop(base, setup.rig, setup.setpoints, plan)
+    row = Row(
+        **asdict(variant),
+        error=opened.error,
+        errors=opened.errors,
+        bound=opened.bound,
+        error_ahead=opened.error_ahead,
+        dc_bias=_dc_bias(plan),
+        operator_bias=_operator_bias(plan),
+        phase_error_deg=float(np.abs(spectrum.phase_deg).max()),
+        magnitude_error_db=float(np.abs(spectrum.magnitude_db).max()),
+        phase_from_rad_s=spectrum.good_from,
+        **(asdict(steps.loop) if steps else {}),
+        **asdict(cost),
+    )
+    return row, _curves(spectrum, steps)
+
+
+def _dc_bias(plan: Plan) -> float | None:
+    """The gain for constants as the plan has it, against the right one."""
+    right = realise(plan.controller).steady_gain
+    if plan.inner is not None or right == 0.0:
+        return None
+    still = sum(plan.direct.values)
+    if plan.feedback is not None:
+        still /= 1.0 + sum(plan.feedback.table.values)
+    return float(still / right - 1.0)
+
+
+def _operator_bias(plan: Plan) -> float:
+    """Γ(L+1−α)/(Γ(1−α) L!), the largest."""
+    controller = plan.controller
+    rows = memory_bias(controller, plan.length)
+    powers = {t.order for t in fractional_terms(controller)}
+    return max((abs(b / (c * controller.sample_time**-o)) for c, o, b in rows if o in powers), default=0.0)
+
+
+def _ideal(setup: Setup, variant: Variant) -> dict[str, Any]:
+    base = replace(setup.controller, sample_time=variant.sample_time)
+    spectrum = sampling_spectrum(base, setup.band)
+    steps = ideal_loop(base, setup.rig, setup.setpoints) if setup.rig is not None else None
+    found = Ideal(
+        variant.sample_time,
+        float(np.abs(spectrum.phase_deg).max()),
+        float(np.abs(spectrum.magnitude_db).max()),
+        steps.loop if steps else None,
+    )
+    return {"ideal": asdict(found), "curves": asdict(_curves(spectrum, steps))}
+
+
+def _plant(setup: Setup, variant: Variant) -> dict[str, Any]:
+    return {"plant": asdict(plant_row(plant_of(setup.controller, setup.rig), variant))}
+
+
+def _curves(spectrum: Spectrum, steps: Steps | None) -> Curves:
+    parts = (spectrum.omega, spectrum.phase_deg, spectrum.magnitude_db)
+    frequency = (tuple(map(float, part[::2])) for part in parts)
+    if steps is None:
+        return Curves(*frequency)
+    return Curves(*frequency, tuple(map(float, steps.time)), tuple(map(float, steps.output)), steps.reference)
+
+
+def read_row(found: dict[str, Any]) -> tuple[Row, Curves]:
+    """A stored row as it was."""
+    return _read(Row, found["row"]), _read(Curves, found["curves"])
+
+
+def read_ideal(found: dict[str, Any]) -> tuple[Ideal, Curves]:
+    """A stored ideal as it was."""
+    loop = found["ideal"]["loop"]
+    ideal = Ideal(**{**found["ideal"], "loop": None if loop is None else Loop(**loop)})
+    return ideal, _read(Curves, found["curves"])
+
+
+def read_plant(found: dict[str, Any]) -> PlantRow:
+    """A stored row of the plant as it was."""
+    return _read(PlantRow, found["plant"])
+
+
+def _read(kind, values: dict[str, Any]):
+    names = {f.name for f in fields(kind)}
+    return kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items() if k in names})

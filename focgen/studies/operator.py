@@ -1,0 +1,100 @@
+"""The open loop: the memory operator alone, and the controller ahead of its integrator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.fractional.transfer import Term, TransferFunction
+from focgen.plan.build import build_plan
+from focgen.plan.canonical import realise
+from focgen.plan.execute import execute
+from focgen.plan.ideal import ideal
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Scenario, physical_trace, to_raw
+from focgen.studies.model import INPUTS, Variant
+from focgen.studies.signals import Inputs, exact_power, inputs, relative_errors
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """See :class:`focgen.studies.model.Row` for each number."""
+
+    errors: dict[str, float]
+    bound: float | None
+    error_ahead: float
+
+    @property
+    def error(self) -> float:
+        """The worst of the four."""
+        return max(self.errors.values())
+
+
+def fractional_terms(controller: Controller) -> tuple[Term, ...]:
+    """The powers that need memory, as they are realised: for each order the term that weighs most."""
+    form = realise(controller)
+    found: dict[float, Term] = {}
+    for term in form.direct + form.rest + form.den:
+        weighs_more = abs(term.coefficient) > abs(found.get(term.order, term).coefficient)
+        if not term.order.is_integer() and (term.order not in found or weighs_more):
+            found[term.order] = term
+    return tuple(found[order] for order in sorted(found))
+
+
+def variant_of(controller: Controller, variant: Variant) -> Controller:
+    """The controller as ``variant`` has it."""
+    length = variant.length or controller.length
+    return replace(
+        controller,
+        sample_time=variant.sample_time,
+        memory=variant.memory,
+        length=length,
+        arithmetic=variant.arithmetic,
+    )
+
+
+def measure(controller: Controller, plan: Plan, own: float, samples: int) -> OpenLoop:
+    """Run the operator and the controller's ``plan`` on the four inputs.
+
+    ``controller`` is the variant; ``own`` and ``samples`` as :func:`focgen.studies.signals.inputs` has them.
+    Raises PlanError where the operator alone has no plan in this arithmetic.
+    """
+    given = inputs(controller, own, samples)
+    each = [_power(controller, term, given) for term in fractional_terms(controller)]
+    errors = {name: max(found[name] for found, _ in each) for name in INPUTS}
+    bounds = [bound for _, bound in each]
+    exact = ideal(controller, given.scenario).d
+    ahead = max(relative_errors(_ahead(plan, given.scenario), exact).values())
+    return OpenLoop(errors, None if None in bounds else max(bounds), ahead)
+
+
+def _ahead(plan: Plan, scenario: Scenario) -> np.ndarray:
+    """The signal ahead of the integrator, physical, shape (lanes, samples)."""
+    return physical_trace(plan, execute(plan, to_raw(plan, scenario))).d
+
+
+def operator_alone(controller: Controller, term: Term) -> Controller:
+    """The controller with nothing but one power of s, and its largest gain."""
+    gains = controller.gain.gains if controller.scheduled else (controller.gain,)
+    return replace(
+        controller,
+        transfer=TransferFunction([term]),
+        gain=max(gains, key=abs),
+        ranges=replace(controller.ranges, schedule=None),
+    )
+
+
+def _power(controller: Controller, term: Term, given: Inputs) -> tuple[dict[str, float], float | None]:
+    """The errors of one power by input, and what proves that they are no larger."""
+    alone = operator_alone(controller, term)
+    plan = build_plan(alone)
+    exact = alone.gain * term.coefficient * exact_power(term.order, alone.sample_time, given.error)
+    scenario = replace(given.scenario, sched=None)
+    errors = relative_errors(_ahead(plan, scenario), exact)
+    proved = plan.error_bound
+    if proved.truncation is None:
+        return errors, None
+    smallest = float(np.abs(exact).max(axis=1).min())
+    return errors, (proved.operator + proved.truncation) / smallest

@@ -1,0 +1,206 @@
+"""``focgen study memory`` as one function."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from focgen.control.controller import Controller
+from focgen.control.equilibrium import derived_ranges, holding, rest
+from focgen.control.files import read_controller
+from focgen.control.setpoints import default_setpoints
+from focgen.errors import ControllerError, DesignError, InputError
+from focgen.rig.files import read_rig
+from focgen.rig.model import Rig
+from focgen.studies.grid import Grid, grid_of
+from focgen.studies.jobs import Job, read_ideal, read_plant, read_row
+from focgen.studies.model import Curves, Plant, Row, Setup, Study, Variant
+from focgen.studies.operator import fractional_terms
+from focgen.studies.plant import exact_step, plant_of, plant_times
+from focgen.studies.recommend import Wish, leanest, pareto, sentence, shortest
+from focgen.studies.spectrum import band_of
+from focgen.studies.store import Store
+from focgen.studies.sweep import sweep
+from focgen.studies.write import write
+
+SUBJECTS = ("memory",)
+SAMPLES = 10_000  # of the open-loop inputs
+
+
+def study(subject: str, controller: Controller | str | Path, out: str | Path, **options) -> Study:
+    """Study a controller's ``subject``; "memory" is the one there is. ``options``: those of
+    :func:`study_memory`. Raises InputError for another subject, and as that does.
+    """
+    if subject not in SUBJECTS:
+        raise InputError("study", f"has no subject {subject!r}", f"choose {' or '.join(SUBJECTS)}")
+    return study_memory(controller, out, **options)
+
+
+def study_memory(
+    controller: Controller | str | Path,
+    out: str | Path,
+    *,
+    rig: Rig | str | Path | None = None,
+    memories: Sequence[str] | None = None,
+    lengths: Sequence[int] | None = None,
+    tolerances: Sequence[float] | None = None,
+    horizon: int | None = None,
+    arithmetics: Sequence[str] | None = None,
+    sample_times: Sequence[float] | None = None,
+    setpoints: Sequence[float] | None = None,
+    target: str | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+) -> Study:
+    """Sweep memory form, length or tolerance, arithmetic and sample time, and write the study into ``out``.
+
+    ``controller``: a :class:`Controller` or its file. ``rig``: what closes the loop; by default the rig that
+    the controller's file says it was designed from, where it is found beside it, unchanged. ``lengths`` in
+    past samples; ``tolerances`` and ``horizon`` (samples at the controller's own sample time) of the
+    exponential form; ``sample_times`` in s; ``setpoints``: outputs stepped to from rest. ``target``: the core
+    that cycles are counted on. ``jobs``: processes at a time (default: the cores); ``scheduler``: address of
+    a Dask scheduler that does the work instead.
+
+    What has been measured stays in ``out``/rows and is not measured again for the same inputs, so that an
+    interrupted study goes on. Raises InputError for options that cannot be used, ControllerError and RigError
+    for the files, DesignError where a set point cannot be reached, MissingExtra where Dask is not installed.
+    """
+    which = controller if isinstance(controller, Controller) else read_controller(controller)
+    if not fractional_terms(which):
+        raise ControllerError(
+            _name(controller),
+            "has no fractional power of s, so no memory",
+            "study a controller of fractional order",
+        )
+    grid = grid_of(which, memories, lengths, tolerances, horizon, arithmetics, sample_times)
+    model, notes = _rig(rig, which, controller)
+    points = _setpoints(which, model, setpoints)
+    setup = Setup(which, model, band_of(which, model, points), SAMPLES, points, target)
+    found = _Sweep(setup, grid, Store(Path(out)), jobs, scheduler).result(notes)
+    write(found, Path(out))
+    return found
+
+
+def _name(controller: Controller | str | Path) -> str:
+    return controller.name if isinstance(controller, Controller) else str(controller)
+
+
+def _rig(given, controller: Controller, source) -> tuple[Rig | None, list[str]]:
+    """The rig, and what has to be said about it."""
+    if given is not None:
+        return (given if isinstance(given, Rig) else read_rig(given)), []
+    made_from = controller.designed_from
+    if made_from is None:
+        return None, ["no rig is named in the controller: give --rig for the closed-loop columns"]
+    folders = [Path.cwd()] if isinstance(source, Controller) else [Path(source).parent, Path.cwd()]
+    places = [place for place in (folder / made_from.file for folder in folders) if place.is_file()]
+    same = [p for p in places if hashlib.sha256(p.read_bytes()).hexdigest() == made_from.sha256]
+    if same:
+        return read_rig(same[0]), []
+    if places:
+        what = f"{places[0]} has changed since the controller was designed from it"
+        return None, [f"{what}: give --rig {places[0]} for the closed-loop columns with it as it is"]
+    return None, [
+        f"{made_from.file}, which the controller was designed from, is not beside it: "
+        "give --rig for the closed-loop columns"
+    ]
+
+
+def _setpoints(controller: Controller, rig: Rig | None, given: Sequence[float] | None) -> tuple[float, ...]:
+    if rig is None:
+        return ()
+    ranges, _ = derived_ranges(rig)
+    start = rest(rig, controller.ranges.output)
+    span = rig.ranges.output or controller.ranges.reference
+    points = default_setpoints(start.output, span) if given is None else tuple(map(float, given))
+    if start.output in points:
+        raise DesignError(
+            "--setpoints", f"{start.output:g} is the rest itself", "give outputs away from rest"
+        )
+    for point in points:
+        holding(rig, point, ranges)
+    return points
+
+
+class _Sweep:
+    """The jobs of one study, and what becomes of them."""
+
+    def __init__(self, setup: Setup, grid: Grid, store: Store, processes: int | None, scheduler: str | None):
+        self.setup, self.grid, self.store = setup, grid, store
+        self.processes, self.scheduler = processes, scheduler
+        self.own = setup.controller.sample_time
+
+    def result(self, notes: list[str]) -> Study:
+        setup, controller = self.setup, self.setup.controller
+        ideals = [Variant("infinite", "f64", h) for h in self.grid.sample_times]
+        variants = self.grid.variants(controller)
+        plant = plant_of(controller, setup.rig)
+        tried = self.grid.of_the_plant(self.own) if plant is not None else []
+        asked = (
+            [("ideal", v) for v in ideals] + [("row", v) for v in variants] + [("plant", v) for v in tried]
+        )
+        answers = self._done(asked)
+        perfect = [read_ideal(a) for a in answers[: len(ideals)]]
+        rows = [read_row(a) for a in answers[len(ideals) : len(ideals) + len(variants)]]
+        plants = tuple(read_plant(a) for a in answers[len(ideals) + len(variants) :])
+        said, rows = self._recommended(rows, perfect[self.grid.sample_times.index(self._first())][0])
+        every = tuple(row for row, _ in rows)
+        return Study(
+            controller,
+            None if setup.rig is None else setup.rig.name,
+            setup.band,
+            setup.setpoints,
+            setup.samples,
+            every,
+            tuple(ideal for ideal, _ in perfect),
+            self._plant(plant, plants) if plant is not None else None,
+            pareto(every, self._first()),
+            said,
+            tuple([*notes, *_missing(every)]),
+            tuple(curves for _, curves in rows),
+            tuple(curves for _, curves in perfect),
+        )
+
+    def _first(self) -> float:
+        """The sample time that is recommended for: the controller's own where it is looked at."""
+        return self.own if self.own in self.grid.sample_times else self.grid.sample_times[0]
+
+    def _done(self, asked: list[tuple[str, Variant]]) -> list[dict]:
+        jobs = [Job(kind, self.setup, variant) for kind, variant in asked]
+        return sweep(jobs, self.store, self.processes, self.scheduler)
+
+    def _recommended(self, rows, ideal) -> tuple[str, list[tuple[Row, Curves]]]:
+        """The sentence, and the rows with those that it took to find the shortest length."""
+        h, arithmetics = self._first(), self.grid.arithmetics
+        own = self.setup.controller.arithmetic
+        arithmetic = own if own in arithmetics else arithmetics[0]
+        wish = Wish(self.setup.band, ideal)
+        mine = [row for row, _ in rows if row.arithmetic == arithmetic and row.sample_time == h]
+        added: list[tuple[Row, Curves]] = []
+
+        def more(length: int) -> Row:
+            found = self._done([("row", self.grid.short(arithmetic, h, length))])
+            added.append(read_row(found[0]))
+            return added[-1][0]
+
+        short, _ = shortest([r for r in mine if r.memory == "short"], wish, more)
+        exponential = leanest([r for r in mine if r.memory == "exponential"], wish)
+        as_run = replace(self.setup.controller, arithmetic=arithmetic, sample_time=h)
+        said = sentence(as_run, wish, short, exponential, set(self.grid.memories), max(self.grid.lengths))
+        return said, [*rows, *added]
+
+    def _plant(self, plant, rows) -> Plant:
+        times = plant_times(self.own) * self.own
+        exact = exact_step(plant, self.own)
+        return Plant(str(plant), self.own, tuple(map(float, times)), tuple(map(float, exact)), rows)
+
+
+def _missing(rows: tuple[Row, ...]) -> list[str]:
+    """One sentence for each reason why rows are empty."""
+    reasons: dict[str, int] = {}
+    for row in rows:
+        if row.note:
+            reasons[row.note] = reasons.get(row.note, 0) + 1
+    return [f"{count} row{'s' * (count > 1)}: {note}" for note, count in reasons.items()]

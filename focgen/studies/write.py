@@ -1,0 +1,57 @@
+"""The study's folder: study.json, the pictures, and the page."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from focgen.errors import MissingExtra
+from focgen.output import write_files
+from focgen.studies.model import Study
+
+
+def write(study: Study, folder: Path) -> None:
+    """Write all of it, or none. Pictures and page where matplotlib is installed."""
+    files: dict[str, str | bytes] = {
+        "study.json": json.dumps(payload(study), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    }
+    write_files(folder, files | _shown(study))
+
+
+def _shown(study: Study) -> dict[str, str | bytes]:
+    # matplotlib is an extra: asked for only where it draws
+    from focgen.report.study import study_pictures
+    from focgen.report.study_page import study_page
+
+    try:
+        pictures = study_pictures(study)
+    except MissingExtra:
+        pictures = {}
+    return {**pictures, "report.html": study_page(study, pictures).html()}
+
+
+def payload(study: Study) -> dict[str, Any]:
+    """What ``focgen study memory --json`` carries."""
+    controller = study.controller
+    return {
+        "subject": "memory",
+        "controller": controller.name,
+        "transfer": str(controller.transfer),
+        "rig": study.rig,
+        "band": asdict(study.band),
+        "samples": study.samples,
+        "setpoints": list(study.setpoints),
+        "rows": [asdict(row) for row in study.rows],
+        "pareto": {cost: list(front) for cost, front in study.pareto.items()},
+        "ideal": [asdict(ideal) for ideal in study.ideal],
+        "plant": None if study.plant is None else _plant(study),
+        "recommendation": study.recommendation,
+        "notes": list(study.notes),
+    }
+
+
+def _plant(study: Study) -> dict[str, Any]:
+    rows = [{k: v for k, v in asdict(row).items() if k != "output"} for row in study.plant.rows]
+    return {"transfer": study.plant.transfer, "sample_time": study.plant.sample_time, "rows": rows}
