@@ -22,7 +22,7 @@ from focgen.studies.plant import exact_step, plant_of, plant_times
 from focgen.studies.recommend import Wish, leanest, pareto, sentence, shortest
 from focgen.studies.spectrum import band_of
 from focgen.studies.store import Store
-from focgen.studies.sweep import sweep
+from focgen.studies.sweep import Workers, sweep
 from focgen.studies.write import write
 
 SUBJECTS = ("memory",)
@@ -78,7 +78,8 @@ def study_memory(
     model, notes = _rig(rig, which, controller)
     points = _setpoints(which, model, setpoints)
     setup = Setup(which, model, band_of(which, model, points), SAMPLES, points, target)
-    found = _Sweep(setup, grid, Store(Path(out)), jobs, scheduler).result(notes)
+    with Workers(jobs, scheduler) as workers:
+        found = _Sweep(setup, grid, Store(Path(out)), workers).result(notes)
     write(found, Path(out))
     return found
 
@@ -127,9 +128,8 @@ def _setpoints(controller: Controller, rig: Rig | None, given: Sequence[float] |
 class _Sweep:
     """The jobs of one study, and what becomes of them."""
 
-    def __init__(self, setup: Setup, grid: Grid, store: Store, processes: int | None, scheduler: str | None):
-        self.setup, self.grid, self.store = setup, grid, store
-        self.processes, self.scheduler = processes, scheduler
+    def __init__(self, setup: Setup, grid: Grid, store: Store, workers: Workers):
+        self.setup, self.grid, self.store, self.workers = setup, grid, store, workers
         self.own = setup.controller.sample_time
 
     def result(self, notes: list[str]) -> Study:
@@ -169,7 +169,7 @@ class _Sweep:
 
     def _done(self, asked: list[tuple[str, Variant]]) -> list[dict]:
         jobs = [Job(kind, self.setup, variant) for kind, variant in asked]
-        return sweep(jobs, self.store, self.processes, self.scheduler)
+        return sweep(jobs, self.store, self.workers)
 
     def _recommended(self, rows, ideal) -> tuple[str, list[tuple[Row, Curves]]]:
         """The sentence, and the rows with those that it took to find the shortest length."""

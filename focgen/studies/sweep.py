@@ -1,4 +1,7 @@
-"""Many jobs on all cores, or on a Dask cluster; what the store has is not done again."""
+"""Many jobs on all cores, or on a Dask cluster; what the store has is not done again.
+
+Every worker has one thread, so that the last digit does not depend on how many there are.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import signal
 import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from focgen.errors import InputError, MissingExtra
@@ -20,34 +23,40 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PATIENCE = "10s"  # until a scheduler must have answered
 
 
-def sweep(
-    jobs: Sequence[Job], store: Store, processes: int | None, scheduler: str | None
-) -> list[dict[str, Any]]:
-    """Return the answers in the order of ``jobs``.
+class Workers:
+    """Whoever does the jobs: ``processes`` of this machine, or the Dask cluster at ``scheduler``.
 
-    ``processes`` at a time (default: the cores), in this process where it is 1; or on the cluster at
-    ``scheduler``. Raises InputError where that does not answer, MissingExtra where Dask is not installed.
+    They are called when there is first something to do, and leave at the end of the ``with`` block. Calling
+    them raises InputError where the scheduler does not answer, MissingExtra where Dask is not installed.
     """
-    found = {i: store.find(job) for i, job in enumerate(jobs)}
-    open_ones = [i for i, answered in found.items() if answered is None]
-    with _answers([jobs[i] for i in open_ones], processes, scheduler) as answers:
-        for place, answered in track(answers, "study", len(open_ones)):
-            found[open_ones[place]] = store.keep(jobs[open_ones[place]], answered)
-    return [found[i] for i in range(len(jobs))]
+
+    def __init__(self, processes: int | None = None, scheduler: str | None = None):
+        self._processes, self._scheduler = processes or os.cpu_count() or 1, scheduler
+        self._stack, self._called = ExitStack(), None
+
+    def __enter__(self) -> Workers:
+        if self._scheduler is not None:  # a wrong address is a fault even where all answers are known
+            self._called = self._stack.enter_context(_cluster(self._scheduler))
+        return self
+
+    def __exit__(self, *reason) -> None:
+        self._stack.close()
+
+    def answers(self, jobs: Sequence[Job]) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Yield (place, answer) in the order in which they are ready."""
+        if jobs and self._called is None:
+            self._called = self._stack.enter_context(_pool(self._processes))
+        if jobs:
+            yield from (_from_pool if self._scheduler is None else _from_cluster)(self._called, jobs)
 
 
-@contextmanager
-def _answers(jobs: Sequence[Job], processes: int | None, scheduler: str | None):
-    """Give an iterator of (place, answer) in the order in which they are ready."""
-    count = min(processes or os.cpu_count() or 1, len(jobs))
-    if scheduler is not None:
-        with _cluster(scheduler) as client:
-            yield _from_cluster(client, jobs)
-    elif count <= 1:
-        yield ((place, answer(job)) for place, job in enumerate(jobs))
-    else:
-        with _pool(count) as pool:
-            yield _from_pool(pool, jobs)
+def sweep(jobs: Sequence[Job], store: Store, workers: Workers) -> list[dict[str, Any]]:
+    """Return the answers in the order of ``jobs``; what the store has is not asked for."""
+    found = [store.find(job) for job in jobs]
+    missing = [place for place, answered in enumerate(found) if answered is None]
+    for place, answered in track(workers.answers([jobs[i] for i in missing]), "study", len(missing)):
+        found[missing[place]] = store.keep(jobs[missing[place]], answered)
+    return found
 
 
 @contextmanager
