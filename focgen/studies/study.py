@@ -77,6 +77,8 @@ def study_memory(
     grid = grid_of(which, memories, lengths, tolerances, horizon, arithmetics, sample_times)
     model, notes = _rig(rig, which, controller)
     points = _setpoints(which, model, setpoints)
+    if model is not None and model.effects:
+        notes.append("the rig's effects are left aside: memory is studied in the loop with the nominal chain")
     setup = Setup(which, model, band_of(which, model, points), SAMPLES, points, target)
     with Workers(jobs, scheduler) as workers:
         found = _Sweep(setup, grid, Store(Path(out)), workers).result(notes)
