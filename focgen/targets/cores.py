@@ -1,0 +1,75 @@
+"""The microcontroller cores that generated C is tried on: what they can do, and how tools call them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from focgen.errors import InputError
+
+
+@dataclass(frozen=True)
+class Core:
+    """One core, bit for bit what the architecture's manual says of it.
+
+    ``zig`` and ``gcc`` are compiler flags; ``model`` the name of unicorn's CPU model; ``board`` QEMU's machine.
+    ``divide``, ``dsp``, ``single``, ``double``: it has hardware division, the DSP extension, a floating-point
+    unit for float, for double. ``unaligned``: single loads and stores may be unaligned.
+    """
+
+    name: str
+    title: str
+    zig: tuple[str, ...]
+    gcc: tuple[str, ...]
+    model: str
+    board: str | None = None
+    wide: bool = True
+    divide: bool = True
+    dsp: bool = False
+    single: bool = False
+    double: bool = False
+    unaligned: bool = True
+
+    @property
+    def arm(self) -> bool:
+        """Whether it runs Thumb code; else RISC-V."""
+        return self.name.startswith("cortex")
+
+
+_SOFT, _HARD = ("-target", "thumb-freestanding-eabi"), ("-target", "thumb-freestanding-eabihf")
+
+CORES = (
+    Core(
+        "cortex-m0plus", "Cortex-M0+", (*_SOFT, "-mcpu=cortex_m0plus"), ("-mthumb", "-mcpu=cortex-m0plus"),
+        "UC_CPU_ARM_CORTEX_M0", "mps2-an385", wide=False, divide=False, unaligned=False,
+    ),
+    Core(
+        "cortex-m3", "Cortex-M3", (*_SOFT, "-mcpu=cortex_m3"), ("-mthumb", "-mcpu=cortex-m3"),
+        "UC_CPU_ARM_CORTEX_M3", "mps2-an385",
+    ),
+    Core(
+        "cortex-m4", "Cortex-M4F", (*_HARD, "-mcpu=cortex_m4+vfp4d16sp"),
+        ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
+        "UC_CPU_ARM_CORTEX_M4", "mps2-an386", dsp=True, single=True,
+    ),
+    Core(
+        "cortex-m7", "Cortex-M7F", (*_HARD, "-mcpu=cortex_m7+fp_armv8d16"),
+        ("-mthumb", "-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
+        "UC_CPU_ARM_CORTEX_M7", "mps2-an500", dsp=True, single=True, double=True,
+    ),
+    Core(
+        "rv32imac", "RV32IMAC",
+        ("-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m+a+c"),
+        ("-march=rv32imac", "-mabi=ilp32"), "UC_CPU_RISCV32_ANY",
+    ),
+)  # fmt: skip
+"""Those that an emulator of the ``targets`` extra runs."""
+
+EMULATED = tuple(core.name for core in CORES)
+
+
+def core(name: str) -> Core:
+    """The core of that name. Raises InputError where there is none."""
+    for one in CORES:
+        if one.name == name:
+            return one
+    raise InputError("--target", f"is {name!r}", f"choose of {', '.join(EMULATED)}")

@@ -1,0 +1,89 @@
+"""C that runs a plan's controller over arrays, on any machine, and the arrays it takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.codegen.manifest import lsbs
+from focgen.codegen.render import render
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Scenario, Trace
+
+DTYPES = {
+    "double": np.float64,
+    "float": np.float32,
+    "int64_t": np.int64,
+    "int32_t": np.int32,
+    "int16_t": np.int16,
+}
+_RESET, _TRACK = 1, 2
+
+
+@dataclass(frozen=True)
+class DriverContext:
+    """Everything ``driver.c.jinja`` asks for."""
+
+    name: str
+    increment: str
+    scheduled: bool
+    integral: bool
+    held: str
+    scales: tuple[str, ...]
+
+
+def driver(plan: Plan) -> str:
+    """C that runs a plan's controller over arrays."""
+    scheduled, integral = plan.schedule is not None, plan.integrator is not None
+    held = f"({plan.name}_flags(state) & {plan.name}_FLAG_INVALID) ? 0 : " if plan.floating else ""
+    scales = tuple(header_scales(plan))
+    context = DriverContext(plan.name, plan.increment.ctype, scheduled, integral, held, scales)
+    return render("driver.c.jinja", context)
+
+
+def header_scales(plan: Plan) -> dict[str, float]:
+    """The values that the header's macros for LSBs and sample time must have, by name."""
+    exact = plan.arithmetic == "f64"
+    return {**lsbs(plan), "SAMPLE_TIME": plan.sample_time if exact else float(np.float32(plan.sample_time))}
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What C gave for a scenario: ``trace``, and the bytes of the state after each lane."""
+
+    trace: Trace
+    states: tuple[bytes, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Lane:
+    """One lane of a scenario as C takes it, in the order of NAME_run's arguments."""
+
+    ref: np.ndarray
+    meas: np.ndarray
+    sched: np.ndarray
+    event: np.ndarray
+    given: np.ndarray
+
+
+def lane_of(plan: Plan, scenario: Scenario, lane: int) -> Lane:
+    """The arrays of one lane; where nothing is scheduled ``sched`` is there and not looked at."""
+    signal = DTYPES[plan.output.ctype]
+    sched = scenario.ref if scenario.sched is None else scenario.sched
+    inputs = [np.ascontiguousarray(x[lane], dtype=signal) for x in (scenario.ref, scenario.meas, sched)]
+    return Lane(*inputs, *_events(scenario, lane, signal))
+
+
+def _events(scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np.ndarray]:
+    """What happens ahead of each sample, and its values (ref, meas, u0, u applied)."""
+    event, given = np.zeros(scenario.samples, np.uint8), np.zeros((scenario.samples, 4), signal)
+    for r in scenario.resets:
+        if r.lane == lane:
+            event[r.sample] |= _RESET
+            given[r.sample, :3] = r.ref, r.meas, r.u0
+    for t in scenario.tracks:
+        if t.lane == lane:
+            event[t.sample] |= _TRACK
+            given[t.sample, 3] = t.u
+    return event, given

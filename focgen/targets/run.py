@@ -1,0 +1,149 @@
+"""Controllers run on an emulated core over scenarios, with the interface of the host's library."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Scenario, Trace
+from focgen.targets.cores import Core
+from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of
+from focgen.targets.emulator import Machine, TargetFault
+from focgen.targets.legality import forbidden
+from focgen.targets.program import RESULTS, WORK, WORK_SIZE, Program, build
+from focgen.targets.toolchains import Toolchain
+
+_DESCRIPTOR = "<10I"
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One lane in memory: the ``descriptor`` that the program reads, ``inputs`` (address, bytes), and where
+    its results will stand.
+    """
+
+    descriptor: bytes
+    inputs: tuple[tuple[int, bytes], ...]
+    count: int
+    u: int
+    d: int
+    flags: int
+
+
+class Work:
+    """Lays out jobs in a board's memory: descriptors, then inputs; results apart from them."""
+
+    def __init__(self, jobs: int):
+        self._in = WORK + 4 + jobs * struct.calcsize(_DESCRIPTOR)
+        self._out = RESULTS
+
+    @property
+    def results(self) -> int:
+        """Bytes of all results so far."""
+        return self._out - RESULTS
+
+    @property
+    def fits(self) -> bool:
+        """Whether everything so far has room."""
+        return self._in <= RESULTS - 8 and self._out <= WORK + WORK_SIZE
+
+    def add(self, index: int, plan: Plan, scenario: Scenario, lane: int) -> Job:
+        """Place one lane of plan number ``index``."""
+        arrays = vars(lane_of(plan, scenario, lane)).values()
+        inputs = [(self._input(a.nbytes), a.tobytes()) for a in arrays]
+        signal, increment = (DTYPES[f.ctype]().itemsize for f in (plan.output, plan.increment))
+        count = scenario.samples
+        u, d, flags = (self._result(count * size) for size in (signal, increment, 1))
+        places = [address for address, _ in inputs]
+        return Job(struct.pack(_DESCRIPTOR, index, count, *places, u, d, flags), tuple(inputs), count, u, d, flags)
+
+    def _input(self, size: int) -> int:
+        place = self._in = -(-self._in // 8) * 8
+        self._in += size
+        return place
+
+    def _result(self, size: int) -> int:
+        place = self._out = -(-self._out // 8) * 8
+        self._out += size
+        return place
+
+
+def results(plan: Plan, job: Job, read) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """u, d and flags of a finished job; ``read(address, size)`` gives bytes of memory."""
+    arrays = []
+    for place, kind in ((job.u, DTYPES[plan.output.ctype]), (job.d, DTYPES[plan.increment.ctype]),
+                        (job.flags, np.uint8)):  # fmt: skip
+        arrays.append(np.frombuffer(read(place, job.count * np.dtype(kind).itemsize), kind))
+    return tuple(arrays)
+
+
+class TargetLibrary:
+    """The C of plans on an emulated core: one program, run lane by lane.
+
+    ``plans`` have different names; ``folders`` hold NAME.h, NAME.c and foc_rt.h, one a plan. Raises BuildError
+    where they do not compile, MissingExtra where the tools are missing.
+    """
+
+    def __init__(self, core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path]):
+        self.plans = tuple(plans)
+        self.program: Program = build(core, chain, plans, folders, [driver(plan) for plan in plans])
+        self.core, self.chain = core, chain
+        self.machine = Machine(self.program)
+        self.machine.watch()
+
+    def illegal(self) -> tuple[str, ...]:
+        """Instructions that the core does not have, each once with its place."""
+        return forbidden(self.program)
+
+    def run(self, plan: Plan, scenario: Scenario) -> Trace:
+        """Run raw inputs; returns raw u and d and the flags, shape (lanes, samples), like the host's library.
+
+        Raises TargetFault where the program faults, does not return, or accesses memory as the core must not.
+        """
+        return self.answers(plan, scenario).trace
+
+    def answers(self, plan: Plan, scenario: Scenario) -> Answers:
+        """The same, with the state's bytes after every lane."""
+        lanes, states = [], []
+        for lane in range(scenario.lanes):
+            job = self._placed(self._index(plan), plan, scenario, lane)
+            self.machine.call("focgen_run", WORK + 4, seconds=time_limit(plan, job.count))
+            lanes.append(results(plan, job, self.machine.read))
+            states.append(self._state(plan))
+        u, d, flags = (np.stack(part) for part in zip(*lanes))
+        return Answers(Trace(u, d if plan.integrator else u, flags), tuple(states))
+
+    def _index(self, plan: Plan) -> int:
+        return [p.name for p in self.plans].index(plan.name)
+
+    def _placed(self, index: int, plan: Plan, scenario: Scenario, lane: int) -> Job:
+        work = Work(1)
+        job = work.add(index, plan, scenario, lane)
+        if not work.fits:
+            raise TargetFault(f"{job.count} samples a run do not fit a board's memory: take fewer --samples")
+        self.machine.write(WORK, struct.pack("<I", 1) + job.descriptor)
+        for address, content in job.inputs:
+            self.machine.write(address, content)
+        return job
+
+    def _state(self, plan: Plan) -> bytes:
+        place = self.machine.call("focgen_bytes", self._index(plan), RESULTS - 4)
+        return self.machine.read(place, *struct.unpack("<I", self.machine.read(RESULTS - 4, 4)))
+
+    def scales(self, plan: Plan) -> dict[str, float]:
+        """What the header's macros for LSBs and sample time are."""
+        names = list(header_scales(plan))
+        self.machine.call("focgen_scale", self._index(plan), RESULTS)
+        return dict(zip(names, np.frombuffer(self.machine.read(RESULTS, 8 * len(names))).tolist()))
+
+
+def time_limit(plan: Plan, samples: int) -> float:
+    """Seconds that a run may take: a thousand times what it should, and at least 20."""
+    taps = sum(s.taps for s in (plan.direct, plan.inner and plan.inner.rest,
+                                plan.feedback and plan.feedback.table) if s)  # fmt: skip
+    return 20.0 + samples * (200 + taps) * 2e-5

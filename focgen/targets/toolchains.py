@@ -1,0 +1,123 @@
+"""Cross compilers: Zig's, which pip installs, and GCC's where the machine has it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from focgen.errors import BuildError, MissingExtra
+from focgen.targets.cores import Core
+
+EXACT = ("-O2", "-std=c99", "-ffp-contract=off")
+"""As a user is told to compile; only so do floating results repeat."""
+
+_ZIG = ("-ffreestanding", "-fno-sanitize=undefined", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
+_GCC = ("-fno-tree-loop-distribute-patterns", "-nostdlib")
+_SLOW = 300.0  # s; Zig's first build also builds its runtime
+
+
+@dataclass(frozen=True)
+class Toolchain:
+    """One cross compiler: ``name`` and version for people, the ``command`` that compiles and links."""
+
+    name: str
+    version: str
+    command: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """Name and version."""
+        return f"{self.name} {self.version}"
+
+
+def toolchains(core: Core) -> tuple[Toolchain, ...]:
+    """Every cross compiler for a core that is there, Zig's first. Raises MissingExtra where there is none."""
+    found = tuple(chain for chain in (_zig(), _gcc(core)) if chain)
+    if not found:
+        raise MissingExtra.of("ziglang", "targets", "a cross compiler")
+    return found
+
+
+def absent(core: Core) -> tuple[str, ...]:
+    """The compilers that are not there, each with the line that installs it."""
+    lines = []
+    if _zig() is None:
+        lines.append("zig: not installed (pip install 'focgen[targets]')")
+    if _gcc(core) is None and core.arm:
+        lines.append("arm-none-eabi-gcc: not installed (apt-get install gcc-arm-none-eabi)")
+    return tuple(lines)
+
+
+@cache
+def _zig() -> Toolchain | None:
+    if find_spec("ziglang") is None:
+        return None
+    command = (sys.executable, "-m", "ziglang")
+    return Toolchain("zig cc", _said(*command, "version"), (*command, "cc"))
+
+
+def _gcc(core: Core) -> Toolchain | None:
+    return _gcc_of("arm-none-eabi-gcc") if core.arm else _gcc_of("riscv64-unknown-elf-gcc")
+
+
+@cache
+def _gcc_of(name: str) -> Toolchain | None:
+    return Toolchain(name, _said(name, "-dumpfullversion"), (name,)) if shutil.which(name) else None
+
+
+def _said(*command: str) -> str:
+    return subprocess.run(command, capture_output=True, text=True, timeout=60.0).stdout.strip()
+
+
+def link(chain: Toolchain, core: Core, sources: Sequence[Path], script: Path, target: Path, entry: str,
+         include: Sequence[Path] = (), flags: Sequence[str] = EXACT) -> None:  # fmt: skip
+    """Compile C files for a core and link them into the ELF file ``target``.
+
+    Raises BuildError with the compiler's first complaint.
+    """
+    zig = chain.command[-1] == "cc"
+    own = (*core.zig, *_ZIG) if zig else (*core.gcc, *_GCC)
+    folders = [f"-I{folder}" for folder in dict.fromkeys(include)]
+    last = ["-Wl,--no-gc-sections", f"-Wl,-e,{entry}"] if zig else [f"-Wl,--entry={entry}", "-lgcc"]
+    parts = [*chain.command, *own, *flags, *folders, "-T", str(script), "-o", str(target), *map(str, sources), *last]
+    try:
+        done = subprocess.run(parts, capture_output=True, text=True, env=_environment(), timeout=_SLOW)
+    except subprocess.TimeoutExpired:
+        raise BuildError(str(sources[0]), f"{chain.name} did not end within {_SLOW:g} s",
+                         "try again; the first build also makes Zig's runtime") from None  # fmt: skip
+    if done.returncode:
+        raise BuildError(str(sources[0]), f"{chain.title} for {core.name}: {_complaint(done.stderr)}",
+                         "generate the folder again")  # fmt: skip
+
+
+def _complaint(text: str) -> str:
+    lines = [line.strip() for line in text.splitlines() if "error" in line.lower()]
+    return (lines or text.splitlines() or ["it says nothing"])[0]
+
+
+def cache_folder() -> Path:
+    """Where built things are kept between runs: $XDG_CACHE_HOME/focgen, ~/.cache/focgen, or a temporary one."""
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    folder = Path(base) / "focgen"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            return folder
+    except OSError:
+        pass
+    folder = Path(tempfile.gettempdir()) / f"focgen-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def _environment() -> dict[str, str]:
+    zig = cache_folder() / "zig"
+    return {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(zig), "ZIG_LOCAL_CACHE_DIR": str(zig)}
