@@ -8,6 +8,7 @@ find them. A lost saturation of a *narrowing* is not among them: it is proved th
 import json
 import re
 import shutil
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from focgen.codegen.manifest import sha256
 from focgen.control.controller import ControllerRanges
 from focgen.errors import FocgenError
 from focgen.fractional.transfer import TransferFunction
+from focgen.targets import emulator
+from focgen.verification import compare
 from focgen.verification.folder import read_folder
 from focgen.verification.verify import verify
 from tests.conftest import paper_controller
@@ -422,14 +425,26 @@ def test_an_unusable_folder_is_an_error_of_one_line(sound, tmp_path, what, capsy
     assert not out and re.fullmatch(r"focgen: error: [^\n]+: [^\n]+; [^\n]+\n", err), err
 
 
-def test_a_target_that_is_not_there_is_skipped_and_says_why(sound, capsys):
+def test_a_target_that_is_not_there_is_skipped_and_says_why(sound, capsys, monkeypatch):
     """With nothing that ran there is nothing that holds."""
+    monkeypatch.setitem(sys.modules, "unicorn", None)
+    emulator._unicorn.cache_clear()
     assert main(["verify", str(sound / "spba_q15"), "--samples", "100", "--target", "all", "--json"]) == 0
     targets = json.loads(capsys.readouterr().out)["targets"]
     assert "skipped" not in targets.pop("host") and len(targets) == 6
-    assert all(list(entry) == ["skipped"] and entry["skipped"] for entry in targets.values())
-    assert main(["verify", str(sound / "spba_q15"), "--target", "avr"]) == 1
-    assert "skipped: " in capsys.readouterr().out
+    targets.pop("avr")
+    for entry in targets.values():
+        assert list(entry) == ["skipped"] and "focgen[targets]" in entry["skipped"]
+    assert main(["verify", str(sound / "spba_q15"), "--target", "cortex-m3"]) == 1
+    assert "skipped: needs unicorn" in capsys.readouterr().out
+
+
+def test_c_that_never_returns_is_a_mismatch_that_says_so(sound, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(compare, "PATIENCE", 0.5)
+    folder = copied(sound, tmp_path, "spba", "q15")
+    sow(folder, "spba", Fault("hang", "@.c", r"s->flags = \(uint8_t\)flags;", "for (;;) { s->flags++; }"))
+    assert main(["verify", str(folder), "--samples", "500"]) == 1
+    assert "did not return within" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,10 @@ from focgen.errors import InputError
 class Core:
     """One core, bit for bit what the architecture's manual says of it.
 
-    ``zig`` and ``gcc`` are compiler flags; ``model`` the name of unicorn's CPU model; ``board`` QEMU's machine.
-    ``divide``, ``dsp``, ``single``, ``double``: it has hardware division, the DSP extension, a floating-point
-    unit for float, for double. ``unaligned``: single loads and stores may be unaligned.
+    ``zig`` and ``gcc`` are compiler flags; ``model`` unicorn's CPU model; ``board`` QEMU's machine. ``wide``:
+    it has the 32-bit instructions of Thumb-2; ``divide``, ``dsp``, ``single``, ``double``: hardware division,
+    the DSP extension, a floating-point unit for float, for double. ``unaligned``: single loads and stores may
+    be unaligned.
     """
 
     name: str

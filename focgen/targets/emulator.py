@@ -1,12 +1,15 @@
-"""A core emulated by unicorn: runs functions of a program, watches what they execute and how they access memory.
+"""A core emulated by unicorn: runs functions of a program, watches what they execute and how they access
+memory.
 
-The emulator is more lenient than silicon in two things: accesses that are not aligned, which are looked for here
-in every instruction that runs, and instructions the core does not have (:mod:`focgen.targets.legality`).
+The emulator is more lenient than silicon in two things: accesses that are not aligned, which are looked for
+here in every instruction that runs, and instructions the core does not have (:mod:`focgen.targets.legality`).
 """
 
 from __future__ import annotations
 
 import ctypes
+import hashlib
+import os
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -99,14 +102,10 @@ def emulator_title() -> str:
 @cache
 def _watcher() -> ctypes.CDLL:
     """watch.c, compiled for this computer and kept."""
-    import hashlib
-
     source = Path(__file__).with_name("watch.c")
     name = f"watch-{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}.so"
     target = cache_folder() / name
     if not target.is_file():
-        import os
-
         part = target.with_name(f"{name}.{os.getpid()}")
         compile_shared([source], part, ["-std=c99", "-O2"])
         part.replace(target)
@@ -158,7 +157,8 @@ class Machine:
         try:
             self._machine.emu_start(begin, halt, timeout=int(seconds * 1e6))
         except self._uc.UcError as reason:
-            raise TargetFault(f"{reason} at {self.program.place(self._pc())}") from None
+            self._check()
+            raise TargetFault(f"failed: {reason} at {self.program.place(self._pc())}") from None
         if self._pc() != halt:
             raise TargetFault(f"did not return within {seconds:g} s, at {self.program.place(self._pc())}")
         self._check()
@@ -173,8 +173,7 @@ class Machine:
             machine.reg_write(names["first"] + i, value)
 
     def _pc(self) -> int:
-        return self._machine.reg_read(self._names["pc"]) & ~1 if self.core.arm else self._machine.reg_read(
-            self._names["pc"])  # fmt: skip
+        return self._machine.reg_read(self._names["pc"]) & (~1 if self.core.arm else ~0)
 
     def paint_stack(self) -> None:
         """Fill the stack's memory, to see later how much of it was used."""
@@ -201,8 +200,8 @@ class Machine:
         self._machine.ctl_flush_tb()  # a hook does nothing to what has been translated before
 
     def _hook(self, kind: int, function) -> None:
-        """Not through Python: a call of it for every instruction would take hours. And no memory hooks: one that
-        is called within an IT block loses the block's condition.
+        """Not through Python: a call of it for every instruction would take hours. And no memory hooks: one
+        that is called within an IT block loses the block's condition.
         """
         handle = ctypes.c_size_t()
         status = _library().uc_hook_add(self._machine._uch, ctypes.byref(handle), kind,
@@ -229,9 +228,9 @@ class Machine:
         if seen is None:
             return
         if seen.strays:
-            raise TargetFault("code ran outside of flash")
+            raise TargetFault("ran code outside of flash")
         if seen.unaligned:
-            raise TargetFault(f"an access to {seen.first:#010x} is not aligned, "
+            raise TargetFault(f"accessed {seen.first:#010x}, which is not aligned, "
                               f"at {self.program.place(seen.first_pc)}")  # fmt: skip
 
 
@@ -241,4 +240,5 @@ def _registers(uc, core: Core) -> dict[str, int]:
         return {"sp": a.UC_ARM_REG_SP, "lr": a.UC_ARM_REG_LR, "pc": a.UC_ARM_REG_PC,
                 "flags": a.UC_ARM_REG_CPSR, "first": a.UC_ARM_REG_R0}
     r = uc.riscv_const
-    return {"sp": r.UC_RISCV_REG_SP, "lr": r.UC_RISCV_REG_RA, "pc": r.UC_RISCV_REG_PC, "flags": 0, "first": r.UC_RISCV_REG_A0}
+    return {"sp": r.UC_RISCV_REG_SP, "lr": r.UC_RISCV_REG_RA, "pc": r.UC_RISCV_REG_PC, "flags": 0,
+            "first": r.UC_RISCV_REG_A0}  # fmt: skip

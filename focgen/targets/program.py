@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -115,8 +116,8 @@ class LinkContext:
     ram_size: int
 
 
-def build(core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path], drivers: Sequence[str],
-          flags: Sequence[str] = EXACT) -> Program:  # fmt: skip
+def build(core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path],
+          drivers: Sequence[str], flags: Sequence[str] = EXACT) -> Program:  # fmt: skip
     """Compile and link the C of plans, one folder each, with the ``drivers`` that run them.
 
     Raises BuildError where they do not compile, MissingExtra without pyelftools.
@@ -127,12 +128,13 @@ def build(core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence
     with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
         base, sources = Path(scratch), []
         (base / "target.c").write_text(render("target.c.jinja", context))
-        (base / "target.ld").write_text(render("target.ld.jinja", LinkContext(FLASH, FLASH_SIZE, RAM, RAM_SIZE)))
+        memory = LinkContext(FLASH, FLASH_SIZE, RAM, RAM_SIZE)
+        (base / "target.ld").write_text(render("target.ld.jinja", memory))
         for plan, folder, text in zip(plans, folders, drivers):
             (base / f"{plan.name}_driver.c").write_text(text)
             sources += [Path(folder) / f"{plan.name}.c", base / f"{plan.name}_driver.c"]
-        link(chain, core, [base / "target.c", *sources], base / "target.ld", base / "target.elf", "focgen_start",
-             list(folders), flags)  # fmt: skip
+        link(chain, core, [base / "target.c", *sources], base / "target.ld", base / "target.elf",
+             "focgen_start", list(folders), flags)  # fmt: skip
         return read_program(core, chain, names, (base / "target.elf").read_bytes())
 
 
@@ -142,8 +144,6 @@ def read_program(core: Core, chain: Toolchain, names: tuple[str, ...], elf: byte
         from elftools.elf.elffile import ELFFile
     except ImportError:
         raise MissingExtra.of("pyelftools", "targets", "reading what was linked") from None
-    import io
-
     file = ELFFile(io.BytesIO(elf))
     sections = tuple(_sections(file))
     symbols, marks = _symbols(file)
@@ -171,7 +171,8 @@ def _symbols(file) -> tuple[list[Symbol], list[tuple[int, bool]]]:
             marks.append((address, not entry.name.startswith("$d")))
         elif kind in ("STT_FUNC", "STT_OBJECT"):
             function = kind == "STT_FUNC"
-            found.append(Symbol(entry.name, address & ~1 if function else address, entry["st_size"], function))
+            place = address & ~1 if function else address
+            found.append(Symbol(entry.name, place, entry["st_size"], function))
     return found, sorted(set(marks))
 
 

@@ -12,13 +12,16 @@ import numpy as np
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.targets.cores import Core
-from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of
+from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of, taps
 from focgen.targets.emulator import Machine, TargetFault
 from focgen.targets.legality import forbidden
 from focgen.targets.program import RESULTS, WORK, WORK_SIZE, Program, build
 from focgen.targets.toolchains import Toolchain
 
 _DESCRIPTOR = "<10I"
+
+PATIENCE = 20.0
+"""Seconds that a run may take at least before it is said not to return."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,8 @@ class Work:
         count = scenario.samples
         u, d, flags = (self._result(count * size) for size in (signal, increment, 1))
         places = [address for address, _ in inputs]
-        return Job(struct.pack(_DESCRIPTOR, index, count, *places, u, d, flags), tuple(inputs), count, u, d, flags)
+        descriptor = struct.pack(_DESCRIPTOR, index, count, *places, u, d, flags)
+        return Job(descriptor, tuple(inputs), count, u, d, flags)
 
     def _input(self, size: int) -> int:
         place = self._in = -(-self._in // 8) * 8
@@ -85,8 +89,8 @@ def results(plan: Plan, job: Job, read) -> tuple[np.ndarray, np.ndarray, np.ndar
 class TargetLibrary:
     """The C of plans on an emulated core: one program, run lane by lane.
 
-    ``plans`` have different names; ``folders`` hold NAME.h, NAME.c and foc_rt.h, one a plan. Raises BuildError
-    where they do not compile, MissingExtra where the tools are missing.
+    ``plans`` have different names; ``folders`` hold NAME.h, NAME.c and foc_rt.h, one a plan. Raises
+    BuildError where they do not compile, MissingExtra where the tools are missing.
     """
 
     def __init__(self, core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path]):
@@ -112,7 +116,8 @@ class TargetLibrary:
         lanes, states = [], []
         for lane in range(scenario.lanes):
             job = self._placed(self._index(plan), plan, scenario, lane)
-            self.machine.call("focgen_run", WORK + 4, seconds=time_limit(plan, job.count))
+            limit = PATIENCE + job.count * (200 + taps(plan)) * 2e-5
+            self.machine.call("focgen_run", WORK + 4, seconds=limit)
             lanes.append(results(plan, job, self.machine.read))
             states.append(self._state(plan))
         u, d, flags = (np.stack(part) for part in zip(*lanes))
@@ -140,10 +145,3 @@ class TargetLibrary:
         names = list(header_scales(plan))
         self.machine.call("focgen_scale", self._index(plan), RESULTS)
         return dict(zip(names, np.frombuffer(self.machine.read(RESULTS, 8 * len(names))).tolist()))
-
-
-def time_limit(plan: Plan, samples: int) -> float:
-    """Seconds that a run may take: a thousand times what it should, and at least 20."""
-    taps = sum(s.taps for s in (plan.direct, plan.inner and plan.inner.rest,
-                                plan.feedback and plan.feedback.table) if s)  # fmt: skip
-    return 20.0 + samples * (200 + taps) * 2e-5

@@ -87,7 +87,8 @@ def link(chain: Toolchain, core: Core, sources: Sequence[Path], script: Path, ta
     own = (*core.zig, *_ZIG) if zig else (*core.gcc, *_GCC)
     folders = [f"-I{folder}" for folder in dict.fromkeys(include)]
     last = ["-Wl,--no-gc-sections", f"-Wl,-e,{entry}"] if zig else [f"-Wl,--entry={entry}", "-lgcc"]
-    parts = [*chain.command, *own, *flags, *folders, "-T", str(script), "-o", str(target), *map(str, sources), *last]
+    named = ["-T", str(script), "-o", str(target), *map(str, sources)]
+    parts = [*chain.command, *own, *flags, *folders, *named, *last]
     try:
         done = subprocess.run(parts, capture_output=True, text=True, env=_environment(), timeout=_SLOW)
     except subprocess.TimeoutExpired:
@@ -104,7 +105,7 @@ def _complaint(text: str) -> str:
 
 
 def cache_folder() -> Path:
-    """Where built things are kept between runs: $XDG_CACHE_HOME/focgen, ~/.cache/focgen, or a temporary one."""
+    """Where built things are kept: $XDG_CACHE_HOME/focgen, ~/.cache/focgen, or a temporary folder."""
     base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     folder = Path(base) / "focgen"
     try:

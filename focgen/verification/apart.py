@@ -15,10 +15,15 @@ class Crashed(Exception):
     """The process ended without an answer; the message says how."""
 
 
-def apart(function: Callable[..., Any], *arguments: Any) -> Any:
+class TimedOut(Exception):
+    """The process gave no answer in time and was ended; the message says in what time."""
+
+
+def apart(function: Callable[..., Any], *arguments: Any, seconds: float | None = None) -> Any:
     """``function(*arguments)``, computed in a forked process; in this one where the system cannot fork.
 
-    Raises what the function raises, and Crashed where its process dies.
+    Raises what the function raises, Crashed where its process dies, and TimedOut where it has not answered
+    after ``seconds``.
     """
     if not hasattr(os, "fork"):
         return function(*arguments)
@@ -30,6 +35,10 @@ def apart(function: Callable[..., Any], *arguments: Any) -> Any:
         process.start()
     sender.close()
     try:
+        if not receiver.poll(seconds):
+            process.kill()
+            process.join()
+            raise TimedOut(f"{seconds:.3g} s")
         result, error = receiver.recv()
     except EOFError:
         process.join()

@@ -111,6 +111,22 @@ def _prolonged(values: np.ndarray, samples: int) -> np.ndarray:
     return np.pad(values, ((0, 0), (0, samples - values.shape[1])), mode="edge")
 
 
+def thinned(scenario: Scenario, samples: int) -> Scenario | None:
+    """Some of the lanes, evenly taken, of at most that many samples in all; None where not even one fits."""
+    keep = min(samples // scenario.samples, scenario.lanes)
+    if not keep:
+        return None
+    chosen = [int(lane) for lane in np.linspace(0, scenario.lanes - 1, keep).round()]
+    place = {lane: i for i, lane in enumerate(chosen)}
+    return Scenario(
+        scenario.ref[chosen],
+        scenario.meas[chosen],
+        None if scenario.sched is None else scenario.sched[chosen],
+        tuple(replace(r, lane=place[r.lane]) for r in scenario.resets if r.lane in place),
+        tuple(replace(t, lane=place[t.lane]) for t in scenario.tracks if t.lane in place),
+    )
+
+
 def raw_scenarios(plan: Plan, samples: int, seed: int) -> dict[str, Scenario]:
     """Everything a plan is compared in, by name; raw inputs."""
     inside, outside = (

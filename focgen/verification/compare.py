@@ -1,0 +1,197 @@
+"""Answers of compiled C beside those of the reference: bits that differ, bounds that are exceeded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from focgen.plan.execute import execute
+from focgen.plan.model import ErrorBound, Plan
+from focgen.plan.scenario import Scenario, Trace, to_raw
+from focgen.targets.driver import Answers, header_scales, taps
+from focgen.verification.apart import Crashed, TimedOut, apart
+from focgen.verification.errors_seen import ErrorsSeen, MaxError, errors_seen
+from focgen.verification.folder import GeneratedFolder
+from focgen.verification.scenarios import mixed, raw_scenarios, thinned
+
+PATIENCE = 20.0
+"""Seconds that C may take at least before it is said not to return."""
+
+
+@dataclass(frozen=True)
+class TargetResult:
+    """One target. ``mismatches``: samples whose output, increment or flags differ in a bit, and runs that
+    left another state behind.
+
+    ``max_error`` of the C against the same memory in float64, ``error_bound`` as the manifest has it,
+    ``within`` whether it holds. ``first`` describes the first mismatch, ``header`` every scale of the header
+    that is not the manifest's. ``tools``: what compiled and ran it; ``illegal``: instructions that the target
+    does not have; ``absent``: further tools that would have been used. ``skipped``: why the target was not
+    run; the rest means nothing then.
+    """
+
+    samples: int = 0
+    mismatches: int = 0
+    max_error: MaxError | None = None
+    error_bound: dict[str, float] | None = None
+    within: bool = True
+    first: str | None = None
+    header: tuple[str, ...] = ()
+    skipped: str | None = None
+    tools: tuple[str, ...] = ()
+    illegal: tuple[str, ...] = ()
+    absent: tuple[str, ...] = ()
+
+    @property
+    def sound(self) -> bool:
+        """Whether what ran agrees in every bit, within its bounds, with the instructions that there are."""
+        return self.within and not self.mismatches and not self.header and not self.illegal
+
+
+class Runs(Protocol):
+    """The C of plans somewhere: on this computer, on an emulated core."""
+
+    def answers(self, plan: Plan, scenario: Scenario) -> Answers: ...
+
+    def scales(self, plan: Plan) -> dict[str, float]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A scenario of raw inputs, and what the reference answers."""
+
+    label: str
+    scenario: Scenario
+    expected: Trace
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """All a plan is compared in; ``physical``: inputs of the last case, whose errors are measured."""
+
+    cases: tuple[Case, ...]
+    physical: Scenario
+
+    @property
+    def samples(self) -> int:
+        """Samples of all cases."""
+        return sum(case.expected.u.size for case in self.cases)
+
+
+def cases_of(plan: Plan, samples: int, seed: int, worst: int | None = None) -> Cases:
+    """What to try a plan with; of the worst cases at most ``worst`` samples, where given."""
+    scenarios = raw_scenarios(plan, samples, seed)
+    if worst is not None:
+        scenarios["worst cases"] = thinned(scenarios["worst cases"], worst)
+    physical = mixed(plan.controller, samples, seed + 1)
+    scenarios["errors"] = to_raw(plan, physical)
+    found = (Case(label, s, execute(plan, s)) for label, s in scenarios.items() if s is not None)
+    return Cases(tuple(found), physical)
+
+
+def compare(
+    plan: Plan, library: Runs, samples: int, seed: int, read: GeneratedFolder | None = None
+) -> TargetResult:
+    """Run a plan's C and its reference over everything; the bound is the folder's, else the plan's."""
+    cases = cases_of(plan, samples, seed)
+    return judged(plan, cases, *answered(library, plan, cases), read)
+
+
+def observed(plan: Plan, library: Runs, samples: int, seed: int, read: GeneratedFolder) -> TargetResult:
+    """The same with the C in a process of its own: what it does to itself ends there."""
+    cases = cases_of(plan, samples, seed)
+    try:
+        seen = apart(answered, library, plan, cases, seconds=host_limit(plan, cases))
+    except (Crashed, TimedOut) as how:
+        return failed(how)
+    return judged(plan, cases, *seen, read)
+
+
+def answered(library: Runs, plan: Plan, cases: Cases) -> tuple[list[Answers], dict[str, float]]:
+    """What the C gives in every case, and the header's scales."""
+    return [library.answers(plan, case.scenario) for case in cases.cases], library.scales(plan)
+
+
+def host_limit(plan: Plan, cases: Cases) -> float:
+    """Seconds that this computer may take: a hundred times what it should, and at least ``PATIENCE``."""
+    return PATIENCE + cases.samples * (200 + taps(plan)) * 1e-7
+
+
+def failed(how: Exception) -> TargetResult:
+    """The result of C that crashed, did what its core cannot do, or did not return."""
+    said = {Crashed: f"the C crashed ({how})", TimedOut: f"the C did not return within {how}: it hangs"}
+    return TargetResult(mismatches=1, within=False, first=said.get(type(how), f"the C {how}"))
+
+
+def judged(plan: Plan, cases: Cases, seen: Sequence[Answers], scales: dict[str, float],
+           read: GeneratedFolder | None) -> TargetResult:  # fmt: skip
+    """Compare what was seen with what was expected."""
+    bound = plan.error_bound if read is None else read.bound
+    total, mismatches, first = 0, 0, None
+    for case, answer in zip(cases.cases, seen):
+        wrong = _differs(plan, answer.trace, case.expected)
+        total += wrong.size
+        mismatches += int(np.count_nonzero(wrong))
+        if first is None and wrong.any():
+            first = _described(case, answer.trace, wrong)
+    errors = _errors(plan, cases, seen[-1].trace, bound)
+    limits = {"operator": bound.operator, "output_per_sample": bound.output_per_sample}
+    header = _header(plan, scales)
+    return TargetResult(total, mismatches, errors.largest, limits, errors.within, first, header)
+
+
+def with_states(plan: Plan, result: TargetResult, cases: Cases, seen: Sequence[Answers],
+                host: Sequence[Answers]) -> TargetResult:  # fmt: skip
+    """Add the runs after which the state's bytes are not those on the host; where a target's own kernels keep
+    another state, its size differs, and only answers can be compared.
+    """
+    different = [
+        f"{case.label}, run {lane}: the state's bytes differ from those on the host"
+        for case, there, here in zip(cases.cases, seen, host)
+        for lane, (a, b) in enumerate(zip(there.states, here.states))
+        if len(a) == len(b) and a != b
+    ]
+    if not different:
+        return result
+    return replace(result, mismatches=result.mismatches + len(different), first=result.first or different[0])
+
+
+def _header(plan: Plan, found: dict[str, float]) -> tuple[str, ...]:
+    """The header's scales that are wrong: no sample depends on them, but every program that uses it does."""
+    return tuple(
+        f"{plan.name}_{key} is {found[key]!r}, the controller gives {value!r}"
+        for key, value in header_scales(plan).items()
+        if found[key] != value
+    )
+
+
+def _differs(plan: Plan, seen: Trace, expected: Trace) -> np.ndarray:
+    """Where output, flags or, with an integrator, the increment differ in a bit; (lanes, samples)."""
+    wrong = (_bits(seen.u) != _bits(expected.u)) | (seen.flags != expected.flags)
+    return wrong | (_bits(seen.d) != _bits(expected.d)) if plan.integrator else wrong
+
+
+def _bits(values: np.ndarray) -> np.ndarray:
+    """What is compared: integers as they are, floating values by their bits, +0 and −0 alike."""
+    if values.dtype.kind != "f":
+        return values.astype(np.int64)
+    positive = np.where(values == 0.0, np.zeros_like(values), values)
+    return positive.view(np.int32 if values.dtype.itemsize == 4 else np.int64)
+
+
+def _described(case: Case, seen: Trace, wrong: np.ndarray) -> str:
+    lane, sample = (int(i) for i in np.argwhere(wrong)[np.argmin(np.argwhere(wrong)[:, 1])])
+    at, expected = (lane, sample), case.expected
+    return (
+        f"{case.label}, run {lane}, sample {sample}: C gives u = {seen.u[at]}, flags {seen.flags[at]}; "
+        f"the reference u = {expected.u[at]}, flags {expected.flags[at]} "
+        f"(ref {case.scenario.ref[at]}, meas {case.scenario.meas[at]})"
+    )
+
+
+def _errors(plan: Plan, cases: Cases, seen: Trace, bound: ErrorBound) -> ErrorsSeen:
+    """The C's errors on physical inputs anywhere in their ranges."""
+    return errors_seen(plan, cases.physical, seen, bound)

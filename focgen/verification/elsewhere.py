@@ -1,0 +1,98 @@
+"""Generated C on emulated cores: every cross compiler that is there, in every emulator that is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from focgen.errors import MissingExtra
+from focgen.plan.model import Plan
+from focgen.targets.cores import Core, core
+from focgen.targets.driver import Answers, taps
+from focgen.targets.emulator import TargetFault, emulator_title
+from focgen.targets.run import TargetLibrary
+from focgen.targets.toolchains import absent, toolchains
+from focgen.verification.apart import Crashed, TimedOut, apart
+from focgen.verification.compare import (
+    Cases,
+    TargetResult,
+    answered,
+    cases_of,
+    failed,
+    host_limit,
+    judged,
+    with_states,
+)
+from focgen.verification.folder import GeneratedFolder
+from focgen.verification.host import Library
+
+_MOST = 2000  # samples by default
+_THOROUGH = 100_000  # samples from which on nothing is left out
+_BUDGET, _SOFT_BUDGET = 2_000_000, 250_000  # multiplications by default; where the core has no such numbers
+
+
+def on_core(name: str, read: GeneratedFolder, samples: int | None, seed: int) -> TargetResult:
+    """A folder's C on an emulated core; skipped, with the line that installs it, where a tool is missing."""
+    one, plan = core(name), read.plan
+    count = default_samples(plan, one) if samples is None else samples
+    try:
+        title, chains = emulator_title(), toolchains(one)
+    except MissingExtra as missing:
+        return TargetResult(skipped=f"{missing.what} ({missing.remedy})")
+    cases = cases_of(plan, count, seed, None if count >= _THOROUGH else max(count, _least(plan)))
+    host = _on_host(read, cases)
+    results = []
+    for chain in chains:
+        library = TargetLibrary(one, chain, [plan], [read.path])
+        result = _observed(plan, library, cases, host, read)
+        results.append(replace(result, tools=(f"{chain.title}, {title}",), illegal=library.illegal()))
+    return replace(_joined(results), absent=absent(one))
+
+
+def on_avr(read: GeneratedFolder, samples: int | None, seed: int) -> TargetResult:
+    """A folder's C on an AVR."""
+    return TargetResult(skipped="not part of this version")
+
+
+def default_samples(plan: Plan, one: Core) -> int:
+    """As many as take seconds."""
+    has = {"f64": one.double, "f32": one.single, "q31": one.wide, "q15": True}
+    soft = not has[plan.arithmetic]
+    return max(100, min(_MOST, (_SOFT_BUDGET if soft else _BUDGET) // (50 + taps(plan))))
+
+
+def _least(plan: Plan) -> int:
+    """Fixed point tries at least one worst case, whatever it takes: no other input goes so far."""
+    return 0 if plan.floating else plan.error_lags + 2
+
+
+def _on_host(read: GeneratedFolder, cases: Cases) -> list[Answers] | None:
+    """What this computer answers, to compare states with; None where its C does not come back."""
+    library = Library([read.plan], [read.path])
+    try:
+        return apart(answered, library, read.plan, cases, seconds=host_limit(read.plan, cases))[0]
+    except (Crashed, TimedOut):
+        return None
+
+
+def _observed(plan: Plan, library: TargetLibrary, cases: Cases, host: list[Answers] | None,
+              read: GeneratedFolder) -> TargetResult:  # fmt: skip
+    try:
+        seen, scales = answered(library, plan, cases)
+    except TargetFault as how:
+        return failed(how)
+    result = judged(plan, cases, seen, scales, read)
+    return with_states(plan, result, cases, seen, host) if host else result
+
+
+def _joined(results: list[TargetResult]) -> TargetResult:
+    """Several compilers' results as one: all samples and mismatches; errors are the same where bits are."""
+    worst = next((r for r in results if not r.sound), results[0])
+    return replace(
+        worst,
+        samples=sum(r.samples for r in results),
+        mismatches=sum(r.mismatches for r in results),
+        within=all(r.within for r in results),
+        first=next((f"{r.tools[0]}: {r.first}" for r in results if r.first), None),
+        tools=tuple(t for r in results for t in r.tools),
+        illegal=tuple(dict.fromkeys(i for r in results for i in r.illegal)),
+    )
