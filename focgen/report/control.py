@@ -24,10 +24,9 @@ def simulation_pictures(simulation: Simulation) -> dict[str, bytes]:
         top.set_ylabel(_label("output", units.measurement))
         bottom.set_ylabel(_label("command", units.output))
         bottom.set_xlabel("time (s)")
-        effects = f", with {', '.join(simulation.effects)}" if simulation.effects else ""
-        top.set_title(
-            f"Closed loop as it will run ({simulation.arithmetic}, memory {simulation.length}){effects}"
-        )
+        effects = f"\nwith {', '.join(simulation.effects)}" if simulation.effects else ""
+        what = f"({simulation.arithmetic}, memory {simulation.length})"
+        top.set_title(f"Closed loop as it will run {what}{effects}")
         low, high = simulation.controller.ranges.output
         for limit in (low, high):
             if _reached(limit, simulation.running.command):
