@@ -24,11 +24,15 @@ def pictures(diagnosis: Diagnosis, evidence: Evidence, logs: Sequence[Experiment
         "loops.png": loops(evidence, logs),
         "waterfall.png": waterfall(diagnosis),
     }
-    return found | ({"candidates.png": candidates(evidence)} if any(e.causes for e in evidence.explanations) else {})
+    return found | (
+        {"candidates.png": candidates(evidence)} if any(e.causes for e in evidence.explanations) else {}
+    )
 
 
 def _gap_ratio(e: Explanation) -> float:
-    return float(np.mean(problem_residual(e.nominal) ** 2) / max(np.mean(problem_residual(e.best) ** 2), 1e-300))
+    return float(
+        np.mean(problem_residual(e.nominal) ** 2) / max(np.mean(problem_residual(e.best) ** 2), 1e-300)
+    )
 
 
 def ladder(evidence: Evidence) -> bytes:
@@ -41,8 +45,10 @@ def ladder(evidence: Evidence) -> bytes:
             for j, (height, colour) in enumerate(zip(heights, ("measured", "bad", "good"))):
                 label = ("as given", "refitted", "with effects")[j] if i == 0 else None
                 axis.bar(i + (j - 1) * 0.27, height, 0.25, color=COLOURS[colour], label=label)
-        axis.set_xticks(range(len(evidence.explanations)),
-                        [f"{e.segment.entry} → {e.segment.exit}" for e in evidence.explanations])
+        axis.set_xticks(
+            range(len(evidence.explanations)),
+            [f"{e.segment.entry} → {e.segment.exit}" for e in evidence.explanations],
+        )
         axis.set_ylabel("RMS error, % of the signal's range")
         axis.set_title("Where: each segment on its measured input")
         axis.legend()
@@ -69,9 +75,13 @@ def residual(e: Explanation) -> bytes:
         (by_level, by_rate), (by_way, by_time) = axes
         for values, colour, label in ((before, "bad", "refitted"), (after, "good", "with effects")):
             for axis, place in ((by_level, level), (by_rate, rate), (by_time, run.clock)):
-                axis.plot(*_thin(place, values), ".", ms=1.2, alpha=0.35, color=COLOURS[colour], rasterized=True)
+                axis.plot(
+                    *_thin(place, values), ".", ms=1.2, alpha=0.35, color=COLOURS[colour], rasterized=True
+                )
             for sign, style in ((1, "-"), (-1, "--")):
-                by_level.plot(*_means(level[way == sign], values[way == sign]), style, color=_DARK[colour], lw=1.3)
+                by_level.plot(
+                    *_means(level[way == sign], values[way == sign]), style, color=_DARK[colour], lw=1.3
+                )
             by_rate.plot(*_means(rate, values), color=_DARK[colour], lw=1.3)
             by_time.plot(*_means(run.clock, values, 60), color=_DARK[colour], lw=1.3, label=label)
         _by_direction(by_way, before, after, way)
@@ -79,8 +89,11 @@ def residual(e: Explanation) -> bytes:
         by_level.plot([], [], "--", color="black", label="mean, falling")
         by_level.legend(fontsize=7)
         by_time.legend(fontsize=7)
-        for axis, label in ((by_level, e.segment.entry), (by_rate, f"rate of {e.segment.entry}, 1/s"),
-                            (by_time, "session's time, s")):
+        for axis, label in (
+            (by_level, e.segment.entry),
+            (by_rate, f"rate of {e.segment.entry}, 1/s"),
+            (by_time, "session's time, s"),
+        ):
             axis.set_xlabel(label)
         by_rate.set_xlim(*(1.5 * np.quantile(rate, q) for q in (0.005, 0.995)))
         widest = 1.05 * np.quantile(np.abs(before), 0.999)
@@ -178,7 +191,9 @@ def waterfall(diagnosis: Diagnosis) -> bytes:
             axis.bar(name, height, bottom=bottom, color=COLOURS[colour])
             axis.annotate(f"{height:.1f} %", (name, bottom + max(height, 0)), ha="center", va="bottom")
         axis.set_ylabel("% of the mean square error as given")
-        axis.set_title(f"GOF {gap.gof['as given']:.3f} → {gap.gof['explained']:.3f} of a possible {gap.gof['possible']:.3f}")
+        axis.set_title(
+            f"GOF {gap.gof['as given']:.3f} → {gap.gof['explained']:.3f} of a possible {gap.gof['possible']:.3f}"
+        )
         return png(fig)
 
 
@@ -194,8 +209,14 @@ def candidates(evidence: Evidence) -> bytes:
             axis.set_xlim(0.0, max(4.0, 1.08 * max(r.separation for r in shown)))
             for place, r in enumerate(shown):
                 text = "found" if r is cause.rivals[0] else f"{r.separation:.1f}"
-                axis.annotate(text, (r.separation, place), xytext=(3, 0), textcoords="offset points", va="center",
-                              fontsize=7)
+                axis.annotate(
+                    text,
+                    (r.separation, place),
+                    xytext=(3, 0),
+                    textcoords="offset points",
+                    va="center",
+                    fontsize=7,
+                )
             axis.set_xlabel("σ behind (below 2: tied)")
             axis.set_title(cause.rivals[0].effect)
         return png(fig)
