@@ -15,7 +15,7 @@ from focgen.diagnosis.noise import autocovariance, whiten
 
 BURSTS = 15.0  # kurtosis of the innovations; 3 for noise
 LOUD = 10.0  # loudest stretch of a response over the usual one
-SWINGS = 8.0  # power at periods beyond eight responses over that between one and four; 1 for noise
+SWINGS = 20.0  # power at periods beyond eight responses over that between one and four; 1 for noise
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,10 @@ _MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of o
 _MENDING = 0.6  # of the best further family's evidence: a form of a family found already then goes first
 _WHOLE = 0.5  # of what inputs foretell of a residual: a further family has to explain as much
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
+_SHARE = (0.06, 0.15)  # of the gap that a further family has to close, and one that is easily confused with those found
+_SWAPS = 3
 _VISIBLE = (0.015, 0.05)  # of the remaining mean square, the first effect and any further: below, one is of no use
+_NOISY = 0.03  # the same for the first where the input is measured: its noise alone looks like a small effect
 
 
 @dataclass(frozen=True)
@@ -117,22 +120,21 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     rankings: list[Ranking] = []
     base, vector = _seen(problem, given, clues)
     while len(rankings) < _DEPTH:
-        ranking = rank(base, vector, _worth_trying(base, vector, [c for c in clues if c not in base.clues and not c.form.seen]))
-        rankings.append(ranking)
-        best = _chosen(ranking, {c.effect for c in base.clues}, threshold, bool(base.clues))
-        if best is None and guests and _much_left(ranking.base):
+        untried = [c for c in clues if c not in base.clues and not c.form.seen]
+        rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
+        best = _chosen(rankings, threshold)
+        if best is None and guests and _much_left(rankings[-1].base):
             clues, guests = clues + guests, []
             continue
         if best is None:
             break
         base, vector = best.problem, best.vector
-    last = rankings[-1]
-    best, ar = last.base, last.ar
-    best = _dropped(best, Weighing(ar), threshold)
-    nominal = fit(problem, rankings[0].base.vector[: len(given)], Weighing(ar))
-    causes = _causes(best, nominal, rankings, clues, Weighing(ar))
+    weighing = Weighing(rankings[-1].ar)
+    best = _dropped(rankings[-1].base, weighing, threshold)
+    nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
+    best, causes = _doubted(best, nominal, rankings, clues, weighing)
     response = problem.references.clocks["response"]
-    return Explanation(segment, given, nominal, best, ar, causes,
+    return Explanation(segment, given, nominal, best, weighing.ar, causes,
                        leftover(segment, weighed(best), response),
                        leftover(segment, weighed(nominal), response), rankings[0].errors)
 
@@ -173,20 +175,35 @@ def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[
     return clues if share > _TELLING else []
 
 
-def _chosen(ranking: Ranking, already: set[str], threshold: float, further: bool) -> Fit | None:
+def _chosen(rankings: Sequence[Ranking], threshold: float) -> Fit | None:
     """The winner where it is beyond chance and of use. Another form of what was found already goes before a further
     family, unless that explains clearly more: no form is quite what the rig does, and others mend what it lacks."""
+    ranking = rankings[-1]
     if ranking.winner is None or ranking.gain[ranking.winner] < threshold:
         return None
-    winner = ranking.best[ranking.winner]
+    winner, already = ranking.best[ranking.winner], {c.effect for c in ranking.base.problem.clues}
     known = [ranking.best[name] for name in already if name in ranking.best]
     again = max(known, key=lambda f: evidence(f, ranking.base), default=None)
     mended = again if again is not None and evidence(again, ranking.base) > threshold and _mends(
         ranking.base, again, _VISIBLE[1], 0.0) else None
     if again is not None and evidence(again, ranking.base) > _MENDING * ranking.gain[ranking.winner]:
         return mended
-    whole = _mends(ranking.base, winner, _VISIBLE[further], _WHOLE * further)
-    return winner if whole else mended
+    further = bool(already)
+    measured = ranking.base.problem.segment.entry != "command"
+    visible = _NOISY if measured and not further else _VISIBLE[further]
+    whole = _mends(ranking.base, winner, visible, _WHOLE * further)
+    return winner if whole and not (further and _marginal(rankings, winner)) else mended
+
+
+def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
+    """Whether a further family closes only a small part of the gap: what the first one's form lacks looks like that,
+    the more so to a family that is easily confused with it."""
+    first, now, then = (float(np.mean(weighed(f) ** 2)) for f in (rankings[0].base, rankings[-1].base, winner))
+    response = winner.problem.references.clocks["response"]
+    noise = now * (1.0 - foretold(winner.problem.segment, weighed(rankings[-1].base), response))
+    name, *others = (c.effect for c in reversed(winner.problem.clues))
+    alike = any(name in library()[o].confused_with or o in library()[name].confused_with for o in others)
+    return now - then < _SHARE[alike] * (first - min(noise, then))
 
 
 def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:
@@ -229,13 +246,25 @@ def _without(of: Fit, clues: Sequence[Clue], weighing: Weighing) -> Fit:
     return fit(problem.with_clues(kept), np.concatenate(vector), weighing, 8)
 
 
+def _doubted(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Fit, tuple[Cause, ...]]:
+    """Every effect held against its rivals beside the others; where one of them does better, it takes the place."""
+    for _ in range(_SWAPS):
+        causes = _causes(best, nominal, rankings, clues, weighing)
+        usurper = min((r for c in causes for r in c.rivals), key=lambda r: r.separation, default=None)
+        if usurper is None or usurper.separation >= 0:
+            return best, causes
+        best = usurper.fit
+    return best, _causes(best, nominal, rankings, clues, weighing)
+
+
 def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Cause, ...]:
     found = []
     for name in dict.fromkeys(c.effect for c in best.problem.clues):
         own = [c for c in best.problem.clues if c.effect == name]
         without = _without(best, own, weighing)
-        first = rankings[0].base.problem.clues == without.problem.clues
-        ranking = rankings[0] if first else rank(without.problem, without.vector, [c for c in clues if c.effect != name and c.form.seen is None])
+        others = [c for c in clues if c.effect != name and c.form.seen is None]
+        ranking = (next((r for r in rankings if r.base.problem.clues == without.problem.clues), None)
+                   or rank(without.problem, without.vector, others))
         rivals = [Rival(name, own[0].stage, 0.0, evidence(best, without), best)]
         if own[0].form.seen:  # read off the signal itself: nothing else makes such steps
             ranking = replace(ranking, best={})

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.diagnosis.noise import whiten
 from focgen.diagnosis.problem import Problem
+from focgen.rig.kernels import innovations as innovated
 from focgen.rig.kernels import products
 
 _STEP = 1e-4
+_STALE = 2  # iterations that rows of the Jacobian are kept for
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +42,6 @@ class Weighing:
     ar: np.ndarray
     coarse: int = 1
 
-    def __call__(self, parts) -> np.ndarray:
-        """The innovations of the parts of a residual, joined."""
-        return np.concatenate([whiten(means(part, self.coarse), self.ar) for part in parts])
-
 
 def means(part: np.ndarray, coarse: int) -> np.ndarray:
     """Means of ``coarse`` neighbours; what does not fill the last one is left out."""
@@ -54,23 +51,25 @@ def means(part: np.ndarray, coarse: int) -> np.ndarray:
 
 def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing) -> np.ndarray:
     """The weighed residual, as a share of the output's level."""
-    found = weighing(problem.segment.parts(problem.weighed(vector)))
-    return np.where(np.isfinite(found), np.clip(found, -1e3, 1e3), 1e3)
+    segment = problem.segment
+    return innovated(segment.y, problem.simulate(vector), segment.weight, segment.run.rest, weighing.coarse, weighing.ar)
 
 
-def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int = 12, tolerance: float = 1e-4,
+def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int = 12, tolerance: float = 1e-3,
         known: np.ndarray | None = None) -> Fit:
     """Least squares from ``start`` within the problem's bounds; stops when the gain is below ``tolerance`` nats.
 
     ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a little off.
+    Otherwise the rows ahead of the clues' own are made anew only every third time, for they change little, and the fit
+    does not end on old ones.
     """
     low, high = problem.bounds()
     vector = np.clip(start, low, high)
     now = innovations(problem, vector, weighing)
     sse, damping = float(now @ now), 1e-3
-    normal = np.eye(len(vector))
+    normal, kept, age = np.eye(len(vector)), known, 0
     for _ in range(iterations):
-        rows = jacobian(problem, vector, now, weighing, low, high, known)
+        rows = jacobian(problem, vector, now, weighing, low, high, kept)
         product = products(np.vstack([rows, now]))
         normal, slope = product[:-1, :-1], product[:-1, -1]
         gained, before = False, sse
@@ -82,8 +81,11 @@ def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int
                 damping = max(damping * 0.2, 1e-9)
                 break
             damping *= 6.0
-        if not gained or 0.5 * len(now) * np.log(before / max(sse, 1e-300)) < tolerance:
+        ended = not gained or 0.5 * len(now) * np.log(before / max(sse, 1e-300)) < tolerance
+        if ended and (kept is None or known is not None):
             break
+        age = 0 if ended or age >= _STALE else age + 1
+        kept = known if known is not None else rows[: problem.head] if age else None
     return Fit(problem, vector, now, sse, normal)
 
 

@@ -44,8 +44,8 @@ class References:
 class Problem:
     """Residuals of a segment under the rig with ``clues``.
 
-    The vector: the rig's own parameters, the nuisances (half a sample of alignment of input and output, and where nothing
-    of the segment has an offset of its own, one), then every clue's parameters, all of order one.
+    The vector: the rig's own parameters, the nuisances (the alignment of input and output, at most ``slack`` samples, and
+    where nothing of the segment has an offset of its own, one), then every clue's parameters, all of order one.
     """
 
     segment: Segment
@@ -53,6 +53,7 @@ class Problem:
     references: References
     clues: tuple[Clue, ...] = ()
     memory: dict = field(default_factory=dict)
+    slack: float = 1.0
 
     def __post_init__(self):
         self.own_start = self.own.start()
@@ -61,7 +62,17 @@ class Problem:
 
     def with_clues(self, clues: Sequence[Clue]) -> Problem:
         """The same segment under other effects."""
-        return Problem(self.segment, self.own, self.references, tuple(clues), self.memory)
+        return Problem(self.segment, self.own, self.references, tuple(clues), self.memory, self.slack)
+
+    def thinned(self, factor: int) -> Problem:
+        """The same on means of ``factor`` samples at a time."""
+        return Problem(self.segment.thinned(factor), self.own, self.references, self.clues, slack=self.slack / factor)
+
+    def stretched(self, vector: np.ndarray, factor: float) -> np.ndarray:
+        """``vector`` with its alignment, which is in samples, times ``factor``."""
+        moved = vector.copy()
+        moved[len(self.own_start)] *= factor
+        return moved
 
     @property
     def head(self) -> int:
@@ -75,7 +86,7 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
         low, high = self.own.bounds()
-        nuisance = [1.0] if self.has_offset else [1.0, 0.03]
+        nuisance = [self.slack] if self.has_offset else [self.slack, 0.03]
         low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
         for clue in self.clues:
             for p in clue.form.parameters:
@@ -126,8 +137,7 @@ class Problem:
         for old, y in kept:
             if old == shift:
                 return y
-        side = np.where(self.segment.run.rest, x, np.roll(x, 1)) if shift > 0 else np.roll(x, -1)
-        y = x + abs(shift) * (side - x)
+        y = x + abs(shift) * (self.segment.neighbours[shift < 0] - x)
         kept.insert(0, (shift, y))
         del kept[2:]
         return y
@@ -138,4 +148,4 @@ class Problem:
 
     def weighed(self, vector: np.ndarray) -> np.ndarray:
         """The residual (n,) as a share of the output's level, each sample by its trust."""
-        return self.residual(vector) * self.segment.trust / self.segment.level_out
+        return self.residual(vector) * self.segment.weight

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.diagnosis.fit import Fit, Weighing, fit, jacobian, means
+from focgen.diagnosis.fit import Fit, Weighing, fit, jacobian
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 
@@ -46,23 +46,30 @@ def evidence(of: Fit, against: Fit) -> float:
     return float(gain - 0.5 * (of.size - against.size) * np.log(n))
 
 
-def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue], ar: np.ndarray | None = None) -> Ranking:
-    """Fit every clue on top of ``base`` (a vector of ``problem``), first coarsely, then with the colour of the noise."""
-    coarse = max(1, len(problem.segment.y) // _COARSE)
-    rough = Weighing(np.ones(1), coarse)
-    ground = fit(problem, base, rough)
-    known = jacobian(problem, ground.vector, ground.innovations, rough, *problem.bounds())
-    tried = [t for clue in clues if (t := best_start(problem, ground.vector, clue, rough, known)) is not None]
+def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
+    """Fit every clue on top of ``base`` (a vector of ``problem``), first on means of neighbouring samples, then on every
+    sample and with the colour of the noise."""
+    shortest = min(last - first for first, last in problem.segment.run.spans)
+    factor = max(1, min(len(problem.segment.y) // _COARSE, shortest // 20))
+    thin, rough = problem.thinned(factor), Weighing(np.ones(1))
+    ground = fit(thin, problem.stretched(base, 1.0 / factor), rough)
+    known = jacobian(thin, ground.vector, ground.innovations, rough, *thin.bounds())
+    tried = [t for clue in clues if (t := best_start(thin, ground.vector, clue, rough, known)) is not None]
     errors = _errors(tried, ground)
     tried = _promising(tried, ground)
-    leader = min([ground, *tried], key=lambda t: t.sse)
-    rough = Weighing(fit_ar([means(p, coarse) for p in leader.residual()]), coarse)
-    ground = fit(problem, ground.vector, rough, 6)
-    tried = sorted((fit(t.problem, t.vector, rough, 5) for t in tried), key=lambda t: -evidence(t, ground))
+    rough = Weighing(fit_ar(min([ground, *tried], key=lambda t: t.sse).residual()))
+    ground = fit(thin, ground.vector, rough, 6)
+    tried = sorted((fit(t.problem, t.vector, rough, 5, 0.05) for t in tried), key=lambda t: -evidence(t, ground))
     top = evidence(tried[0], ground) if tried else 0.0
-    if top < _NOTHING:
-        return finish(ground, tried[:2], errors)
-    return finish(ground, [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR], errors)
+    kept = tried[:2] if top < _NOTHING else [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR]
+    full = [_on_all(t, problem, factor) for t in (ground, *kept)]
+    return finish(full[0], full[1:], errors)
+
+
+def _on_all(of: Fit, problem: Problem, factor: int) -> Fit:
+    """A fit to thinned samples as the start of one to all of them."""
+    whole = problem.with_clues(of.problem.clues)
+    return fit(whole, whole.stretched(of.vector, factor), Weighing(np.ones(1)), 0)
 
 
 def _promising(tried: Sequence[Fit], ground: Fit) -> list[Fit]:
@@ -100,7 +107,7 @@ def finish(ground: Fit, tried: Sequence[Fit], errors: dict[str, float]) -> Ranki
     for iterations in (3, 6):
         weighing = Weighing(fit_ar(leader.residual()))
         ground = fit(ground.problem, ground.vector, weighing, iterations)
-        tried = [fit(t.problem, t.vector, weighing, iterations) for t in tried]
+        tried = [fit(t.problem, t.vector, weighing, iterations, 0.02) for t in tried]
         tried = sorted(tried, key=lambda t: t.sse)
         leader = min([ground, *tried], key=lambda t: t.sse)
         tried = [t for t in tried if t.sse < leader.sse * _HOPELESS or t is leader] or tried[:1]

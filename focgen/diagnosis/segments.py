@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -33,15 +34,37 @@ class Segment:
     names: tuple[str, ...]
     trust: np.ndarray
 
-    @property
+    @cached_property
     def level_in(self) -> float:
         """The largest magnitude of the input, in its unit."""
         return float(np.max(np.abs(self.x))) or 1.0
 
-    @property
+    @cached_property
     def level_out(self) -> float:
         """The largest magnitude of the output, in its unit."""
         return float(np.max(np.abs(self.y))) or 1.0
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """What residuals (n,) are multiplied by: the trust, by the output's level."""
+        return self.trust / self.level_out
+
+    @cached_property
+    def neighbours(self) -> tuple[np.ndarray, np.ndarray]:
+        """The input a sample earlier and a sample later (n,)."""
+        return np.where(self.run.rest, self.x, np.roll(self.x, 1)), np.r_[self.x[1:], self.x[-1]]
+
+    def thinned(self, factor: int) -> Segment:
+        """The same in means of ``factor`` samples at a time; what does not fill the last of an experiment is left out."""
+        if factor == 1:
+            return self
+        counts = [(last - first) // factor for first, last in self.run.spans]
+        kept = np.concatenate([first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)])
+        x, y, trust, clock = (v[kept].reshape(-1, factor).mean(axis=1) for v in (self.x, self.y, self.trust, self.run.clock))
+        rest = np.zeros(len(x), np.uint8)
+        rest[np.cumsum([0, *counts[:-1]])] = 1
+        run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
+        return replace(self, x=x, y=y, trust=trust, run=run, held=False)
 
     def parts(self, signal: np.ndarray) -> list[np.ndarray]:
         """``signal`` (n, …) by experiment."""

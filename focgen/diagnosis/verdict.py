@@ -44,7 +44,7 @@ def reach(rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations
     found = _ordered([_found(e, c, rigs, logs, squares, floor) for e, c in causes])
     found += _departures(controller)
     word = _word(found, unknown, explanations)
-    shares = stage_shares(found, unknown, word)
+    shares = stage_shares(found, unknown, explanations)
     diagnosis = Diagnosis(
         word, locate(explanations, shares, found, unknown, word), found, _gap(rig, logs, made, squares, floor),
         total.value if total else None, total.interval if total else None, "refitted.toml", "augmented.toml",

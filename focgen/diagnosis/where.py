@@ -6,22 +6,31 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.explain import Explanation, problem_residual
+from focgen.diagnosis.explain import Explanation, problem_residual, weighed
 from focgen.diagnosis.model import Found, Where
 
 STAGES = ("regulator", "actuator", "sensor", "controller")
 
 
-def stage_shares(found: Sequence[Found], unknown: Sequence[Explanation], word: str) -> dict[str, float]:
-    """The part of the gap that each stage's causes carry; they sum to 1 where there is one."""
+def stage_shares(found: Sequence[Found], unknown: Sequence[Explanation],
+                 explanations: Sequence[Explanation]) -> dict[str, float]:
+    """The part of the gap that each stage's causes carry; they sum to 1 where there is one. A segment that no effect
+    explains carries its part of what inputs foretell of all residuals."""
     weight = dict.fromkeys(STAGES, 0.0)
     for f in found:
         weight[f.stage] += max(f.shrink, 0.01)
+    gaps = [_foretold(e) for e in explanations]
     for e in unknown:
+        part = max(_foretold(e) / max(sum(gaps), 1e-300), 0.01)
         for stage in e.segment.stages:
-            weight[stage] += 1.0 / len(e.segment.stages)
+            weight[stage] += part / len(e.segment.stages)
     total = sum(weight.values())
     return {k: v / total for k, v in weight.items()} if total else weight
+
+
+def _foretold(e: Explanation) -> float:
+    """What inputs foretell of the nominal residual: mean square, as a share of the level's."""
+    return float(np.mean(weighed(e.nominal) ** 2)) * e.left_nominal.share
 
 
 def locate(explanations: Sequence[Explanation], share: dict[str, float], found, unknown, word: str) -> Where:

@@ -152,3 +152,27 @@ void focgen_products(int n, int k, const double *r, double *m)
         m[i * k + j] = m[j * k + i] = sum;
     }
 }
+
+/* Innovations of the residual (y - made) weight, experiment by experiment: means of `coarse` neighbours (what does not fill the
+ * last one is left out), through the whitening filter `ar` of `order`, which knows no past; at most 1e3 in size. `mean` is scratch (n).
+ * Returns how many there are in `out`. */
+int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double *made, const double *weight,
+                       int coarse, int order, const double *ar, double *mean)
+{
+    int total = 0;
+    for (int first = 0, last; first < n; first = last) {
+        for (last = first + 1; last < n && !rest[last]; last++) ;
+        int count = (last - first) / coarse;
+        for (int k = 0; k < count; k++) {
+            double sum = 0.0;
+            for (int i = first + k * coarse; i < first + (k + 1) * coarse; i++) sum += weight[i] * (y[i] - made[i]);
+            mean[k] = sum / coarse;
+        }
+        double *to = out + total;
+        for (int k = 0; k < count; k++) to[k] = ar[0] * mean[k];
+        for (int i = 1; i <= order; i++) for (int k = i; k < count; k++) to[k] += ar[i] * mean[k - i];
+        for (int k = 0; k < count; k++) to[k] = to[k] < -1e3 ? -1e3 : to[k] < 1e3 ? to[k] : 1e3;
+        total += count;
+    }
+    return total;
+}

@@ -28,6 +28,8 @@ void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, 
 void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width, double power, double beta);
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *a,
                    double *w);
+int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double *made, const double *weight,
+                       int coarse, int order, const double *ar, double *mean);
 void focgen_products(int n, int k, const double *r, double *m);
 """
 _FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
@@ -123,3 +125,14 @@ def products(rows: np.ndarray) -> np.ndarray:
     found = np.empty((len(rows), len(rows)))
     library.focgen_products(rows.shape[1], len(rows), ffi.from_buffer("double[]", rows), ffi.from_buffer("double[]", found))
     return found
+
+
+def innovations(y, made, weight, rest, coarse: int, ar) -> np.ndarray:
+    """(y − made) · weight of every experiment in means of ``coarse`` samples, whitened by ``ar``; all (n,) but ``ar``."""
+    ffi, library = _library()
+    arrays = [np.ascontiguousarray(a, float) for a in (y, made, weight, ar)]
+    found, scratch = np.empty(len(y)), np.empty(len(y))
+    pointers = [ffi.from_buffer("double[]", a) for a in (*arrays, found, scratch)]
+    count = library.focgen_innovations(len(y), pointers[0], pointers[4], ffi.from_buffer("unsigned char[]", rest),
+                                       pointers[1], pointers[2], coarse, len(ar) - 1, pointers[3], pointers[5])
+    return found[:count]
