@@ -28,13 +28,14 @@ THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stay
 
 def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out: str | Path | None = None,
              controller: str | Path | None = None, first: float | None = None, last: float | None = None,
-             bootstrap: int = 0, only: Sequence[str] | None = None) -> Diagnosis:
+             bootstrap: int = 0, only: Sequence[str] | None = None, pictures: bool = True) -> Diagnosis:
     """Diagnose the gap between the nominal rig and its logs, one session of one rig.
 
     ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures; ``controller``: of
     closed-loop logs, whose own departures are then looked for too; ``first``, ``last``: s within each experiment;
     ``bootstrap``: sessions simulated from the nominal rig to set the threshold of evidence by (0: the built-in one).
     ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how strong it is.
+    ``pictures``: whether to draw them.
     Raises RigError, LogError, ControllerError for files that cannot be used, FocgenError for an unknown effect.
     """
     _check(only)
@@ -46,7 +47,7 @@ def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out
     if out is not None:
         from focgen.diagnosis.write import write
 
-        write(out, diagnosis, evidence, rigs, logs)
+        write(out, diagnosis, evidence, rigs, logs, pictures)
     return diagnosis
 
 

@@ -15,8 +15,9 @@ from focgen.output import write_files
 from focgen.rig.files import rig_table
 
 
-def write(out: str | Path, diagnosis: Diagnosis, evidence: Evidence, rigs: Rigs, logs: Sequence[Experiment]) -> None:
-    """Write all files into ``out``, or none."""
+def write(out: str | Path, diagnosis: Diagnosis, evidence: Evidence, rigs: Rigs, logs: Sequence[Experiment],
+          drawn: bool = True) -> None:
+    """Write all files into ``out``, or none; pictures where they are to be ``drawn``."""
     from focgen.cli.outcome import to_json
 
     files: dict[str, str | bytes] = {
@@ -24,7 +25,7 @@ def write(out: str | Path, diagnosis: Diagnosis, evidence: Evidence, rigs: Rigs,
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
         diagnosis.augmented_rig: tomlkit.dumps(rig_table(rigs.augmented(logs))),
     }
-    if find_spec("matplotlib"):
+    if drawn and find_spec("matplotlib"):
         from focgen.report.diagnosis import pictures
 
         files |= pictures(diagnosis, evidence, logs)

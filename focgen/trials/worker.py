@@ -25,7 +25,7 @@ def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
     started = time.perf_counter()
     fault = None
     try:
-        extra = {"only": effects} if effects else {}
+        extra = {"pictures": False} | ({"only": effects} if effects else {})
         if (case / "controller.toml").exists():
             extra["controller"] = case / "controller.toml"
         focgen.diagnose(case / "rig.toml", sorted((case / "logs").iterdir()), out=out, **extra)
