@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,11 @@ class Fit:
     def size(self) -> int:
         """How many parameters the clues have."""
         return len(self.vector) - self.problem.head
+
+    @cached_property
+    def doubt(self) -> float:
+        """Nats against its own parameters, for being far from those given."""
+        return self.problem.own.doubt(self.vector)
 
     def residual(self) -> list[np.ndarray]:
         """Measured less simulated, by experiment, as a share of the output's level, each sample by its trust."""

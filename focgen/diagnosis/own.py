@@ -10,6 +10,9 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.rig.model import Actuator, LinearActuator, Rig
 
 
+_USUAL = 0.2  # relative deviation of own parameters from those given that surprises nobody
+
+
 @dataclass(frozen=True)
 class Own:
     """Turns the own parameters of ``stage`` into a vector and back; levels are the segment's largest magnitudes."""
@@ -49,6 +52,21 @@ class Own:
             count = len(self._logs(self._transfer_of()))
             low[:count], high[:count] = start[:count] - 8.0, start[:count] + 8.0
         return low, high
+
+    def doubt(self, vector: np.ndarray) -> float:
+        """Nats against own parameters this far from those given. The owner identified them once: a tenth off is usual, a
+        factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a guess; an offset is free."""
+        start = self.start()
+        if not len(start):
+            return 0.0
+        away, scale = vector[: len(start)] - start, np.full(len(start), _USUAL)
+        if self.stage == "actuator":
+            away = away[:-1]
+            scale = scale[:-1]
+        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
+            gains = np.abs(start[2:-1])
+            scale[1], scale[2:] = 0.5 * _USUAL * start[1], _USUAL * (gains + 0.1 * gains.sum() + 1e-12)
+        return float(np.sum(np.log1p((away / scale) ** 2)))
 
     def rig_with(self, vector: np.ndarray) -> Rig:
         """The rig with its own parameters taken from ``vector``."""

@@ -40,10 +40,11 @@ class Ranking:
 
 
 def evidence(of: Fit, against: Fit) -> float:
-    """Nats of evidence of one fit over another on the same innovations (Schwarz's approximation)."""
+    """Nats of evidence of one fit over another on the same innovations (Schwarz's approximation), own parameters close
+    to those given preferred."""
     n = len(of.innovations)
     gain = 0.5 * n * np.log(max(against.sse, 1e-300) / max(of.sse, 1e-300))
-    return float(gain - 0.5 * (of.size - against.size) * np.log(n))
+    return float(gain - 0.5 * (of.size - against.size) * np.log(n) + against.doubt - of.doubt)
 
 
 def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:

@@ -11,10 +11,12 @@ import numpy as np
 from focgen.diagnosis.fit import Fit
 
 _BLOCKS = 80
+_ROUGH = 2.0  # nats: what is held against own parameters far from those given is known no better
 
 
 def separation(better: Fit, other: Fit) -> float:
-    """Standard deviations by which ``better`` beats ``other``, complexity paid for; innovations of the same weighing."""
+    """Standard deviations by which ``better`` beats ``other``, complexity paid for, own parameters close to
+    those given preferred; innovations of the same weighing."""
     a, b = better.innovations, other.innovations
     n = min(len(a), len(b))
     variance = min(better.sse, other.sse) / n
@@ -23,4 +25,5 @@ def separation(better: Fit, other: Fit) -> float:
     sums = difference[: n // length * length].reshape(-1, length).sum(axis=1)
     spread = float(np.std(sums, ddof=1) * np.sqrt(len(sums))) if len(sums) > 2 else np.inf
     paid = 0.5 * (better.size - other.size) * np.log(n)
-    return float((difference.sum() - paid) / max(spread, 1.0))
+    likely = (other.doubt - better.doubt) / max(spread, _ROUGH)
+    return float((difference.sum() - paid) / max(spread, 1.0) + likely)

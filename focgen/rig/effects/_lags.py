@@ -2,6 +2,7 @@
 
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Form, Parameter
+from focgen.rig.modes import respond
 
 _LAG = (Parameter("lag", time=1, lower=0.0, upper=20.0, starts=(0.02, 0.2), zero=0.0),)
 
@@ -19,9 +20,42 @@ def lag_response(tau, s):
     return 1.0 / (tau * s + 1.0)
 
 
+def _partial(x, values, run):
+    share, tau = values
+    return x + share * (_one(x, (tau,), run) - x)
+
+
+def _partial_response(values, s):
+    share, tau = values
+    return 1.0 + share * (lag_response(tau, s) - 1.0)
+
+
+def _spread(x, values, run):
+    tau, order = values
+    return respond(x, run.rest, run.h, max(tau, 1e-9 * run.h) ** order, order, run.duration)
+
+
+def _spread_response(values, s):
+    tau, order = values
+    return 1.0 / ((tau * s) ** order + 1.0)
+
+
 def forms(slot):
     """One lag, and two equal ones, at ``slot``."""
     return [
         Form("one_lag", slot, _LAG, _one, response=lambda values, s: lag_response(values[0], s)),
         Form("two_lags", slot, _LAG, _two, response=lambda values, s: lag_response(values[0], s) ** 2),
+    ]
+
+
+def deep_forms(slot):
+    """Besides, a lag of a part of the signal only, and one with its times spread (Cole and Cole, J. Chem. Phys. 9,
+    1941), as where something has to soak in."""
+    share = Parameter("share", lower=0.0, upper=1.0, starts=(0.3, 0.5), zero=0.0)
+    tau = Parameter("lag", time=1, lower=0.02, upper=20.0, starts=(0.2, 1.5), log=True)
+    order = Parameter("order", lower=0.4, upper=1.0, starts=(0.8,))
+    return [
+        *forms(slot),
+        Form("partial", slot, (share, tau), _partial, response=_partial_response),
+        Form("spread", slot, (*_LAG, order), _spread, response=_spread_response),
     ]

@@ -9,8 +9,9 @@ _DECADES = np.geomspace(0.03, 30.0, 7)
 _SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
 
-def _tau(*starts):
-    return Parameter("time", time=1, clock="record", lower=0.02, upper=10.0, starts=starts, log=True)
+def _tau(lower, *starts):
+    """A time constant long beside the rig's response: what is quicker is no creep."""
+    return Parameter("time", time=1, lower=lower, upper=3000.0, starts=starts, log=True)
 
 
 def _pole(x, values, run):
@@ -51,12 +52,12 @@ EFFECT = Effect(
     confused_with=("sensor_relaxation", "sensor_lag", "sensor_drift", "gain_drift", "softening"),
     needs=lambda e: None if e.hold > 8 else "no hold is long beside the rig's response: hold a level longer",
     forms=[
-        Form("pole", "response", (_SHARE, _tau(0.1, 0.5)), _pole, response=_pole_response),
-        Form("logarithmic", "response", (_SHARE, _tau(0.2, 1.0)), _logarithmic,
+        Form("pole", "response", (_SHARE, _tau(6.0, 12.0, 60.0)), _pole, response=_pole_response),
+        Form("logarithmic", "response", (_SHARE, _tau(15.0, 30.0, 150.0)), _logarithmic,
              response=_logarithmic_response),
         Form("two_poles", "response", (
             Parameter("quick", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0),
-            Parameter("slow", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0), _tau(0.2, 0.5),
+            Parameter("slow", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0), _tau(20.0, 30.0, 80.0),
         ), _two, response=_two_response),
     ],
 )

@@ -10,5 +10,5 @@ EFFECT = Effect(
     reveals="steps and fast sines with the curvature logged",
     confused_with=("slow_regulator", "transport_delay", "sensor_relaxation", "creep"),
     needs=lambda e: None if e.fastest < 1.0 else "no change of the input is fast beside the rig's response",
-    forms=_lags.forms("strain"),
+    forms=_lags.deep_forms("strain"),
 )

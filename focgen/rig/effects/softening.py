@@ -34,6 +34,11 @@ def _work(x, values, run):
     return x * (1.0 - growth * np.expm1(-_done(x, run) / scale))
 
 
+def _reloading(x, values, run):
+    growth, scale = values
+    return x * (1.0 - growth * np.expm1((np.abs(x) - _peak(x, run)) / scale))
+
+
 def _leaves_peak(x, values, run):
     return {"largest": float(_peak(x, run)[-1])}
 
@@ -53,6 +58,7 @@ EFFECT = Effect(
         Form("largest", "drive", (_GROWTH, Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))),
              _largest, leaves=_leaves_peak),
         Form("saturating", "drive", (_GROWTH, _scale(0.3, 1.0)), _saturating, leaves=_leaves_peak),
+        Form("reloading", "drive", (_GROWTH, _scale(0.1, 0.5)), _reloading, leaves=_leaves_peak),
         Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
     ],
 )
