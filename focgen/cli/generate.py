@@ -31,6 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--horizon", type=int, metavar="N", help="of the exponential memory, in samples")
     parser.add_argument("--target", metavar="CORE", help="use a core's own kernels (same bits)")
     parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
+    parser.add_argument(
+        "--selftest", action="store_true", help="add NAME_selftest(), for the board: 0 where its bits are right"
+    )
     parser.add_argument("--for", dest="package", choices=PACKAGES, default="plain", help="build files to add")
 
 
@@ -47,6 +50,7 @@ def run(args: argparse.Namespace) -> Outcome:
         args.package,
         args.tolerance,
         args.horizon,
+        args.selftest,
     )
     return Outcome(made.manifest, _text(made))
 

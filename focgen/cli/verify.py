@@ -72,6 +72,9 @@ def _result(result: TargetResult) -> str:
         lines.append(f"{result.samples - result.mismatches} of {result.samples} samples equal in every bit")
     if result.first:
         lines.append(f"first difference: {result.first}" if lines else result.first)
+    if result.selftest is not None:
+        wrong = f"wrong at its step {result.selftest}"
+        lines.append(f"self-test: {wrong if result.selftest else '0, agrees'}")
     lines += result.header
     lines += [f"an instruction the core does not have: {one}" for one in result.illegal]
     lines += _errors(result) if result.max_error is not None else []

@@ -53,10 +53,11 @@ class ReadmeContext:
     truncation: str
     biases: list[str]
     unit: str
+    selftest: bool
 
 
-def readme_context(plan: Plan, title: str) -> ReadmeContext:
-    """Prepare the folder's README."""
+def readme_context(plan: Plan, title: str, selftest: bool = False) -> ReadmeContext:
+    """Prepare the folder's README; ``selftest``: whether it tells of one."""
     size, bound, unit = sizes(plan), plan.error_bound, plan.controller.units.output
     operator_unit = f"{unit}/s" if plan.integrator and unit else unit
     return ReadmeContext(
@@ -85,6 +86,7 @@ def readme_context(plan: Plan, title: str) -> ReadmeContext:
         else _quantity(bound.truncation, operator_unit),
         biases=_biases(plan),
         unit=unit,
+        selftest=selftest,
     )
 
 

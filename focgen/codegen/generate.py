@@ -12,6 +12,7 @@ from focgen.codegen.header import header_context
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.codegen.names import check_name
 from focgen.codegen.render import render
+from focgen.codegen.selftest import selftest_files
 from focgen.codegen.source import source_context
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.control.files import controller_text, read_controller
@@ -46,11 +47,13 @@ def generate(
     package: str = "plain",
     tolerance: float | None = None,
     horizon: int | None = None,
+    selftest: bool = False,
 ) -> Generated:
     """Write C for a controller into the folder ``out``, whole or not at all.
 
     ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15),
     ``memory``, ``length`` (past samples) and ``name`` (a C identifier) default to the controller's own.
+    ``selftest`` adds NAME_selftest.c and .h.
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be
@@ -60,27 +63,28 @@ def generate(
     text, made, where = _source(controller)
     _check(arithmetic, memory, made.length if length is None else length)
     plan = build_plan(made, arithmetic, length, check_name(made.name if name is None else name, where))
-    files = folder_files(plan, text)
+    files = folder_files(plan, text, selftest)
     write_files(out, files)
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
 
 
-def folder_files(plan: Plan, controller_toml: bytes) -> dict[str, str | bytes]:
+def folder_files(plan: Plan, controller_toml: bytes, selftest: bool = False) -> dict[str, str | bytes]:
     """Name and content of every file of a generated folder; the same plan gives the same bytes.
 
     Raises PlanError for what C cannot express.
     """
     title, digest = plan.controller.name, sha256(controller_toml)
     runtime = (shipped("c_runtime") / "foc_rt.h").read_text(encoding="utf-8")
-    manifest = manifest_of(plan, {"controller.toml": digest, "foc_rt.h": sha256(runtime)})
+    manifest = manifest_of(plan, {"controller.toml": digest, "foc_rt.h": sha256(runtime)}, selftest)
     return {
         f"{plan.name}.h": render("controller.h.jinja", header_context(plan, title, digest)),
         f"{plan.name}.c": render("controller.c.jinja", source_context(plan, title, digest)),
         "foc_rt.h": runtime,
         "controller.toml": controller_toml,
         "manifest.json": json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
-        "README.md": render("README.md.jinja", readme_context(plan, title)),
+        "README.md": render("README.md.jinja", readme_context(plan, title, selftest)),
         "example/main.c": render("main.c.jinja", example_context(plan, title)),
+        **(selftest_files(plan, digest) if selftest else {}),
     }
 
 

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import focgen
+from focgen.codegen.selftest import selftest_entry
 from focgen.codegen.state import size_of, state_bytes
 from focgen.plan.canonical import memory_bias
 from focgen.plan.model import (
@@ -28,8 +29,8 @@ def sha256(data: str | bytes) -> str:
     return hashlib.sha256(data.encode("utf-8") if isinstance(data, str) else data).hexdigest()
 
 
-def manifest_of(plan: Plan, inputs: dict[str, str]) -> dict[str, Any]:
-    """The manifest of a plan; ``inputs`` maps every input to its SHA-256."""
+def manifest_of(plan: Plan, inputs: dict[str, str], selftest: bool = False) -> dict[str, Any]:
+    """The manifest of a plan; ``inputs`` maps every input to its SHA-256; ``selftest``: whether it has one."""
     return {
         "name": plan.name,
         "generator": f"focgen {focgen.__version__}",
@@ -45,6 +46,7 @@ def manifest_of(plan: Plan, inputs: dict[str, str]) -> dict[str, Any]:
         "error_bound": bound_entry(plan.error_bound),
         "memory_bias": _bias(plan),
         "sizes": sizes(plan),
+        **({"selftest": selftest_entry(plan)} if selftest else {}),
         "inputs": inputs,
     }
 

@@ -15,6 +15,7 @@ from focgen.targets.driver import Answers, header_scales, taps
 from focgen.verification.apart import Crashed, TimedOut, apart
 from focgen.verification.errors_seen import ErrorsSeen, MaxError, errors_seen
 from focgen.verification.folder import GeneratedFolder
+from focgen.verification.host import Library
 from focgen.verification.scenarios import mixed, raw_scenarios, thinned
 
 PATIENCE = 20.0
@@ -29,8 +30,9 @@ class TargetResult:
     ``max_error`` of the C against the same memory in float64, ``error_bound`` as the manifest has it,
     ``within`` whether it holds. ``first`` describes the first mismatch, ``header`` every scale of the header
     that is not the manifest's. ``tools``: what compiled and ran it; ``illegal``: instructions that the target
-    does not have; ``absent``: further tools that would have been used. ``skipped``: why the target was not
-    run; the rest means nothing then.
+    does not have; ``absent``: further tools that would have been used. ``selftest``: what NAME_selftest()
+    returned, 0 where it agrees; None where it was not run. ``skipped``: why the target was not run; the rest
+    means nothing then.
     """
 
     samples: int = 0
@@ -44,11 +46,13 @@ class TargetResult:
     tools: tuple[str, ...] = ()
     illegal: tuple[str, ...] = ()
     absent: tuple[str, ...] = ()
+    selftest: int | None = None
 
     @property
     def sound(self) -> bool:
         """Whether what ran agrees in every bit, within its bounds, with the instructions that there are."""
-        return self.within and not self.mismatches and not self.header and not self.illegal
+        faults = self.mismatches or self.header or self.illegal or self.selftest
+        return self.within and not faults
 
 
 class Runs(Protocol):
@@ -108,6 +112,14 @@ def observed(plan: Plan, library: Runs, samples: int, seed: int, read: Generated
     except (Crashed, TimedOut) as how:
         return failed(how)
     return judged(plan, cases, *seen, read)
+
+
+def self_tested(result: TargetResult, plan: Plan, library: Library) -> TargetResult:
+    """Add what the folder's self-test says, on this computer."""
+    try:
+        return replace(result, selftest=apart(library.selftest, plan, seconds=PATIENCE))
+    except (Crashed, TimedOut) as how:
+        return failed(how)
 
 
 def answered(library: Runs, plan: Plan, cases: Cases) -> tuple[list[Answers], dict[str, float]]:

@@ -21,13 +21,14 @@ _ROUNDING = 1e-9  # relative
 @dataclass(frozen=True, eq=False)
 class GeneratedFolder:
     """``plan`` from the folder's own controller.toml; ``bound`` as the manifest claims it; ``differences``
-    between what the manifest says and what the plan gives.
+    between what the manifest says and what the plan gives; ``selftest``: whether it has NAME_selftest.c.
     """
 
     path: Path
     plan: Plan
     bound: ErrorBound
     differences: tuple[str, ...]
+    selftest: bool = False
 
 
 def read_folder(path: str | Path) -> GeneratedFolder:
@@ -44,12 +45,14 @@ def read_folder(path: str | Path) -> GeneratedFolder:
         raise InputError(
             str(path / "manifest.json"), f"is not as it was written ({reason})", _AGAIN
         ) from None
-    for name in (f"{plan.name}.h", f"{plan.name}.c", "foc_rt.h"):
+    test = [f"{plan.name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
+    for name in (f"{plan.name}.h", f"{plan.name}.c", "foc_rt.h", *test):
         if not (path / name).is_file():
             raise InputError(str(path), f"lacks {name}", _AGAIN)
     inputs = {name: sha256((path / name).read_bytes()) for name in ("controller.toml", "foc_rt.h")}
-    expected = json.loads(json.dumps(manifest_of(plan, inputs)))
-    return GeneratedFolder(path, plan, claimed, tuple(_differences(expected, manifest, "")))
+    expected = json.loads(json.dumps(manifest_of(plan, inputs, "selftest" in manifest)))
+    differences = tuple(_differences(expected, manifest, ""))
+    return GeneratedFolder(path, plan, claimed, differences, bool(test))
 
 
 def _manifest(path: Path) -> dict[str, Any]:

@@ -21,10 +21,17 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 class Library:
     """The C of one or several plans, compiled together; each plan has a name of its own.
 
-    ``folders`` hold NAME.h, NAME.c and foc_rt.h, one a plan. Raises BuildError where they do not compile.
+    ``folders`` hold NAME.h, NAME.c and foc_rt.h, one a plan, and with ``selftest`` NAME_selftest.c and .h.
+    Raises BuildError where they do not compile.
     """
 
-    def __init__(self, plans: Sequence[Plan], folders: Sequence[Path], flags: Sequence[str] = FLAGS):
+    def __init__(
+        self,
+        plans: Sequence[Plan],
+        folders: Sequence[Path],
+        flags: Sequence[str] = FLAGS,
+        selftest: bool = False,
+    ):
         self._ffi = FFI()
         with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
             sources = []
@@ -33,6 +40,9 @@ class Library:
                 drive.write_text(driver(plan))
                 sources += [Path(folder) / f"{plan.name}.c", drive]
                 self._ffi.cdef(_declaration(plan))
+                if selftest:
+                    sources.append(Path(folder) / f"{plan.name}_selftest.c")
+                    self._ffi.cdef(f"uint32_t {plan.name}_selftest(void);")
             target = Path(scratch) / "controllers.so"
             compile_shared(sources, target, flags, list(dict.fromkeys(folders)))
             self._library = self._ffi.dlopen(str(target))
@@ -52,6 +62,10 @@ class Library:
             states.append(self._state(plan))
         u, d, flags = (np.stack(part) for part in zip(*lanes))
         return Answers(Trace(u, d if plan.integrator else u, flags), tuple(states))
+
+    def selftest(self, plan: Plan) -> int:
+        """What NAME_selftest() returns: 0, or the first step that is wrong."""
+        return int(getattr(self._library, f"{plan.name}_selftest")())
 
     def scales(self, plan: Plan) -> dict[str, float]:
         """What the header's macros for LSBs and sample time are."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from focgen.errors import InputError
 from focgen.targets.cores import EMULATED
-from focgen.verification.compare import TargetResult, compare, observed
+from focgen.verification.compare import TargetResult, compare, observed, self_tested
 from focgen.verification.elsewhere import on_avr, on_core
 from focgen.verification.folder import GeneratedFolder, read_folder
 from focgen.verification.host import Library
@@ -71,5 +71,6 @@ def _on(name: str, read: GeneratedFolder, samples: int | None, seed: int) -> Tar
         return on_avr(read, samples, seed)
     if name != "host":
         return on_core(name, read, samples, seed)
-    library = Library([read.plan], [read.path])
-    return observed(read.plan, library, samples or _SAMPLES, seed, read)
+    library = Library([read.plan], [read.path], selftest=read.selftest)
+    result = observed(read.plan, library, samples or _SAMPLES, seed, read)
+    return self_tested(result, read.plan, library) if read.selftest else result
