@@ -196,8 +196,9 @@ def test_it_names_the_first_step_that_is_wrong(sound, tmp_path, arithmetic, step
     path = folder / "spba_selftest.c"
     head, table, rest = re.split(r"(spba_outputs\[\d+\] = \{\n[^}]*\};)", path.read_text())
     begin, end = list(re.finditer(r"-?\d[\d.e-]*(?=,)", table))[step - 1].span()
-    path.write_text(head + table[:begin] + "3" + table[begin + 1 : end].replace("3", "4") + table[end:] + rest)
-    assert path.read_text() != head + table + rest
+    other = "3" + table[begin + 1 : end].replace("3", "4")
+    assert other != table[begin:end]
+    path.write_text(head + table[:begin] + other + table[end:] + rest)
     assert results(folder, ["spba"], compiler("gcc"), *EXACT) == [step]
     assert main(["verify", str(folder), "--samples", "200"]) == 1
     out = capsys.readouterr().out

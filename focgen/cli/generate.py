@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--target", metavar="CORE", help="use a core's own kernels (same bits)")
     parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
     parser.add_argument(
-        "--selftest", action="store_true", help="add NAME_selftest(), for the board: 0 where its bits are right"
+        "--selftest", action="store_true", help="add NAME_selftest(), which a board runs: 0 if it agrees"
     )
     parser.add_argument("--for", dest="package", choices=PACKAGES, default="plain", help="build files to add")
 

@@ -30,7 +30,7 @@ def sha256(data: str | bytes) -> str:
 
 
 def manifest_of(plan: Plan, inputs: dict[str, str], selftest: bool = False) -> dict[str, Any]:
-    """The manifest of a plan; ``inputs`` maps every input to its SHA-256; ``selftest``: whether it has one."""
+    """The manifest of a plan; ``inputs`` maps every input to its SHA-256; ``selftest``: has it one?"""
     return {
         "name": plan.name,
         "generator": f"focgen {focgen.__version__}",

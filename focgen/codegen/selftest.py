@@ -98,7 +98,7 @@ def _text(plan: Plan, row: Row) -> str:
     return f"{{{row.event}, {bad}{row.steps}, {{{given}}}, {{{inputs}}}}},"
 
 
-# ---------------------------------------------------------------------------------------------- what is fed in
+# --------------------------------------------------------------------------------------------- what is fed in
 
 
 def selftest_rows(plan: Plan) -> list[Row]:
@@ -173,7 +173,7 @@ class _Maker:
         return made
 
     def eventful(self) -> list[Row]:
-        """Both limits, the ends of the schedule and between its breakpoints, resets and tracks, bad inputs."""
+        """Both limits, the schedule from end to end, resets and tracks, bad inputs."""
         made = [self.large(True, 6), self.track(self.large(False, 6), 1.0), self.large(True, 2)]
         made += [self.reset(self.small(3), at) for at in (0.0, 1.0, 0.4)]
         for place in range(13):
