@@ -19,6 +19,8 @@ DTYPES = {
     "int16_t": np.int16,
 }
 _RESET, _TRACK = 1, 2
+RESUME = 4
+"""Event of a first sample: go on from the state that is there, without init."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -74,6 +75,13 @@ class Executed:
     address: np.ndarray
     ran: np.ndarray
     jumped: np.ndarray
+
+    def without(self, ranges: Sequence[tuple[int, int]]) -> Executed:
+        """All but the instructions in ranges (begin, end) of addresses."""
+        keep = np.ones(self.address.size, bool)
+        for begin, end in ranges:
+            keep &= (self.address < begin) | (self.address >= end)
+        return Executed(self.address[keep], self.ran[keep], self.jumped[keep])
 
 
 @cache

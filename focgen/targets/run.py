@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,11 +12,11 @@ import numpy as np
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.targets.cores import Core
-from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of, taps
-from focgen.targets.emulator import Machine, TargetFault
+from focgen.targets.driver import DTYPES, RESUME, Answers, driver, header_scales, lane_of, taps
+from focgen.targets.emulator import Executed, Machine, TargetFault
 from focgen.targets.legality import forbidden
 from focgen.targets.program import RESULTS, WORK, WORK_SIZE, Program, build
-from focgen.targets.toolchains import Toolchain
+from focgen.targets.toolchains import EXACT, Toolchain
 
 _DESCRIPTOR = "<10I"
 
@@ -93,9 +93,10 @@ class TargetLibrary:
     BuildError where they do not compile, MissingExtra where the tools are missing.
     """
 
-    def __init__(self, core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path]):
+    def __init__(self, core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path],
+                 flags: Sequence[str] = EXACT):  # fmt: skip
         self.plans = tuple(plans)
-        self.program: Program = build(core, chain, plans, folders, [driver(plan) for plan in plans])
+        self.program: Program = build(core, chain, plans, folders, [driver(p) for p in plans], flags)
         self.core, self.chain = core, chain
         self.machine = Machine(self.program)
         self.machine.watch()
@@ -122,6 +123,25 @@ class TargetLibrary:
             states.append(self._state(plan))
         u, d, flags = (np.stack(part) for part in zip(*lanes))
         return Answers(Trace(u, d if plan.integrator else u, flags), tuple(states))
+
+    def stepwise(self, plan: Plan, scenario: Scenario) -> Iterator[Executed]:
+        """Run the first lane step by step; yield what ran for each but the first, the feeding included.
+
+        The first sample begins with a reset of the scenario, if it has one; no other does.
+        """
+        job = self._placed(self._index(plan), plan, scenario, 0)
+        sizes = [DTYPES[plan.output.ctype]().itemsize] * 3 + [1]
+        for k in range(job.count):
+            words = list(struct.unpack(_DESCRIPTOR, job.descriptor))
+            words[1] = 1
+            words[2:6] = [place + k * size for place, size in zip(words[2:6], sizes)]
+            if k:
+                self.machine.write(words[5], bytes([RESUME]))
+            self.machine.write(WORK + 4, struct.pack(_DESCRIPTOR, *words))
+            self.machine.forget()
+            self.machine.call("focgen_run", WORK + 4, seconds=PATIENCE)
+            if k:
+                yield self.machine.executed()
 
     def _index(self, plan: Plan) -> int:
         return [p.name for p in self.plans].index(plan.name)

@@ -1,0 +1,87 @@
+"""What one step costs on a core: exact executed instructions, estimated cycles, used stack."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Reset, Scenario
+from focgen.targets.cores import core
+from focgen.targets.run import TargetLibrary
+from focgen.targets.timing import timing
+from focgen.targets.toolchains import EXACT, Toolchain, toolchains
+
+
+@dataclass(frozen=True, eq=False)
+class StepCosts:
+    """Of every measured step: ``instructions`` that ran in it, and ``cycles`` by the timing model (None for a
+    core without one); ``stack``: bytes that steps used at most, as seen.
+    """
+
+    instructions: np.ndarray
+    cycles: np.ndarray | None
+    stack: int
+
+
+def step_costs(library: TargetLibrary, plan: Plan, steps: int, seed: int = 0) -> StepCosts:
+    """Run ``steps`` steps on noise, steps and extremes within the ranges, after a reset that has filled the
+    memory, and count in each of them what runs from the call of NAME_step to its return.
+    """
+    program, machine = library.program, library.machine
+    outside = _outside(program, plan)
+    model = timing(program)
+    counts, cycles = [], []
+    machine.paint_stack()
+    for ran in library.stepwise(plan, exercise(plan, steps + 1, seed)):
+        inside = ran.without(outside)
+        counts.append(int(inside.ran.sum()))
+        cycles.append(model.cycles(inside) if model else 0.0)
+    used = machine.stack_used()
+    return StepCosts(np.array(counts), np.array(cycles) if model else None, used)
+
+
+def exercise(plan: Plan, steps: int, seed: int) -> Scenario:
+    """One lane of raw inputs: a reset, then a third noise, a third steps, a third from end to end."""
+    rng = np.random.default_rng([seed, 23])
+    third = -(-steps // 3)
+    shapes = [rng.uniform(size=third), np.repeat(rng.uniform(size=third), 20)[:third],
+              rng.integers(0, 2, third).astype(float)]  # fmt: skip
+    forms = [plan.reference, plan.measurement, *([plan.schedule.signal] if plan.schedule else [])]
+    signals = []
+    for form in forms:
+        unit = np.concatenate([rng.permutation(part) if i == 0 else part for i, part in enumerate(shapes)])
+        values = form.low + (form.high - form.low) * np.roll(unit, int(rng.integers(third)))[:steps]
+        signals.append(np.asarray(values if form.floating else np.round(values).astype(np.int64))[None])
+    kind = np.float32 if plan.output.ctype == "float" else np.float64
+    signals = [s.astype(kind) if plan.floating else s for s in signals]
+    last = [s[0, -1] for s in signals]
+    reset = Reset(0, 0, last[0], last[1], plan.output.low)
+    return Scenario(signals[0], signals[1], signals[2] if plan.schedule else None, (reset,))
+
+
+def _outside(program, plan: Plan) -> list[tuple[int, int]]:
+    """The code that runs besides the step: what feeds it."""
+    names = (f"{plan.name}_run", f"{plan.name}_flags", f"{plan.name}_init", "focgen_run", "focgen_halt")
+    found = [program[name] for name in names if name in program]
+    return [(s.address, s.address + max(s.size, 2)) for s in found]
+
+
+def per_tap(plans: Sequence[Plan], folders: Sequence[Path], core_name: str, chain: Toolchain | None = None,
+            steps: int = 64, flags: Sequence[str] = EXACT) -> tuple[float, float | None]:  # fmt: skip
+    """Instructions and estimated cycles that one more past sample costs a step: the slope between two plans
+    of the same controller with different lengths; the mean over ``steps`` steps.
+
+    ``plans`` have different names; ``folders`` hold their C. Zig compiles unless ``chain`` is given.
+    """
+    one = core(core_name)
+    library = TargetLibrary(one, chain or toolchains(one)[0], plans, folders, flags)
+    short, long = (step_costs(library, plan, steps) for plan in plans)
+    taps = plans[1].length - plans[0].length
+    instructions = (long.instructions.mean() - short.instructions.mean()) / taps
+    if short.cycles is None:
+        return instructions, None
+    return instructions, (long.cycles.mean() - short.cycles.mean()) / taps
