@@ -35,7 +35,7 @@ FINGER = ROOT / "tests" / "golden" / "finger.toml"
         (["--arithmetic", "q7"], "invalid choice"),
         (["--memory", "exponential"], "--memory short"),
         (["--memory", "eternal"], "invalid choice"),
-        (["--target", "cortex-m4"], "--target"),
+        (["--target", "z80"], "cortex-m4"),
         (["--for", "zephyr"], "--for plain"),
         (["--for", "matlab"], "invalid choice"),
         (["--tolerance", "1e-3"], "--length"),

@@ -6,6 +6,7 @@ import argparse
 
 from focgen.cli.outcome import Outcome
 from focgen.codegen.generate import PACKAGES, Generated, generate
+from focgen.codegen.kernels import TARGETS
 from focgen.control.controller import ARITHMETICS, MEMORIES
 
 HELP = "Write C99 for a controller, with proofs and error bounds in its manifest."
@@ -29,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--tolerance", type=float, metavar="E", help="of the exponential memory")
     parser.add_argument("--horizon", type=int, metavar="N", help="of the exponential memory, in samples")
-    parser.add_argument("--target", metavar="CORE", help="use a core's own kernels (same bits)")
+    parser.add_argument("--target", metavar="CORE", help=f"sums for a core: {', '.join(TARGETS)}")
     parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
     parser.add_argument(
         "--selftest", action="store_true", help="add NAME_selftest(), which a board runs: 0 if it agrees"

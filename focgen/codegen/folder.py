@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import focgen
 from focgen.codegen.formulas import transfer_text
 from focgen.codegen.guard import unusable_text
+from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import comment, quantity
 from focgen.codegen.manifest import sizes
 from focgen.plan.canonical import memory_bias
@@ -54,11 +55,14 @@ class ReadmeContext:
     biases: list[str]
     unit: str
     selftest: bool
+    files: list[str]
 
 
-def readme_context(plan: Plan, title: str, selftest: bool = False) -> ReadmeContext:
+def readme_context(
+    plan: Plan, title: str, selftest: bool = False, kernels: Kernels = PORTABLE
+) -> ReadmeContext:
     """Prepare the folder's README; ``selftest``: whether it tells of one."""
-    size, bound, unit = sizes(plan), plan.error_bound, plan.controller.units.output
+    size, bound, unit = sizes(plan, kernels), plan.error_bound, plan.controller.units.output
     operator_unit = f"{unit}/s" if plan.integrator and unit else unit
     return ReadmeContext(
         name=plan.name,
@@ -87,6 +91,7 @@ def readme_context(plan: Plan, title: str, selftest: bool = False) -> ReadmeCont
         biases=_biases(plan),
         unit=unit,
         selftest=selftest,
+        files=[f"{plan.name}.h", f"{plan.name}.c", "foc_rt.h", *kernels.headers(plan)],
     )
 
 

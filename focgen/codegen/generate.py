@@ -9,6 +9,7 @@ from typing import Any
 
 from focgen.codegen.folder import example_context, readme_context
 from focgen.codegen.header import header_context
+from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.codegen.names import check_name
 from focgen.codegen.render import render
@@ -54,35 +55,44 @@ def generate(
     ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15),
     ``memory``, ``length`` (past samples) and ``name`` (a C identifier) default to the controller's own.
     ``selftest`` adds NAME_selftest.c and .h.
+    ``target`` names a core whose own instructions and loads the history sums shall use; without it they take
+    their portable form. The bits are the same.
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be
     written.
     """
-    _refuse_what_is_missing(memory, target, package, tolerance, horizon)
+    _refuse_what_is_missing(memory, package, tolerance, horizon)
+    kernels = _kernels(target)
     text, made, where = _source(controller)
     _check(arithmetic, memory, made.length if length is None else length)
     plan = build_plan(made, arithmetic, length, check_name(made.name if name is None else name, where))
-    files = folder_files(plan, text, selftest)
+    files = folder_files(plan, text, selftest, kernels)
     write_files(out, files)
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
 
 
-def folder_files(plan: Plan, controller_toml: bytes, selftest: bool = False) -> dict[str, str | bytes]:
+def folder_files(
+    plan: Plan, controller_toml: bytes, selftest: bool = False, kernels: Kernels = PORTABLE
+) -> dict[str, str | bytes]:
     """Name and content of every file of a generated folder; the same plan gives the same bytes.
 
     Raises PlanError for what C cannot express.
     """
     title, digest = plan.controller.name, sha256(controller_toml)
-    runtime = (shipped("c_runtime") / "foc_rt.h").read_text(encoding="utf-8")
-    manifest = manifest_of(plan, {"controller.toml": digest, "foc_rt.h": sha256(runtime)}, selftest)
+    runtime = {
+        name: (shipped("c_runtime") / name).read_text(encoding="utf-8")
+        for name in ("foc_rt.h", *kernels.headers(plan))
+    }
+    inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
+    manifest = manifest_of(plan, inputs, selftest, kernels)
     return {
-        f"{plan.name}.h": render("controller.h.jinja", header_context(plan, title, digest)),
-        f"{plan.name}.c": render("controller.c.jinja", source_context(plan, title, digest)),
-        "foc_rt.h": runtime,
+        f"{plan.name}.h": render("controller.h.jinja", header_context(plan, title, digest, kernels)),
+        f"{plan.name}.c": render("controller.c.jinja", source_context(plan, title, digest, kernels)),
+        **runtime,
         "controller.toml": controller_toml,
         "manifest.json": json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
-        "README.md": render("README.md.jinja", readme_context(plan, title, selftest)),
+        "README.md": render("README.md.jinja", readme_context(plan, title, selftest, kernels)),
         "example/main.c": render("main.c.jinja", example_context(plan, title)),
         **(selftest_files(plan, digest) if selftest else {}),
     }
@@ -109,16 +119,16 @@ def _check(arithmetic: str | None, memory: str | None, length: int) -> None:
         )
 
 
-def _refuse_what_is_missing(memory, target, package, tolerance, horizon) -> None:
+def _kernels(target: str | None) -> Kernels:
+    if target is not None and target not in TARGETS:
+        raise InputError("--target", f"is {target!r}", f"choose one of {', '.join(TARGETS)}")
+    return Kernels(target)
+
+
+def _refuse_what_is_missing(memory, package, tolerance, horizon) -> None:
     """Options of the command that this version does not have are refused, never ignored."""
     if memory == "exponential":
         raise InputError("--memory", "exponential is not available in this version", "use --memory short")
-    if target is not None:
-        raise InputError(
-            "--target",
-            f"{target} has no kernels of its own in this version",
-            "leave it out: the C runs there",
-        )
     if package not in PACKAGES:
         raise InputError("--for", f"is {package!r}", f"choose one of {', '.join(PACKAGES)}")
     if package != "plain":

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import focgen
 from focgen.codegen.formulas import transfer_text
 from focgen.codegen.guard import unusable_text
+from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import comment, constant, literal, power_of_two, quantity
 from focgen.codegen.state import Member, members, state_bytes
 from focgen.plan.model import Format, Plan
@@ -44,7 +45,7 @@ class HeaderContext:
     scheduled: bool
 
 
-def header_context(plan: Plan, title: str, sha256: str) -> HeaderContext:
+def header_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTABLE) -> HeaderContext:
     """Prepare NAME.h; ``sha256`` is of the controller's file."""
     return HeaderContext(
         name=plan.name,
@@ -59,9 +60,9 @@ def header_context(plan: Plan, title: str, sha256: str) -> HeaderContext:
         sample_time=Define("SAMPLE_TIME", _sample_time(plan), "s: call step this often"),
         scales=_scales(plan),
         limits=_limits(plan),
-        sizes=_sizes(plan),
-        members=members(plan),
-        state_bytes=state_bytes(plan),
+        sizes=_sizes(plan, kernels),
+        members=members(plan, kernels),
+        state_bytes=state_bytes(plan, kernels),
         integral=plan.integrator is not None,
         scheduled=plan.schedule is not None,
     )
@@ -114,8 +115,9 @@ def _ends(name: str, form: Format, physical: tuple[float, float], unit: str) -> 
     ]
 
 
-def _sizes(plan: Plan) -> list[Define]:
-    found = [Define("ERRORS", str(plan.error_lags + 1), "the present error and those before it")]
+def _sizes(plan: Plan, kernels: Kernels) -> list[Define]:
+    found = [Define("ERRORS", str(kernels.slots(plan, "error")), "the present error and those before it")]
     if plan.feedback:
-        found.append(Define("FILTERED", str(plan.filtered_lags + 1), "the same of the filtered error"))
+        about = "the same of the filtered error"
+        found.append(Define("FILTERED", str(kernels.slots(plan, "filtered")), about))
     return found

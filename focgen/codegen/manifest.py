@@ -7,8 +7,9 @@ import math
 from typing import Any
 
 import focgen
+from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.selftest import selftest_entry
-from focgen.codegen.state import size_of, state_bytes
+from focgen.codegen.state import ahead_words, size_of, state_bytes
 from focgen.plan.canonical import memory_bias
 from focgen.plan.model import (
     FLAG_HIGH,
@@ -29,8 +30,13 @@ def sha256(data: str | bytes) -> str:
     return hashlib.sha256(data.encode("utf-8") if isinstance(data, str) else data).hexdigest()
 
 
-def manifest_of(plan: Plan, inputs: dict[str, str], selftest: bool = False) -> dict[str, Any]:
-    """The manifest of a plan; ``inputs`` maps every input to its SHA-256; ``selftest``: has it one?"""
+def manifest_of(
+    plan: Plan, inputs: dict[str, str], selftest: bool = False, kernels: Kernels = PORTABLE
+) -> dict[str, Any]:
+    """The manifest of a plan; ``inputs`` maps every input to its SHA-256; ``selftest``: has it one?
+
+    ``kernels`` leave a mark only where a target was named.
+    """
     return {
         "name": plan.name,
         "generator": f"focgen {focgen.__version__}",
@@ -45,7 +51,8 @@ def manifest_of(plan: Plan, inputs: dict[str, str], selftest: bool = False) -> d
         "proofs": [proof_entry(proof) for proof in plan.proofs],
         "error_bound": bound_entry(plan.error_bound),
         "memory_bias": _bias(plan),
-        "sizes": sizes(plan),
+        **({"kernels": kernel_entry(plan, kernels)} if kernels.target else {}),
+        "sizes": sizes(plan, kernels),
         **({"selftest": selftest_entry(plan)} if selftest else {}),
         "inputs": inputs,
     }
@@ -103,20 +110,40 @@ def _bias(plan: Plan) -> list[dict[str, float]]:
     return [dict(zip(keys, row)) for row in memory_bias(plan.controller, plan.length)]
 
 
-def sizes(plan: Plan) -> dict[str, int]:
+def kernel_entry(plan: Plan, kernels: Kernels) -> dict[str, Any]:
+    """The target, and of every sum: its form, taps, bytes of tables, and bytes of state beside its ring."""
+    found = {}
+    for name, table in named_sums(plan).items():
+        ahead = kernels.ahead(plan, table)
+        found[name] = {
+            "form": "look-ahead" if ahead else "plain",
+            "taps": table.taps,
+            "table_bytes": _sum_bytes(plan, table, kernels),
+            "state_bytes": ahead_words(table) * size_of(table.blocks[0].sum.ctype) if ahead else 0,
+        }
+    return {"target": kernels.target, "sums": found}
+
+
+def sizes(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, int]:
     """Bytes of the state (types aligned to their size, as on 32-bit cores) and of the constant tables."""
-    return {"state_bytes": state_bytes(plan), "table_bytes": _table_bytes(plan)}
+    return {"state_bytes": state_bytes(plan, kernels), "table_bytes": _table_bytes(plan, kernels)}
 
 
-def _table_bytes(plan: Plan) -> int:
-    sums = [plan.direct, plan.inner and plan.inner.rest, plan.feedback and plan.feedback.table]
-    total = sum(_sum_bytes(plan, s) for s in sums if s)
+def _table_bytes(plan: Plan, kernels: Kernels) -> int:
+    total = sum(_sum_bytes(plan, table, kernels) for table in named_sums(plan).values())
     if plan.schedule:
         counts = len(plan.schedule.breakpoints) + len(plan.schedule.gains) + len(plan.schedule.slopes)
         total += counts * size_of(plan.error.ctype) + (0 if plan.floating else len(plan.schedule.slopes))
     return total
 
 
-def _sum_bytes(plan: Plan, table: Sum) -> int:
-    blocks = 0 if plan.floating else 6 * len(table.blocks)
-    return table.taps * size_of(plan.error.ctype) + blocks
+def _sum_bytes(plan: Plan, table: Sum, kernels: Kernels) -> int:
+    ahead, word = kernels.ahead(plan, table), size_of(plan.error.ctype)
+    if ahead is not None:
+        weights = sum(map(len, ahead.weights)) + (ahead.near.taps if ahead.near else 0)
+        return weights * word + 8 * len(ahead.runs) + len(ahead.slices)
+    return _plain_bytes(plan, table, word)
+
+
+def _plain_bytes(plan: Plan, table: Sum, word: int) -> int:
+    return table.taps * word + (0 if plan.floating else 6 * len(table.blocks))

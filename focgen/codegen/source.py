@@ -8,6 +8,7 @@ import focgen
 from focgen.codegen.expressions import CLAMP, LONGEST_SHIFT, bound, converted, saturated, scaled_up, shifted
 from focgen.codegen.formulas import step_formulas, transfer_text, weights_about
 from focgen.codegen.guard import GuardText, guard_text
+from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import comment, constant, literal, quantity, scale
 from focgen.codegen.state import carries, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
@@ -96,12 +97,17 @@ class SourceContext:
     increment: str
     increment_about: str
     product: str
+    kernels: str
+    error_start: str
+    filtered_start: str
     integral: IntegralText | None
     guard: GuardText | None
     output: str
 
 
-def source_context(plan: Plan, title: str, sha256: str) -> SourceContext:
+def source_context(
+    plan: Plan, title: str, sha256: str, kernels: Kernels = PORTABLE
+) -> SourceContext:
     """Prepare NAME.c; ``sha256`` is of the controller's file. Raises PlanError for what C cannot express."""
     signal = plan.output.ctype
     return SourceContext(
@@ -121,9 +127,9 @@ def source_context(plan: Plan, title: str, sha256: str) -> SourceContext:
         filtered_about="" if plan.floating else f"counts of {scale(plan.filtered.lsb)}",
         wide=plan.wide.ctype,
         wide_about=bound(plan.wide, "x"),
-        numerator=_numerator(plan),
-        inner=_inner(plan),
-        feedback=_feedback(plan),
+        numerator=_numerator(plan, kernels),
+        inner=_inner(plan, kernels),
+        feedback=_feedback(plan, kernels),
         narrowed=_narrowed(plan, "x"),
         at_rest=_at_rest(plan),
         schedule=schedule_text(plan) if plan.schedule else None,
@@ -132,10 +138,19 @@ def source_context(plan: Plan, title: str, sha256: str) -> SourceContext:
         increment=plan.increment.ctype,
         increment_about=_increment_about(plan),
         product=_product(plan),
+        kernels=(kernels.target or "") if kernels.headers(plan) else "",
+        error_start=_start(plan, kernels, "error"),
+        filtered_start=_start(plan, kernels, "filtered"),
         integral=_integral(plan),
         guard=guard_text(plan),
         output=_output(plan),
     )
+
+
+def _start(plan: Plan, kernels: Kernels, history: str) -> str:
+    """The slot of the latest sample after a reset: before a group where there are groups."""
+    size = f"{plan.name}_{'ERRORS' if history == 'error' else 'FILTERED'}"
+    return f"{size} - 1u" if kernels.grouped(plan, history) else "0"
 
 
 def _narrowed(plan: Plan, x: str) -> str:
@@ -150,23 +165,24 @@ def _at_rest(plan: Plan) -> str:
     )
 
 
-def _numerator(plan: Plan) -> SumText | None:
+def _numerator(plan: Plan, kernels: Kernels) -> SumText | None:
     if plan.direct is None:
         return None
     about = weights_about(plan, realise(plan.controller).direct, plan.direct, "Numerator")
-    return sum_text(plan, plan.direct, "numerator", about)
+    return sum_text(plan, plan.direct, "numerator", about, kernels.ahead(plan, plan.direct))
 
 
-def _inner(plan: Plan) -> InnerText | None:
+def _inner(plan: Plan, kernels: Kernels) -> InnerText | None:
     if plan.inner is None:
         return None
     state = plan.inner.state
     what = "What 1/s integrates: numerator terms of negative order times s"
     about = weights_about(plan, realise(plan.controller).rest, plan.inner.rest, what, half_step=True)
     ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
+    ahead = kernels.ahead(plan, plan.inner.rest)
     total = f"s->inner + ({converted('r', plan.inner.rest.total.ctype, state.ctype)} + s->inner_input)"
     return InnerText(
-        sum=sum_text(plan, plan.inner.rest, "integrand", about),
+        sum=sum_text(plan, plan.inner.rest, "integrand", about, ahead),
         ctype=plan.inner.rest.total.ctype,
         clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
         to_wide=converted(shifted("s->inner", state.ctype, plan.inner.to_wide), state.ctype, plan.wide.ctype),
@@ -179,13 +195,14 @@ def _proved(plan: Plan, node: str, bits: int) -> str:
     return f"|sum| <= {proof.worst} < 2^{bits - 1}" if proof else ""
 
 
-def _feedback(plan: Plan) -> FeedbackText | None:
+def _feedback(plan: Plan, kernels: Kernels) -> FeedbackText | None:
     if plan.feedback is None:
         return None
     about = weights_about(plan, realise(plan.controller).den, plan.feedback.table, "Denominator")
     wide, carried = plan.wide.ctype, carries(plan)
+    ahead = kernels.ahead(plan, plan.feedback.table)
     return FeedbackText(
-        sum=sum_text(plan, plan.feedback.table, "denominator", about),
+        sum=sum_text(plan, plan.feedback.table, "denominator", about, ahead),
         about=bound(plan.wide, "x"),
         rounded=shifted("x", wide, plan.narrow),
         carries=carried,

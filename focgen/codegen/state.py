@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.literals import scale
-from focgen.plan.model import Format, Plan
+from focgen.plan.model import Format, Plan, Sum
 
 _SIZES = {"uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "float": 4, "int64_t": 8, "double": 8}
 
@@ -26,25 +27,42 @@ class Member:
         return f"{self.ctype} {self.name}{f'[{self.array}]' if self.array else ''};"
 
 
-def members(plan: Plan) -> tuple[Member, ...]:
-    """The members: single ones first, within reach of short addresses, then the rings; widest types first."""
-    found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan), *_bytes(plan)]
+def members(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[Member, ...]:
+    """The members: single ones first, within reach of short addresses, then the rings; widest types first.
+
+    Sums that look ahead stand before the rings, which are aligned to words for that.
+    """
+    found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan, kernels), *_bytes(plan)]
+    found += [
+        _ahead(table, name) for name, table in named_sums(plan).items() if kernels.ahead(plan, table)
+    ]
     return tuple(sorted(found, key=lambda m: (bool(m.array), -_SIZES[m.ctype])))
 
 
-def _histories(plan: Plan) -> list[Member]:
+def _ahead(table: Sum, name: str) -> Member:
+    words = ahead_words(table)
+    about = "sums that look ahead: of this group, of the next" + (", of a block" if words == 12 else "")
+    return Member(table.blocks[0].sum.ctype, f"{name}_ahead", about, words, str(words))
+
+
+def ahead_words(table: Sum) -> int:
+    """How many sums a sum that looks ahead keeps in the state."""
+    return 8 if table.total.floating else 12
+
+
+def _histories(plan: Plan, kernels: Kernels) -> list[Member]:
     error = Member(
         plan.error.ctype,
         "error",
         f"ring of ref - meas{_counts(plan.error)}",
-        plan.error_lags + 1,
+        kernels.slots(plan, "error"),
         f"{plan.name}_ERRORS",
     )
     slots = [error, Member("uint16_t", "error_now", "slot of the latest error")]
     if plan.feedback:
         about = f"ring of the filtered error{_counts(plan.filtered)}"
         size = f"{plan.name}_FILTERED"
-        slots.append(Member(plan.filtered.ctype, "filtered", about, plan.filtered_lags + 1, size))
+        slots.append(Member(plan.filtered.ctype, "filtered", about, kernels.slots(plan, "filtered"), size))
         slots.append(Member("uint16_t", "filtered_now", "slot of the latest filtered error"))
     return slots
 
@@ -115,10 +133,10 @@ def _counts(form: Format) -> str:
     return "" if form.floating else f", counts of {scale(form.lsb, form.unit)}"
 
 
-def state_bytes(plan: Plan) -> int:
+def state_bytes(plan: Plan, kernels: Kernels = PORTABLE) -> int:
     """sizeof(NAME_state) where every type is aligned to its size, as on 32-bit ARM and RISC-V."""
     total, widest = 0, 1
-    for member in members(plan):
+    for member in members(plan, kernels):
         size = _SIZES[member.ctype]
         total = -(-total // size) * size + size * member.count
         widest = max(widest, size)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from focgen.codegen.expressions import bound, shifted
 from focgen.codegen.literals import comment, exponent, quantity, rows, scale, wrapped
+from focgen.codegen.lookahead import LookAhead, Run
 from focgen.plan.model import Block, Plan, Sum
 
 
@@ -29,40 +30,141 @@ class TableText:
 
 
 @dataclass(frozen=True)
+class NearText:
+    """The near lags: the samples' type, how many there are, the call that finds them, their weights, and every
+    block's sum as an expression in weights w and samples x."""
+
+    ctype: str
+    count: int
+    samples: str
+    weights: str
+    parts: list[str]
+
+
+@dataclass(frozen=True)
 class SumText:
-    """A history sum: its tables, and the function that computes it."""
+    """A history sum: its tables, and the function that computes it.
+
+    Where it looks ahead: ``ahead`` is the call of each step, ``rest`` that of a reset, ``near`` what is left to
+    its own step; else they are empty, and ``near`` None.
+    """
 
     tables: list[TableText]
     function: str
     ctype: str
     about: str
     call: str
+    ahead: str = ""
+    rest: str = ""
+    near: NearText | None = None
 
 
-def sum_text(plan: Plan, table: Sum, name: str, about: list[str]) -> SumText:
+def sum_text(
+    plan: Plan, table: Sum, name: str, about: list[str], ahead: LookAhead | None = None
+) -> SumText:
     """The sum ``table`` as C; its weights are called NAME_``name``, and ``about`` says what they are.
 
-    Blocks in which every weight is zero leave nothing behind.
+    Blocks in which every weight is zero leave nothing behind. ``ahead`` is its layout where it looks ahead.
     """
+    if ahead is not None:
+        return _ahead_text(plan, table, f"{plan.name}_{name}", about, ahead)
     blocks = [block for block in table.blocks if any(block.weights)]
     weights = f"{plan.name}_{name}"
     made = [_weights(plan, blocks, weights, about)]
     if len(blocks) > 1:
         made.append(_blocks(table, blocks, f"{weights}_blocks"))
-    about_sum = bound(table.total, "sum")
-    if about_sum:
-        about_sum = f"{about_sum}, counts of {scale(table.total.lsb)}"
-    return SumText(made, f"{weights}_sum", table.total.ctype, about_sum, _call(plan, table, blocks, weights))
+    return SumText(
+        made, f"{weights}_sum", table.total.ctype, _sum_about(table), _call(plan, table, blocks, weights)
+    )
+
+
+def _sum_about(table: Sum) -> str:
+    about = bound(table.total, "sum")
+    return f"{about}, counts of {scale(table.total.lsb)}" if about else ""
+
+
+def _ring(table: Sum) -> tuple[str, str]:
+    """The ring's member and the macro of its size."""
+    return ("error", "ERRORS") if table.history == "error" else ("filtered", "FILTERED")
 
 
 def _call(plan: Plan, table: Sum, blocks: list[Block], weights: str) -> str:
-    ring, size = ("error", "ERRORS") if table.history == "error" else ("filtered", "FILTERED")
+    ring, size = _ring(table)
     history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
     if len(blocks) > 1:
         return f"foc_sum_{plan.arithmetic}({weights}, {weights}_blocks, {len(blocks)}, {history})"
     one = blocks[0]
     dot = f"foc_dot_{plan.arithmetic}({weights}, {len(one.weights)}, {history}, {one.last})"
     return shifted(dot, one.sum.ctype, one.align)
+
+
+def _ahead_text(plan: Plan, table: Sum, name: str, about: list[str], ahead: LookAhead) -> SumText:
+    """Far tables, the runs over them, and the near sum with tables of its own."""
+    member = f"s->{name.removeprefix(plan.name + '_')}_ahead"
+    ring, size = _ring(table)
+    far = f"{member}, {name}_far, {name}_runs, {name}_slices, s->{ring}, {plan.name}_{size}"
+    near = ahead.near
+    nearer = [] if near is None else [_weights(plan, near.blocks, f"{name}_near", ["The lags nearer than those."])]
+    return SumText(
+        [*_far_tables(plan, name, about, ahead), *nearer],
+        f"{name}_sum",
+        table.total.ctype,
+        _sum_about(table),
+        f"{member}[s->{ring}_now & 3u]",
+        f"foc_ahead_{plan.arithmetic}({far}, s->{ring}_now);",
+        f"foc_rest_{plan.arithmetic}({far});",
+        None if near is None else _near(plan, near, f"{name}_near", f"s->{ring}, {plan.name}_{size}, s->{ring}_now"),
+    )
+
+
+def _near(plan: Plan, near: Sum, weights: str, history: str) -> NearText:
+    count, at, parts = near.last + 1, 0, []
+    for block in near.blocks:
+        wide = f"({block.sum.ctype})" if not block.sum.floating else ""
+        products = [
+            f"{wide}w[{at + i}] * x[{near.last - block.last + i}]" for i in range(len(block.weights))
+        ]
+        parts += products if plan.floating else [shifted(" + ".join(products), block.sum.ctype, block.align)]
+        at += len(block.weights)
+    call = f"foc_latest_{plan.arithmetic}(copy, {count}, {history})"
+    return NearText(plan.error.ctype, count, call, weights, parts)
+
+
+def _far_tables(plan: Plan, name: str, about: list[str], ahead: LookAhead) -> list[TableText]:
+    ctype = plan.error.ctype
+    groups = [
+        Group(_block_about(plan, block), rows(weights, ctype))
+        for block, weights in zip(ahead.far, ahead.weights)
+    ]
+    count = sum(map(len, ahead.weights))
+    more = "Zeros fill up every block for the four sums that look ahead."
+    lines = [f"{_run_text(run):<28} /* step {_step(ahead, i)} */" for i, run in enumerate(ahead.runs)]
+    slices = [", ".join(map(str, ahead.slices))]
+    return [
+        TableText([*about, more], f"FOC_WORDS {ctype}", f"{name}_far", count, groups),
+        TableText(
+            ["What each step of a group of four does of it."],
+            "foc_run",
+            f"{name}_runs",
+            len(lines),
+            [Group("weights from, tiles, tiles back, shift, whether the block ends", lines)],
+        ),
+        TableText(
+            ["The run with which each of the four steps begins, and where the last of them ends."],
+            "uint8_t",
+            f"{name}_slices",
+            len(ahead.slices),
+            [Group("", slices)],
+        ),
+    ]
+
+
+def _run_text(run: Run) -> str:
+    return f"{{{run.weights}, {run.tiles}, {run.back}, {run.shift}, {int(run.ends)}}},"
+
+
+def _step(ahead: LookAhead, run: int) -> int:
+    return sum(first <= run for first in ahead.slices[1:-1])
 
 
 def _weights(plan: Plan, blocks: list[Block], name: str, about: list[str]) -> TableText:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.codegen.kernels import Kernels
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.control.files import read_controller
 from focgen.errors import InputError
@@ -46,11 +47,13 @@ def read_folder(path: str | Path) -> GeneratedFolder:
             str(path / "manifest.json"), f"is not as it was written ({reason})", _AGAIN
         ) from None
     test = [f"{plan.name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
-    for name in (f"{plan.name}.h", f"{plan.name}.c", "foc_rt.h", *test):
+    kernels = Kernels(manifest["kernels"]["target"] if "kernels" in manifest else None)
+    headers = ("foc_rt.h", *kernels.headers(plan))
+    for name in (f"{plan.name}.h", f"{plan.name}.c", *headers, *test):
         if not (path / name).is_file():
             raise InputError(str(path), f"lacks {name}", _AGAIN)
-    inputs = {name: sha256((path / name).read_bytes()) for name in ("controller.toml", "foc_rt.h")}
-    expected = json.loads(json.dumps(manifest_of(plan, inputs, "selftest" in manifest)))
+    inputs = {name: sha256((path / name).read_bytes()) for name in ("controller.toml", *headers)}
+    expected = json.loads(json.dumps(manifest_of(plan, inputs, "selftest" in manifest, kernels)))
     differences = tuple(_differences(expected, manifest, ""))
     return GeneratedFolder(path, plan, claimed, differences, bool(test))
 

@@ -1,0 +1,66 @@
+"""Which form a core's history sums take; without a core, the portable one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from focgen.codegen.lookahead import AHEAD, LookAhead, look_ahead
+from focgen.plan.model import Plan, Sum
+
+TARGETS = ("cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7", "rv32imac", "avr")
+"""The cores that ``--target`` names. An AVR, and float64 anywhere, take the portable form: there the products
+cost, not the loads."""
+
+_AHEAD = {
+    ("cortex-m0plus", "q15"),
+    ("cortex-m3", "q15"),
+    ("cortex-m3", "q31"),
+    ("cortex-m4", "q15"),
+    ("cortex-m4", "q31"),
+    ("cortex-m4", "f32"),
+    ("cortex-m7", "q15"),
+    ("cortex-m7", "q31"),
+    ("cortex-m7", "f32"),
+    ("rv32imac", "q15"),
+    ("rv32imac", "q31"),
+}
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """How a plan's sums are computed on ``target``; None: everywhere, in portable C."""
+
+    target: str | None = None
+
+    def ahead(self, plan: Plan, table: Sum | None) -> LookAhead | None:
+        """The look-ahead form of a sum, where it takes that form."""
+        if table is None or (self.target, plan.arithmetic) not in _AHEAD:
+            return None
+        return look_ahead(table)
+
+    def slots(self, plan: Plan, history: str) -> int:
+        """How many samples a ring holds: ``history`` is "error" or "filtered"."""
+        lags = plan.error_lags if history == "error" else plan.filtered_lags
+        return -(-(lags + 1) // AHEAD) * AHEAD if self.grouped(plan, history) else lags + 1
+
+    def grouped(self, plan: Plan, history: str) -> bool:
+        """Whether a sum looks ahead over this ring."""
+        return any(self.ahead(plan, s) for s in named_sums(plan).values() if s.history == history)
+
+    def headers(self, plan: Plan) -> tuple[str, ...]:
+        """The runtime's headers beside ``foc_rt.h``."""
+        looks = any(self.ahead(plan, s) for s in named_sums(plan).values())
+        return ("foc_ahead.h", "foc_tiles.h", "foc_tiles_arm.h") if looks else ()
+
+
+PORTABLE = Kernels()
+
+
+def named_sums(plan: Plan) -> dict[str, Sum]:
+    """A plan's history sums by the name their tables have in C."""
+    found = {
+        "numerator": plan.direct,
+        "integrand": plan.inner.rest if plan.inner else None,
+        "denominator": plan.feedback.table if plan.feedback else None,
+    }
+    return {name: table for name, table in found.items() if table is not None}
