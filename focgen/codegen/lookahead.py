@@ -1,13 +1,13 @@
 """History sums that look four samples ahead: how the weights are laid out and the work is shared out.
 
-The sums of four successive steps, a *group*, are taken together, so that each load of a weight and of a sample
-serves four products; ``foc_ahead.h`` does it. The samples known when the group before it began are its far
+The sums of four successive steps, a *group*, are taken together, so that each load of a weight and of a
+sample serves four products; ``foc_ahead.h`` does it. The samples known when the group before it began are its far
 part, lags 16 and more (8 and more in floating point); a quarter of that work is done in each of that
 group's four steps. The near lags are summed in their own step.
 
 A block of lags ``first`` … ``last`` becomes tiles of four samples times four sums. With the group in the making
-beginning at sample T, its tiles cover samples T − 4·back … T − 4·(first // 4) + 3, back = ⌈last / 4⌉; sum i
-takes weight [j + 4 − i] for sample j, so that weight q belongs to lag 4·back + 4 − q, and is 0 outside the
+beginning at sample T, its tiles cover samples T − 4·back … T − 4·(first // 4) + 3, back = ⌈last / 4⌉;
+sum i takes weight [j + 4 − i] for sample j, so that weight q belongs to lag 4·back + 4 − q, and is 0 outside the
 block.
 """
 
@@ -38,9 +38,9 @@ class Run:
 
 @dataclass(frozen=True)
 class LookAhead:
-    """A sum in two parts: the ``far`` blocks with their padded ``weights`` (oldest first, block by block), the
-    ``runs`` in order, of which step p does ``slices[p]`` … ``slices[p + 1]``; and the ``near`` sum, None where
-    all its weights are zero."""
+    """A sum in two parts: the ``far`` blocks with their padded ``weights`` (oldest first, block by block),
+    the ``runs`` in order, of which step p does ``slices[p]`` … ``slices[p + 1]``; and the ``near`` sum, None
+    where all its weights are zero."""
 
     far: tuple[Block, ...]
     weights: tuple[tuple[Count, ...], ...]

@@ -31,8 +31,8 @@ class TableText:
 
 @dataclass(frozen=True)
 class NearText:
-    """The near lags: the samples' type, how many there are, the call that finds them, their weights, and every
-    block's sum as an expression in weights w and samples x."""
+    """The near lags: the samples' type, how many there are, the call that finds them, their weights, and
+    every block's sum as an expression in weights w and samples x."""
 
     ctype: str
     count: int
@@ -45,8 +45,8 @@ class NearText:
 class SumText:
     """A history sum: its tables, and the function that computes it.
 
-    Where it looks ahead: ``ahead`` is the call of each step, ``rest`` that of a reset, ``near`` what is left to
-    its own step; else they are empty, and ``near`` None.
+    Where it looks ahead: ``ahead`` is the call of each step, ``rest`` that of a reset, ``near`` what is left
+    to its own step; else they are empty, and ``near`` None.
     """
 
     tables: list[TableText]
@@ -104,7 +104,8 @@ def _ahead_text(plan: Plan, table: Sum, name: str, about: list[str], ahead: Look
     ring, size = _ring(table)
     far = f"{member}, {name}_far, {name}_runs, {name}_slices, s->{ring}, {plan.name}_{size}"
     near = ahead.near
-    nearer = [] if near is None else [_weights(plan, near.blocks, f"{name}_near", ["The lags nearer than those."])]
+    history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
+    nearer = [_weights(plan, near.blocks, f"{name}_near", ["The lags nearer than those."])] if near else []
     return SumText(
         [*_far_tables(plan, name, about, ahead), *nearer],
         f"{name}_sum",
@@ -113,7 +114,7 @@ def _ahead_text(plan: Plan, table: Sum, name: str, about: list[str], ahead: Look
         f"{member}[s->{ring}_now & 3u]",
         f"foc_ahead_{plan.arithmetic}({far}, s->{ring}_now);",
         f"foc_rest_{plan.arithmetic}({far});",
-        None if near is None else _near(plan, near, f"{name}_near", f"s->{ring}, {plan.name}_{size}, s->{ring}_now"),
+        _near(plan, near, f"{name}_near", history) if near else None,
     )
 
 
