@@ -16,9 +16,9 @@ from focgen.errors import InputError, PlanError
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.scenario import to_raw
+from focgen.verification.compare import compare
 from focgen.verification.folder import read_folder
 from focgen.verification.host import Library
-from focgen.verification.compare import compare
 from tests.c_code import STRICT, compiler, run
 from tests.conftest import paper_controller
 from tests.controllers import random_controller, random_scenario
@@ -47,7 +47,7 @@ def planned(seeds, lengths):
 def compiled(plans, folder: Path, flags=("-std=c99", "-O1", "-ffp-contract=off")) -> Library:
     for plan in plans:
         kernels = Kernels(CORES[plan.arithmetic])
-        write_files(folder, folder_files(plan, controller_text(plan.controller).encode(), kernels))
+        write_files(folder, folder_files(plan, controller_text(plan.controller).encode(), kernels=kernels))
     return Library(plans, [folder] * len(plans), flags)
 
 
@@ -133,7 +133,7 @@ def test_no_undefined_behaviour(tmp_path):
     plans = planned([1, 12, 25], [64, 100, 129])
     for plan in plans:
         kernels = Kernels(CORES[plan.arithmetic])
-        write_files(tmp_path, folder_files(plan, b"", kernels))
+        write_files(tmp_path, folder_files(plan, b"", kernels=kernels))
         name, sched = plan.name, ", k * 7" if plan.schedule else ""
         (tmp_path / f"{name}_main.c").write_text(
             f'#include "{name}.h"\nstatic {name}_state s;\nint main(void) {{ int k; {name}_init(&s);'
@@ -210,7 +210,7 @@ FAULTS = {
 def test_a_fault_is_seen(fault, tmp_path):
     file, old, new = FAULTS[fault]
     plan = build_plan(paper_controller(100), "q15", name="k")
-    write_files(tmp_path, folder_files(plan, b"", Kernels("cortex-m4")))
+    write_files(tmp_path, folder_files(plan, b"", kernels=Kernels("cortex-m4")))
     text = (tmp_path / file).read_text()
     assert old in text
     (tmp_path / file).write_text(text.replace(old, new))
