@@ -98,7 +98,8 @@ def residual(e: Explanation) -> bytes:
         by_rate.set_xlim(*(1.5 * np.quantile(rate, q) for q in (0.005, 0.995)))
         widest = 1.05 * np.quantile(np.abs(before), 0.999)
         for axis in axes.ravel():
-            axis.set_ylim(-widest, widest)
+            if axis is not by_way:
+                axis.set_ylim(-widest, widest)
             axis.set_ylabel(f"error of {e.segment.exit}")
         fig.suptitle(f"What {e.segment.entry} → {e.segment.exit} leaves")
         return png(fig)
