@@ -68,6 +68,8 @@ def _firmware(generated: dict[str, Generated], verified: dict[str, Verification]
 
 def _diagnosis(found: Diagnosis, sealed: tuple[str, ...]) -> Section:
     shown = {"ladder.png": "Where the gap is: measured signals put in place of simulated ones, stage by stage",
+             "residual.png": "What the refitted model leaves, against level, rate, direction and time, and with the effect",
+             "loops.png": "Output against input, measured and simulated, before and after",
              "candidates.png": "Which effect: the candidates, and how far each is behind the best",
              "waterfall.png": "How far: what parameters, effect and noise account for"}
     pictures = tuple(Picture(f"diagnosis/found/{name}", caption) for name, caption in shown.items())

@@ -95,6 +95,7 @@ def residual(e: Explanation) -> bytes:
             (by_time, "session's time, s"),
         ):
             axis.set_xlabel(label)
+        by_rate.locator_params(axis="x", nbins=5)
         by_rate.set_xlim(*(1.5 * np.quantile(rate, q) for q in (0.005, 0.995)))
         widest = 1.05 * np.quantile(np.abs(before), 0.999)
         for axis in axes.ravel():
@@ -148,32 +149,45 @@ def _by_direction(axis, before: np.ndarray, after: np.ndarray, way: np.ndarray) 
 
 
 def loops(evidence: Evidence, logs: Sequence[Experiment]) -> bytes:
-    """Output against input, measured and simulated, before and after, for the two experiments that tell most."""
+    """Output against input, measured and simulated, before and after, for the two experiments that tell most;
+    against time where the input only steps.
+    """
     chosen = _telling(evidence, logs)
-    entry = "command" if all("command" in log for log in logs) else "pressure"
     with figure(len(chosen), 2, squeeze=False, sharex="row", sharey="row") as (fig, axes):
         for row, i in zip(axes, chosen):
+            x = logs[i][_entry(logs)]
+            place, label = (x, _entry(logs)) if _places(x) >= _SWEEPING else (logs[i].time, "time, s")
             for axis, name in zip(row, ("refitted", "explained")):
-                x, y, made = _thin(logs[i][entry], logs[i]["output"], evidence.simulated[name][i]["output"])
-                axis.plot(x, y, color=COLOURS["measured"], lw=0.7, label="measured")
-                axis.plot(x, made, color=COLOURS["bad" if name == "refitted" else "good"], lw=1.0, label=name)
+                where, y, made = _thin(place, logs[i]["output"], evidence.simulated[name][i]["output"])
+                axis.plot(where, y, color=COLOURS["measured"], lw=0.7, label="measured")
+                axis.plot(where, made, color=COLOURS["bad" if name == "refitted" else "good"], lw=1.0)
                 axis.set_title(f"{logs[i].name}, {'refitted' if name == 'refitted' else 'with the effects'}")
-                axis.set_xlabel(entry)
+                axis.set_xlabel(label)
             row[0].set_ylabel("output")
-            row[1].legend(loc="lower right")
+        axes[0, 0].legend(loc="best")
         return png(fig)
 
 
+_SWEEPING = 20  # of 50 places in its range: an input that visits fewer only steps
+
+
+def _entry(logs: Sequence[Experiment]) -> str:
+    return "command" if all("command" in log for log in logs) else "pressure"
+
+
+def _places(x: np.ndarray) -> int:
+    """How many fiftieths of its range a signal visits."""
+    return len(np.unique(np.round((x - x.min()) / max(float(np.ptp(x)), 1e-300) * 50)))
+
+
 def _telling(evidence: Evidence, logs: Sequence[Experiment]) -> list[int]:
-    """Up to two experiments whose input moves and where the effects changed the simulated output most."""
-    entry = "command" if all("command" in log for log in logs) else "pressure"
+    """Up to two experiments where the effects changed the simulated output most, those that sweep first."""
     before, after = evidence.simulated["refitted"], evidence.simulated["explained"]
 
     def telling(i: int) -> float:
-        x = logs[i][entry]
-        moving = len(np.unique(np.round((x - x.min()) / max(float(np.ptp(x)), 1e-300) * 50)))
         changed = np.sqrt(np.mean((before[i]["output"] - after[i]["output"]) ** 2))
-        return float(changed) * min(moving, 12) + 1e-12 * len(logs[i])
+        sweeps = _places(logs[i][_entry(logs)]) >= _SWEEPING
+        return float(changed) * (3.0 if sweeps else 1.0) + 1e-12 * len(logs[i])
 
     return sorted(sorted(range(len(logs)), key=telling)[-2:])
 
