@@ -16,6 +16,7 @@ _FUNCTIONS = {
     "simulate": "focgen.loop.simulate",
     "generate": "focgen.codegen.generate",
     "verify": "focgen.verification.verify",
+    "cost": "focgen.verification.costs",
     "diagnose": "focgen.diagnosis.diagnose",
     "trial": "focgen.trials.trial",
     "replay": "focgen.rig.replay",

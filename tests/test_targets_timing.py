@@ -20,25 +20,32 @@ LOOPS = {  # the body of a loop, its instructions and its cycles, each with the 
                            6, 3 + 1 + 2 + 1 + 1 + 2),
     "m0+: there and back": ("cortex-m0plus", "bl 2f\n b 3f\n 2: push {r4, lr}\n pop {r4, pc}\n 3:",
                             6, 3 + 2 + 3 + 5 + 1 + 2),
-    "m3: 16 bits": ("cortex-m3", "ldrsh r2, [r1]\n ldrsh r3, [r1, #2]\n mla r5, r2, r3, r5", 5, 2 + 1 + 2 + 1 + 3),
+    "m3: 16 bits": ("cortex-m3", "ldrsh r2, [r1]\n ldrsh r3, [r1, #2]\n mla r5, r2, r3, r5", 5,
+                    2 + 1 + 2 + 1 + 3),
     "m3: 32 bits": ("cortex-m3", "ldr r2, [r1]\n ldr r3, [r1, #4]\n smlal r4, r5, r2, r3", 5,
                     2 + 1 + 5.5 + 1 + 3),
     "m3: pointer chased": ("cortex-m3", "ldr r2, [r1]\n ldrb r3, [r2, #4]\n smull r4, r5, r2, r3", 5,
                            2 + 2 + 4 + 1 + 3),
-    "m4: 32 bits": ("cortex-m4", "ldr r2, [r1]\n ldr r3, [r1, #4]\n smlal r4, r5, r2, r3", 5, 2 + 1 + 1 + 1 + 3),
+    "m4: 32 bits": ("cortex-m4", "ldr r2, [r1]\n ldr r3, [r1, #4]\n smlal r4, r5, r2, r3", 5,
+                    2 + 1 + 1 + 1 + 3),
     "m4: bases updated": ("cortex-m4", "ldr r2, [r1], #4\n ldr r3, [r1, #-4]!\n smlal r4, r5, r2, r3", 5,
                           2 + 2 + 1 + 1 + 3),
-    "m4: four words at once": ("cortex-m4", "ldm r1, {r2, r3, r4, r5}\n smlad r2, r3, r4, r2", 4, 5 + 1 + 1 + 3),
-    "m4: loaded, then stored": ("cortex-m4", "movs r4, #0\n ldr r2, [r1]\n str r2, [r1, r4]\n str r2, [r1, #4]", 6,
+    "m4: four words at once": ("cortex-m4", "ldm r1, {r2, r3, r4, r5}\n smlad r2, r3, r4, r2", 4,
+                               5 + 1 + 1 + 3),
+    "m4: loaded, then stored": ("cortex-m4", "movs r4, #0\n ldr r2, [r1]\n str r2, [r1, r4]\n "
+                                "str r2, [r1, #4]",
+                                6,
                                 1 + 2 + 1 + 1 + 1 + 3),
-    "m4: two words": ("cortex-m4", "ldrd r2, r3, [r1]\n ldr r4, [r1]\n sdiv r4, r4, r1", 5, 3 + 2 + 7 + 1 + 3),
+    "m4: two words": ("cortex-m4", "ldrd r2, r3, [r1]\n ldr r4, [r1]\n sdiv r4, r4, r1", 5,
+                      3 + 2 + 7 + 1 + 3),
     "m4: float, one waits": ("cortex-m4", "vldr s0, [r1]\n vldr s1, [r1, #4]\n vmul.f32 s2, s0, s1\n "
                              "vadd.f32 s3, s3, s2", 6, 2 + 2 + 1 + 1 + 1 + 1 + 3),
     "m4: float, none waits": ("cortex-m4", "vldm r1, {s0-s3}\n vmul.f32 s4, s0, s1\n vmul.f32 s5, s2, s3\n "
                               "vadd.f32 s6, s6, s4\n vadd.f32 s6, s6, s5", 7, 5 + 1 + 1 + 2 + 1 + 1 + 3),
     "m4: float, slow ones": ("cortex-m4", "vmla.f32 s0, s1, s2\n vdiv.f32 s3, s1, s1\n vmov r2, s4\n "
                              "vmov s4, r2", 6, 3 + 14 + 1 + 1 + 1 + 3),
-    "m4: a branch not taken": ("cortex-m4", "cmp r1, #0\n beq 2f\n it ne\n movne r2, #1\n 2:", 6, 1 + 1 + 2 + 1 + 3),
+    "m4: a branch not taken": ("cortex-m4", "cmp r1, #0\n beq 2f\n it ne\n movne r2, #1\n 2:", 6,
+                               1 + 1 + 2 + 1 + 3),
 }  # fmt: skip
 
 

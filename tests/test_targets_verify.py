@@ -121,7 +121,8 @@ def test_contraction_shows_where_the_core_has_a_fused_multiply_add(tmp_path, mon
 
 def test_c_that_never_returns(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("focgen.targets.run.PATIENCE", 0.5)
-    folder = sown(tmp_path, "q15", "spba.c", r"s->error_now = 0;", "s->error_now = 0; for (;;) { s->flags++; }")
+    hang = "s->error_now = 0; for (;;) { s->flags++; }"
+    folder = sown(tmp_path, "q15", "spba.c", r"s->error_now = 0;", hang)
     monkeypatch.setattr("focgen.verification.compare.PATIENCE", 0.5)
     assert main(["verify", str(folder), "--samples", "200", "--target", "cortex-m3"]) == 1
     assert re.search(r"the C did not return within [\d.]+ s, at spba_", capsys.readouterr().out)

@@ -38,11 +38,17 @@ def disassembler(core: Core):
     return made
 
 
-def instructions(program: Program) -> Iterator:
+def instructions(program: Program) -> list:
     """Every instruction of a program by rising address, literal pools left out.
 
     What cannot be read as an instruction is passed over.
     """
+    if not program.read_code:
+        program.read_code.extend(_instructions(program))
+    return program.read_code
+
+
+def _instructions(program: Program) -> Iterator:
     reader = disassembler(program.core)
     for begin, end in program.code_ranges:
         while begin < end:

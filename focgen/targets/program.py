@@ -55,6 +55,7 @@ class Program:
     symbols: tuple[Symbol, ...]
     code_ranges: tuple[tuple[int, int], ...]
     elf: bytes = b""
+    read_code: list = field(init=False, repr=False, default_factory=list)
     _by_name: dict[str, Symbol] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self):
@@ -165,10 +166,12 @@ def _sections(file):
 def _symbols(file) -> tuple[list[Symbol], list[tuple[int, bool]]]:
     """Functions and objects; and the marks where code ($t, $x) and data ($d) begin within sections."""
     found, marks = [], []
+    code = {i for i, section in enumerate(file.iter_sections()) if section["sh_flags"] & 4}
     for entry in file.get_section_by_name(".symtab").iter_symbols():
         kind, address = entry["st_info"]["type"], entry["st_value"]
         if entry.name.startswith(("$t", "$x", "$d", "$a")):
-            marks.append((address, not entry.name.startswith("$d")))
+            if entry["st_shndx"] in code:
+                marks.append((address, not entry.name.startswith("$d")))
         elif kind in ("STT_FUNC", "STT_OBJECT"):
             function = kind == "STT_FUNC"
             place = address & ~1 if function else address

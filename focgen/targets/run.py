@@ -125,7 +125,8 @@ class TargetLibrary:
         return Answers(Trace(u, d if plan.integrator else u, flags), tuple(states))
 
     def stepwise(self, plan: Plan, scenario: Scenario) -> Iterator[Executed]:
-        """Run the first lane step by step; yield what ran for each but the first, the feeding included.
+        """Run the first lane step by step; yield what ran for each but the first, the feeding included;
+        the stack is painted after it.
 
         The first sample begins with a reset of the scenario, if it has one; no other does.
         """
@@ -137,6 +138,8 @@ class TargetLibrary:
             words[2:6] = [place + k * size for place, size in zip(words[2:6], sizes)]
             if k:
                 self.machine.write(words[5], bytes([RESUME]))
+            if k == 1:
+                self.machine.paint_stack()
             self.machine.write(WORK + 4, struct.pack(_DESCRIPTOR, *words))
             self.machine.forget()
             self.machine.call("focgen_run", WORK + 4, seconds=PATIENCE)
@@ -155,6 +158,10 @@ class TargetLibrary:
         for address, content in job.inputs:
             self.machine.write(address, content)
         return job
+
+    def state_bytes(self, plan: Plan) -> int:
+        """sizeof(NAME_state) there."""
+        return len(self._state(plan))
 
     def _state(self, plan: Plan) -> bytes:
         place = self.machine.call("focgen_bytes", self._index(plan), RESULTS - 4)

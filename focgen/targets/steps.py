@@ -35,7 +35,6 @@ def step_costs(library: TargetLibrary, plan: Plan, steps: int, seed: int = 0) ->
     outside = _outside(program, plan)
     model = timing(program)
     counts, cycles = [], []
-    machine.paint_stack()
     for ran in library.stepwise(plan, exercise(plan, steps + 1, seed)):
         inside = ran.without(outside)
         counts.append(int(inside.ran.sum()))

@@ -6,8 +6,8 @@ timings" and, for its floating-point unit, table 7-1). They hold for memory with
 Cortex-M7 and for RISC-V nothing of the kind is published; no cycles are given for them.
 
 Where a table gives a range, this is taken: a refilled pipeline is 2 cycles of 1 … 3; a multiplication or
-division whose time depends on its operands, the middle of the range. The Cortex-M0+ has the fast multiplier. A
-conditional instruction counts as if its condition held.
+division whose time depends on its operands, the middle of the range. The Cortex-M0+ has the fast multiplier.
+A conditional instruction counts as if its condition held.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _CONDITIONS = re.compile(r"(eq|ne|hs|lo|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)$")
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """Cycles by halfword of code: ``each`` time an instruction runs, ``jump`` in addition where something else
-    than the instruction behind it follows, ``next`` in addition where that one does.
+    """Cycles by halfword of code: ``each`` time an instruction runs, ``jump`` in addition where something
+    else than the instruction behind it follows, ``next`` in addition where that one does.
     """
 
     each: np.ndarray

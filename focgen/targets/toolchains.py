@@ -86,16 +86,32 @@ def link(chain: Toolchain, core: Core, sources: Sequence[Path], script: Path, ta
     zig = chain.command[-1] == "cc"
     own = (*core.zig, *_ZIG) if zig else (*core.gcc, *_GCC)
     folders = [f"-I{folder}" for folder in dict.fromkeys(include)]
-    last = ["-Wl,--no-gc-sections", f"-Wl,-e,{entry}"] if zig else [f"-Wl,--entry={entry}", "-lgcc"]
+    last = ["-Wl,--gc-sections", f"-Wl,-e,{entry}"] if zig else [f"-Wl,--entry={entry}", "-lgcc"]
     named = ["-T", str(script), "-o", str(target), *map(str, sources)]
     parts = [*chain.command, *own, *flags, *folders, *named, *last]
+    _run(chain, core, sources[0], parts)
+
+
+def compile_object(chain: Toolchain, core: Core, source: Path, include: Sequence[Path],
+                   flags: Sequence[str] = EXACT) -> bytes:  # fmt: skip
+    """One C file as an object file for a core. Raises BuildError with the compiler's first complaint."""
+    own = (*core.zig, *_ZIG) if chain.command[-1] == "cc" else (*core.gcc, *_GCC)
+    folders = [f"-I{folder}" for folder in include]
+    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+        target = Path(scratch) / "object.o"
+        parts = [*chain.command, *own, *flags, *folders, "-c", str(source), "-o", str(target)]
+        _run(chain, core, source, parts)
+        return target.read_bytes()
+
+
+def _run(chain: Toolchain, core: Core, source: Path, parts: list[str]) -> None:
     try:
         done = subprocess.run(parts, capture_output=True, text=True, env=_environment(), timeout=_SLOW)
     except subprocess.TimeoutExpired:
-        raise BuildError(str(sources[0]), f"{chain.name} did not end within {_SLOW:g} s",
+        raise BuildError(str(source), f"{chain.name} did not end within {_SLOW:g} s",
                          "try again; the first build also makes Zig's runtime") from None  # fmt: skip
     if done.returncode:
-        raise BuildError(str(sources[0]), f"{chain.title} for {core.name}: {_complaint(done.stderr)}",
+        raise BuildError(str(source), f"{chain.title} for {core.name}: {_complaint(done.stderr)}",
                          "generate the folder again")  # fmt: skip
 
 

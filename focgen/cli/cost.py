@@ -1,0 +1,105 @@
+"""``focgen cost``: what a step of generated C costs on microcontrollers."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import Any
+
+from focgen.cli.outcome import Outcome
+from focgen.report.page import TableOf, text_table
+from focgen.targets.cost import COUNTED, Cost, PerStep, entry_of
+from focgen.targets.timing import HOW
+from focgen.verification.costs import COMPILERS, TARGETS, ControllerCost, cost
+
+HELP = "what one step of generated C costs on microcontrollers: instructions, cycles, flash, RAM, stack"
+EXAMPLE = """example:
+  focgen cost firmware --target all
+  focgen cost build/demo/firmware --target cortex-m4 --compiler gcc
+  focgen cost firmware --against firmware-before
+
+  compiles the folder's C for each core, runs it in an emulator and counts every instruction of every step.
+  Cycles are a model, by Arm's published timings, where there are such. A folder that holds several generated
+  ones gives one table of them all. What a controller's C has cost before stands in brackets: the folder
+  remembers it in cost.json."""
+
+_HEADS = ("controller", "core", "instructions mean", "worst", "cycles mean", "worst", "flash B", "RAM B",
+          "stack B")  # fmt: skip
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", help="a generated folder, or one that holds several")
+    parser.add_argument(
+        "--target", default="all", choices=(*TARGETS, "all"), help="where it runs (default: all)"
+    )
+    parser.add_argument(
+        "--compiler", default="zig", choices=COMPILERS, help="what compiles it (default: zig)"
+    )
+    parser.add_argument("--against", metavar="DIR", help="another generated folder to compare with")
+
+
+def run(args: Namespace) -> Outcome:
+    found = cost(args.folder, args.target, args.compiler, args.against)
+    entries = [_entry(one) for one in found.controllers]
+    payload = entries[0] if len(entries) == 1 else {"controllers": entries}
+    if len(entries) == 1 and args.target != "all":
+        payload = {**payload, **payload["targets"][args.target]}
+    return Outcome(payload, _text(found.controllers))
+
+
+def _entry(one: ControllerCost) -> dict[str, Any]:
+    """A controller in JSON."""
+    targets = {}
+    for name, counted in one.targets.items():
+        targets[name] = entry_of(counted)
+        if name in one.previous:
+            targets[name]["previous"] = entry_of(one.previous[name])
+    return {"folder": str(one.folder), "name": one.name, "arithmetic": one.arithmetic, "memory": one.memory,
+            "length": one.length, "against": None if one.against is None else str(one.against),
+            "targets": targets}  # fmt: skip
+
+
+def _text(controllers: tuple[ControllerCost, ...]) -> str:
+    """The costs for people: a table, and under it how they were counted."""
+    rows, skipped, paths, compilers = [], {}, [], {}
+    for one in controllers:
+        title = f"{one.name} {one.arithmetic} {one.memory} {one.length}"
+        for name, counted in one.targets.items():
+            if counted.skipped is not None:
+                skipped[name] = counted.skipped
+                continue
+            rows.append((title, name, *_cells(counted, one.previous.get(name))))
+            compilers[counted.compiler] = None
+            paths.append(f"{title}, {name}: {' > '.join(counted.stack_path)}")
+    why = [f"{name} skipped: {reason}" for name, reason in skipped.items()]
+    if not rows:
+        return "\n".join(why)
+    table = text_table(TableOf(_HEADS, tuple(rows)))
+    stacks = ["", "deepest stack, each function with its bytes:", *(f"  {path}" for path in paths)]
+    how = ["", f"compiled by {', '.join(compilers)}", f"instructions: {COUNTED}", f"cycles: {HOW}"]
+    return "\n".join([table, *why, *stacks, *how])
+
+
+def _cells(now: Cost, before: Cost | None) -> list[str]:
+    was = before or Cost()
+    return [
+        *_pair(now.instructions_per_step, was.instructions_per_step),
+        *_pair(now.cycles_per_step, was.cycles_per_step),
+        _change(now.flash_bytes, was.flash_bytes),
+        _change(now.ram_bytes, was.ram_bytes),
+        _change(now.stack_bytes, was.stack_bytes),
+    ]
+
+
+def _pair(now: PerStep | None, before: PerStep | None) -> list[str]:
+    if now is None:
+        return ["-", "-"]
+    return [_change(getattr(now, key), before and getattr(before, key)) for key in ("mean", "worst")]
+
+
+def _change(now: float | None, before: float | None) -> str:
+    """A figure, and in brackets by how much it has changed."""
+    if now is None:
+        return "-"
+    if not before or round(now) == round(before):
+        return f"{now:.0f}"
+    return f"{now:.0f} ({100.0 * (now / before - 1.0):+.0f} %)"

@@ -1,0 +1,146 @@
+"""What a controller costs on a core: time of a step, flash, RAM, stack."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from focgen.errors import BuildError, MissingExtra
+from focgen.plan.model import Plan
+from focgen.targets.cores import Core
+from focgen.targets.run import TargetLibrary
+from focgen.targets.stack import Stack
+from focgen.targets.steps import StepCosts, step_costs
+from focgen.targets.timing import HOW
+from focgen.targets.toolchains import Toolchain, compile_object
+
+COUNTED = "executed instructions, counted in the emulator"
+_INTERFACE = ("init", "reset", "step", "track", "flags")
+_UNWINDING = (".ARM.", ".eh_frame", ".note", ".riscv")
+_FEW = 128  # steps, where floating point without a unit makes them long
+
+
+@dataclass(frozen=True)
+class PerStep:
+    """The ``mean`` and the ``worst`` of ``steps`` steps; ``how`` they were counted."""
+
+    mean: float
+    worst: float
+    steps: int
+    how: str
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a controller costs on a core, built by ``compiler``.
+
+    ``flash_bytes``: machine code and constants of the controller and of the compiler's own functions that it
+    calls (``flash`` has the parts). ``ram_bytes``: one state, and what else the controller keeps.
+    ``stack_bytes``: the most that a call of its interface uses, from machine code, ``stack_path``: the
+    functions on that path, each with its bytes; ``stack_seen``: the most that the measured steps have used.
+    ``cycles_per_step`` is None for a core whose timings are not published. ``skipped``: why nothing was
+    counted; the rest is None then.
+    """
+
+    compiler: str | None = None
+    instructions_per_step: PerStep | None = None
+    cycles_per_step: PerStep | None = None
+    flash_bytes: int | None = None
+    flash: dict[str, int] | None = None
+    ram_bytes: int | None = None
+    stack_bytes: int | None = None
+    stack_path: tuple[str, ...] | None = None
+    stack_seen: int | None = None
+    skipped: str | None = None
+
+
+def entry_of(cost: Cost) -> dict[str, Any]:
+    """A cost as JSON carries it: why it was skipped and nothing else, or what was counted."""
+    if cost.skipped is not None:
+        return {"skipped": cost.skipped}
+    entry = asdict(cost)
+    del entry["skipped"]
+    return entry
+
+
+def cost_of(entry: dict[str, Any]) -> Cost:
+    """The cost that an entry stands for. Raises TypeError and KeyError where it is none."""
+    made = {key: entry[key] and PerStep(**entry[key]) for key in ("instructions_per_step", "cycles_per_step")}
+    path = entry["stack_path"]
+    return Cost(**{**entry, **made, "stack_path": None if path is None else tuple(path)})
+
+
+def cost_on(core: Core, chain: Toolchain, plan: Plan, folder: Path) -> Cost:
+    """Build a generated folder for a core and count.
+
+    Raises BuildError where it does not compile, MissingExtra where the emulator is missing.
+    """
+    library = TargetLibrary(core, chain, [plan], [folder])
+    costs = step_costs(library, plan, measured_steps(plan, core))
+    stack = Stack(library.program)
+    try:
+        deepest = max((stack.depth(f"{plan.name}_{part}") for part in _INTERFACE), key=lambda d: d.bytes)
+    except ValueError as reason:
+        raise BuildError(str(folder), f"the stack on {core.name} cannot be told: {reason}",
+                         "generate the folder again") from None  # fmt: skip
+    flash, kept = _sizes(core, chain, plan, folder, library, stack)
+    return Cost(
+        chain.title,
+        _per_step(costs.instructions, COUNTED),
+        None if costs.cycles is None else _per_step(costs.cycles, HOW),
+        sum(flash.values()),
+        flash,
+        library.state_bytes(plan) + kept,
+        deepest.bytes,
+        deepest.path,
+        _stack_seen(plan, stack, costs),
+    )
+
+
+def measured_steps(plan: Plan, core: Core) -> int:
+    """Once around the memory, so that no place of the ring's end is left out; fewer where steps are long."""
+    has = {"f64": core.double, "f32": core.single}.get(plan.arithmetic, True)
+    around = max(plan.error_lags, plan.filtered_lags) + 65
+    return around if has else min(around, _FEW)
+
+
+def _per_step(values: np.ndarray, how: str) -> PerStep:
+    return PerStep(float(values.mean()), float(values.max()), int(values.size), how)
+
+
+def _stack_seen(plan: Plan, stack: Stack, costs: StepCosts) -> int:
+    """What the steps have used, without what fed them."""
+    run, step = f"{plan.name}_run", f"{plan.name}_step"
+    return costs.stack - stack.at_call("focgen_run", run) - stack.at_call(run, step)
+
+
+def _sizes(core: Core, chain: Toolchain, plan: Plan, folder: Path, library: TargetLibrary,
+           stack: Stack) -> tuple[dict[str, int], int]:  # fmt: skip
+    """Bytes of flash by part, and of memory besides the state."""
+    sizes, own = object_sizes(compile_object(chain, core, folder / f"{plan.name}.c", [folder]))
+    reached = stack.reached([f"{plan.name}_{part}" for part in _INTERFACE])
+    helpers = sum(library.program[name].size for name in reached - own)
+    return {"code": sizes["code"], "constants": sizes["constants"], "compiler": helpers}, sizes["data"]
+
+
+def object_sizes(elf: bytes) -> tuple[dict[str, int], set[str]]:
+    """Bytes of code, constants and data in an object file, and the names of its functions.
+
+    Raises MissingExtra without pyelftools.
+    """
+    try:
+        from elftools.elf.elffile import ELFFile
+    except ImportError:
+        raise MissingExtra.of("pyelftools", "targets", "reading what was compiled") from None
+    file, sizes = ELFFile(io.BytesIO(elf)), {"code": 0, "constants": 0, "data": 0}
+    for section in file.iter_sections():
+        flags = section["sh_flags"]
+        if flags & 2 and not section.name.startswith(_UNWINDING):
+            sizes["code" if flags & 4 else "data" if flags & 1 else "constants"] += section["sh_size"]
+    functions = [s for s in file.get_section_by_name(".symtab").iter_symbols()
+                 if s["st_info"]["type"] == "STT_FUNC" and s["st_shndx"] != "SHN_UNDEF"]  # fmt: skip
+    return sizes, {s.name for s in functions}

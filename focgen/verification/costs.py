@@ -1,0 +1,147 @@
+"""``cost``: what a step of generated C costs on microcontrollers, beside what it cost before."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from focgen.errors import InputError, MissingExtra
+from focgen.output import write_file
+from focgen.targets.cores import EMULATED, core
+from focgen.targets.cost import Cost, cost_of, cost_on, entry_of
+from focgen.targets.emulator import emulator_title
+from focgen.targets.toolchains import Toolchain, toolchains
+from focgen.verification.folder import GeneratedFolder, read_folder
+
+TARGETS = (*EMULATED, "avr")
+COMPILERS = ("zig", "gcc")
+REMEMBERED = "cost.json"
+"""The file beside a controller's C that remembers what it cost; no part of what was generated."""
+
+
+@dataclass(frozen=True)
+class ControllerCost:
+    """One generated folder: ``targets`` by name, and the ``previous`` costs: those of ``against``, which is
+    another folder, or this one before it was generated anew.
+    """
+
+    folder: Path
+    name: str
+    arithmetic: str
+    memory: str
+    length: int
+    targets: dict[str, Cost]
+    previous: dict[str, Cost]
+    against: Path | None = None
+
+
+@dataclass(frozen=True)
+class Costs:
+    """The costs of every generated folder, by folder."""
+
+    controllers: tuple[ControllerCost, ...]
+
+
+def cost(folder: str | Path, target: str | Sequence[str] = "all", compiler: str = "zig",
+         against: str | Path | None = None) -> Costs:  # fmt: skip
+    """Count what a step costs on emulated cores, and what flash, RAM and stack are used.
+
+    ``folder`` has been generated, or holds generated folders: then each of them is counted. ``target``: a
+    name of ``TARGETS``, several, or "all". ``compiler``: "zig" or "gcc" (arm-none-eabi-gcc, where installed).
+    ``against``: another generated folder to compare with; without it the costs are compared with those of the
+    folder's previous C, which its cost.json remembers.
+
+    Raises InputError for a folder that is none, BuildError where the C does not compile.
+    """
+    names = _targets(target)
+    if compiler not in COMPILERS:
+        raise InputError("--compiler", f"is {compiler!r}", f"choose of {', '.join(COMPILERS)}")
+    folders = [read_folder(path) for path in _generated(Path(folder))]
+    other = None if against is None else read_folder(against)
+    beside = {} if other is None else {name: _on(name, other, compiler) for name in names}
+    return Costs(tuple(_counted(read, names, compiler, other, beside) for read in folders))
+
+
+def _targets(target: str | Sequence[str]) -> tuple[str, ...]:
+    names = TARGETS if target == "all" else (target,) if isinstance(target, str) else tuple(target)
+    for name in names:
+        if name not in TARGETS:
+            raise InputError("--target", f"is {name!r}", f"choose of {', '.join(TARGETS)}, all")
+    return names
+
+
+def _generated(path: Path) -> list[Path]:
+    """The folder itself, or the generated folders in it."""
+    if not path.is_dir() or (path / "manifest.json").is_file():
+        return [path]
+    found = sorted(part.parent for part in path.glob("*/manifest.json"))
+    return found or [path]
+
+
+def _counted(read: GeneratedFolder, names: Sequence[str], compiler: str, other: GeneratedFolder | None,
+             beside: dict[str, Cost]) -> ControllerCost:  # fmt: skip
+    plan, found = read.plan, {name: _on(name, read, compiler) for name in names}
+    before = _remember(read, compiler, found)
+    previous = before if other is None else beside
+    return ControllerCost(read.path, plan.name, plan.arithmetic, plan.memory, plan.length, found,
+                          {name: previous[name] for name in names if name in previous},
+                          None if other is None else other.path)  # fmt: skip
+
+
+def _on(name: str, read: GeneratedFolder, compiler: str) -> Cost:
+    if name == "avr":
+        return Cost(skipped="not part of this version")
+    one = core(name)
+    try:
+        emulator_title()
+        chain = _chain(name, compiler)
+    except MissingExtra as missing:
+        return Cost(skipped=f"{missing.what} ({missing.remedy})")
+    if chain is None:
+        return Cost(skipped="needs arm-none-eabi-gcc (apt-get install gcc-arm-none-eabi)" if one.arm else
+                    "needs riscv64-unknown-elf-gcc (apt-get install gcc-riscv64-unknown-elf)")  # fmt: skip
+    return cost_on(one, chain, read.plan, read.path)
+
+
+def _chain(name: str, compiler: str) -> Toolchain | None:
+    chains = toolchains(core(name))
+    return next((c for c in chains if c.name.startswith("zig") == (compiler == "zig")), None)
+
+
+def _remember(read: GeneratedFolder, compiler: str, found: dict[str, Cost]) -> dict[str, Cost]:
+    """Write the costs down in the folder; return those of the C that was there before, same compiler."""
+    path, made_from = read.path / REMEMBERED, _hash(read)
+    stored = _stored(path)
+    mine = stored.get(compiler, {})
+    same = mine.get("made_from") == made_from
+    previous = mine.get("previous", {}) if same else mine.get("targets", {})
+    counted = {name: entry_of(one) for name, one in found.items() if one.skipped is None}
+    targets = {**(mine.get("targets", {}) if same else {}), **counted}
+    stored[compiler] = {"made_from": made_from, "targets": targets, "previous": previous}
+    with suppress(InputError):  # a folder that cannot be written remembers nothing
+        write_file(path, json.dumps(stored, indent=2) + "\n")
+    return {name: cost_of(entry) for name, entry in previous.items()}
+
+
+def _stored(path: Path) -> dict:
+    """What a folder remembers; nothing where that cannot be read."""
+    try:
+        stored = json.loads(path.read_text(encoding="utf-8"))
+        for part in stored.values():
+            for entry in (*part["targets"].values(), *part["previous"].values()):
+                cost_of(entry)
+        return stored
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+        return {}
+
+
+def _hash(read: GeneratedFolder) -> str:
+    """Of the C: what else is in the folder costs nothing."""
+    digest = hashlib.sha256()
+    for name in (f"{read.plan.name}.c", f"{read.plan.name}.h", "foc_rt.h"):
+        digest.update((read.path / name).read_bytes())
+    return digest.hexdigest()
