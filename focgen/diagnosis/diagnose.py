@@ -22,6 +22,7 @@ from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.rig.replay import experiments
 
+UNTRUSTED = 0.2  # of a segment's residual foretold by inputs: its output still carries noise into the next
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
@@ -74,12 +75,13 @@ def _check(only: Sequence[str] | None) -> None:
 def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float,
                 only: Sequence[str] | None = None) -> tuple[Explanation, ...]:
     """Explain segment after segment, each on what the one before it gives freed of noise."""
-    roles, x, found = cuts(logs), None, []
+    roles, x, found, trusted = cuts(logs), None, [], True
     for entry, exit in zip(roles, roles[1:]):
         segment = make(logs, entry, exit, x)
         say(f"{entry} to {exit}")
-        found.append(explain(rig, segment, logs, threshold, only))
+        found.append(explain(rig, segment, logs, threshold, only, trusted))
         best = found[-1].best
         response = best.problem.references.clocks["response"]
+        trusted = found[-1].left.share < UNTRUSTED
         x = freed(segment, best.problem.simulate(best.vector), response, found[-1].left.share)
     return tuple(found)

@@ -15,16 +15,25 @@ from focgen.diagnosis.noise import autocovariance, whiten
 
 BURSTS = 15.0  # kurtosis of the innovations; 3 for noise
 LOUD = 10.0  # loudest stretch of a response over the usual one
+HUMS = 0.25  # of the power in one line, in the greater part of the long experiments; up to a tenth for noise
+_LONG = 400  # samples of an experiment in which a line stands out
 SWINGS = 20.0  # power at periods beyond eight responses over that between one and four; 1 for noise
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """``kurtosis`` and ``loudest`` of the innovations, ``slow``: the ratio of slow power to that about the response."""
+    """``kurtosis`` and ``loudest`` of the innovations, ``slow``: the ratio of slow power to that about the response;
+    ``line``: the part of the power in the strongest line, in the median of the long experiments."""
 
     kurtosis: float
     loudest: float
     slow: float
+    line: float
+
+    @property
+    def hums(self) -> bool:
+        """Whether it is a tone."""
+        return self.line > HUMS
 
     @property
     def bursts(self) -> bool:
@@ -48,7 +57,19 @@ def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturban
     count = max(10, int(response / h))
     local = np.array([np.mean(s**2) for p in quiet for s in np.array_split(p, max(1, len(p) // count))])
     loudest = float(np.max(local) / max(np.median(local), 1e-300))
-    return Disturbance(float(np.mean(joined**4) / variance**2), loudest, _slow(parts, h, response))
+    return Disturbance(float(np.mean(joined**4) / variance**2), loudest, _slow(parts, h, response),
+                       _line(parts))
+
+
+def _line(parts: list[np.ndarray]) -> float:
+    """The part of the power within two bins of the strongest line, slow ones left out; the median over experiments."""
+    shares = []
+    for p in parts:
+        if len(p) >= _LONG:
+            power = np.abs(np.fft.rfft((p - p.mean()) * np.hanning(len(p)))) ** 2
+            near = np.convolve(power, np.ones(5), "same")
+            shares.append(float(near[len(power) // 50:].max() / max(power.sum(), 1e-300)))
+    return float(np.median(shares)) if shares else 0.0
 
 
 def _slow(parts: list[np.ndarray], h: float, response: float) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.leftover import Leftover, foretold, leftover
 from focgen.diagnosis.own import Own
@@ -27,8 +28,10 @@ _WHOLE = 0.5  # of what inputs foretell of a residual: a further family has to e
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 _SHARE = (0.06, 0.15)  # of the gap that a further family has to close, and one that is easily confused with those found
 _SWAPS = 3
+_MENDED = 3  # rivals that get a second form where the best has one
 _VISIBLE = (0.015, 0.05)  # of the remaining mean square, the first effect and any further: below, one is of no use
-_NOISY = 0.03  # the same for the first where the input is measured: its noise alone looks like a small effect
+_KNOWN = 0.3  # of what an effect takes from a residual has to be foretold by inputs
+_NOISY = (0.15, 0.03)  # the same where the input is measured, its noise still in it or not: that looks like a small effect
 
 
 @dataclass(frozen=True)
@@ -108,10 +111,11 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
 
 
 def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: float,
-            only: Sequence[str] | None = None) -> Explanation:
+            only: Sequence[str] | None = None, trusted: bool = True) -> Explanation:
     """Find the segment's effects; ``threshold``: nats of evidence that noise alone does not reach.
 
-    ``only``: the effects to consider, of which each that finds anything to mend is taken.
+    ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``: whether the input
+    could be freed of its noise.
     """
     problem, clues, guests = _held(rig, segment, logs), clues_for(segment, rig), guests_in(segment, rig)
     if only is not None:
@@ -122,7 +126,7 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     while len(rankings) < _DEPTH:
         untried = [c for c in clues if c not in base.clues and not c.form.seen]
         rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
-        best = _chosen(rankings, threshold)
+        best = _chosen(rankings, threshold, trusted)
         if best is None and guests and _much_left(rankings[-1].base):
             clues, guests = clues + guests, []
             continue
@@ -175,7 +179,7 @@ def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[
     return clues if share > _TELLING else []
 
 
-def _chosen(rankings: Sequence[Ranking], threshold: float) -> Fit | None:
+def _chosen(rankings: Sequence[Ranking], threshold: float, trusted: bool) -> Fit | None:
     """The winner where it is beyond chance and of use. Another form of what was found already goes before a further
     family, unless that explains clearly more: no form is quite what the rig does, and others mend what it lacks."""
     ranking = rankings[-1]
@@ -190,7 +194,7 @@ def _chosen(rankings: Sequence[Ranking], threshold: float) -> Fit | None:
         return mended
     further = bool(already)
     measured = ranking.base.problem.segment.entry != "command"
-    visible = _NOISY if measured and not further else _VISIBLE[further]
+    visible = _NOISY[trusted] if measured and not (further and trusted) else _VISIBLE[further]
     whole = _mends(ranking.base, winner, visible, _WHOLE * further)
     return winner if whole and not (further and _marginal(rankings, winner)) else mended
 
@@ -207,13 +211,15 @@ def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
 
 
 def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:
-    """Whether the residual falls visibly, and by the part ``whole`` of what inputs foretell of it."""
+    """Whether the residual falls visibly, by the part ``whole`` of what inputs foretell of it, and mostly so: what is not
+    foretold is noise, and what takes that away no effect."""
     before, after = (weighed(f) for f in (base, better))
     old, new = np.mean(before**2), np.mean(after**2)
     if old - new < visible * new:
         return False
-    response = base.problem.references.clocks["response"]
-    return not whole or old - new > whole * old * foretold(base.problem.segment, before, response)
+    response, segment = base.problem.references.clocks["response"], base.problem.segment
+    known, left = foretold(segment, before, response), foretold(segment, after, response)
+    return known * old - left * new > _KNOWN * (old - new) and old - new > whole * old * known
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
@@ -262,17 +268,12 @@ def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tup
     for name in dict.fromkeys(c.effect for c in best.problem.clues):
         own = [c for c in best.problem.clues if c.effect == name]
         without = _without(best, own, weighing)
-        others = [c for c in clues if c.effect != name and c.form.seen is None]
-        ranking = (next((r for r in rankings if r.base.problem.clues == without.problem.clues), None)
-                   or rank(without.problem, without.vector, others))
         rivals = [Rival(name, own[0].stage, 0.0, evidence(best, without), best)]
-        if own[0].form.seen:  # read off the signal itself: nothing else makes such steps
-            ranking = replace(ranking, best={})
-        for other, candidate in ranking.best.items():
-            if other != name and other not in {c.effect for c in without.problem.clues}:
-                again = fit(candidate.problem, candidate.vector, weighing, 6)
-                rivals.append(Rival(other, again.problem.clues[-1].stage, separation(best, again),
-                                    evidence(again, without), again))
+        if not own[0].form.seen:  # what is read off the signal itself has no rival: nothing else makes such steps
+            others = [c for c in clues if c.effect != name and c.form.seen is None]
+            ranking = (next((r for r in rankings if r.base.problem.clues == without.problem.clues), None)
+                       or rank(without.problem, without.vector, others))
+            rivals += _rivals(best, without, ranking, clues, weighing, len(own) > 1)
         before, after = (np.mean(weighed(f) ** 2) for f in (nominal, best))
         lost = np.mean(weighed(without) ** 2) - after
         share = float(np.clip(lost / max(before - after, 1e-300), 0, 1))
@@ -281,3 +282,42 @@ def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tup
     return tuple(sorted(found, key=lambda c: -c.share))
 
 
+def _rivals(best: Fit, without: Fit, ranking: Ranking, clues, weighing: Weighing, mended: bool) -> list[Rival]:
+    """The families of ``ranking`` in the place of one of ``best``; ``mended``: that one has two forms, so the foremost
+    of the others may have, too."""
+    found, open_ = [], _indistinct(best, ranking)
+    for other, candidate in ranking.best.items():
+        if other in {c.effect for c in best.problem.clues}:
+            continue
+        again = fit(candidate.problem, candidate.vector, weighing, 6)
+        if mended and len(found) < _MENDED:
+            again = _second_form(again, clues, weighing)
+        apart = separation(best, again, without, other in open_)
+        found.append(Rival(other, again.problem.clues[-1].stage, apart,
+                           evidence(again, without), again))
+    return found
+
+
+def _indistinct(best: Fit, ranking: Ranking) -> set[str]:
+    """The families that these experiments are not made to tell from those of ``best``: easily confused with one of them, and
+    one of the two lacking what would show it."""
+    segment, response = best.problem.segment, best.problem.references.clocks["response"]
+    seen = excitation(segment.parts(segment.x), segment.run.h, response)
+    found = set()
+    for a in (library()[c.effect] for c in best.problem.clues):
+        for b in (library()[name] for name in ranking.best):
+            alike = a.name in b.confused_with or b.name in a.confused_with
+            if alike and (a.needs(seen) or b.needs(seen)):
+                found.add(b.name)
+    return found
+
+
+def _second_form(of: Fit, clues, weighing: Weighing) -> Fit:
+    """With the form of the same family beside it that helps most, where one does."""
+    last = of.problem.clues[-1]
+    forms = [c for c in clues if c.effect == last.effect and c.stage == last.stage and c != last]
+    ranking = rank(of.problem, of.vector, forms)
+    if ranking.winner is None:
+        return of
+    better = fit(ranking.best[ranking.winner].problem, ranking.best[ranking.winner].vector, weighing, 6)
+    return better if evidence(better, of) > 0 else of

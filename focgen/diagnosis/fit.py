@@ -26,10 +26,11 @@ class Fit:
     sse: float
     information: np.ndarray
 
-    @property
+    @cached_property
     def size(self) -> int:
-        """How many parameters the clues have."""
-        return len(self.vector) - self.problem.head
+        """How many parameters the clues have that are free."""
+        low, high = self.problem.bounds()
+        return int(np.sum(high[self.problem.head:] - low[self.problem.head:] > 1e-6))
 
     @cached_property
     def doubt(self) -> float:

@@ -90,9 +90,14 @@ class Problem:
         low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
         for clue in self.clues:
             for p in clue.form.parameters:
-                low.append(np.log(p.lower) if p.log else p.lower)
-                high.append(np.log(p.upper) if p.log else p.upper)
+                least = self._least(p) if p.log else p.lower
+                low.append(np.log(least) if p.log else least)
+                high.append(np.log(max(p.upper, least)) if p.log else p.upper)
         return np.array(low, float), np.array(high, float)
+
+    def _least(self, p) -> float:
+        """The lower bound: a time constant of less than two samples is nothing that samples could show."""
+        return max(p.lower, 2.0 * self.segment.run.h / self.references.clocks[p.clock]) if p.time == 1 else p.lower
 
     def starts(self, clue: Clue) -> list[np.ndarray]:
         """Start values of one clue's entries."""
@@ -130,7 +135,7 @@ class Problem:
         return chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held) + zero
 
     def _aligned(self, shift: float) -> np.ndarray:
-        x = self.segment.x
+        x = self.segment.bent
         if shift == 0.0:
             return x
         kept = self.memory.setdefault("shifted", [])

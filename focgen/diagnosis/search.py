@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.diagnosis.fit import Fit, Weighing, fit, jacobian
+from focgen.diagnosis.leftover import foretold
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 
 _COARSE = 5000  # samples of the first, coarse pass
 _DEEP = 5  # how many forms are fitted to the end beside the families' best
 _QUICK = 0.3  # of the best quick fit's fall in the sum of squares: forms below are left at that
+_MISFIT = 0.15  # of a residual's mean square foretold by inputs: beyond it the colour is not the noise's
 _NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
 _FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
 _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
@@ -58,9 +60,9 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
     tried = [t for clue in clues if (t := best_start(thin, ground.vector, clue, rough, known)) is not None]
     errors = _errors(tried, ground)
     tried = _promising(tried, ground)
-    rough = Weighing(fit_ar(min([ground, *tried], key=lambda t: t.sse).residual()))
+    rough = Weighing(_colour(min([ground, *tried], key=lambda t: t.sse)))
     ground = fit(thin, ground.vector, rough, 6)
-    tried = sorted((fit(t.problem, t.vector, rough, 5, 0.05) for t in tried), key=lambda t: -evidence(t, ground))
+    tried = sorted((fit(t.problem, t.vector, rough, 10, 0.05) for t in tried), key=lambda t: -evidence(t, ground))
     top = evidence(tried[0], ground) if tried else 0.0
     kept = tried[:2] if top < _NOTHING else [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR]
     full = [_on_all(t, problem, factor) for t in (ground, *kept)]
@@ -93,6 +95,14 @@ def _chosen(tried: Sequence[Fit]) -> list[Fit]:
     return first + [t for t in tried[:_DEEP] if t not in first]
 
 
+def _colour(leader: Fit) -> np.ndarray:
+    """The whitening filter of what the best fit leaves. Where inputs foretell much of that it is no noise yet, and a filter
+    that takes out its colour would hide what is missing: then there is none."""
+    problem = leader.problem
+    share = foretold(problem.segment, problem.weighed(leader.vector), problem.references.clocks["response"])
+    return np.ones(1) if share > _MISFIT else fit_ar(leader.residual())
+
+
 def _errors(tried: Sequence[Fit], ground: Fit) -> dict[str, float]:
     """Each family's least root mean square over the ground's."""
     found: dict[str, float] = {}
@@ -106,7 +116,7 @@ def finish(ground: Fit, tried: Sequence[Fit], errors: dict[str, float]) -> Ranki
     """Fit on every sample, in the colour of what the best one leaves."""
     leader = min([ground, *tried], key=lambda t: t.sse)
     for iterations in (3, 6):
-        weighing = Weighing(fit_ar(leader.residual()))
+        weighing = Weighing(_colour(leader))
         ground = fit(ground.problem, ground.vector, weighing, iterations)
         tried = [fit(t.problem, t.vector, weighing, iterations, 0.02) for t in tried]
         tried = sorted(tried, key=lambda t: t.sse)

@@ -11,12 +11,18 @@ import numpy as np
 from focgen.diagnosis.fit import Fit
 
 _BLOCKS = 80
+_FORM = (0.004, 0.01)  # of the gain: what a form a little wrong may cost, in one stage, and where stages are merged
+_UNTOLD = 0.05
 _ROUGH = 2.0  # nats: what is held against own parameters far from those given is known no better
 
 
-def separation(better: Fit, other: Fit) -> float:
+def separation(better: Fit, other: Fit, nominal: Fit, indistinct: bool = False) -> float:
     """Standard deviations by which ``better`` beats ``other``, complexity paid for, own parameters close to
-    those given preferred; innovations of the same weighing."""
+    those given preferred; innovations of the same weighing.
+
+    To the spread belongs that no form is quite what the rig does: a part of the gain over ``nominal``, a larger one
+    where the experiments are not made to tell the two apart (``indistinct``).
+    """
     a, b = better.innovations, other.innovations
     n = min(len(a), len(b))
     variance = min(better.sse, other.sse) / n
@@ -24,6 +30,9 @@ def separation(better: Fit, other: Fit) -> float:
     length = max(1, n // _BLOCKS)
     sums = difference[: n // length * length].reshape(-1, length).sum(axis=1)
     spread = float(np.std(sums, ddof=1) * np.sqrt(len(sums))) if len(sums) > 2 else np.inf
+    gain = 0.5 * n * np.log(max(nominal.sse, 1e-300) / max(better.sse, 1e-300))
+    part = _UNTOLD if indistinct else _FORM[len(better.problem.segment.stages) > 1]
+    spread = float(np.hypot(max(spread, 1.0), part * gain))
     paid = 0.5 * (better.size - other.size) * np.log(n)
     likely = (other.doubt - better.doubt) / max(spread, _ROUGH)
-    return float((difference.sum() - paid) / max(spread, 1.0) + likely)
+    return float((difference.sum() - paid) / spread + likely)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import savgol_filter
 
 from focgen.diagnosis.segments import Segment
 
 
-_WRONG = 0.05  # of the residual foretold by inputs: beyond it the simulation is not to be relied on
+WRONG = 0.05  # of the residual foretold by inputs: beyond it the simulation is not to be relied on
 
 
 def freed(segment: Segment, simulated: np.ndarray, response: float, left: float) -> np.ndarray:
@@ -20,7 +21,9 @@ def freed(segment: Segment, simulated: np.ndarray, response: float, left: float)
 
     ``left``: the share of the residual that inputs foretell; where there is one, little is smoothed away.
     """
-    width = max(4.0, 0.15 * response / segment.run.h) if left < _WRONG else 1.5
     residual = segment.parts(segment.y - simulated)
+    if left > WRONG:
+        return simulated + np.concatenate([savgol_filter(p, 7, 3) if len(p) > 7 else p for p in residual])
+    width = max(4.0, 0.15 * response / segment.run.h)
     slow = [gaussian_filter1d(part, min(width, len(part) / 6), mode="nearest") for part in residual]
     return simulated + np.concatenate(slow)

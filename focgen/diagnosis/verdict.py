@@ -73,7 +73,7 @@ def _departures(controller: Running | None) -> tuple[Found, ...]:
 def is_unknown(e: Explanation) -> bool:
     """Whether most of what inputs foretell of the nominal residual is still there after the effects, or without any the
     residual is not just noise."""
-    if not e.causes and (disturbed(e).bursts or disturbed(e).swings):
+    if not e.causes and (disturbed(e).bursts or disturbed(e).swings or disturbed(e).hums):
         return True
     if e.left.share < LEFT:
         return False
@@ -194,5 +194,6 @@ def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
         parts, noise = {k: v for k, v in e.left_nominal.depends.items() if v > 0.02}, disturbed(e)
         found[f"{e.segment.entry} to {e.segment.exit}"] = {
             "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"], "share": e.left_nominal.share,
-            "bursts": noise.bursts, "slow_swings": noise.swings}
+            "bursts": noise.bursts, "slow_swings": noise.swings,
+            "hums": noise.hums}
     return found

@@ -9,6 +9,6 @@ EFFECT = Effect(
     meaning="the gain moves slowly with time, whatever the load",
     reveals="the same experiment at the start and at the end",
     confused_with=("sensor_drift", "softening", "creep", "leak"),
-    needs=lambda e: None if e.repeats or e.experiments > 1 else "nothing is repeated later in the session",
+    needs=lambda e: None if e.repeats else "no level is repeated later in the session",
     forms=_trends.forms("drive", 0, lambda x, trend: x * (1.0 + trend)),
 )

@@ -1,6 +1,7 @@
 """A static gain that departs smoothly from the line K(p): stiffening, ballooning."""
 
 import numpy as np
+from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 
@@ -17,13 +18,6 @@ def _exponential(x, values, run):
     bend = values[0]
     y = np.clip(bend * x, -30.0, 30.0)
     return x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
-
-
-def _spline(x, values, run):
-    *sizes, scale = values
-    place = np.abs(x) / scale
-    bumps = sum(s * np.sin(np.pi * np.minimum(place, 1.0) * (i + 2)) for i, s in enumerate(sizes))
-    return x + np.sign(x) * scale * bumps
 
 
 _ONE = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
@@ -45,9 +39,6 @@ EFFECT = Effect(
         Form("locking", "drive", (
             Parameter("bend", level=-1, lower=-0.97, upper=3.0, starts=(0.3, -0.3), zero=0.0),
         ), _gent),
-        Form("curve", "drive", (
-            Parameter("first", lower=-0.5, upper=0.5, starts=(0.02,), zero=0.0),
-            Parameter("second", lower=-0.5, upper=0.5, starts=(0.02,), zero=0.0), _ONE,
-        ), _spline),
+        _curves.quartic("drive"),
     ],
 )

@@ -1,6 +1,7 @@
 """A bent calibration curve."""
 
 import numpy as np
+from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 
@@ -16,13 +17,6 @@ def _exponential(x, values, run):
 def _cubic(x, values, run):
     first, second = values
     return x * (1.0 + first * x + second * x * x)
-
-
-def _curve(x, values, run):
-    *sizes, scale = values
-    place = np.minimum(np.abs(x) / scale, 1.0)
-    bumps = sum(s * np.sin(np.pi * place * (i + 1)) for i, s in enumerate(sizes))
-    return x + np.sign(x) * scale * bumps
 
 
 def _even(x, values, run):
@@ -44,10 +38,7 @@ EFFECT = Effect(
         Form("quadratic", "strain", (_bend("bend", -1, 0.1),), _quadratic),
         Form("exponential", "strain", (_bend("bend", -1, 0.1, -0.3),), _exponential),
         Form("cubic", "strain", (_bend("bend", -1, 0.1), _bend("twist", -2, 0.05)), _cubic),
-        Form("curve", "strain", (
-            *(Parameter(n, lower=-0.5, upper=0.5, starts=(0.02,), zero=0.0) for n in ("first", "second", "third")),
-            Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
-        ), _curve),
+        _curves.quartic("strain"),
         Form("even", "strain", (Parameter("share", lower=0.0, upper=1.0, starts=(0.5,), zero=0.0),), _even),
     ],
 )
