@@ -267,7 +267,7 @@ def test_what_cannot_be_planned_is_refused_with_a_remedy():
     assert "orders up to" in str(refused(simple(TransferFunction([(1.0, 9.0)]))))
     assert "memory length" in str(refused(simple(unit), length=0))
     assert "choose one of" in str(refused(simple(unit), arithmetic="q7"))
-    assert "memory form" in str(refused(simple(unit, memory="exponential")))
+    assert "memory form" in str(refused(simple(unit, memory="endless")))
     steep = GainSchedule((0.5, 0.50001), (-1.0, 1.0))
     ranges = ControllerRanges((0.0, 1.0), (0.0, 1.0), (0.0, 1.0), (0.0, 1.0))
     assert "steep" in str(refused(simple(unit, gain=steep, ranges=ranges)))

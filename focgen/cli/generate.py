@@ -8,12 +8,14 @@ from focgen.cli.outcome import Outcome
 from focgen.codegen.generate import PACKAGES, Generated, generate
 from focgen.codegen.kernels import TARGETS
 from focgen.control.controller import ARITHMETICS, MEMORIES
+from focgen.plan.model import Plan
 
 HELP = "Write C99 for a controller, with proofs and error bounds in its manifest."
 
 EXAMPLE = """example:
   focgen generate controller.toml --out firmware --arithmetic q31 --length 1000
   focgen verify firmware
+  focgen generate controller.toml --out firmware --memory exponential --tolerance 1e-4 --horizon 1000000
 """
 
 
@@ -28,8 +30,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--length", type=int, metavar="L", help="past samples that take part; default: the controller's"
     )
-    parser.add_argument("--tolerance", type=float, metavar="E", help="of the exponential memory")
-    parser.add_argument("--horizon", type=int, metavar="N", help="of the exponential memory, in samples")
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="E",
+        help="largest relative error of the exponential memory's weights; default: the controller's, else 1e-4",
+    )
+    parser.add_argument(
+        "--horizon",
+        type=int,
+        metavar="N",
+        help="samples back to which --tolerance holds; default: the controller's, else 1000000",
+    )
     parser.add_argument("--target", metavar="CORE", help=f"sums for a core: {', '.join(TARGETS)}")
     parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
     parser.add_argument(
@@ -63,10 +75,10 @@ def _text(made: Generated) -> str:
     ahead = "integrator" if plan.integrator else "limits"
     truncation = "no bound" if bound.truncation is None else f"{bound.truncation:.3g} {rate}".rstrip()
     lines = [
-        f"{plan.name}: {plan.arithmetic}, {plan.length} past samples, {size['state_bytes']} bytes of state,"
+        f"{plan.name}: {plan.arithmetic}, {_memory(plan)}, {size['state_bytes']} bytes of state,"
         f" {size['table_bytes']} bytes of tables",
         f"error ahead of the {ahead}: {_growth(bound.operator_per_sample)}at most {bound.operator:.3g} {rate}".rstrip()
-        + f"; by short memory at most {truncation}",
+        + f"; by {plan.memory} memory at most {truncation}{_within(bound.within_horizon, rate)}",
         *(
             f"short memory: {b['coefficient']:.6g} s^{b['order']:g} is {b['bias']:.3g} at rest instead of 0"
             for b in manifest["memory_bias"]
@@ -76,6 +88,17 @@ def _text(made: Generated) -> str:
         f"next: focgen verify {made.folder}",
     ]
     return "\n".join(lines)
+
+
+def _memory(plan: Plan) -> str:
+    if not plan.exponential:
+        return f"{plan.length} past samples"
+    return f"exponential memory of {plan.states} modes, {plan.multiplies} multiplications a step"
+
+
+def _within(bound: float | None, unit: str) -> str:
+    """Of an exponential memory."""
+    return "" if bound is None else f", up to its horizon {bound:.3g} {unit}".rstrip()
 
 
 def _growth(per_sample: float) -> str:

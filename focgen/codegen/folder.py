@@ -41,6 +41,9 @@ class ReadmeContext:
     transfer: str
     sample_time: str
     length: int
+    exponential: bool
+    memory: str
+    within_horizon: str
     signals: list[Signal]
     scheduled: bool
     integral: bool
@@ -75,12 +78,15 @@ def readme_context(
         transfer=transfer_text(plan),
         sample_time=f"{plan.sample_time:g}",
         length=plan.length,
+        exponential=plan.exponential,
+        memory=_memory(plan),
+        within_horizon=_quantity(bound.within_horizon or 0.0, operator_unit),
         signals=_signals(plan),
         scheduled=plan.schedule is not None,
         integral=plan.integrator is not None,
         state_bytes=size["state_bytes"],
         table_bytes=size["table_bytes"],
-        multiplies=_multiplies(plan),
+        multiplies=plan.multiplies,
         proofs=len(plan.proofs),
         tightest=_tightest(plan),
         operator=_quantity(bound.operator, operator_unit),
@@ -115,9 +121,11 @@ def _signals(plan: Plan) -> list[Signal]:
     ]
 
 
-def _multiplies(plan: Plan) -> int:
-    sums = [plan.direct, plan.inner and plan.inner.rest, plan.feedback and plan.feedback.table]
-    return sum(s.taps for s in sums if s) + 1 + (plan.schedule is not None)
+def _memory(plan: Plan) -> str:
+    """What is remembered, in words."""
+    if not plan.exponential:
+        return f"the present and at most {plan.length} past samples"
+    return f"an exponential memory of {plan.states} modes"
 
 
 def _tightest(plan: Plan) -> str:
@@ -128,6 +136,8 @@ def _tightest(plan: Plan) -> str:
 
 
 def _biases(plan: Plan) -> list[str]:
+    if plan.exponential:
+        return []
     return [
         f"`{coefficient:.6g} s^{order:g}` is {bias:.3g} at rest instead of 0"
         for coefficient, order, bias in memory_bias(plan.controller, plan.length)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from focgen.codegen.literals import comment, quantity, wrapped
 from focgen.fractional.transfer import Polynomial, TransferFunction
-from focgen.plan.canonical import realise, tables
+from focgen.plan.canonical import normaliser, realise
 from focgen.plan.model import Plan, Sum
 
 
@@ -52,13 +52,28 @@ def _output_formulas(plan: Plan) -> list[str]:
 def weights_about(plan: Plan, terms: Polynomial, table: Sum, what: str, half_step: bool = False) -> list[str]:
     """What a weight table holds: its polynomial, formula and order."""
     factor = " times h/2" if half_step else ""
-    normaliser = tables(plan.controller, plan.length).normaliser
-    if normaliser != 1.0:
-        factor += f" over {normaliser:.6g}, the denominator's weight of lag 0"
+    over = normaliser(plan.controller)
+    if over != 1.0:
+        factor += f" over {over:.6g}, the denominator's weight of lag 0"
     lags = f"lags {table.last} ... {table.first}" if table.last > table.first else f"lag {table.first} only"
     formula = (
         "Each term c s^b gives c h^-b (-1)^j binomial(b, j) (Gruenwald-Letnikov),"
         f" h = {quantity(plan.sample_time, 's')};"
         f" the weight of lag j is their sum{factor}. Oldest first, {lags}."
     )
+    if table.banks:
+        formula = (
+            "Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up,"
+            f" h = {quantity(plan.sample_time, 's')}; the modes below remember the rest."
+            f" The weight of lag j is their sum{factor}. Oldest first, {lags}."
+        )
     return [f"{what}: {polynomial_text(terms)}.", *wrapped(formula.split(" "))]
+
+
+def memory_about(plan: Plan) -> list[str]:
+    """What the exponential memory is, for the head of the file; nothing with a short one."""
+    if not plan.exponential:
+        return []
+    head = f"Memory: exponential, {plan.states} modes with a mean each. The weights of every s^b are within"
+    proved = max((memory.tolerance for memory in plan.memories), default=0.0)
+    return [head, f"{proved:.2g} of the exact ones up to {plan.horizon} samples back, and the gain at rest is exact."]

@@ -18,6 +18,7 @@ from focgen.codegen.source import source_context
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.control.files import controller_text, read_controller
 from focgen.errors import InputError
+from focgen.fractional.exponential import HORIZONS, TOLERANCES
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.model import Plan
@@ -53,7 +54,8 @@ def generate(
     """Write C for a controller into the folder ``out``, whole or not at all.
 
     ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15),
-    ``memory``, ``length`` (past samples) and ``name`` (a C identifier) default to the controller's own.
+    ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one, ``tolerance`` (1e-8 … 0.1) and
+    ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier) default to the controller's own.
     ``selftest`` adds NAME_selftest.c and .h.
     ``target`` names a core whose own instructions and loads the history sums shall use; without it they take
     their portable form. The bits are the same.
@@ -62,11 +64,13 @@ def generate(
     in this arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be
     written.
     """
-    _refuse_what_is_missing(memory, package, tolerance, horizon)
+    _refuse_what_is_missing(package)
     kernels = _kernels(target)
     text, made, where = _source(controller)
     _check(arithmetic, memory, made.length if length is None else length)
-    plan = build_plan(made, arithmetic, length, check_name(made.name if name is None else name, where))
+    _check_form(made.memory if memory is None else memory, length, tolerance, horizon)
+    called = check_name(made.name if name is None else name, where)
+    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon)
     files = folder_files(plan, text, selftest, kernels)
     write_files(out, files)
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
@@ -81,8 +85,7 @@ def folder_files(
     """
     title, digest = plan.controller.name, sha256(controller_toml)
     runtime = {
-        name: (shipped("c_runtime") / name).read_text(encoding="utf-8")
-        for name in ("foc_rt.h", *kernels.headers(plan))
+        name: (shipped("c_runtime") / name).read_text(encoding="utf-8") for name in runtime_files(plan, kernels)
     }
     inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
     manifest = manifest_of(plan, inputs, selftest, kernels)
@@ -96,6 +99,11 @@ def folder_files(
         "example/main.c": render("main.c.jinja", example_context(plan, title)),
         **(selftest_files(plan, digest) if selftest else {}),
     }
+
+
+def runtime_files(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[str, ...]:
+    """The files of the runtime that a plan's C includes."""
+    return ("foc_rt.h", *["foc_memory.h"] * (plan.states > 0), *kernels.headers(plan))
 
 
 def _source(controller: Controller | str | Path) -> tuple[bytes, Controller, str]:
@@ -125,18 +133,24 @@ def _kernels(target: str | None) -> Kernels:
     return Kernels(target)
 
 
-def _refuse_what_is_missing(memory, package, tolerance, horizon) -> None:
+def _check_form(memory: str, length: int | None, tolerance: float | None, horizon: int | None) -> None:
+    """Options of the other memory form are refused, never ignored."""
+    for option, value in (("--tolerance", tolerance), ("--horizon", horizon)):
+        if memory == "short" and value is not None:
+            raise InputError(option, "belongs to --memory exponential", "add that, or use --length")
+    if memory == "exponential" and length is not None:
+        raise InputError("--length", "belongs to --memory short", "use --tolerance and --horizon")
+    if tolerance is not None and not TOLERANCES[0] <= tolerance <= TOLERANCES[1]:
+        raise InputError("--tolerance", f"is {tolerance:g}", f"give {TOLERANCES[0]:g} to {TOLERANCES[1]:g}")
+    if horizon is not None and not (isinstance(horizon, int) and HORIZONS[0] <= horizon <= HORIZONS[1]):
+        raise InputError("--horizon", f"is {horizon!r}", f"give {HORIZONS[0]} to {HORIZONS[1]} samples")
+
+
+def _refuse_what_is_missing(package) -> None:
     """Options of the command that this version does not have are refused, never ignored."""
-    if memory == "exponential":
-        raise InputError("--memory", "exponential is not available in this version", "use --memory short")
     if package not in PACKAGES:
         raise InputError("--for", f"is {package!r}", f"choose one of {', '.join(PACKAGES)}")
     if package != "plain":
         raise InputError(
             "--for", f"{package} is not available in this version", "use --for plain and add the three files"
         )
-    for option, value in (("--tolerance", tolerance), ("--horizon", horizon)):
-        if value is not None:
-            raise InputError(
-                option, "belongs to --memory exponential, which this version lacks", "use --length"
-            )

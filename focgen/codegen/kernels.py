@@ -34,7 +34,7 @@ class Kernels:
 
     def ahead(self, plan: Plan, table: Sum | None) -> LookAhead | None:
         """The look-ahead form of a sum, where it takes that form."""
-        if table is None or (self.target, plan.arithmetic) not in _AHEAD:
+        if table is None or table.banks or (self.target, plan.arithmetic) not in _AHEAD:
             return None
         return look_ahead(table)
 

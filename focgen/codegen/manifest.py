@@ -17,6 +17,7 @@ from focgen.plan.model import (
     FLAG_INVALID,
     FLAG_LOW,
     FLAG_SCHEDULE,
+    Bank,
     ErrorBound,
     Plan,
     Proof,
@@ -43,6 +44,7 @@ def manifest_of(
         "arithmetic": plan.arithmetic,
         "memory": plan.memory,
         "length": plan.length,
+        **_exponential(plan),
         "sample_time": plan.sample_time,
         **lsbs(plan),
         "ranges": _ranges(plan),
@@ -101,11 +103,33 @@ def bound_entry(bound: ErrorBound) -> dict[str, Any]:
     }
     if bound.operator_per_sample:
         quantisation["operator_per_sample"] = bound.operator_per_sample
-    return {"quantisation": quantisation, "truncation": {"operator": bound.truncation}}
+    truncation = {"operator": bound.truncation}
+    if bound.within_horizon is not None:
+        truncation["within_horizon"] = bound.within_horizon
+    return {"quantisation": quantisation, "truncation": truncation}
+
+
+def _exponential(plan: Plan) -> dict[str, Any]:
+    """What was asked of an exponential memory, what it costs, and what is proved of each order's weights."""
+    if not plan.exponential:
+        return {}
+    return {
+        "tolerance": plan.tolerance,
+        "horizon": plan.horizon,
+        "states": plan.states,
+        "multiplies": plan.multiplies,
+        "orders": [
+            {"order": memory.order, "states": memory.states, "tolerance": memory.tolerance}
+            for memory in plan.memories
+        ],
+        "compensated": any(bank.compensated for table in plan.sums for bank in table.banks),
+    }
 
 
 def _bias(plan: Plan) -> list[dict[str, float]]:
     """What each term reads of a constant, instead of 0, since the memory ends: T s^alpha at rest."""
+    if plan.exponential:
+        return []
     keys = ("coefficient", "order", "bias")
     return [dict(zip(keys, row)) for row in memory_bias(plan.controller, plan.length)]
 
@@ -142,8 +166,13 @@ def _sum_bytes(plan: Plan, table: Sum, kernels: Kernels) -> int:
     if ahead is not None:
         weights = sum(map(len, ahead.weights)) + (ahead.near.taps if ahead.near else 0)
         return weights * word + 8 * len(ahead.runs) + len(ahead.slices)
-    return _plain_bytes(plan, table, word)
+    return _plain_bytes(plan, table, word) + sum(bank.modes * _mode_bytes(bank) for bank in table.banks)
 
 
 def _plain_bytes(plan: Plan, table: Sum, word: int) -> int:
     return table.taps * word + (0 if plan.floating else 6 * len(table.blocks))
+
+
+def _mode_bytes(bank: Bank) -> int:
+    """Of a rate and a weight, which share a struct."""
+    return 2 * max(size_of(bank.rate.ctype), size_of(bank.drive.ctype))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import focgen
 from focgen.codegen.expressions import CLAMP, LONGEST_SHIFT, bound, converted, saturated, scaled_up, shifted
-from focgen.codegen.formulas import step_formulas, transfer_text, weights_about
+from focgen.codegen.formulas import memory_about, step_formulas, transfer_text, weights_about
 from focgen.codegen.guard import GuardText, guard_text
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import comment, constant, literal, quantity, scale
@@ -77,6 +77,8 @@ class SourceContext:
     sha256: str
     transfer: str
     formulas: list[str]
+    exponential: bool
+    memory_about: list[str]
     fixed: bool
     signal: str
     clamp: str
@@ -118,6 +120,8 @@ def source_context(
         sha256=sha256,
         transfer=comment(transfer_text(plan)),
         formulas=step_formulas(plan),
+        exponential=plan.states > 0,
+        memory_about=memory_about(plan),
         fixed=not plan.floating,
         signal=signal,
         clamp=CLAMP[signal],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from focgen.codegen.banks import means, rests, state_about
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.literals import scale
 from focgen.plan.model import Format, Plan, Sum
@@ -32,7 +33,8 @@ def members(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[Member, ...]:
 
     Sums that look ahead stand before the rings, which are aligned to words for that.
     """
-    found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan, kernels), *_bytes(plan)]
+    found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan, kernels), *_means(plan)]
+    found += _bytes(plan)
     found += [
         _ahead(table, name) for name, table in named_sums(plan).items() if kernels.ahead(plan, table)
     ]
@@ -65,6 +67,19 @@ def _histories(plan: Plan, kernels: Kernels) -> list[Member]:
         slots.append(Member(plan.filtered.ctype, "filtered", about, kernels.slots(plan, "filtered"), size))
         slots.append(Member("uint16_t", "filtered_now", "slot of the latest filtered error"))
     return slots
+
+
+def _means(plan: Plan) -> list[Member]:
+    """The exponential memory's."""
+    found = []
+    for table in plan.sums:
+        for i, bank in enumerate(table.banks):
+            ctype, count = bank.state.ctype, bank.modes
+            found.append(Member(ctype, means(table, i), state_about(plan, table, bank), count, str(count)))
+            if bank.compensated:
+                about = "what the means above have still to take up"
+                found.append(Member(ctype, rests(table, i), about, count, str(count)))
+    return found
 
 
 def _inner(plan: Plan) -> list[Member]:

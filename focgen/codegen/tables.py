@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from focgen.codegen.banks import BankText, bank_texts, inputs
 from focgen.codegen.expressions import bound, shifted
 from focgen.codegen.literals import comment, exponent, quantity, rows, scale, wrapped
 from focgen.codegen.lookahead import LookAhead, Run
@@ -46,7 +47,8 @@ class SumText:
     """A history sum: its tables, and the function that computes it.
 
     Where it looks ahead: ``ahead`` is the call of each step, ``rest`` that of a reset, ``near`` what is left
-    to its own step; else they are empty, and ``near`` None.
+    to its own step; else they are empty, and ``near`` None. ``banks`` remember what is beyond the taps, driven by
+    what ``inputs`` declare.
     """
 
     tables: list[TableText]
@@ -57,6 +59,8 @@ class SumText:
     ahead: str = ""
     rest: str = ""
     near: NearText | None = None
+    banks: list[BankText] = field(default_factory=list)
+    inputs: list[str] = field(default_factory=list)
 
 
 def sum_text(
@@ -74,7 +78,13 @@ def sum_text(
     if len(blocks) > 1:
         made.append(_blocks(table, blocks, f"{weights}_blocks"))
     return SumText(
-        made, f"{weights}_sum", table.total.ctype, _sum_about(table), _call(plan, table, blocks, weights)
+        made,
+        f"{weights}_sum",
+        table.total.ctype,
+        _sum_about(table),
+        _call(plan, table, blocks, weights),
+        banks=bank_texts(plan, table),
+        inputs=inputs(plan, table),
     )
 
 

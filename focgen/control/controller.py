@@ -64,6 +64,9 @@ class Controller:
     ``gain`` is a constant or a :class:`GainSchedule`. With ``integrator`` the integral is clamped to
     ``ranges.output``; without, the output itself is. ``length`` is the memory length L: the past samples
     j = 1 … L take part. ``sample_time`` in s. ``arithmetic`` is the one it was designed for.
+
+    ``memory`` is "short" or "exponential"; the latter keeps the weights within the relative ``tolerance`` up to
+    ``horizon`` samples and has no use for ``length``.
     """
 
     name: str
@@ -77,6 +80,8 @@ class Controller:
     arithmetic: str = "q31"
     units: Units = Units()
     designed_from: Source | None = None
+    tolerance: float = 1e-4
+    horizon: int = 1_000_000
 
     @property
     def scheduled(self) -> bool:

@@ -4,7 +4,9 @@
     sample_time = 0.01                       # s
     integrator = true                        # trapezoidal, clamped to ranges.output
     length = 1000                            # memory length L, samples
-    memory = "short"
+    memory = "short"                         # or "exponential", with
+    tolerance = 1e-4                         # optional: relative error of its weights, up to
+    horizon = 1000000                        # optional: so many samples
     arithmetic = "q31"
 
     [transfer]                               # eq. (8): terms [coefficient, order of s]
@@ -63,11 +65,13 @@ def read_controller(path: str | Path) -> Controller:
         gain=gain,
         integrator=top.flag("integrator", False),
         ranges=_ranges(top, isinstance(gain, GainSchedule)),
-        length=_length(top),
+        length=_whole(top, "length", 1000),
         memory=_choice(top, "memory", "short", MEMORIES),
         arithmetic=_choice(top, "arithmetic", "q31", ARITHMETICS),
         units=_units(top.table("units")),
         designed_from=_source(top.table("designed_from")),
+        tolerance=top.number("tolerance", 1e-4, above=0.0),
+        horizon=_whole(top, "horizon", 1_000_000),
     )
     top.done()
     return controller
@@ -112,11 +116,11 @@ def _ranges(top: Table, scheduled: bool) -> ControllerRanges:
     return ranges
 
 
-def _length(top: Table) -> int:
-    length = top.raw("length", 1000)
-    if not isinstance(length, int) or isinstance(length, bool) or length < 1:
-        raise top.fail("length", f"is {length!r}", "give a memory length of at least 1 sample")
-    return length
+def _whole(top: Table, key: str, default: int) -> int:
+    count = top.raw(key, default)
+    if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+        raise top.fail(key, f"is {count!r}", f"give a memory {key} of at least 1 sample")
+    return count
 
 
 def _choice(top: Table, key: str, default: str, choices: tuple[str, ...]) -> str:
@@ -156,6 +160,8 @@ def controller_text(controller: Controller) -> str:
 def _table(controller: Controller) -> dict:
     plain = ("name", "sample_time", "integrator", "length", "memory", "arithmetic")
     table: dict = {key: getattr(controller, key) for key in plain}
+    if controller.memory == "exponential":
+        table.update(tolerance=controller.tolerance, horizon=controller.horizon)
     if not controller.scheduled:
         table["gain"] = controller.gain
     transfer = controller.transfer

@@ -99,7 +99,7 @@ class ExponentialMemory:
         positive.
         """
         weights = best_weights(self.beta, self.horizon, np.asarray(poles, dtype=float))
-        return _proved(self.order, self.horizon, poles, weights)
+        return memory_of(self.order, self.horizon, poles, weights)
 
 
 @functools.lru_cache(maxsize=256)
@@ -111,7 +111,7 @@ def fit_exponential(order: float, horizon: int, tolerance: float) -> Exponential
     goes to the last lags, which weigh least in the output, so the others come out better.
     Raises ValueError outside these ranges, or where float64 poles are too coarse for the tolerance.
     """
-    differences = _differences(order, horizon)
+    differences = checked_differences(order, horizon)
     if not TOLERANCES[0] <= tolerance <= TOLERANCES[1]:
         raise ValueError(f"the tolerance {tolerance} is not between {TOLERANCES[0]:g} and {TOLERANCES[1]:g}")
     for fit in ladder(differences - order, horizon):
@@ -132,11 +132,11 @@ def fit_states(order: float, horizon: int, states: int) -> ExponentialMemory:
     Raises ValueError for orders and horizons as :func:`fit_exponential` does, and where the states are none,
     or more than float64 can tell apart.
     """
-    beta = _differences(order, horizon) - order
+    beta = checked_differences(order, horizon) - order
     fit = next((f for f in ladder(beta, horizon) if f.modes == states), None)
     if fit is None:
         raise ValueError(f"no best fit with {states} states exists in float64 at the horizon {horizon}")
-    return _proved(order, horizon, *_poles_and_weights(eased(beta, horizon, fit, math.inf)))
+    return memory_of(order, horizon, *_poles_and_weights(eased(beta, horizon, fit, math.inf)))
 
 
 def theoretical_states(horizon: int, tolerance: float) -> float:
@@ -147,7 +147,8 @@ def theoretical_states(horizon: int, tolerance: float) -> float:
     return math.log(1.0 / tolerance) * math.log(8.0 * horizon) / math.pi**2
 
 
-def _differences(order: float, horizon: int) -> int:
+def checked_differences(order: float, horizon: int) -> int:
+    """Return the number of whole differences of ``order``. Raises ValueError for what cannot be fitted."""
     if not (-1.0 < order < 2.0 and abs(order - round(order)) >= _CLOSEST_TO_INTEGER):
         raise ValueError(f"the order {order} is not between -1 and 2, or within 1e-7 of a whole one")
     if not HORIZONS[0] <= horizon <= HORIZONS[1]:
@@ -165,7 +166,8 @@ def _memory(order: float, horizon: int, tolerance: float, fit: Alternation) -> E
                              tuple(weights.tolist()))
 
 
-def _proved(order: float, horizon: int, poles, weights) -> ExponentialMemory:
+def memory_of(order: float, horizon: int, poles, weights) -> ExponentialMemory:
+    """Return the memory with these ``poles`` and ``weights``; its tolerance is what its certificate proves."""
     differences = math.ceil(order)
     tolerance = certify(differences - order, differences, horizon, poles, weights).kernel
     return ExponentialMemory(order, horizon, tolerance, differences, tuple(map(float, poles)),

@@ -15,7 +15,7 @@ import numpy as np
 from focgen.plan.formats import Interval, Word, exponent_for, integer, limit, weighted
 from focgen.plan.model import Block, Format
 
-_SPARE = 4  # bits between a sum's width and the widest alignment, so that its rounding fits too
+SPARE = 4  # bits between a sum's width and the widest alignment, so that its rounding fits too
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def _octaves(first: int, stop: int):
 def _halved(weights: np.ndarray, first: int, largest: int, word: Word, allowed: float) -> list[Draft]:
     if not weights.any():
         return [Draft(first, weights, 0)]
-    draft = Draft(first, weights, _exponent(weights, largest, word))
+    draft = Draft(first, weights, finest_exponent(weights, largest, word))
     lost = np.any((draft.counts == 0) & (weights != 0.0))
     if len(weights) == 1 or not (lost or draft.error > allowed):
         return [draft]
@@ -75,10 +75,10 @@ def _halved(weights: np.ndarray, first: int, largest: int, word: Word, allowed: 
     return newer + _halved(weights[half:], first + half, largest, word, allowed)
 
 
-def _exponent(weights: np.ndarray, largest: int, word: Word) -> int:
+def finest_exponent(weights: np.ndarray, largest: int, word: Word) -> int:
     """The finest scale at which every weight and the block's sum fit."""
     magnitude = np.abs(weights)
-    room = limit(word.sum_bits) - (1 << (word.sum_bits - _SPARE))
+    room = limit(word.sum_bits) - (1 << (word.sum_bits - SPARE))
     by_weight = exponent_for(float(magnitude.max()), word.limit, "[transfer]", "a weight")
     by_sum = exponent_for(float(magnitude.sum()) * largest, room, "[transfer]", "a sum of weights")
     exponent = max(by_weight, by_sum)
@@ -94,7 +94,7 @@ def finished(
     range."""
     blocks = []
     for draft in reversed(drafts):
-        finest = total - sample - (word.sum_bits - _SPARE)
+        finest = total - sample - (word.sum_bits - SPARE)
         draft = draft.coarser(finest if draft.real.any() else total - sample)
         counts, exponent = draft.counts, sample + draft.exponent
         reach = weighted(counts.tolist(), each)

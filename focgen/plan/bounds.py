@@ -27,11 +27,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.errors import PlanError
+from focgen.plan.banks import drive_error
 from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error
-from focgen.plan.model import ErrorBound, Plan, Sum
+from focgen.plan.model import Bank, ErrorBound, Plan, Sum
 from focgen.plan.proofs import at_rest, reset_error
-from focgen.plan.stability import inverse
+from focgen.plan.stability import inverse_of
 from focgen.plan.truncation import largest_error, truncation
 
 _UNIT = {"f64": 2.0**-53, "f32": 2.0**-24}
@@ -62,6 +63,7 @@ def error_bound(plan: Plan, tables: Tables) -> ErrorBound:
         operator=operator,
         output_per_sample=account.output(static, growth, operator),
         truncation=truncation(plan, tables),
+        within_horizon=truncation(plan, tables, past_horizon=False) if plan.exponential else None,
         operator_per_sample=static + growth if growth else 0.0,
         parts=tuple((cause, value) for cause, value in parts.items() if value)
         + (("inner integral", ceiling),) * bool(ceiling),
@@ -102,7 +104,7 @@ class _Account:
         self.half_step = 0.5 * plan.sample_time if plan.integrator else 1.0
         self.largest_gain = largest_gain(controller)
         self.E = self.input_error + largest_error(plan.controller)
-        self.own = inverse(tables.feedback.weights) if tables.feedback else None
+        self.own = inverse_of(tables.feedback) if tables.feedback else None
         self.M = self.own.norm if self.own else 1.0
         self.N = self.norm_after(tables.direct)
         clamp = [x / tables.normaliser for x in inner_limits(controller)] if tables.rest else [0.0]
@@ -113,15 +115,21 @@ class _Account:
         """‖table/A‖₁."""
         if table is None:
             return 0.0
-        return self.own.norm_after(table.weights) if self.own else table.l1
+        whole = table.response
+        return self.own.norm_after(whole.weights, whole.left_out) if self.own else whole.l1
 
     def weight_error(self, made: Sum | None, table: Table | None, first: int = 0) -> float:
-        """Σ |ŵ − w|, with what the exact weights themselves are uncertain by."""
+        """Σ |ŵ − w|, with what the exact weights themselves are uncertain by. A mode's response has a sum of
+        magnitudes of at most 2.
+        """
         if made is None:
             return 0.0
         exact, size = table.weights[first:], table.size[first:]
         lags = np.arange(first, first + len(exact))
-        return float(np.abs(np.array(made.values) - exact).sum() + (self.recursion(lags) * size).sum())
+        taps = float(np.abs(np.array(made.values) - exact).sum() + (self.recursion(lags) * size).sum())
+        return taps + 2.0 * sum(
+            abs(c - w) + 16.0 * _DOUBLE * abs(w) for c, w in zip(_mode_weights(made), _exact_weights(table))
+        )
 
     def recursion(self, lags: np.ndarray) -> np.ndarray:
         """Relative error of a double's weights by the recursion of eq. (11), the reference's, in 4 roundings
@@ -151,9 +159,11 @@ class _Fixed(_Account):
         return self.plan.error.lsb
 
     def sum_error(self, made: Sum | None, table: Table | None, largest: float) -> float:
-        """The alignments' rounding."""
-        aligned = sum(1 for b in made.blocks if b.align) if made else 0
-        return 0.5 * aligned * made.total.lsb if made else 0.0
+        """The alignments' rounding, and that of the modes' drives."""
+        if made is None:
+            return 0.0
+        aligned = sum(1 for b in (*made.blocks, *made.banks) if b.align)
+        return (0.5 * aligned + drive_error(made)) * made.total.lsb
 
     def inner_edge(self) -> float:
         return 0.5 * self.plan.inner.state.lsb
@@ -205,9 +215,33 @@ class _Fixed(_Account):
         return max(static + growth, 0.5 * self.plan.output.lsb)
 
 
+def _mode_weights(made: Sum) -> list[float]:
+    return [c for bank in made.banks for c in bank.values]
+
+
+def _exact_weights(table: Table) -> list[float]:
+    return [w for modes in table.modes for w in modes.weights.tolist()]
+
+
 def plan_reach(plan: Plan) -> float:
     """Proven |v| in counts."""
     return next(p.worst for p in plan.proofs if p.node == "v")
+
+
+def _drive_error(rates: np.ndarray, m: float, u: float, tiny: float, compensated: bool) -> np.ndarray:
+    """How far a mode's D can be off for |u| ≤ m, shape of ``rates``.
+
+    u_{k−1} itself is rounded where m = 2: u m, once, and as much in L. Each sample adds to L's error η ≤ q (2 u
+    |D|) + u |L|, and the rate takes η / q of it; D is rounded once more. Compensated, with r ≤ u |L| and t = r +
+    q D: D is rounded twice, t once, and r loses at most 3 u |t| more where |t| > |L| (Dekker 1971 is exact
+    otherwise): η ≤ q (4 u |D|) + 4 u |t|.
+    """
+    far = 2.0 * m
+    twice = 2.0 * u * m * (m > 1.0)
+    if not compensated:
+        return twice + 3.0 * u * far + (u * m + 3.0 * tiny) / rates
+    slow = 4.0 * u * (u * m) / rates
+    return twice + (4.0 + 4.0 + 2.0) * u * far + slow + 6.0 * tiny / rates
 
 
 class _Floating(_Account):
@@ -232,8 +266,22 @@ class _Floating(_Account):
             return 0.0
         count, partial = made.taps + 2, np.cumsum(np.abs(made.weights)[::-1])
         here = self.u * (1.0 + gamma(count, self.u)) * float(partial.sum() + partial[-1])
-        there = gamma(count, _DOUBLE) * table.l1
-        return 1.01 * (here + there) * largest + count * self.tiny * (1.0 + largest)
+        there = gamma(count, _DOUBLE) * float(np.abs(table.weights).sum())
+        taps = 1.01 * (here + there) * largest + count * self.tiny * (1.0 + largest)
+        return taps + sum(self.bank_error(bank, float(partial[-1])) for bank in made.banks) * largest
+
+    def bank_error(self, bank: Bank, before: float) -> float:
+        """Of a bank, for a history of at most 1, here and in the reference, which has no compensation.
+
+        Each mode's D is off by what :func:`_drive_error` says; products, their sum, and adding it to what is
+        ``before`` it at most round γ_{n+2} of their magnitudes. |u| ≤ m, |L| ≤ m, |D| ≤ 2 m.
+        """
+        m, c = float(bank.differences), np.abs(bank.values)
+        rates = np.array(bank.real_rates)
+        here = _drive_error(rates, m, self.u, self.tiny, bank.compensated)
+        there = _drive_error(rates, m, _DOUBLE, _TINY["f64"], False)
+        sums = gamma(bank.modes + 2, self.u) + gamma(bank.modes + 2, _DOUBLE)
+        return 1.01 * (float(c @ (here + there)) + sums * (2.0 * m * float(c.sum()) + before))
 
     def inner_edge(self) -> float:
         return (self.u + _DOUBLE) * self.Z

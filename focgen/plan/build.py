@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from focgen.control.controller import ARITHMETICS, Controller
+from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.errors import PlanError
+from focgen.fractional.exponential import ExponentialMemory
 from focgen.plan import fixed, floating
 from focgen.plan.bounds import error_bound
 from focgen.plan.canonical import Tables, realise, tables
 from focgen.plan.formats import WORDS
+from focgen.plan.memory import exponential_tables, memories_of
 from focgen.plan.model import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
 from focgen.plan.stability import check_stable
@@ -20,36 +22,67 @@ _LONGEST = 1_000_000
 
 
 def build_plan(
-    controller: Controller, arithmetic: str | None = None, length: int | None = None, name: str | None = None
+    controller: Controller,
+    arithmetic: str | None = None,
+    length: int | None = None,
+    name: str | None = None,
+    memory: str | None = None,
+    tolerance: float | None = None,
+    horizon: int | None = None,
 ) -> Plan:
-    """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with memory ``length``; both default to the
-    controller's.
+    """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with ``memory`` "short", of ``length`` past samples,
+    or "exponential", within ``tolerance`` up to ``horizon`` samples; all default to the controller's.
+
+    ``tolerance``: 1e-8 … 0.1, the largest relative error of the exact memory's weights up to the horizon, 100 …
+    1e8 samples (:class:`focgen.fractional.exponential.ExponentialMemory`).
 
     Raises PlanError where the transfer function cannot be realised, its truncated recursion is not stable, a
     range cannot be represented, or a node cannot be proved; the remedy says what would work.
     """
-    arithmetic, length = arithmetic or controller.arithmetic, controller.length if length is None else length
-    _check(controller, arithmetic, length)
-    folded = tables(controller, length)
-    check_stable(controller, folded, length)
-    draft = _fixed if arithmetic in WORDS else _floating
-    plan = draft(controller, arithmetic, length, name or controller.name, folded)
+    given = {"arithmetic": arithmetic, "length": length, "memory": memory, "tolerance": tolerance, "horizon": horizon}
+    wanted = replace(controller, **{key: value for key, value in given.items() if value is not None})
+    _check(wanted)
+    folded, memories = _tables(wanted)
+    check_stable(controller, folded, wanted.length)
+    draft = _fixed if wanted.arithmetic in WORDS else _floating
+    plan = draft(controller, wanted.arithmetic, wanted.length, name or controller.name, folded)
+    if wanted.memory == "exponential":
+        asked = {"tolerance": wanted.tolerance, "horizon": wanted.horizon}
+        plan = replace(plan, memory="exponential", memories=memories, **asked)
+        plan = replace(plan, length=max(plan.error_lags, plan.filtered_lags))
     _check_at_rest(plan, folded)
     check_room(plan)
     plan = replace(plan, proofs=prove(plan))
     return replace(plan, error_bound=error_bound(plan, folded))
 
 
-def _check(controller: Controller, arithmetic: str, length: int) -> None:
-    where = controller.name
+def plan_tables(plan: Plan) -> Tables:
+    """The exact weights that a plan was made from."""
+    if plan.exponential:
+        return exponential_tables(plan.controller, plan.memories)
+    return tables(plan.controller, plan.length)
+
+
+def _tables(wanted: Controller) -> tuple[Tables, tuple[ExponentialMemory, ...]]:
+    if wanted.memory == "short":
+        return tables(wanted, wanted.length), ()
+    memories = memories_of(wanted, wanted.arithmetic, wanted.tolerance, wanted.horizon)
+    return exponential_tables(wanted, memories), memories
+
+
+def _check(controller: Controller) -> None:
+    where, arithmetic, length = controller.name, controller.arithmetic, controller.length
     if arithmetic not in ARITHMETICS:
         raise PlanError(
             where, f"the arithmetic {arithmetic!r} is unknown", f"choose one of {', '.join(ARITHMETICS)}"
         )
     if not isinstance(length, int) or not 1 <= length <= _LONGEST:
         raise PlanError(where, f"the memory length is {length!r}", f"give 1 to {_LONGEST} past samples")
-    if controller.memory != "short":
-        raise PlanError(where, f"the memory form {controller.memory!r} has no plan", 'set memory = "short"')
+    if controller.memory not in MEMORIES:
+        raise PlanError(where, f"the memory form {controller.memory!r} is unknown", f"choose {' or '.join(MEMORIES)}")
+    if not isinstance(controller.tolerance, float) or not isinstance(controller.horizon, int):
+        remedy = "give a number, and a whole number of samples"
+        raise PlanError(where, f"tolerance {controller.tolerance!r} and horizon {controller.horizon!r}", remedy)
     if not all(map(math.isfinite, _numbers(controller))) or controller.sample_time <= 0.0:
         raise PlanError(
             where, "has a number that is not finite, or a sample_time that is not positive", "correct it"
@@ -112,7 +145,7 @@ def _assembled(
         controller=controller,
         name=name,
         arithmetic=arithmetic,
-        memory=controller.memory,
+        memory="short",
         length=length,
         sample_time=controller.sample_time,
         reference=reference,

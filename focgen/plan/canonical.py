@@ -26,6 +26,7 @@ integrator it is clamped to what would take the output across its whole range in
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,7 @@ from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.fractional.transfer import Polynomial, polynomial
 from focgen.fractional.weights import gl_weights, short_memory_bias
+from focgen.plan.modes import Modes, Response
 
 _WHOLE = 1e-9
 _HIGHEST = 8.0  # of any order: beyond, h^−β leaves no digits
@@ -65,19 +67,29 @@ class Realisation:
 
 @dataclass(frozen=True)
 class Table:
-    """Weights by lag from 0 on. ``size`` is Σ|terms| of each: the weight is known to 1e-13 of it."""
+    """Weights by lag from 0 on. ``size`` is Σ|terms| of each: the weight is known to 1e-13 of it.
+
+    With an exponential memory they are the taps alone; ``modes`` has the rest, and ``whole`` the response of all.
+    """
 
     weights: np.ndarray
     size: np.ndarray
+    modes: tuple[Modes, ...] = ()
+    whole: Response | None = None
+
+    @property
+    def response(self) -> Response:
+        """Taps and modes by lag from 0 on."""
+        return self.whole or Response(self.weights)
 
     @property
     def l1(self) -> float:
         """Σ |w_j|."""
-        return float(np.abs(self.weights).sum())
+        return self.response.l1
 
     @property
     def total(self) -> float:
-        """Σ w_j: the gain for a constant."""
+        """Σ w_j: the gain for a constant; a mode's is 0."""
         return float(self.weights.sum())
 
 
@@ -135,21 +147,36 @@ def _whole(order: float) -> float:
     return float(round(order)) if abs(order - round(order)) < _WHOLE else order
 
 
+def normaliser(controller: Controller) -> float:
+    """The denominator's coefficient of the present sample, which all weights are divided by."""
+    h = controller.sample_time
+    return sum(t.coefficient * h**-t.order for t in realise(controller).den)
+
+
 def tables(controller: Controller, length: int) -> Tables:
     """Fold the terms into weight tables for memory length ``length``, eq. (10)–(14).
 
     Raises PlanError where the coefficient of the present sample vanishes.
     """
+    return tables_by(controller, lambda terms: folded(terms, controller.sample_time, length))
+
+
+def tables_by(controller: Controller, fold: Callable[[Polynomial], Table]) -> Tables:
+    """The tables of a controller's polynomials, each made by ``fold``, over the coefficient of the present
+    sample.
+
+    Raises PlanError where that vanishes.
+    """
     form, h = realise(controller), controller.sample_time
-    den = folded(form.den, h, length)
+    den = fold(form.den)
     scale = float(den.weights[0])
     if abs(scale) <= 1e-9 * den.size[0]:
         raise PlanError(
             f"{controller.name} [transfer]", "den cancels out at this sample time", "change sample_time"
         )
     return Tables(
-        direct=_scaled(folded(form.direct, h, length), 1.0 / scale) if form.direct else None,
-        rest=_scaled(folded(form.rest, h, length), 0.5 * h / scale) if form.rest else None,
+        direct=_scaled(fold(form.direct), 1.0 / scale) if form.direct else None,
+        rest=_scaled(fold(form.rest), 0.5 * h / scale) if form.rest else None,
         feedback=_scaled(den, 1.0 / scale) if form.recursive else None,
         normaliser=scale,
     )
@@ -164,7 +191,9 @@ def folded(terms: Polynomial, step: float, length: int) -> Table:
 
 
 def _scaled(table: Table, factor: float) -> Table:
-    return Table(table.weights * factor, table.size * abs(factor))
+    whole = table.whole and Response(table.whole.weights * factor, table.whole.left_out * abs(factor))
+    modes = tuple(m.scaled(factor) for m in table.modes)
+    return Table(table.weights * factor, table.size * abs(factor), modes, whole)
 
 
 def tail_l1(terms: Polynomial, step: float, length: int) -> float:

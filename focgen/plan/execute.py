@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_LOW, FLAG_SCHEDULE, Format, Plan, Schedule, Sum
+from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_LOW, FLAG_SCHEDULE, Bank, Format, Plan, Schedule, Sum
 from focgen.plan.scenario import Reset, Scenario, Trace
 from focgen.plan.usable import holding, invalid_samples, usable
 
@@ -122,6 +122,27 @@ class _Run:
         if table is None:
             zero = self.kind(0)
             return np.zeros(self.shape, self.kind), dict.fromkeys(self.starts, zero)
+        if table.banks:
+            return self._remembered(table)
+        return self._by_taps(table)
+
+    def _remembered(self, table: Sum) -> tuple[np.ndarray, dict]:
+        """Taps, and modes sample by sample; at rest modes add nothing."""
+        total, rest = self._by_taps(table)
+        memory = [_Modes(bank, self.kind, self.shape[0]) for bank in table.banks]
+        past = _Past(self.shape[0], self.kind)
+        for k in range(self.shape[1]):
+            for lane in self.starting.get(k, ()):
+                past.settle(lane, self.starts[lane, k].constant)
+                for modes in memory:
+                    modes.settle(lane, self.starts[lane, k].constant)
+            for modes in memory:
+                total[:, k] = total[:, k] + modes.step(past)
+            past.push(self.e[:, k])
+        return total, rest
+
+    def _by_taps(self, table: Sum) -> tuple[np.ndarray, dict]:
+        """The sums of the taps alone."""
         lags, long, places = table.last, [], []
         for s in self.segments:
             places.append(sum(map(len, long)))
@@ -193,17 +214,26 @@ class _Run:
         past = np.zeros((lanes, lags + samples), self.kind)
         carry, out = np.zeros(lanes, self.kind), np.empty(self.shape, self.kind)
         table = _Recursion(plan.feedback.table, self.kind)
+        memory = [_Modes(bank, self.kind, lanes) for bank in plan.feedback.table.banks]
+        latest = _Past(lanes, self.kind)
         for k in range(samples):
             for lane in self.starting.get(k, ()):
                 past[lane, k : k + lags] = self.v_rest[lane, k]
                 carry[lane] = 0
-            x = p[:, k] - table(past[:, k : k + lags])
+                latest.settle(lane, self.v_rest[lane, k])
+                for modes in memory:
+                    modes.settle(lane, self.v_rest[lane, k])
+            s = table(past[:, k : k + lags])
+            for modes in memory:
+                s = s + modes.step(latest)
+            x = p[:, k] - s
             if not plan.floating:
                 x = x + carry
                 v = _shift(x, plan.narrow)
                 carry = x - (v << plan.narrow)
                 x = _saturate(v, plan.filtered.bits)
             past[:, k + lags] = out[:, k] = x
+            latest.push(x)
         return out
 
     # -------------------------------------------------------------------------------------- gain, output
@@ -278,6 +308,58 @@ class _Recursion:
         if self.kind is not np.int64:
             return np.add.accumulate(products, axis=1)[:, -1] + self.kind(0)
         return sum(_shift(products[:, a:b].sum(axis=1), align) for a, b, align in self.blocks)
+
+
+class _Past:
+    """The two latest values of a history, shape (lanes,)."""
+
+    def __init__(self, lanes: int, kind: type):
+        self.last, self.before = np.zeros(lanes, kind), np.zeros(lanes, kind)
+
+    def settle(self, lane: int, constant) -> None:
+        self.last[lane] = self.before[lane] = constant
+
+    def push(self, values: np.ndarray) -> None:
+        self.before, self.last = self.last, values.copy()
+
+
+class _Modes:
+    """One bank, sample by sample; ``mean`` L and ``rest`` r have the shape (lanes, modes)."""
+
+    def __init__(self, bank: Bank, kind: type, lanes: int):
+        self.bank, self.kind = bank, kind
+        self.rates, self.weights = np.array(bank.rates, kind), np.array(bank.weights, kind)
+        self.mean = np.zeros((lanes, bank.modes), kind)
+        self.rest = np.zeros((lanes, bank.modes), kind)
+
+    def settle(self, lane: int, constant) -> None:
+        """As if the history had been ``constant`` for ever."""
+        still = constant if self.bank.differences == 1 else self.kind(0)
+        self.mean[lane] = still if self.kind is not np.int64 else still << self.bank.up
+        self.rest[lane] = 0
+
+    def step(self, past: _Past) -> np.ndarray:
+        """M of this sample, in counts of the total; then the means take in what is past."""
+        u = past.last if self.bank.differences == 1 else past.last - past.before
+        return self._whole(u[:, None]) if self.kind is np.int64 else self._floating(u[:, None])
+
+    def _whole(self, u: np.ndarray) -> np.ndarray:
+        bank = self.bank
+        drive = _shift((u << bank.up) - self.mean, bank.to_drive)
+        self.mean = self.mean + _shift(self.rates * drive, bank.rate_shift)
+        return _shift((self.weights * drive).sum(axis=1), bank.align)
+
+    def _floating(self, u: np.ndarray) -> np.ndarray:
+        drive = u - self.mean
+        if self.bank.compensated:
+            drive = drive - self.rest
+            step = self.rest + self.rates * drive
+            mean = self.mean + step
+            self.rest = step - (mean - self.mean)
+            self.mean = mean
+        else:
+            self.mean = self.mean + self.rates * drive
+        return np.add.accumulate(self.weights * drive, axis=1)[:, -1] + self.kind(0)
 
 
 def scheduled_gain(plan: Plan, s: np.ndarray) -> np.ndarray:

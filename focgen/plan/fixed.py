@@ -9,11 +9,13 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
+from focgen.plan.banks import BankDraft, bank_drafts, drive_error
 from focgen.plan.blocks import Draft, coarsest, finished, split
-from focgen.plan.canonical import Tables, inner_limits
+from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.formats import Interval, Word, exponent_for, integer, limit, nearest, span
 from focgen.plan.gains import Gain, fixed_gain, span_of
-from focgen.plan.model import Block, Feedback, Format, InnerIntegrator, Integrator, Sum
+from focgen.plan.model import Feedback, Format, InnerIntegrator, Integrator, Sum
+from focgen.plan.modes import Response, response_of
 from focgen.plan.stability import Inverse, inverse
 
 _FEWEST_COUNTS = 16  # of the integrator that the smallest steady error must add
@@ -88,7 +90,7 @@ def filter_of(controller: Controller, tables: Tables, inputs: Signals, word: Wor
     """Formats and integer weights from e to v. Raises PlanError where the recursion is not stable or does not
     fit."""
     sample = _Sample(inputs.exponent, span(inputs.error), word)
-    direct = split(tables.direct.weights, 0, sample.each.worst, word) if tables.direct else None
+    direct = sample.parts(tables.direct, 0) if tables.direct else None
     inner = _inner(controller, tables, sample) if tables.rest else None
     if tables.feedback is None:
         return _without_feedback(direct, inner, sample)
@@ -103,27 +105,49 @@ class _Sample:
     each: Interval
     word: Word
 
-    def sum(self, name: str, history: str, drafts: list[Draft], total: int, unit: str = "") -> Sum:
-        blocks = finished(drafts, self.exponent, total, self.each, self.word, unit)
-        return Sum(name, history, blocks, _format(self.word.sum_bits, total, total_of(blocks), unit))
+    def parts(self, table: Table, first: int) -> _Parts:
+        """Modes lose the end of a type's range to the rounding of their means."""
+        most = self.word.limit - 1
+        each = Interval(max(self.each.low, -most), min(self.each.high, most))
+        taps = split(table.weights[first:], first, self.each.worst, self.word)
+        return _Parts(taps, bank_drafts(table.modes, each, self.word))
+
+    def sum(self, name: str, history: str, parts: _Parts, total: int, unit: str = "") -> Sum:
+        blocks = finished(parts.taps, self.exponent, total, self.each, self.word, unit)
+        banks = tuple(b.finished(self.exponent, total) for b in parts.banks)
+        reach = Interval(0, 0)
+        for part in (*blocks, *banks):
+            reach = reach + span(part.sum).shifted(part.align)
+        return Sum(name, history, blocks, _format(self.word.sum_bits, total, reach, unit), banks)
 
 
-def total_of(blocks: tuple[Block, ...]) -> Interval:
-    """The range of a sum: every block's, aligned, added."""
-    reach = Interval(0, 0)
-    for block in blocks:
-        reach = reach + span(block.sum).shifted(block.align)
-    return reach
+@dataclass(frozen=True)
+class _Parts:
+    """A sum before its parts are aligned: blocks of taps, newest first, and banks."""
+
+    taps: list[Draft]
+    banks: list[BankDraft]
+
+    @property
+    def coarsest(self) -> int:
+        """log2 of the coarsest scale of weights times what they weigh, in counts of the history."""
+        return max([coarsest(self.taps)] + [b.exponent + b.guard for b in self.banks])
+
+    @property
+    def response(self) -> Response:
+        """The quantised weights by lag from 0 on."""
+        taps = np.concatenate([d.counts * 2.0**d.exponent for d in self.taps])
+        return response_of(taps, self.taps[0].first, [b.modes for b in self.banks])
 
 
 def _inner(controller: Controller, tables: Tables, sample: _Sample) -> InnerIntegrator:
     """The clamped integral; ``to_wide`` is filled in once the wide format is known."""
-    drafts = split(tables.rest.weights, 0, sample.each.worst, sample.word)
+    parts = sample.parts(tables.rest, 0)
     low, high = (x / tables.normaliser for x in inner_limits(controller))
     low, high = min(low, high), max(low, high)
-    exponent = sample.exponent + coarsest(drafts)
+    exponent = sample.exponent + parts.coarsest
     while True:
-        rest = sample.sum("rest", "error", drafts, exponent)
+        rest = sample.sum("rest", "error", parts, exponent)
         clamp = Interval(nearest(low * 2.0**-exponent), nearest(high * 2.0**-exponent))
         worst = (clamp + span(rest.total) + span(rest.total)).worst
         if span(rest.total).worst <= limit(sample.word.sum_bits) and worst <= limit(64):
@@ -133,9 +157,9 @@ def _inner(controller: Controller, tables: Tables, sample: _Sample) -> InnerInte
     return InnerIntegrator(rest, _format(bits, exponent, clamp), 0)
 
 
-def _floor(direct: list[Draft] | None, inner: InnerIntegrator | None, sample: _Sample) -> int:
+def _floor(direct: _Parts | None, inner: InnerIntegrator | None, sample: _Sample) -> int:
     """The finest exponent of the wide format: no shift to it goes left."""
-    finest = [sample.exponent + coarsest(direct)] if direct else []
+    finest = [sample.exponent + direct.coarsest] if direct else []
     return max(finest + ([_log2(inner.state.lsb)] if inner else []))
 
 
@@ -173,27 +197,26 @@ def _without_feedback(direct, inner, sample: _Sample) -> Filter:
 
 def _with_feedback(direct, inner, sample: _Sample, controller: Controller, tables: Tables) -> Filter:
     word = sample.word
-    back = split(tables.feedback.weights[1:], 1, word.limit + 1, word)
-    own, b = _quantised_inverse(back, controller, word), _values(direct) if direct else np.zeros(1)
-    reach = own.norm_after(b) * sample.each.worst * 2.0**sample.exponent
+    whole = Interval(-word.limit - 1, word.limit)
+    back = _Sample(0, whole, word).parts(tables.feedback, 1)
+    own = _quantised_inverse(back, controller, word)
+    b = direct.response if direct else Response(np.zeros(1))
+    reach = own.norm_after(b.weights, b.left_out) * sample.each.worst * 2.0**sample.exponent
     if inner:
         reach += own.norm * span(inner.state).worst * inner.state.lsb
     exponent = exponent_for(reach, word.limit, controller.name, "the filtered error")
     while exponent < 150:
         made = _recursion(direct, inner, sample, back, exponent)
-        if made is not None and reach * 2.0**-exponent + _noise(made, own) <= word.limit:
+        if made is not None and reach * 2.0**-exponent + _noise(made, own) <= word.limit - 1:
             return made
         exponent += 1
     what = f"the recursion multiplies rounding by up to {own.norm:.3g}, more than {word.bits} bits can hold"
     raise PlanError(controller.name, what, "choose q31, f32 or f64, or a longer sample_time")
 
 
-def _values(drafts: list[Draft]) -> np.ndarray:
-    return np.concatenate([d.counts * 2.0**d.exponent for d in drafts])
-
-
-def _quantised_inverse(back: list[Draft], controller: Controller, word: Word) -> Inverse:
-    made = inverse(np.concatenate([[1.0], _values(back)]))
+def _quantised_inverse(back: _Parts, controller: Controller, word: Word) -> Inverse:
+    response = back.response
+    made = inverse(np.concatenate([[1.0], response.weights[1:]]), response.left_out)
     if made is None:
         what = f"its recursion is stable, but not with weights of {word.bits} bits"
         raise PlanError(controller.name, what, "choose q31, f32 or f64, or a longer sample_time")
@@ -202,18 +225,20 @@ def _quantised_inverse(back: list[Draft], controller: Controller, word: Word) ->
 
 def _noise(made: Filter, own: Inverse) -> float:
     """What rounding can add to v, in counts of v."""
-    aligned = len(made.feedback.table.blocks) + (len(made.direct.blocks) if made.direct else 0) + 1
+    sums = [made.feedback.table] + ([made.direct] if made.direct else [])
+    aligned = sum(len(s.blocks) + len(s.banks) for s in sums) + 1
+    drives = sum(drive_error(s) for s in sums) * 2.0**-made.narrow
     carried = own.norm_after(np.array([1.0, -1.0]))
     at_reset = 2.0 * max(1.0, own.norm * (1.0 + float(np.sum(made.feedback.table.values))))
-    return 0.5 * carried + own.norm * (0.5 * aligned * 2.0**-made.narrow) + at_reset
+    return 0.5 * carried + own.norm * (0.5 * aligned * 2.0**-made.narrow + drives) + at_reset
 
 
-def _recursion(direct, inner, sample: _Sample, back: list[Draft], exponent: int) -> Filter | None:
+def _recursion(direct, inner, sample: _Sample, back: _Parts, exponent: int) -> Filter | None:
     """The filter with v in counts of 2^``exponent``; None where the wide format cannot be finer than v."""
     word = sample.word
     whole = Interval(-word.limit - 1, word.limit)
     past = _Sample(exponent, whole, word)
-    wide = max(_floor(direct, inner, sample), exponent + coarsest(back))
+    wide = max(_floor(direct, inner, sample), exponent + back.coarsest)
     while wide <= exponent:
         made, placed, p = _combined(direct, inner, sample, wide)
         table = past.sum("feedback", "filtered", back, wide)

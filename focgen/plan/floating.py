@@ -6,6 +6,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
+from focgen.plan.banks import floating_banks
 from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.fixed import Actuation, Filter
 from focgen.plan.gains import floating_gain
@@ -37,7 +38,9 @@ def _rounded(value: float, controller: Controller, kind: type[np.floating]) -> f
 def _sum(name: str, history: str, table: Table, first: int, controller, kind, real: Format) -> Sum:
     weights = tuple(_rounded(w, controller, kind) for w in table.weights[first:].tolist())
     block = Block(first, first + len(weights) - 1, weights, 1.0, real, 0)
-    return Sum(name, history, (block,), real)
+    for m in table.modes:
+        _rounded(float(np.abs(m.weights).max()), controller, kind)
+    return Sum(name, history, (block,), real, floating_banks(table.modes, kind, real))
 
 
 def _inner(controller: Controller, tables: Tables, kind, real: Format) -> InnerIntegrator:

@@ -10,12 +10,14 @@ memory D^β of a constant is 0 for β > 0), and the sums run over e − e0, whic
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import fftconvolve, lfilter
 
 from focgen.control.controller import Controller
+from focgen.fractional.exponential import ExponentialMemory
 from focgen.fractional.transfer import Polynomial
 from focgen.plan.canonical import Realisation, inner_limits, realise
 from focgen.plan.scenario import Reset, Scenario, Trace
@@ -23,13 +25,20 @@ from focgen.plan.scenario import Reset, Scenario, Trace
 _DIRECT = 4096  # taps up to which sums are taken one by one, not by transforms
 
 
-def ideal(controller: Controller, scenario: Scenario, length: int | None = None) -> Trace:
+def ideal(
+    controller: Controller,
+    scenario: Scenario,
+    length: int | None = None,
+    memories: Sequence[ExponentialMemory] = (),
+) -> Trace:
     """Run a controller on physical inputs; returns physical u and d (ahead of the integrator), no flags.
 
-    ``length``: the memory length L; None for infinite memory, all that has been.
+    ``length``: the memory length L; None for infinite memory, all that has been. ``memories``: exponential ones that
+    stand for the orders they are of, instead; with them ``length`` only has to cover whole orders.
     Raises PlanError where the transfer function cannot be realised.
     """
-    operator = _Operator(realise(controller), controller, scenario.samples if length is None else length)
+    count = scenario.samples if length is None else length
+    operator = _Operator(realise(controller), controller, count, {m.order: m for m in memories})
     v, rest = operator.run(scenario, endless=length is None)
     gain = controller.gain_at(scenario.sched) if controller.scheduled else controller.gain
     d = gain * v
@@ -50,12 +59,53 @@ def _weights(order: float, count: int) -> np.ndarray:
     return np.concatenate([[1.0], np.cumprod(1.0 - (order + 1.0) / j)])
 
 
-def _table(terms: Polynomial, step: float, count: int) -> np.ndarray:
-    """Σ c h^−β w_j^(β), eq. (10)–(14), without the zeros that whole orders end in."""
-    total = sum(
-        (t.coefficient * step**-t.order * _weights(t.order, count) for t in terms), np.zeros(count + 1)
-    )
-    return np.trim_zeros(total, "b") if total.any() else total[:1]
+class _Sum:
+    """Σ c h^−β w_j^(β), eq. (10)–(14): taps, without the zeros that whole orders end in, and modes where a memory
+    stands for an order: c h^−β ∇^m (1 + Σ_i w_i / (z − p_i)).
+    """
+
+    def __init__(self, terms: Polynomial, step: float, count: int, memories: dict[float, ExponentialMemory]):
+        total = np.zeros(max(count, 2) + 1)
+        self.modes: list[tuple[float, float, int]] = []
+        for t in terms:
+            factor, memory = t.coefficient * step**-t.order, memories.get(t.order)
+            order = t.order if memory is None else float(memory.differences)
+            total[: count + 1] += factor * _weights(order, count)
+            for pole, weight in zip(memory.poles, memory.weights) if memory else ():
+                self.modes.append((pole, factor * weight, memory.differences))
+        self.taps = np.trim_zeros(total, "b") if total.any() else total[:1]
+
+    @property
+    def still(self) -> float:
+        """The gain for a constant; a mode's is 0."""
+        return float(self.taps.sum())
+
+    def __call__(self, signal: np.ndarray) -> np.ndarray:
+        """Applied to a signal that starts from zero."""
+        total = _convolved(self.taps, signal)
+        for pole, weight, m in self.modes:
+            total = total + lfilter(np.concatenate([[0.0], weight * _weights(float(m), m)]), [1.0, -pole], signal)
+        return total
+
+    def solved(self, forced: np.ndarray) -> np.ndarray:
+        """v of (this) v = forced, from zero."""
+        if self.modes:
+            return self._recursion(forced)
+        return lfilter([1.0], self.taps, forced) if len(self.taps) > 1 else forced / self.taps[0]
+
+    def _recursion(self, forced: np.ndarray) -> np.ndarray:
+        """Sample by sample: a mode's part at k is S_{k−1}, where S_k = p S_{k−1} + ∇^m v_k."""
+        pole, weight, m = (np.array(x) for x in zip(*self.modes))
+        state, back = np.zeros(len(pole)), self.taps[1:]
+        past, out = np.zeros(len(back) + 2), []  # the newest first
+        for target in forced.tolist():
+            v = (target - back @ past[: len(back)] - weight @ state) / self.taps[0]
+            first, second = v - past[0], v - 2.0 * past[0] + past[1]
+            state = pole * state + np.where(m == 1, first, second)
+            past[1:] = past[:-1].copy()
+            past[0] = v
+            out.append(v)
+        return np.array(out)
 
 
 @dataclass(frozen=True)
@@ -82,10 +132,12 @@ def _segments(scenario: Scenario) -> list[_Segment]:
 class _Operator:
     """The transfer function, from e to v."""
 
-    def __init__(self, form: Realisation, controller: Controller, count: int):
-        h = controller.sample_time
+    def __init__(
+        self, form: Realisation, controller: Controller, count: int, memories: dict[float, ExponentialMemory]
+    ):
+        h, parts = controller.sample_time, (form.direct, form.rest, form.den)
         self.form, self.limits, self.half_step = form, inner_limits(controller), 0.5 * h
-        self.direct, self.rest, self.den = (_table(t, h, count) for t in (form.direct, form.rest, form.den))
+        self.direct, self.rest, self.den = (_Sum(terms, h, count, memories) for terms in parts)
 
     def run(self, scenario: Scenario, endless: bool) -> tuple[np.ndarray, dict]:
         """v of every sample, and what it was before each segment (key: lane, start)."""
@@ -101,23 +153,23 @@ class _Operator:
         """The gain for a constant error."""
         if endless:
             return self.form.steady_gain
-        return float(self.direct.sum() / self.den.sum())
+        return self.direct.still / self.den.still
 
     def moved(self, part: np.ndarray, constant: float, endless: bool) -> np.ndarray:
         """What a change of the error from its constant adds to v."""
-        forced = _convolved(self.direct, part)
+        forced = self.direct(part)
         if self.form.rest:
             forced = forced + self.integral(part, constant, endless)
-        return _solved(self.den, forced)
+        return self.den.solved(forced)
 
     def integral(self, part: np.ndarray, constant: float, endless: bool) -> np.ndarray:
         """The clamped trapezoid, from 0."""
         still = (
             sum(t.coefficient for t in self.form.rest if t.order == 0.0)
             if endless
-            else float(self.rest.sum())
+            else self.rest.still
         )
-        r = np.concatenate([[0.0], _convolved(self.rest, part)]) + still * constant
+        r = np.concatenate([[0.0], self.rest(part)]) + still * constant
         low, high = self.limits
         out, z = [], 0.0
         for increment in (self.half_step * (r[1:] + r[:-1])).tolist():
@@ -130,11 +182,6 @@ def _convolved(table: np.ndarray, signal: np.ndarray) -> np.ndarray:
     if len(table) <= _DIRECT:
         return lfilter(table, [1.0], signal)
     return fftconvolve(table, signal)[: len(signal)]
-
-
-def _solved(den: np.ndarray, forced: np.ndarray) -> np.ndarray:
-    """v of den · v = forced."""
-    return lfilter([1.0], den, forced) if len(den) > 1 else forced / den[0]
 
 
 def _integrated(controller: Controller, scenario: Scenario, d: np.ndarray, first: dict) -> np.ndarray:

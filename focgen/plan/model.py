@@ -61,6 +61,42 @@ proof in ``proofs`` says for each of these nodes that it cannot overflow, so the
 narrowing (v, u) saturates to the ends of its type all the same; the proofs say that in range it never has to.
 Additions to an integral (z, I) are made in the type of its state, r and d widened to it.
 
+Exponential memory
+------------------
+With ``memory`` "exponential" a sum's taps are short, and ``Sum.banks`` remember the rest. A term c s^β, m − 1 <
+β < m, is c h^−β ∇^m (x_k + Σ_{j≥1} Σ_i w_i p_i^(j−1) x_{k−j}) (:mod:`focgen.fractional.exponential`), ∇ the
+backward difference; its lag 0 and every whole order are taps. A mode's part, ∇^m Σ_{j≥1} p^(j−1) x_{k−j}, is
+how far the history's past is from its own mean, weighted by p^j. So a mode keeps that mean, L: it never leaves
+the range of what it averages, and a constant is remembered without any error.
+
+With u_k = ∇^(m−1) x_k (x itself for m = 1), at sample k, before L_i knows of it:
+
+    D_i = u_{k−1} − L_i,      M = Σ_i c_i D_i,      L_i ← L_i + q_i D_i,      q_i = 1 − p_i
+
+in the order of the bank. The sum's total is that of its blocks plus M of each bank. Every fractional term has
+modes of its own; those too slow to be held like the rest are in a second bank.
+
+* Fixed: D_i = shift(u_{k−1}·2^up − L_i, to_drive), M = Σ c_i D_i, L_i ← L_i + shift(a_i D_i, rate_shift), where
+  a_i counts 2^−(to_drive + rate_shift). M starts at 0, is exact, and enters as shift(M, align). L has ``up``
+  bits more than x, and D_i is the only thing that is rounded (where rate_shift is 0): to at most half a count of
+  D, whatever q is, and for ever, since L only ever moves towards u.
+* Floating: as written, M = 0, M ← M + c_i D_i. In a ``compensated`` bank L_i is the sum of two numbers, L_i and
+  r_i: D_i = (u_{k−1} − L_i) − r_i, t = r_i + q_i D_i, L' = L_i + t, r_i ← t − (L' − L_i), L_i ← L'. That is so for
+  f32 and slow modes: L_i alone would stand still as soon as q_i D_i is less than half its last digit.
+
+``reset`` and ``init`` set L_i to u of the constant past: x (m = 1) or 0 (m = 2), and r_i = 0. ``track`` leaves them.
+
+=================  ========================  ========================  ================
+mode               q15, q ≥ 2^−8             q15, slower               q31
+=================  ========================  ========================  ================
+D, c               int16                     int16                     int32
+a                  int16                     int32                     int32
+a·D, L             int32                     int64                     int64
+M                  int32                     int32                     int64
+=================  ========================  ========================  ================
+
+u·2^up − L_i is in the type of L.
+
 Floating point
 --------------
 The same structure with one block per sum, lsb 1.0 and no shifts: acc = 0; acc = acc + w·x, from the oldest
@@ -85,6 +121,7 @@ import math
 from dataclasses import dataclass
 
 from focgen.control.controller import Controller
+from focgen.fractional.exponential import ExponentialMemory
 
 Count = int | float
 
@@ -133,13 +170,61 @@ class Block:
 
 
 @dataclass(frozen=True)
+class Bank:
+    """Modes of an exponential memory that are held alike, the fastest first; see the module's description.
+
+    ``rates`` (a_i) and ``weights`` (c_i) are counts of ``rate.lsb`` and ``lsb``. ``state`` is L, ``drive`` D, in
+    units of the history; ``sum`` M, which shifted right by ``align`` is in counts of the total. ``order`` is that
+    of their term s^β.
+    """
+
+    order: float
+    rates: tuple[Count, ...]
+    weights: tuple[Count, ...]
+    rate: Format
+    lsb: float
+    state: Format
+    drive: Format
+    sum: Format
+    up: int = 0
+    to_drive: int = 0
+    rate_shift: int = 0
+    align: int = 0
+    compensated: bool = False
+
+    @property
+    def differences(self) -> int:
+        """m, the order rounded up: 1 or 2."""
+        return math.ceil(self.order)
+
+    @property
+    def modes(self) -> int:
+        """How many there are."""
+        return len(self.rates)
+
+    @property
+    def real_rates(self) -> tuple[float, ...]:
+        """q_i; exact."""
+        return tuple(a * self.rate.lsb for a in self.rates)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """c_i; exact."""
+        return tuple(c * self.lsb for c in self.weights)
+
+
+@dataclass(frozen=True)
 class Sum:
-    """Σ_j w_j x_{k−j} over ``history`` ("error" or "filtered"); ``blocks`` oldest first, without gaps."""
+    """Σ_j w_j x_{k−j} over ``history`` ("error" or "filtered"); ``blocks`` oldest first, without gaps.
+
+    ``banks`` add what an exponential memory remembers beyond the taps.
+    """
 
     name: str
     history: str
     blocks: tuple[Block, ...]
     total: Format
+    banks: tuple[Bank, ...] = ()
 
     @property
     def taps(self) -> int:
@@ -162,8 +247,13 @@ class Sum:
         return tuple(w for block in reversed(self.blocks) for w in block.weights)
 
     @property
+    def modes(self) -> int:
+        """How many modes its banks have."""
+        return sum(bank.modes for bank in self.banks)
+
+    @property
     def values(self) -> tuple[float, ...]:
-        """The weights' real values by rising lag; exact."""
+        """The taps' real values by rising lag; exact."""
         return tuple(w * block.lsb for block in reversed(self.blocks) for w in block.weights)
 
 
@@ -241,7 +331,8 @@ class ErrorBound:
     their rounding, half a count each, is included. ``truncation``: of the operator, against infinite memory.
     ``operator_per_sample``: with an inner integrator the error of its state adds up until its clamp ends it;
     n samples after a reset the operator's error is at most n times this (and ``operator``). 0 elsewhere.
-    ``parts`` splits ``operator`` by cause, for reports.
+    ``parts`` splits ``operator`` by cause, for reports. ``within_horizon``: ``truncation`` as long as no more
+    than the horizon's samples have passed since a reset to a constant; None for short memory.
     """
 
     operator: float
@@ -249,6 +340,7 @@ class ErrorBound:
     truncation: float | None
     operator_per_sample: float = 0.0
     parts: tuple[tuple[str, float], ...] = ()
+    within_horizon: float | None = None
 
 
 @dataclass(frozen=True)
@@ -258,6 +350,10 @@ class Plan:
     At least one of ``direct`` and ``inner`` is there. ``wide`` holds p and x, ``filtered`` holds v,
     ``product`` g·v before its shift. ``constant_gain`` (counts of ``gain``) is used where there is no
     schedule. ``increment`` holds d. ``output`` carries the output limits as its low and high.
+
+    ``memory`` is "short", with ``length`` past samples, or "exponential": then ``memories`` has the operator of
+    each fractional order, with the poles as the arithmetic holds them, ``horizon`` (samples) and ``tolerance``
+    are what was asked for, and ``length`` counts the past samples that the taps need.
     """
 
     controller: Controller
@@ -285,6 +381,30 @@ class Plan:
     output: Format
     proofs: tuple[Proof, ...]
     error_bound: ErrorBound
+    memories: tuple[ExponentialMemory, ...] = ()
+    tolerance: float | None = None
+    horizon: int | None = None
+
+    @property
+    def exponential(self) -> bool:
+        """Whether the memory is a sum of exponentials."""
+        return self.memory == "exponential"
+
+    @property
+    def sums(self) -> tuple[Sum, ...]:
+        """The sums that there are: numerator, what 1/s integrates, denominator."""
+        found = (self.direct, self.inner and self.inner.rest, self.feedback and self.feedback.table)
+        return tuple(s for s in found if s)
+
+    @property
+    def states(self) -> int:
+        """How many modes its memory has; 0 with short memory."""
+        return sum(s.modes for s in self.sums)
+
+    @property
+    def multiplies(self) -> int:
+        """Multiplications in one step: a tap one, a mode two, gain and slope one each."""
+        return sum(s.taps + 2 * s.modes for s in self.sums) + 1 + (self.schedule is not None)
 
     @property
     def floating(self) -> bool:
@@ -294,8 +414,7 @@ class Plan:
     @property
     def error_lags(self) -> int:
         """How many past samples of the error are needed."""
-        sums = [self.direct, self.inner.rest if self.inner else None]
-        return max(s.last for s in sums if s is not None)
+        return max(s.last for s in self.sums if s.history == "error")
 
     @property
     def filtered_lags(self) -> int:

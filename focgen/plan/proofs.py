@@ -12,9 +12,11 @@ import math
 import numpy as np
 
 from focgen.errors import PlanError
+from focgen.plan.banks import departure, drive_error, driven_by, mean_of
 from focgen.plan.formats import Interval, limit, span, weighted
-from focgen.plan.model import Plan, Proof, Schedule, Sum
-from focgen.plan.stability import inverse
+from focgen.plan.model import Bank, Plan, Proof, Schedule, Sum
+from focgen.plan.modes import LAGS, Modes, Response, response_of
+from focgen.plan.stability import Inverse, inverse
 
 
 def prove(plan: Plan) -> tuple[Proof, ...]:
@@ -55,14 +57,33 @@ class _Ledger:
         reach = span(plan.reference) - span(plan.measurement)
         self.add("error", reach, plan.error.ctype, "range")
 
-    def sum(self, table: Sum, each: Interval) -> Interval:
-        """Every block and every partial total of a history sum."""
+    def bank(self, name: str, bank: Bank, past: Interval) -> Interval:
+        """What a mode keeps, how far u is from it, D, its product with the rate, and the sum of all."""
+        u, half = driven_by(past, bank.differences), (1 << bank.to_drive) >> 1
+        mean = mean_of(u, bank.up, bank.to_drive, bank.rate_shift, min(bank.real_rates))
+        self.add(f"{name} mean", mean, bank.state.ctype, "mean of its inputs")
+        far = departure(u, mean, bank.up)
+        self.add(f"{name} departure", far, bank.state.ctype, "mean of its inputs", half)
+        drive = self.add(f"{name} drive", far.shifted(bank.to_drive), bank.drive.ctype, "mean of its inputs")
+        rate = Interval(min(bank.rates), max(bank.rates))
+        half = (1 << bank.rate_shift) >> 1
+        self.add(f"{name} rate product", drive * rate, bank.state.ctype, "mean of its inputs", half)
+        half = (1 << bank.align) >> 1
+        return self.add(f"{name} sum", weighted(bank.weights, drive), bank.sum.ctype, "l1 norm", half)
+
+    def sum(self, table: Sum, each: Interval, past: Interval | None = None) -> Interval:
+        """Every block and every partial total of a history sum; ``past`` is what modes are driven by, if not by
+        ``each``.
+        """
         total = Interval(0, 0)
         for block in table.blocks:
             node = f"{table.name}[{block.first}..{block.last}]"
             half = (1 << block.align) >> 1
             reach = self.add(node, weighted(block.weights, each), block.sum.ctype, "l1 norm", half)
             total = total + reach.shifted(block.align)
+        for i, bank in enumerate(table.banks):
+            past = each if past is None else past
+            total = total + self.bank(f"{table.name} bank {i}", bank, past).shifted(bank.align)
         return self.add(f"{table.name} total", total, table.total.ctype, "l1 norm")
 
     def combined(self) -> Interval:
@@ -82,7 +103,8 @@ class _Ledger:
         if plan.feedback is None:
             return self.add("v", p.shifted(plan.narrow), plan.filtered.ctype, "l1 norm", 0)
         whole = span(plan.filtered)
-        s = self.sum(plan.feedback.table, whole)
+        reach = math.ceil(filtered_reach(plan))
+        s = self.sum(plan.feedback.table, whole, Interval(-reach, reach))
         self.add("x", p - s + Interval(-half, half), plan.wide.ctype, "clamp", half)
         self.add(
             "steady product",
@@ -91,7 +113,6 @@ class _Ledger:
             "range",
             (1 << plan.feedback.steady_shift) >> 1,
         )
-        reach = math.ceil(filtered_reach(plan))
         self.add("v", Interval(-reach, reach), plan.filtered.ctype, "l1 norm of the recursion")
         return whole
 
@@ -140,24 +161,37 @@ def _schedule(schedule: Schedule) -> tuple[Interval, Interval, int]:
 
 def filtered_reach(plan: Plan) -> float:
     """Bound on |v| in counts: ‖B/A‖₁ of the integer weights times the range of e, and what rounding adds."""
-    table = plan.feedback.table
-    own = inverse(np.concatenate([[1.0], table.values]))
+    own = inverse_of_recursion(plan)
     if own is None:
         raise PlanError(plan.name, "the integer recursion cannot be proved stable", "choose q31, f32 or f64")
     unit = plan.filtered.lsb
     reach = 0.0
     if plan.direct:
-        reach += own.norm_after(np.array(plan.direct.values)) * span(plan.error).worst * plan.error.lsb / unit
+        b = sum_response(plan.direct)
+        reach += own.norm_after(b.weights, b.left_out) * span(plan.error).worst * plan.error.lsb / unit
     if plan.inner:
         reach += own.norm * span(plan.inner.state).worst * plan.inner.state.lsb / unit
     return reach + rounding_reach(plan, own)
 
 
+def inverse_of_recursion(plan: Plan) -> Inverse | None:
+    """The integer recursion, inverted."""
+    response = sum_response(plan.feedback.table)
+    return inverse(np.concatenate([[1.0], response.weights[1:]]), response.left_out)
+
+
+def sum_response(made: Sum, lags: int = LAGS) -> Response:
+    """What a sum, with its quantised weights, answers to a unit sample, by lag from 0 on."""
+    modes = [Modes(b.order, np.array(b.real_rates), np.array(b.values)) for b in made.banks]
+    return response_of(made.values, made.first, modes, lags)
+
+
 def rounding_reach(plan: Plan, own) -> float:
-    """What alignments, the carried rounding and the reset's rounding can add to v, in counts."""
+    """What alignments, the drives of modes, the carried rounding and the reset's can add to v, in counts."""
     unit = plan.wide.lsb / plan.filtered.lsb
-    rounded = [b for s in (plan.direct, plan.feedback.table) if s for b in s.blocks if b.align]
-    each = 0.5 * unit * (len(rounded) + bool(plan.inner))
+    sums = [s for s in (plan.direct, plan.feedback.table) if s]
+    rounded = [b for s in sums for b in (*s.blocks, *s.banks) if b.align]
+    each = 0.5 * unit * (len(rounded) + bool(plan.inner)) + unit * sum(map(drive_error, sums))
     carried = 0.5 * own.norm_after(np.array([1.0, -1.0]))
     return own.norm * each + carried + reset_error(plan) * max(1.0, own.norm * at_rest(plan))
 

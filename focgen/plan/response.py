@@ -6,7 +6,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.plan.execute import scheduled_gain
-from focgen.plan.model import Plan, Sum
+from focgen.plan.model import Bank, Plan, Sum
 from focgen.plan.scenario import nearest_raw
 
 
@@ -52,4 +52,10 @@ def _response(table: Sum, back: np.ndarray) -> np.ndarray:
     total = np.zeros(back.shape, complex)
     for weight in reversed(table.values):
         total = total * back + weight
-    return total * back**table.first
+    return total * back**table.first + sum(_bank_response(bank, back) for bank in table.banks)
+
+
+def _bank_response(bank: Bank, back: np.ndarray) -> np.ndarray:
+    """Σ c_i z^−1 ∇^m / (1 − p_i z^−1)."""
+    modes = sum(c / (1.0 - (1.0 - q) * back) for c, q in zip(bank.values, bank.real_rates))
+    return modes * back * (1.0 - back) ** bank.differences

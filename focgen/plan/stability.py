@@ -6,12 +6,13 @@ then 1/A = g / (1 + residual) is absolutely summable (Wiener), the recursion is 
     ‖1/A‖₁ ≤ ‖g‖₁ / (1 − ρ),      ‖B/A‖₁ ≤ ‖B g‖₁ + ‖B‖₁ ‖1/A‖₁ ρ.
 
 These hold for every bounded input, from any bounded history, and they are what ranges and error bounds rest
-on.
+on. Where A goes on beyond the coefficients that are written out, by a sum of magnitudes τ, ρ grows by τ ‖g‖₁.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.signal import fftconvolve
@@ -26,7 +27,7 @@ from focgen.fractional.discrete import (
     shortest_stable_length,
 )
 from focgen.fractional.transfer import TransferFunction
-from focgen.plan.canonical import Tables, realise
+from focgen.plan.canonical import Table, Tables, realise
 
 _LONGEST = 1 << 18
 _WANTED = 1e-6  # residual at which a longer inverse gains nothing
@@ -42,18 +43,28 @@ class Inverse:
     residual: float
     norm: float
 
-    def norm_after(self, numerator: np.ndarray) -> float:
-        """Bound on ‖B/A‖₁ for the numerator's weights, shape (taps,)."""
+    def norm_after(self, numerator: np.ndarray, left_out: float = 0.0) -> float:
+        """Bound on ‖B/A‖₁ for the numerator's weights, shape (taps,), and ``left_out``, Σ|weights| of more."""
         own = float(np.abs(fftconvolve(numerator, self.response)).sum())
-        return (own + float(np.abs(numerator).sum()) * self.norm * self.residual) * _SLACK
+        rest = float(np.abs(numerator).sum()) * self.residual + left_out
+        return (own + rest * self.norm) * _SLACK
 
 
-def inverse(coefficients: np.ndarray) -> Inverse | None:
-    """Invert 1 + Σ a_j z^−j, given as (1, a_1, …); None where it is not, or not provably, stable."""
-    coefficients = np.asarray(coefficients, dtype=float)
+def inverse(coefficients: np.ndarray, left_out: float = 0.0) -> Inverse | None:
+    """Invert 1 + Σ a_j z^−j, given as (1, a_1, …); None where it is not, or not provably, stable.
+
+    ``left_out``: Σ |a_j| of the coefficients that are not given.
+    """
+    return _inverse(np.asarray(coefficients, dtype=float).tobytes(), left_out)
+
+
+@lru_cache(maxsize=16)
+def _inverse(data: bytes, left_out: float) -> Inverse | None:
+    """A plan asks for the same inverse several times."""
+    coefficients = np.frombuffer(data)
     count, best = max(1024, 4 * len(coefficients)), None
     while count <= max(_LONGEST, 4 * len(coefficients)):
-        found = _attempt(coefficients, count)
+        found = _attempt(coefficients, count, left_out)
         if best is not None and (found is None or found.residual > 0.5 * best.residual):
             break
         best = found
@@ -63,21 +74,31 @@ def inverse(coefficients: np.ndarray) -> Inverse | None:
     return best
 
 
-def _attempt(coefficients: np.ndarray, count: int) -> Inverse | None:
+def _attempt(coefficients: np.ndarray, count: int, left_out: float) -> Inverse | None:
     with np.errstate(over="ignore", invalid="ignore"):
         response = power_series_inverse(coefficients, count)
     if not np.abs(response).max() < _GROWN:
         return None
-    residual = inverse_residual(coefficients, response)
+    size = float(np.abs(response).sum())
+    residual = inverse_residual(coefficients, response) + left_out * size
     if not residual < 0.9:
         return None
-    return Inverse(response, residual, float(np.abs(response).sum()) / (1.0 - residual) * _SLACK)
+    return Inverse(response, residual, size / (1.0 - residual) * _SLACK)
+
+
+def inverse_of(table: Table) -> Inverse | None:
+    """Invert a denominator's table, modes included."""
+    return inverse(table.response.weights, table.response.left_out)
 
 
 def check_stable(controller: Controller, tables: Tables, length: int) -> None:
     """Raise PlanError where the truncated recursion is unstable, naming a memory length that works."""
-    if tables.feedback is None or inverse(tables.feedback.weights) is not None:
+    if tables.feedback is None or inverse_of(tables.feedback) is not None:
         return
+    if tables.feedback.modes:
+        what = "nothing proves that the recursion with this exponential memory is stable"
+        remedy = "check the signs in den, shorten the horizon, or use memory short"
+        raise PlanError(controller.name, what, remedy)
     try:
         outside = poles_outside(tables.feedback.weights)
     except UnprovenStability:

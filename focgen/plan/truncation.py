@@ -1,12 +1,17 @@
-"""What a memory of L samples leaves out, against an infinite one."""
+"""What a memory leaves out, against an infinite one.
+
+Short memory leaves out its tail. An exponential one is wrong by what its certificate bounds, once up to its horizon
+and once for ever: Σ |∇^m (h_j − g_j)| for each term.
+"""
 
 from __future__ import annotations
 
 from focgen.control.controller import Controller
+from focgen.fractional.transfer import Polynomial
 from focgen.plan.canonical import Realisation, Tables, folded, inner_limits, realise, tail_l1
 from focgen.plan.gains import largest_gain
 from focgen.plan.model import Plan
-from focgen.plan.stability import inverse
+from focgen.plan.stability import inverse, inverse_of
 
 _SLACK = 1.0 + 1e-9
 
@@ -17,36 +22,51 @@ def largest_error(controller: Controller) -> float:
     return max(abs(r0 - m1), abs(r1 - m0))
 
 
-def truncation(plan: Plan, tables: Tables) -> float | None:
+def truncation(plan: Plan, tables: Tables, past_horizon: bool = True) -> float | None:
     """Bound on the operator's error against infinite memory, both in exact arithmetic; None where there is
-    none.
+    none. ``past_horizon``: for runs of any length, not only up to an exponential memory's horizon.
 
     With feedback A∞ (v − v∞) = (B − B∞) e + (A∞ − A) v, and ‖1/A∞‖₁ is bounded through a longer table:
     ‖1/A∞‖₁ ≤ M' / (1 − M' t') with t' what that one still leaves out. An inner integral that misses something
     drifts until its clamp ends it.
     """
-    form, h, length = realise(plan.controller), plan.sample_time, plan.length
+    form, h = realise(plan.controller), plan.sample_time
     scale = abs(tables.normaliser)
     e, gain = largest_error(plan.controller), largest_gain(plan.controller)
-    direct = tail_l1(form.direct, h, length) / scale
-    rest = 0.5 * h * tail_l1(form.rest, h, length) / scale
+    direct = _left_out(plan, form.direct, past_horizon) / scale
+    rest = 0.5 * h * _left_out(plan, form.rest, past_horizon) / scale
     clamp = [x / tables.normaliser for x in inner_limits(plan.controller)] if form.rest else [0.0]
     drift = (max(clamp) - min(clamp)) if rest else 0.0
     if tables.feedback is None:
         return gain * (direct * e + drift) * _SLACK
-    return _recursive_truncation(plan, tables, form, direct, drift, max(map(abs, clamp)))
+    back = _left_out(plan, form.den, past_horizon) / scale
+    return _recursive_truncation(plan, tables, form, (direct, back), drift, max(map(abs, clamp)))
+
+
+def _left_out(plan: Plan, terms: Polynomial, past_horizon: bool) -> float:
+    """Bound on Σ |w − w∞| of Σ c s^β."""
+    if not plan.exponential:
+        return tail_l1(terms, plan.sample_time, plan.length)
+    proved = {memory.order: memory.certificate for memory in plan.memories}
+    return sum(
+        abs(t.coefficient) * plan.sample_time**-t.order * proved[t.order].output_error(1.0, past_horizon)
+        for t in terms
+        if t.order in proved
+    )
 
 
 def _recursive_truncation(
-    plan: Plan, tables: Tables, form: Realisation, direct: float, drift: float, z: float
+    plan: Plan, tables: Tables, form: Realisation, missed: tuple[float, float], drift: float, z: float
 ) -> float | None:
-    h, scale = plan.sample_time, abs(tables.normaliser)
-    own = inverse(tables.feedback.weights)
+    """``missed``: what numerator and denominator leave out."""
+    scale, (direct, back) = abs(tables.normaliser), missed
+    own = inverse_of(tables.feedback)
     endless = _endless_norm(plan, form, scale)
     if own is None or endless is None:
         return None
-    e, back = largest_error(plan.controller), tail_l1(form.den, h, plan.length) / scale
-    v = (own.norm_after(tables.direct.weights) if tables.direct else 0.0) * e + own.norm * z
+    e = largest_error(plan.controller)
+    b = tables.direct and tables.direct.response
+    v = (own.norm_after(b.weights, b.left_out) if b else 0.0) * e + own.norm * z
     return largest_gain(plan.controller) * (endless * (direct * e + back * v) + endless * drift) * _SLACK
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from focgen.errors import PlanError
 from focgen.plan.model import FLAG_HIGH, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
+from focgen.plan.proofs import inverse_of_recursion
 from focgen.plan.scenario import Reset, Scenario, Trace, Track
-from focgen.plan.stability import inverse
 
 EXPONENT = {"float": 48, "double": 512}
 """log2 of the magnitude from which on an input is not used, by type."""
@@ -54,7 +54,7 @@ def reach(plan: Plan, error: float) -> float:
         r, z = _l1(plan.inner.rest) * error, _largest(plan.inner.state)
     v = after = p + z
     if plan.feedback:
-        own = inverse(np.concatenate([[1.0], plan.feedback.table.values]))
+        own = inverse_of_recursion(plan)
         v = max(own.norm * (p + z), abs(plan.feedback.steady) * error) if own else np.inf
         after = p + z + _l1(plan.feedback.table) * v
     gain = max(abs(plan.gain.low), abs(plan.gain.high))
@@ -62,7 +62,11 @@ def reach(plan: Plan, error: float) -> float:
 
 
 def _l1(table: Sum | None) -> float:
-    return float(np.abs(table.values).sum()) if table else 0.0
+    """Of taps, and of modes, whose drives reach 2 m times what drives them."""
+    if table is None:
+        return 0.0
+    modes = sum(2.0 * bank.differences * float(np.abs(bank.values).sum()) for bank in table.banks)
+    return float(np.abs(table.values).sum()) + modes
 
 
 def _largest(form: Format) -> float:

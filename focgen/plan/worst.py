@@ -8,8 +8,11 @@ from scipy.signal import lfilter
 from focgen.errors import PlanError
 from focgen.plan.execute import scheduled_gain
 from focgen.plan.model import Plan, Sum
+from focgen.plan.modes import Modes
+from focgen.plan.proofs import sum_response
 from focgen.plan.scenario import Reset, Scenario
 
+_LONGEST = 400  # samples of an exponential memory's response
 _SETTLED = 8  # memory lengths after which a recursion's response is taken to have died away
 
 
@@ -33,7 +36,9 @@ def worst_case_input(plan: Plan, node: str) -> Scenario:
 
 
 def _response(plan: Plan, node: str) -> np.ndarray:
-    """How the node answers a unit error, sample by sample."""
+    """How the node answers a unit error, sample by sample; an exponential memory for ``_LONGEST`` samples."""
+    if " bank " in node and not node.startswith("feedback"):
+        return _bank(plan, node)
     if node.startswith("rest") or node == "inner sum":
         return _part(plan.inner.rest, node)
     if node.startswith("direct"):
@@ -42,9 +47,18 @@ def _response(plan: Plan, node: str) -> np.ndarray:
     return np.convolve(v, [1.0, 1.0]) if node == "integrator sum" else v
 
 
+def _bank(plan: Plan, node: str) -> np.ndarray:
+    """Of a bank's sum, or of its slowest mode."""
+    name, _, index, *what = node.split()
+    table = plan.direct if name == "direct" else plan.inner.rest
+    bank = table.banks[int(index)]
+    weights = np.array(bank.values) if what == ["sum"] else np.eye(bank.modes)[-1]
+    return Modes(bank.order, np.array(bank.real_rates), weights).response(_LONGEST)
+
+
 def _part(table: Sum, node: str) -> np.ndarray:
     """The weights by lag, those of other blocks 0."""
-    weights = np.array(table.values)
+    weights = sum_response(table, _LONGEST).weights
     for block in table.blocks:
         if node == f"{table.name}[{block.first}..{block.last}]":
             weights[: block.first] = 0.0
@@ -55,20 +69,29 @@ def _part(table: Sum, node: str) -> np.ndarray:
 def _filtered(plan: Plan, node: str) -> np.ndarray:
     """e to v, or to a sum of past v."""
     count = plan.error_lags + 1 + (_SETTLED * plan.filtered_lags if plan.feedback else 0)
+    count = _LONGEST if plan.states else count
     unit = np.zeros(count)
     unit[0] = 1.0
     p = np.zeros(count)
     if plan.direct:
-        p = p + lfilter(plan.direct.values, [1.0], unit)
+        p = p + _answer(plan.direct, unit)
     if plan.inner:
-        p = p + lfilter([1.0, 1.0], [1.0, -1.0], lfilter(plan.inner.rest.values, [1.0], unit))
+        p = p + lfilter([1.0, 1.0], [1.0, -1.0], _answer(plan.inner.rest, unit))
     if plan.feedback is None:
         return p
     table = plan.feedback.table
-    v = lfilter([1.0], np.concatenate([[1.0], table.values]), p)
-    if not node.startswith("feedback"):
+    den = sum_response(table, count).weights.copy()
+    den[0] = 1.0
+    v = lfilter([1.0], den, p)
+    if not node.startswith("feedback") or " bank " in node:
         return v
     return lfilter(np.concatenate([[0.0], _part_of_past(table, node)]), [1.0], v)
+
+
+def _answer(table: Sum, unit: np.ndarray) -> np.ndarray:
+    """To a unit sample, as long as ``unit``."""
+    found = sum_response(table, len(unit)).weights[: len(unit)]
+    return np.pad(found, (0, len(unit) - len(found)))
 
 
 def _part_of_past(table: Sum, node: str) -> np.ndarray:

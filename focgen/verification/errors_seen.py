@@ -38,7 +38,8 @@ def errors_seen(plan: Plan, physical: Scenario, trace: Trace, bound: ErrorBound)
 
     Without an integrator only the clamped output is seen, which errs no more than what is clamped.
     """
-    reference, seen = ideal(plan.controller, physical, plan.length), physical_trace(plan, trace)
+    reference = ideal(plan.controller, physical, plan.length, plan.memories)
+    seen = physical_trace(plan, trace)
     since = _samples_since_reset(physical)
     truth = reference.d if plan.integrator else reference.u
     operator, output = np.abs(seen.d - truth), np.abs(seen.u - reference.u)

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.codegen.generate import runtime_files
 from focgen.codegen.kernels import Kernels
 from focgen.codegen.manifest import manifest_of, sha256
+from focgen.control.controller import Controller
 from focgen.control.files import read_controller
 from focgen.errors import InputError
 from focgen.plan.build import build_plan
@@ -38,7 +40,7 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     manifest = _manifest(path)
     try:
         controller = read_controller(path / "controller.toml")
-        plan = build_plan(controller, manifest["arithmetic"], manifest["length"], manifest["name"])
+        plan = _plan(controller, manifest)
         claimed = _claimed(manifest["error_bound"])
     except KeyError as reason:
         raise InputError(str(path / "manifest.json"), f"lacks {reason}", _AGAIN) from None
@@ -48,7 +50,7 @@ def read_folder(path: str | Path) -> GeneratedFolder:
         ) from None
     test = [f"{plan.name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
     kernels = Kernels(manifest["kernels"]["target"] if "kernels" in manifest else None)
-    headers = ("foc_rt.h", *kernels.headers(plan))
+    headers = runtime_files(plan, kernels)
     for name in (f"{plan.name}.h", f"{plan.name}.c", *headers, *test):
         if not (path / name).is_file():
             raise InputError(str(path), f"lacks {name}", _AGAIN)
@@ -56,6 +58,15 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     expected = json.loads(json.dumps(manifest_of(plan, inputs, "selftest" in manifest, kernels)))
     differences = tuple(_differences(expected, manifest, ""))
     return GeneratedFolder(path, plan, claimed, differences, bool(test))
+
+
+def _plan(controller: Controller, manifest: dict[str, Any]) -> Plan:
+    """As it was made: the form of the memory is the manifest's, whatever the controller's file prefers."""
+    arithmetic, name, memory = manifest["arithmetic"], manifest["name"], manifest["memory"]
+    if memory == "exponential":
+        asked = manifest["tolerance"], manifest["horizon"]
+        return build_plan(controller, arithmetic, None, name, memory, *asked)
+    return build_plan(controller, arithmetic, manifest["length"], name, memory)
 
 
 def _manifest(path: Path) -> dict[str, Any]:

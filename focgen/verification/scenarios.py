@@ -86,11 +86,13 @@ def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:
 def worst_cases(plan: Plan) -> Scenario:
     """Raw inputs that take each node to its proved worst case, two lanes a node, up and down.
 
-    They stand in the order of the proofs. The floating forms have no proofs; theirs take the filtered error
+    They stand in the order of the proofs, those that are alike once. The floating forms have no proofs; theirs take the filtered error
     to its largest.
     """
     nodes = ["v"] if plan.floating else [proof.node for proof in plan.proofs]
-    return side_by_side([worst_case_input(plan, node) for node in nodes])
+    made = [worst_case_input(plan, node) for node in nodes]
+    distinct = {(s.ref.tobytes(), s.meas.tobytes(), s.resets, s.sched is not None and s.sched.tobytes()): s for s in made}
+    return side_by_side(list(distinct.values()))
 
 
 def side_by_side(scenarios: list[Scenario]) -> Scenario:

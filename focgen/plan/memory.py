@@ -1,0 +1,134 @@
+"""Exponential memories for a controller's fractional terms, as an arithmetic can hold them.
+
+Fixed point: a rate q = 1 − p is an integer count a of 2^−bits, and only rates that are such counts are used, so
+the poles are exact; their weights and certificates are found for them. Slow modes, whose rates would lose digits,
+stand in a bank of their own with more bits. Floating point: rates are numbers of the type.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.errors import PlanError
+from focgen.fractional.exponential import ExponentialMemory
+from focgen.fractional.exponential_rounded import fit_rounded
+from focgen.fractional.transfer import Polynomial, Term
+from focgen.fractional.weights import gl_weights
+from focgen.plan.canonical import Realisation, Table, Tables, realise, tables_by
+from focgen.plan.modes import Modes, response_of
+
+_LARGEST_ORDER = 2.0
+
+
+@dataclass(frozen=True)
+class Speed:
+    """How modes with rates below ``below`` are held, as :class:`~focgen.plan.model.Bank` has it.
+
+    Fixed: ``rate_bits`` of a, which counts 2^−(``to_drive`` + ``rate_shift``), and ``state_bits`` of L.
+    Floating: only ``compensated``.
+    """
+
+    below: float
+    rate_bits: int = 0
+    to_drive: int = 0
+    rate_shift: int = 0
+    state_bits: int = 0
+    compensated: bool = False
+
+    def nearest(self, rates: np.ndarray) -> np.ndarray:
+        """The nearest rates, as counts."""
+        counts = np.rint(rates * 2.0 ** (self.to_drive + self.rate_shift))
+        return np.clip(counts, 1.0, 2.0 ** (self.rate_bits - 1) - 1.0)
+
+
+SPEEDS = {
+    "f64": (Speed(2.0),),
+    "f32": (Speed(2.0), Speed(2.0**-4, compensated=True)),
+    "q31": (Speed(2.0, 32, 31, 0, 64), Speed(2.0**-18, 32, 31, 18, 64)),
+    "q15": (Speed(2.0, 16, 15, 0, 32), Speed(2.0**-8, 32, 39, 0, 64)),
+}
+"""How each arithmetic holds modes, the fastest first."""
+
+
+def by_speed(arithmetic: str, rates: np.ndarray) -> list[tuple[Speed, np.ndarray]]:
+    """Which of ``rates`` (falling) are held in which way; ways without any are left out."""
+    speeds = SPEEDS[arithmetic]
+    slower = [np.searchsorted(-rates, -s.below, side="right") for s in speeds] + [len(rates)]
+    places = [np.arange(a, b) for a, b in zip(slower, slower[1:])]
+    return [(speed, place) for speed, place in zip(speeds, places) if len(place)]
+
+
+def _rounded(arithmetic: str):
+    """The function that takes rates to those the arithmetic holds; one object for each, so that fits are kept."""
+    kind = {"f64": np.float64, "f32": np.float32}.get(arithmetic)
+
+    def held(rates: np.ndarray) -> np.ndarray:
+        if kind is not None:
+            return rates.astype(kind).astype(float)
+        found = np.empty(len(rates))
+        for speed, place in by_speed(arithmetic, rates):
+            found[place] = speed.nearest(rates[place]) * 2.0 ** -(speed.to_drive + speed.rate_shift)
+        return found
+
+    return held
+
+
+_ROUNDED = {arithmetic: _rounded(arithmetic) for arithmetic in SPEEDS}
+
+
+def memories_of(
+    controller: Controller, arithmetic: str, tolerance: float, horizon: int
+) -> tuple[ExponentialMemory, ...]:
+    """One memory for each fractional order of the transfer function, the lowest order first.
+
+    Raises PlanError where an order is beyond 2, or tolerance and horizon cannot be met.
+    """
+    orders = sorted({t.order for t in _terms(realise(controller)) if not t.order.is_integer()})
+    if orders and orders[-1] > _LARGEST_ORDER:
+        what = f"has the order {orders[-1]:g} over its lowest: exponential memory ends at 2"
+        raise PlanError(f"{controller.name} [transfer]", what, "use memory short")
+    return tuple(_fitted(controller, order, arithmetic, tolerance, horizon) for order in orders)
+
+
+def _terms(form: Realisation) -> Polynomial:
+    return form.direct + form.rest + form.den
+
+
+def _fitted(
+    controller: Controller, order: float, arithmetic: str, tolerance: float, horizon: int
+) -> ExponentialMemory:
+    try:
+        return fit_rounded(order, horizon, tolerance, _ROUNDED[arithmetic])
+    except ValueError as reason:
+        remedy = "allow a larger tolerance, a shorter horizon, or choose another arithmetic"
+        raise PlanError(controller.name, f"order {order:g} has no exponential memory: {reason}", remedy) from None
+
+
+def exponential_tables(controller: Controller, memories: tuple[ExponentialMemory, ...]) -> Tables:
+    """The controller's terms as taps and modes. Raises PlanError as :func:`focgen.plan.canonical.tables`."""
+    by_order = {memory.order: memory for memory in memories}
+    return tables_by(controller, lambda terms: _folded(terms, controller.sample_time, by_order))
+
+
+def _folded(terms: Polynomial, step: float, memories: dict[float, ExponentialMemory]) -> Table:
+    """Whole orders, and lag 0 of the others with their differences, as taps."""
+    count = max(math.ceil(t.order) for t in terms)
+    each = np.array([t.coefficient * step**-t.order * _differences(math.ceil(t.order), count) for t in terms])
+    taps, size = each.sum(axis=0), np.abs(each).sum(axis=0)
+    keep = int(np.flatnonzero(size)[-1]) + 1
+    modes = tuple(_modes(t, step, memories[t.order]) for t in terms if t.order in memories)
+    return Table(taps[:keep], size[:keep], modes, response_of(taps[:keep], 0, modes))
+
+
+def _differences(m: int, count: int) -> np.ndarray:
+    """The weights of ∇^m at the lags 0 … ``count``."""
+    return gl_weights(float(m), count)
+
+
+def _modes(term: Term, step: float, memory: ExponentialMemory) -> Modes:
+    factor = term.coefficient * step**-term.order
+    return Modes(memory.order, 1.0 - np.array(memory.poles), factor * np.array(memory.weights))
