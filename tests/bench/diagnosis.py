@@ -1,4 +1,4 @@
-"""What a diagnosis costs: 400 s of 100 Hz logs, beside one replay of the same session; seconds of one core."""
+"""What a diagnosis costs: 400 s of 100 Hz logs, in seconds of one core, beside one replay of the session."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def run() -> str:
     """The table."""
     lines = [
         "Diagnosis of 400 s at 100 Hz, without bootstrap",
-        "signals  effect             core s   replays  says",
+        "signals  effect             core s  replays  says",
     ]
     for signals, effect in EFFECTS:
         rig, logs = session(signals, effect)
