@@ -24,9 +24,6 @@
 
 #include "foc_rt.h"
 
-/* Generated files ask for the version they were written for. */
-#define FOC_AHEAD_VERSION 1
-
 /* Tiles that follow each other in one block and one step. */
 typedef struct {
     uint16_t weights; /* where its weights begin */

@@ -13,6 +13,9 @@
 
 #include "foc_rt.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_TILES_VERSION 1
+
 /* A table that is read by words: its first entry stands at one. */
 #ifdef __GNUC__
 #define FOC_WORDS __attribute__((aligned(4)))

@@ -26,17 +26,28 @@ _AHEAD = {
 }
 
 
+_LONG = {("cortex-m0plus", "q31")}  # no product of 64 bits: halves, by hand
+
+
 @dataclass(frozen=True)
 class Kernels:
     """How a plan's sums are computed on ``target``; None: everywhere, in portable C."""
 
     target: str | None = None
 
+    def own(self, arithmetic: str) -> bool:
+        """Whether the target has kernels of its own for an arithmetic."""
+        return (self.target, arithmetic) in _AHEAD | _LONG
+
     def ahead(self, plan: Plan, table: Sum | None) -> LookAhead | None:
         """The look-ahead form of a sum, where it takes that form."""
         if table is None or table.banks or (self.target, plan.arithmetic) not in _AHEAD:
             return None
         return look_ahead(table)
+
+    def long(self, plan: Plan) -> bool:
+        """Whether the sums take the form for cores without a long product."""
+        return (self.target, plan.arithmetic) in _LONG
 
     def slots(self, plan: Plan, history: str) -> int:
         """How many samples a ring holds: ``history`` is "error" or "filtered"."""
@@ -50,7 +61,8 @@ class Kernels:
     def headers(self, plan: Plan) -> tuple[str, ...]:
         """The runtime's headers beside ``foc_rt.h``."""
         looks = any(self.ahead(plan, s) for s in named_sums(plan).values())
-        return ("foc_ahead.h", "foc_tiles.h", "foc_tiles_arm.h") if looks else ()
+        first = "foc_ahead.h" if looks else "foc_long.h"
+        return (first, "foc_tiles.h", "foc_tiles_arm.h") if looks or self.long(plan) else ()
 
 
 PORTABLE = Kernels()

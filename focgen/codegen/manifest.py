@@ -140,7 +140,7 @@ def kernel_entry(plan: Plan, kernels: Kernels) -> dict[str, Any]:
     for name, table in named_sums(plan).items():
         ahead = kernels.ahead(plan, table)
         found[name] = {
-            "form": "look-ahead" if ahead else "plain",
+            "form": "look-ahead" if ahead else "halves" if kernels.long(plan) else "plain",
             "taps": table.taps,
             "table_bytes": _sum_bytes(plan, table, kernels),
             "state_bytes": ahead_words(table) * size_of(table.blocks[0].sum.ctype) if ahead else 0,

@@ -26,7 +26,7 @@ _CPP_KEYWORDS = """
 _HEADERS = """
     assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
     stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar
-    wchar wctype foc_rt foc_memory foc_ahead foc_tiles foc_tiles_arm
+    wchar wctype foc_rt foc_memory foc_ahead foc_long foc_tiles foc_tiles_arm
 """.split()
 
 

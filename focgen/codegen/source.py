@@ -13,7 +13,7 @@ from focgen.codegen.literals import comment, constant, literal, quantity, scale
 from focgen.codegen.state import carries, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
 from focgen.plan.canonical import realise
-from focgen.plan.model import Plan
+from focgen.plan.model import Plan, Sum
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,7 @@ class SourceContext:
     increment_about: str
     product: str
     kernels: str
+    target: str
     error_start: str
     filtered_start: str
     integral: IntegralText | None
@@ -142,7 +143,8 @@ def source_context(
         increment=plan.increment.ctype,
         increment_about=_increment_about(plan),
         product=_product(plan),
-        kernels=(kernels.target or "") if kernels.headers(plan) else "",
+        kernels=kernels.headers(plan)[0] if kernels.headers(plan) else "",
+        target=kernels.target or "",
         error_start=_start(plan, kernels, "error"),
         filtered_start=_start(plan, kernels, "filtered"),
         integral=_integral(plan),
@@ -169,11 +171,16 @@ def _at_rest(plan: Plan) -> str:
     )
 
 
+def _sum(plan: Plan, table: Sum, name: str, about: list[str], kernels: Kernels) -> SumText:
+    prefix = "foc_long" if kernels.long(plan) else "foc"
+    return sum_text(plan, table, name, about, kernels.ahead(plan, table), prefix)
+
+
 def _numerator(plan: Plan, kernels: Kernels) -> SumText | None:
     if plan.direct is None:
         return None
     about = weights_about(plan, realise(plan.controller).direct, plan.direct, "Numerator")
-    return sum_text(plan, plan.direct, "numerator", about, kernels.ahead(plan, plan.direct))
+    return _sum(plan, plan.direct, "numerator", about, kernels)
 
 
 def _inner(plan: Plan, kernels: Kernels) -> InnerText | None:
@@ -183,10 +190,9 @@ def _inner(plan: Plan, kernels: Kernels) -> InnerText | None:
     what = "What 1/s integrates: numerator terms of negative order times s"
     about = weights_about(plan, realise(plan.controller).rest, plan.inner.rest, what, half_step=True)
     ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
-    ahead = kernels.ahead(plan, plan.inner.rest)
     total = f"s->inner + ({converted('r', plan.inner.rest.total.ctype, state.ctype)} + s->inner_input)"
     return InnerText(
-        sum=sum_text(plan, plan.inner.rest, "integrand", about, ahead),
+        sum=_sum(plan, plan.inner.rest, "integrand", about, kernels),
         ctype=plan.inner.rest.total.ctype,
         clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
         to_wide=converted(shifted("s->inner", state.ctype, plan.inner.to_wide), state.ctype, plan.wide.ctype),
@@ -204,9 +210,8 @@ def _feedback(plan: Plan, kernels: Kernels) -> FeedbackText | None:
         return None
     about = weights_about(plan, realise(plan.controller).den, plan.feedback.table, "Denominator")
     wide, carried = plan.wide.ctype, carries(plan)
-    ahead = kernels.ahead(plan, plan.feedback.table)
     return FeedbackText(
-        sum=sum_text(plan, plan.feedback.table, "denominator", about, ahead),
+        sum=_sum(plan, plan.feedback.table, "denominator", about, kernels),
         about=bound(plan.wide, "x"),
         rounded=shifted("x", wide, plan.narrow),
         carries=carried,

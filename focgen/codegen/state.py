@@ -31,14 +31,19 @@ class Member:
 def members(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[Member, ...]:
     """The members: single ones first, within reach of short addresses, then the rings; widest types first.
 
-    Sums that look ahead stand before the rings, which are aligned to words for that.
+    Sums that look ahead stand before the rings that they look at, and these before other rings, so that they
+    begin at a word.
     """
     found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan, kernels), *_means(plan)]
     found += _bytes(plan)
     found += [
         _ahead(table, name) for name, table in named_sums(plan).items() if kernels.ahead(plan, table)
     ]
-    return tuple(sorted(found, key=lambda m: (bool(m.array), -_SIZES[m.ctype])))
+    grouped = [h for h in ("error", "filtered") if kernels.grouped(plan, h)]
+    by_words = [*(f"{name}_ahead" for name in named_sums(plan)), *grouped] if grouped else []
+    return tuple(
+        sorted(found, key=lambda m: (bool(m.array), -_SIZES[m.ctype], bool(by_words) and m.name not in by_words))
+    )
 
 
 def _ahead(table: Sum, name: str) -> Member:

@@ -64,11 +64,12 @@ class SumText:
 
 
 def sum_text(
-    plan: Plan, table: Sum, name: str, about: list[str], ahead: LookAhead | None = None
+    plan: Plan, table: Sum, name: str, about: list[str], ahead: LookAhead | None = None, prefix: str = "foc"
 ) -> SumText:
     """The sum ``table`` as C; its weights are called NAME_``name``, and ``about`` says what they are.
 
-    Blocks in which every weight is zero leave nothing behind. ``ahead`` is its layout where it looks ahead.
+    Blocks in which every weight is zero leave nothing behind. ``ahead`` is its layout where it looks ahead;
+    ``prefix`` begins the names of the runtime's functions for the plain form.
     """
     if ahead is not None:
         return _ahead_text(plan, table, f"{plan.name}_{name}", about, ahead)
@@ -82,7 +83,7 @@ def sum_text(
         f"{weights}_sum",
         table.total.ctype,
         _sum_about(table),
-        _call(plan, table, blocks, weights),
+        _call(plan, table, blocks, weights, prefix),
         banks=bank_texts(plan, table),
         inputs=inputs(plan, table),
     )
@@ -98,13 +99,13 @@ def _ring(table: Sum) -> tuple[str, str]:
     return ("error", "ERRORS") if table.history == "error" else ("filtered", "FILTERED")
 
 
-def _call(plan: Plan, table: Sum, blocks: list[Block], weights: str) -> str:
+def _call(plan: Plan, table: Sum, blocks: list[Block], weights: str, prefix: str) -> str:
     ring, size = _ring(table)
     history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
     if len(blocks) > 1:
-        return f"foc_sum_{plan.arithmetic}({weights}, {weights}_blocks, {len(blocks)}, {history})"
+        return f"{prefix}_sum_{plan.arithmetic}({weights}, {weights}_blocks, {len(blocks)}, {history})"
     one = blocks[0]
-    dot = f"foc_dot_{plan.arithmetic}({weights}, {len(one.weights)}, {history}, {one.last})"
+    dot = f"{prefix}_dot_{plan.arithmetic}({weights}, {len(one.weights)}, {history}, {one.last})"
     return shifted(dot, one.sum.ctype, one.align)
 
 
