@@ -8,13 +8,13 @@
  *
  *   group         ... | k  k+1 k+2 k+3 | k+4 k+5 k+6 k+7 |      four steps each; k stands at a multiple of 4
  *   known, used   ----'                |                 |      samples before k
- *   in the making       1/4 1/4 1/4 1/4|                 |      what those samples add to the next group's sums
+ *   in the making       1/4 1/4 1/4 1/4|                 |      what those samples add to the next group
  *   ready                              | +near ...       |      each step adds its near lags
  *
  * Lags of 8 and more could be looked ahead; from 16 on (8 in floating point) they are. The near lags are
  * summed in their own step, after the far ones: the order from the oldest sample to the newest stays, so
  * floating point gives the bits of the plain sum, and integers are exact in any order. It costs 12 more sums
- * of state (8 in floating point), up to 7 zeros a block in the table, and a ring rounded up to a multiple of 4.
+ * of state (8 in floating point), up to 7 zeros a block in the table, and a ring of a multiple of 4 samples.
  *
  * A tile is four samples times four sums. Weights stand oldest first: tile by tile, sum i of the group takes
  * weights[j + 4 - i] for sample j, so each sum sees the same weights one place on. Zeros fill both ends.

@@ -4,7 +4,8 @@
  *
  * A Cortex-M0 or M0+ has no instruction for the upper half of a product: compilers call a function for each.
  * Here every factor is cut into halves, upper * 2^16 + lower, the lower without sign: four products of
- * 16 x 16 bits, none of which can overflow, added at their places. The C is for every other core; the same bits.
+ * 16 x 16 bits, none of which can overflow, added at their places. The C serves every other core; the bits
+ * are the same.
  */
 #ifndef FOC_LONG_H
 #define FOC_LONG_H
@@ -172,7 +173,8 @@ FOC_ASSEMBLY void foc_line_q31(int64_t *sum, const int32_t *weights, const int32
     );
 }
 #else
-static inline void foc_line_q31(int64_t *sum, const FOC_ROM int32_t *weights, const int32_t *x, uint16_t taps)
+static inline void foc_line_q31(int64_t *sum, const FOC_ROM int32_t *weights, const int32_t *x,
+                                uint16_t taps)
 {
     int64_t total = *sum;
     uint16_t i;

@@ -1,4 +1,4 @@
-/* foc_tiles.h: four sums over four samples at a time, for foc_ahead.h, and plain sums by hand where that pays.
+/* foc_tiles.h: four sums over four samples at a time, for foc_ahead.h.
  *
  * SPDX-License-Identifier: 0BSD
  *
@@ -30,7 +30,8 @@
 #endif
 
 #ifndef FOC_HAS_TILES_Q15
-static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, const int16_t *x, uint16_t tiles)
+static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, const int16_t *x,
+                                 uint16_t tiles)
 {
     int32_t s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
     int32_t a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
@@ -68,7 +69,8 @@ static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, c
 #endif
 
 #ifndef FOC_HAS_TILES_Q31
-static inline void foc_tiles_q31(int64_t *sum, const FOC_ROM int32_t *weights, const int32_t *x, uint16_t tiles)
+static inline void foc_tiles_q31(int64_t *sum, const FOC_ROM int32_t *weights, const int32_t *x,
+                                 uint16_t tiles)
 {
     int64_t s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
     int32_t a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */

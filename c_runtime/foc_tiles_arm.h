@@ -12,9 +12,9 @@
 
 /* A function that is its assembly text and nothing else; no compiler may look through it. */
 #if defined(__clang__)
-#define FOC_ASSEMBLY static __attribute__((naked, noinline, used))
+#define FOC_ASSEMBLY static __attribute__((naked, noinline, unused))
 #else
-#define FOC_ASSEMBLY static __attribute__((naked, noinline, noipa, used))
+#define FOC_ASSEMBLY static __attribute__((naked, noinline, noipa, unused))
 #endif
 
 /* --- Cortex-M4, M7, M33: two products an instruction ------------------------------------------------- */

@@ -68,6 +68,23 @@ def test_the_text_is_the_golden_one(arithmetic, tmp_path, request):
     assert alike(manifest, expected) and digests[0].keys() == digests[1].keys()
 
 
+def test_the_text_for_a_core_is_the_golden_one(tmp_path, request):
+    """A sum that looks ahead: its tables, its runs, its calls."""
+    options = ["--arithmetic", "q15", "--name", "finger_m4", "--length", "64", "--target", "cortex-m4"]
+    assert main(["generate", str(CONTROLLER), "--out", str(tmp_path), *options]) == 0
+    folder, names = GOLDEN / "finger_m4", ("finger_m4.c", "finger_m4.h", "README.md")
+    found = {name: (tmp_path / name).read_bytes() for name in names}
+    found["kernels.json"] = json.dumps(json.loads((tmp_path / "manifest.json").read_text())["kernels"], indent=2).encode()
+    if request.config.getoption("--update-golden"):
+        write_files(folder, found)
+    assert {p.name: p.read_bytes().decode() for p in folder.iterdir()} == {n: t.decode() for n, t in found.items()}
+    for name in ("foc_ahead.h", "foc_tiles.h", "foc_tiles_arm.h"):
+        assert (tmp_path / name).read_bytes() == (GOLDEN.parents[1] / "c_runtime" / name).read_bytes()
+        lines = (tmp_path / name).read_text(encoding="ascii").splitlines()
+        assert max(map(len, lines)) <= 112 and all(line == line.rstrip() for line in lines)
+    assert max(map(len, found["finger_m4.c"].decode().splitlines())) <= 110
+
+
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_it_compiles_without_a_warning(name, arithmetic, tmp_path):

@@ -1,14 +1,14 @@
 """History sums that look four samples ahead: how the weights are laid out and the work is shared out.
 
 The sums of four successive steps, a *group*, are taken together, so that each load of a weight and of a
-sample serves four products; ``foc_ahead.h`` does it. The samples known when the group before it began are its far
-part, lags 16 and more (8 and more in floating point); a quarter of that work is done in each of that
+sample serves four products; ``foc_ahead.h`` does it. The samples known when the group before it began are
+its far part, lags 16 and more (8 and more in floating point); a quarter of that work is done in each of that
 group's four steps. The near lags are summed in their own step.
 
-A block of lags ``first`` … ``last`` becomes tiles of four samples times four sums. With the group in the making
-beginning at sample T, its tiles cover samples T − 4·back … T − 4·(first // 4) + 3, back = ⌈last / 4⌉;
-sum i takes weight [j + 4 − i] for sample j, so that weight q belongs to lag 4·back + 4 − q, and is 0 outside the
-block.
+A block of lags ``first`` … ``last`` becomes tiles of four samples times four sums. With the group in the
+making beginning at sample T, its tiles cover samples T − 4·back … T − 4·(first // 4) + 3, where
+back = ⌈last / 4⌉; sum i takes weight [j + 4 − i] for sample j, so that weight q belongs to lag
+4·back + 4 − q, and is 0 outside the block.
 """
 
 from __future__ import annotations
@@ -47,6 +47,15 @@ class LookAhead:
     runs: tuple[Run, ...]
     slices: tuple[int, ...]
     near: Sum | None
+
+    def table_bytes(self, word: int) -> int:
+        """Bytes of all its tables, with weights of ``word`` bytes."""
+        weights = sum(map(len, self.weights)) + (self.near.taps if self.near else 0)
+        return weights * word + 8 * len(self.runs) + len(self.slices)
+
+    def state_bytes(self, sum_bytes: int) -> int:
+        """Bytes of state beside the ring, with sums of ``sum_bytes`` bytes."""
+        return (8 if self.far[0].sum.floating else 12) * sum_bytes
 
 
 def look_ahead(table: Sum) -> LookAhead | None:

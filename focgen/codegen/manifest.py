@@ -9,7 +9,7 @@ from typing import Any
 import focgen
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.selftest import selftest_entry
-from focgen.codegen.state import ahead_words, size_of, state_bytes
+from focgen.codegen.state import plain_bytes, size_of, state_bytes
 from focgen.plan.canonical import memory_bias
 from focgen.plan.model import (
     FLAG_HIGH,
@@ -135,7 +135,8 @@ def _bias(plan: Plan) -> list[dict[str, float]]:
 
 
 def kernel_entry(plan: Plan, kernels: Kernels) -> dict[str, Any]:
-    """The target, and of every sum: its form, taps, bytes of tables, and bytes of state beside its ring."""
+    """The target, and of every sum: its form, taps, bytes of tables (and of those the plain form has), and
+    bytes of state beside its ring."""
     found = {}
     for name, table in named_sums(plan).items():
         ahead = kernels.ahead(plan, table)
@@ -143,7 +144,8 @@ def kernel_entry(plan: Plan, kernels: Kernels) -> dict[str, Any]:
             "form": "look-ahead" if ahead else "halves" if kernels.long(plan) else "plain",
             "taps": table.taps,
             "table_bytes": _sum_bytes(plan, table, kernels),
-            "state_bytes": ahead_words(table) * size_of(table.blocks[0].sum.ctype) if ahead else 0,
+            "plain_table_bytes": plain_bytes(plan, table),
+            "state_bytes": ahead.state_bytes(size_of(table.blocks[0].sum.ctype)) if ahead else 0,
         }
     return {"target": kernels.target, "sums": found}
 
@@ -162,15 +164,10 @@ def _table_bytes(plan: Plan, kernels: Kernels) -> int:
 
 
 def _sum_bytes(plan: Plan, table: Sum, kernels: Kernels) -> int:
-    ahead, word = kernels.ahead(plan, table), size_of(plan.error.ctype)
+    ahead = kernels.ahead(plan, table)
     if ahead is not None:
-        weights = sum(map(len, ahead.weights)) + (ahead.near.taps if ahead.near else 0)
-        return weights * word + 8 * len(ahead.runs) + len(ahead.slices)
-    return _plain_bytes(plan, table, word) + sum(bank.modes * _mode_bytes(bank) for bank in table.banks)
-
-
-def _plain_bytes(plan: Plan, table: Sum, word: int) -> int:
-    return table.taps * word + (0 if plan.floating else 6 * len(table.blocks))
+        return ahead.table_bytes(size_of(plan.error.ctype))
+    return plain_bytes(plan, table) + sum(bank.modes * _mode_bytes(bank) for bank in table.banks)
 
 
 def _mode_bytes(bank: Bank) -> int:

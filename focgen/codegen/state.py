@@ -41,20 +41,14 @@ def members(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[Member, ...]:
     ]
     grouped = [h for h in ("error", "filtered") if kernels.grouped(plan, h)]
     by_words = [*(f"{name}_ahead" for name in named_sums(plan)), *grouped] if grouped else []
-    return tuple(
-        sorted(found, key=lambda m: (bool(m.array), -_SIZES[m.ctype], bool(by_words) and m.name not in by_words))
-    )
+    late = {m.name for m in found if by_words and m.name not in by_words}
+    return tuple(sorted(found, key=lambda m: (bool(m.array), -_SIZES[m.ctype], m.name in late)))
 
 
 def _ahead(table: Sum, name: str) -> Member:
-    words = ahead_words(table)
+    words = 8 if table.total.floating else 12
     about = "sums that look ahead: of this group, of the next" + (", of a block" if words == 12 else "")
     return Member(table.blocks[0].sum.ctype, f"{name}_ahead", about, words, str(words))
-
-
-def ahead_words(table: Sum) -> int:
-    """How many sums a sum that looks ahead keeps in the state."""
-    return 8 if table.total.floating else 12
 
 
 def _histories(plan: Plan, kernels: Kernels) -> list[Member]:
@@ -161,6 +155,11 @@ def state_bytes(plan: Plan, kernels: Kernels = PORTABLE) -> int:
         total = -(-total // size) * size + size * member.count
         widest = max(widest, size)
     return -(-total // widest) * widest
+
+
+def plain_bytes(plan: Plan, table: Sum) -> int:
+    """Bytes of a sum's tables in the plain form."""
+    return table.taps * size_of(plan.error.ctype) + (0 if plan.floating else 6 * len(table.blocks))
 
 
 def size_of(ctype: str) -> int:

@@ -8,6 +8,7 @@ from focgen.codegen.banks import BankText, bank_texts, inputs
 from focgen.codegen.expressions import bound, shifted
 from focgen.codegen.literals import comment, exponent, quantity, rows, scale, wrapped
 from focgen.codegen.lookahead import LookAhead, Run
+from focgen.codegen.state import plain_bytes, size_of
 from focgen.plan.model import Block, Plan, Sum
 
 
@@ -118,7 +119,7 @@ def _ahead_text(plan: Plan, table: Sum, name: str, about: list[str], ahead: Look
     history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
     nearer = [_weights(plan, near.blocks, f"{name}_near", ["The lags nearer than those."])] if near else []
     return SumText(
-        [*_far_tables(plan, name, about, ahead), *nearer],
+        [*_far_tables(plan, table, name, about, ahead), *nearer],
         f"{name}_sum",
         table.total.ctype,
         _sum_about(table),
@@ -136,24 +137,35 @@ def _near(plan: Plan, near: Sum, weights: str, history: str) -> NearText:
         products = [
             f"{wide}w[{at + i}] * x[{near.last - block.last + i}]" for i in range(len(block.weights))
         ]
-        parts += products if plan.floating else [shifted(" + ".join(products), block.sum.ctype, block.align)]
+        parts += products if plan.floating else [_shifted_sum(products, block)]
         at += len(block.weights)
     call = f"foc_latest_{plan.arithmetic}(copy, {count}, {history})"
     return NearText(plan.error.ctype, count, call, weights, parts)
 
 
-def _far_tables(plan: Plan, name: str, about: list[str], ahead: LookAhead) -> list[TableText]:
+def _shifted_sum(products: list[str], block: Block) -> str:
+    """Their sum, three to a line below each other, as it stands behind "sum += "."""
+    begins = shifted("", block.sum.ctype, block.align).split(",")[0].rstrip(")")
+    beside = "\n" + " " * (len("    sum += ") + len(begins))
+    lines = [" + ".join(products[i : i + 3]) for i in range(0, len(products), 3)]
+    return shifted(f"{beside}+ ".join(lines), block.sum.ctype, block.align)
+
+
+def _far_tables(plan: Plan, table: Sum, name: str, about: list[str], ahead: LookAhead) -> list[TableText]:
     ctype = plan.error.ctype
     groups = [
         Group(_block_about(plan, block), rows(weights, ctype))
         for block, weights in zip(ahead.far, ahead.weights)
     ]
     count = sum(map(len, ahead.weights))
+    word, held = size_of(ctype), size_of(ahead.far[0].sum.ctype)
+    costs = f"{ahead.table_bytes(word)} bytes of tables and {ahead.state_bytes(held)} of state beside the ring"
     more = "Zeros fill up every block for the four sums that look ahead."
+    plain = f"This takes {costs}; the plain form {plain_bytes(plan, table)} and none."
     lines = [f"{_run_text(run):<28} /* step {_step(ahead, i)} */" for i, run in enumerate(ahead.runs)]
     slices = [", ".join(map(str, ahead.slices))]
     return [
-        TableText([*about, more], f"FOC_WORDS {ctype}", f"{name}_far", count, groups),
+        TableText([*about, more, plain], f"FOC_WORDS {ctype}", f"{name}_far", count, groups),
         TableText(
             ["What each step of a group of four does of it."],
             "foc_run",
