@@ -28,8 +28,7 @@ def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
         extra = {"pictures": False} | ({"only": effects} if effects else {})
         if (case / "controller.toml").exists():
             extra["controller"] = case / "controller.toml"
-        logs = sorted((case / "logs").iterdir())
-        focgen.diagnose(case / "rig.toml", logs, out=out, pictures=False, **extra)
+        focgen.diagnose(case / "rig.toml", sorted((case / "logs").iterdir()), out=out, **extra)
     except Exception as error:  # every failure is a miss, whatever it is
         fault = f"{type(error).__name__}: {error}"
     outcome = {
