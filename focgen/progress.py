@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterable, Iterator, Sized
 from typing import TypeVar
 
 Item = TypeVar("Item")
+
+_WIDTH = 24  # characters of the bar
 
 
 def say(line: str) -> None:
@@ -15,12 +18,21 @@ def say(line: str) -> None:
 
 
 def track(items: Iterable[Item], label: str, total: int | None = None) -> Iterator[Item]:
-    """Yield ``items`` while showing how far they are; silent where stderr is not a terminal."""
+    """Yield ``items`` while a bar shows how far they are; silent where stderr is not a terminal."""
     total = len(items) if total is None and isinstance(items, Sized) else total
-    shown = sys.stderr.isatty()
+    shown, begin = sys.stderr.isatty(), time.monotonic()
     for count, item in enumerate(items):
         if shown:
-            print(f"\r{label} {count}/{total or '?'}", end="", file=sys.stderr, flush=True)
+            print(f"\r\033[K{bar(label, count, total, time.monotonic() - begin)}", end="", file=sys.stderr, flush=True)
         yield item
     if shown:
         print("\r\033[K", end="", file=sys.stderr, flush=True)
+
+
+def bar(label: str, count: int, total: int | None, seconds: float) -> str:
+    """One line: how many of ``total`` are done after so many ``seconds``, and how long the rest will take."""
+    if not total:
+        return f"{label} {count}"
+    full = _WIDTH * count // total
+    left = f", {seconds / count * (total - count):.0f} s left" if count and seconds > 1.0 else ""
+    return f"{label} {'█' * full}{'░' * (_WIDTH - full)} {count}/{total}{left}"

@@ -11,6 +11,7 @@ from focgen.cli.main import commands, main, parser
 from focgen.cli.outcome import to_json
 from focgen.errors import InputError
 from focgen.output import new_folder, write_file, write_files
+from focgen.progress import bar
 
 
 @pytest.mark.parametrize("argv", [["nonsense"], [], ["design"], ["design", "missing.toml", "--out", "x.toml"]])
@@ -61,3 +62,10 @@ def test_an_unwritable_place_is_reported(tmp_path):
     for write in (lambda: write_files(tmp_path / "file", {"a": "b"}), lambda: write_file(tmp_path / "file" / "x", "b")):
         with pytest.raises(InputError, match="cannot be written"):
             write()
+
+
+def test_a_bar_shows_how_far_and_how_long():
+    assert bar("study", 0, 48, 0.0) == f"study {'░' * 24} 0/48"
+    assert bar("study", 12, 48, 10.0) == f"study {'█' * 6}{'░' * 18} 12/48, 30 s left"
+    assert bar("study", 48, 48, 10.0) == f"study {'█' * 24} 48/48, 0 s left"
+    assert bar("files", 3, None, 9.0) == "files 3"

@@ -23,8 +23,8 @@ from tests.conftest import paper_controller, paper_rig
 
 SMALL = dict(
     rig=paper_rig(),
-    lengths=(20, 80, 300),
-    tolerances=(0.1, 0.01),
+    lengths=(20, 80),
+    tolerances=(0.1,),
     arithmetics=("f64", "q15"),
     sample_times=(0.02,),
     setpoints=(0.004, 0.01),
@@ -151,11 +151,9 @@ def _files(folder):
         "0.01",
         "--tolerances",
         "0.1",
-        "0.01",
         "--lengths",
         "20",
         "80",
-        "300",
     ]
 
 
