@@ -14,6 +14,7 @@ from focgen.plan.scenario import Reset, Scenario, physical_trace, to_raw
 from tests.controllers import random_controller
 
 LANES = 3
+EXPONENTIAL = {"memory": "exponential", "tolerance": 1e-3, "horizon": 10_000}
 
 
 def signals(rng, controller, lanes, samples):
@@ -43,23 +44,24 @@ def rest_of(controller, rng):
     return start, tuple(Reset(lane, 0, high, high, start) for lane in range(LANES))
 
 
-def cases(arithmetic, count):
-    """Random controllers that can be planned."""
+def cases(arithmetic, count, **memory):
+    """Random controllers that can be planned with ``memory``."""
     seed = 100
     while count:
         seed += 1
         controller = random_controller(seed)
         try:
-            plan = build_plan(controller, arithmetic)
+            plan = build_plan(controller, arithmetic, **memory)
         except PlanError:
             continue
         count -= 1
         yield np.random.default_rng(seed), controller, plan
 
 
+@pytest.mark.parametrize("memory", [{}, EXPONENTIAL], ids=["short", "exponential"])
 @pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])
-def test_plan_stepper_is_the_bit_true_reference(arithmetic):
-    for rng, controller, plan in cases(arithmetic, 20):
+def test_plan_stepper_is_the_bit_true_reference(arithmetic, memory):
+    for rng, controller, plan in cases(arithmetic, 20, **memory):
         ref, meas, sched = signals(rng, controller, LANES, 150)
         start, resets = rest_of(controller, rng)
         scenario = Scenario(ref, meas, sched if controller.scheduled else None, resets)

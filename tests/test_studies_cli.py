@@ -9,12 +9,14 @@ import pytest
 import focgen
 from focgen.cli.main import main
 from focgen.control.controller import Source
-from focgen.control.files import write_controller
+from focgen.control.files import read_controller, write_controller
 from focgen.fractional.transfer import TransferFunction
 from focgen.loop.simulate import simulate
 from focgen.rig.files import write_rig
-from focgen.studies import write
-from focgen.studies.study import study_memory
+from focgen.studies import study, write
+from focgen.studies.jobs import Job, answer, read_row
+from focgen.studies.model import Setup, Variant
+from focgen.studies.spectrum import band_of
 from tests.conftest import paper_controller, paper_rig
 
 OPTIONS = [
@@ -78,9 +80,13 @@ def test_every_variant_has_its_row(found):
         (a, n) for a in ("f64", "q31") for n in (20, 200, 2000)
     }
     assert {r["arithmetic"] for r in found["rows"] if r["sample_time"] == 0.02} == {"q31"}
-    assert {r["tolerance"] for r in found["rows"] if r["memory"] == "exponential"} == {0.1, 0.001}
-    for row in short:
-        assert row["error"] <= row["bound"] and row["multiplies"] == row["length"] + 1
+    exponential = [r for r in found["rows"] if r["memory"] == "exponential"]
+    assert {r["tolerance"] for r in exponential} == {0.1, 0.001} and all(
+        r["dc_bias"] == 0.0 for r in exponential
+    )
+    for row in found["rows"]:
+        taps = 2 * row["states"] + 2 if row["states"] else row["length"] + 1
+        assert row["error"] <= row["bound"] and row["multiplies"] == taps
         assert row["settling_s"] > 0.0 and row["margin_deg"] > 0.0 and row["flash_bytes"] > row["table_bytes"]
     errors = [r["error"] for r in sorted(short, key=lambda r: r["length"]) if r["arithmetic"] == "f64"]
     assert errors == sorted(errors, reverse=True)
@@ -112,11 +118,15 @@ def test_it_says_what_its_json_says(folder, found, capsys, plainly):
     assert json.loads(capsys.readouterr().out) == found
     assert main(argv) == 0
     said = capsys.readouterr().out
-    assert found["recommendation"] in said and "keeps the phase within 2°" in said
+    assert (
+        found["recommendation"] in said
+        and "keeps the phase within 2°" in said
+        and "the exponential form does it in" in said
+    )
 
 
 def test_the_result_is_dataclasses(folder, found, plainly):
-    study = focgen.study(
+    result = focgen.study(
         "memory",
         folder / "controller.toml",
         folder / "out",
@@ -127,8 +137,8 @@ def test_the_result_is_dataclasses(folder, found, plainly):
         setpoints=(0.004, 0.01),
         jobs=1,
     )
-    assert [row.error for row in study.rows] == [row["error"] for row in found["rows"]]
-    assert {cost: list(front) for cost, front in study.pareto.items()} == found["pareto"]
+    assert [row.error for row in result.rows] == [row["error"] for row in found["rows"]]
+    assert {cost: list(front) for cost, front in result.pareto.items()} == found["pareto"]
 
 
 FEW = dict(lengths=(20,), memories=("short",), arithmetics=("f64",), sample_times=(0.05,), jobs=1)
@@ -151,15 +161,21 @@ def _unnamed(folder):
     "fault, said",
     [(_lost, "is not beside it"), (_changed, "has changed since"), (_unnamed, "no rig is named")],
 )
-def test_without_its_rig_the_open_loop_still_comes(tmp_path, fault, said, monkeypatch):
-    if fault is not _lost:
-        monkeypatch.setattr(write, "_shown", lambda study: {})
+def test_a_rig_that_is_not_the_one_is_not_taken(tmp_path, fault, said):
     _made(tmp_path)
+    path = tmp_path / "controller.toml"
+    assert study._rig(None, read_controller(path), path) == (paper_rig(), [])
     fault(tmp_path)
-    study = study_memory(tmp_path / "controller.toml", tmp_path / "out", **FEW)
-    assert study.rows[0].error > 0.0 and study.rows[0].settling_s is None and study.rig is None
-    assert said in study.notes[0] and "--rig" in study.notes[0]
-    assert not (tmp_path / "out" / "loops.png").exists()
+    rig, notes = study._rig(None, read_controller(path), path)
+    assert rig is None and said in notes[0] and "--rig" in notes[0]
+
+
+def test_without_its_rig_the_open_loop_still_comes(tmp_path):
+    _made(tmp_path)
+    _lost(tmp_path)
+    found = study.study_memory(tmp_path / "controller.toml", tmp_path / "out", **FEW)
+    assert found.rows[0].error > 0.0 and found.rows[0].settling_s is None and found.rig is None
+    assert "--rig" in found.notes[0] and not (tmp_path / "out" / "loops.png").exists()
 
 
 def test_faults_are_one_line(tmp_path, capsys):
@@ -179,12 +195,14 @@ def test_faults_are_one_line(tmp_path, capsys):
         assert not (tmp_path / "out").exists()
 
 
-def test_a_length_that_is_unstable_in_the_denominator_is_a_note(tmp_path, plainly):
-    """T s^1.6 + s^0.2 + 1 cut off early: said in its row, and the others come."""
-    den = [(1.0, 1.6), (1.0, 0.0)]
-    lag = paper_controller(transfer=TransferFunction([(1.0, 0.0)], den), integrator=False)
+def test_a_length_that_is_unstable_in_the_denominator_is_a_note():
+    """1/(s^1.6 + 1) cut off early is said in its row; the others come."""
+    lag = paper_controller(
+        transfer=TransferFunction([(1.0, 0.0)], [(1.0, 1.6), (1.0, 0.0)]), integrator=False
+    )
     lag = replace(lag, gain=1.0, ranges=replace(lag.ranges, output=(-1.0, 1.0), schedule=None))
-    study = study_memory(lag, tmp_path / "out", **{**FEW, "lengths": (2, 400), "sample_times": (0.01,)})
-    by_length = {row.length: row for row in study.rows}
-    assert "unstable" in by_length[2].note and by_length[2].error is None
-    assert by_length[400].error > 0.0 and any("1 row" in note for note in study.notes)
+    setup = Setup(lag, None, band_of(lag, None, ()), 500, ())
+    short, longer = (
+        read_row(answer(Job("row", setup, Variant("short", "f64", 0.01, length=n))))[0] for n in (2, 400)
+    )
+    assert "unstable" in short.note and short.error is None and longer.error > 0.0

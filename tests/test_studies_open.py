@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from focgen.fractional.exponential import fit_exponential
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.studies.costs import multiplies
@@ -78,8 +79,9 @@ def test_the_bias_is_what_a_constant_leaves_after_hours():
     assert found.dc_bias == pytest.approx(constant, rel=1e-9)
 
 
+@pytest.mark.parametrize("memory", ["short", "exponential"])
 @pytest.mark.parametrize("seed", range(12))
-def test_no_error_exceeds_its_bound(seed):
+def test_no_error_exceeds_its_bound(seed, memory):
     random = np.random.default_rng(seed)
     order, length = float(random.uniform(0.05, 1.6)), int(random.integers(2, 300))
     arithmetic = ("f64", "f32", "q31", "q15")[seed % 4]
@@ -87,7 +89,13 @@ def test_no_error_exceeds_its_bound(seed):
     controller = paper_controller(transfer=TransferFunction(num), integrator=bool(seed % 3))
     if not controller.integrator:
         controller = replace(controller, ranges=replace(controller.ranges, output=(-2000.0, 2000.0)))
-    found = row(Variant("short", arithmetic, 0.01, length=length), controller, 800)
+    variant = Variant("short", arithmetic, 0.01, length=length)
+    if memory == "exponential":
+        tolerance = float(10.0 ** random.uniform(-6.0, -1.0))
+        variant = Variant(
+            memory, arithmetic, 0.01, tolerance=tolerance, horizon=int(random.integers(100, 10_000))
+        )
+    found = row(variant, controller, 800)
     assert found.note is None or "compiled" in found.note
     assert 0.0 < found.error <= found.bound
 
@@ -103,8 +111,8 @@ def test_arithmetic_adds_what_it_rounds():
 
 
 def test_an_exponential_memory_of_six_states_beats_a_thousand_taps():
-    short = row(Variant("short", "f64", 0.01, length=1000), samples=10_000)
-    exponential = row(Variant("exponential", "f64", 0.01, tolerance=0.1, horizon=10_000), samples=10_000)
+    short = row(Variant("short", "q31", 0.01, length=1000), samples=10_000)
+    exponential = row(Variant("exponential", "q31", 0.01, tolerance=0.1, horizon=10_000), samples=10_000)
     assert exponential.error < 0.1 * short.error and exponential.multiplies < 0.02 * short.multiplies
     assert exponential.dc_bias == pytest.approx(0.0, abs=1e-9) and exponential.error <= exponential.bound
 
@@ -152,9 +160,24 @@ def test_what_an_arithmetic_cannot_do_is_said_not_guessed():
     assert found.error is None and "output range is too small" in found.note
 
 
-def test_multiplies_are_the_taps():
+def test_multiplies_are_one_a_tap_and_two_an_exponential():
     for length in (5, 400):
         assert multiplies(build_plan(paper_controller(length))) == length + 1
+    found = row(Variant("exponential", "q31", 0.01, tolerance=1e-3, horizon=10_000), samples=100)
+    assert found.multiplies == 2 * found.states + 2 and found.dc_bias == found.operator_bias == 0.0
+
+
+@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])
+def test_the_error_of_an_exponential_memory_is_that_of_its_operator(arithmetic):
+    """The plan's error, less the rounding of the arithmetic, is the exponentials' by themselves."""
+    found = row(Variant("exponential", arithmetic, 0.01, tolerance=0.03, horizon=10_000))
+    memory = fit_exponential(0.6, 10_000, 0.03)
+    x = inputs(paper_controller(), 0.01, SAMPLES).error
+    exact = np.array([np.convolve(weights(0.6, SAMPLES - 1), each)[:SAMPLES] for each in x])
+    made = np.array([memory.run(each) for each in x])
+    expected = (np.abs(made - exact).max(axis=1) / np.abs(exact).max(axis=1)).max()
+    assert found.states == memory.states
+    assert found.error == pytest.approx(expected, rel=0.2 if arithmetic == "q15" else 1e-3)
 
 
 def test_the_signal_ahead_of_the_integrator_is_hurt_less_than_its_power():

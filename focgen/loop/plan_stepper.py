@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from focgen.plan.execute import scheduled_gain
+from focgen.plan.execute import Modes, Past, scheduled_gain
 from focgen.plan.model import Format, Plan, Sum
 from focgen.plan.scenario import nearest_raw
 
@@ -92,20 +92,31 @@ class _Window:
             return
         self.weights = np.array(table.weights[::-1], dtype=kind)[:, None]
         self.samples = np.zeros((table.last - table.first + 1, columns), kind)
+        self.memory = [Modes(bank, kind, columns) for bank in table.banks]
+        self.latest = Past(columns, kind)
         self.blocks = [(table.last - b.last, table.last - b.first + 1, b.align) for b in table.blocks]
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """Take in x_k and return the sum, x_k in it."""
+        remembered = self._remembered()
         self.push(x)
-        return self.past()
+        return sum(remembered, self._of_taps())
 
     def push(self, x: np.ndarray) -> None:
         """Take in x_k."""
         if self.table is not None:
             self.samples = np.concatenate([self.samples[1:], x[None]])
+            self.latest.push(x)
 
     def past(self) -> np.ndarray:
-        """Return the sum over what has been taken in."""
+        """Return the sum over what has been taken in; once a sample."""
+        return sum(self._remembered(), self._of_taps())
+
+    def _remembered(self) -> list[np.ndarray]:
+        """What each bank adds; its modes take in what is past."""
+        return [] if self.table is None else [modes.step(self.latest) for modes in self.memory]
+
+    def _of_taps(self) -> np.ndarray:
         if self.table is None:
             return np.zeros(self.columns, self.kind)
         products = self.weights * self.samples

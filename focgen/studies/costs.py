@@ -47,9 +47,8 @@ def costs(plan: Plan, target: str | None) -> Costs:
 
 
 def multiplies(plan: Plan) -> int:
-    """Multiplications of the memory operator in one step: gain and schedule are not among them."""
-    sums = [plan.direct, plan.inner and plan.inner.rest, plan.feedback and plan.feedback.table]
-    return sum(s.taps for s in sums if s is not None)
+    """Multiplications of the memory in one step: a tap one, a mode two; gain and schedule not counted."""
+    return sum(s.taps + 2 * s.modes for s in plan.sums)
 
 
 def _compiled(plan: Plan, target: str | None) -> tuple[int | None, str | None, float | None]:

@@ -22,7 +22,6 @@ from focgen.studies.model import Curves, Ideal, Loop, PlantRow, Row, Setup, Vari
 from focgen.studies.operator import fractional_terms, measure, variant_of
 from focgen.studies.plant import plant_of, plant_row
 from focgen.studies.spectrum import Spectrum, memory_spectrum, sampling_spectrum
-from focgen.studies.unplanned import unplanned_row
 
 _FORMAT = 1  # of a stored answer
 
@@ -65,9 +64,6 @@ def _row(setup: Setup, variant: Variant) -> dict[str, Any]:
         plan = build_plan(controller)
         row, curves = _measured(setup, variant, plan)
     except PlanError as reason:
-        if variant.memory == "exponential" and variant.arithmetic == "f64":
-            row, curves = unplanned_row(setup, variant, controller, "the operator alone: no plan carries it")
-            return {"row": asdict(row), "curves": asdict(curves)}
         row, curves = Row(**asdict(variant), note=str(reason)), Curves()
     return {"row": asdict(row), "curves": asdict(curves)}
 
@@ -82,6 +78,7 @@ def _measured(setup: Setup, variant: Variant, plan: Plan) -> tuple[Row, Curves]:
         steps = running_loop(base, setup.rig, setup.setpoints, plan)
     row = Row(
         **asdict(variant),
+        states=plan.states or None,
         error=opened.error,
         errors=opened.errors,
         bound=opened.bound,
@@ -111,6 +108,8 @@ def _dc_bias(plan: Plan) -> float | None:
 def _operator_bias(plan: Plan) -> float:
     """Γ(L+1−α)/(Γ(1−α) L!), the largest."""
     controller = plan.controller
+    if plan.exponential:
+        return 0.0
     rows = memory_bias(controller, plan.length)
     powers = {t.order for t in fractional_terms(controller)}
     return max((abs(b / (c * controller.sample_time**-o)) for c, o, b in rows if o in powers), default=0.0)

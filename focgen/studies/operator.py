@@ -45,13 +45,13 @@ def fractional_terms(controller: Controller) -> tuple[Term, ...]:
 
 def variant_of(controller: Controller, variant: Variant) -> Controller:
     """The controller as ``variant`` has it."""
-    length = variant.length or controller.length
+    given = {key: getattr(variant, key) for key in ("length", "tolerance", "horizon")}
     return replace(
         controller,
         sample_time=variant.sample_time,
         memory=variant.memory,
-        length=length,
         arithmetic=variant.arithmetic,
+        **{key: value for key, value in given.items() if value is not None},
     )
 
 
@@ -92,9 +92,26 @@ def _power(controller: Controller, term: Term, given: Inputs) -> tuple[dict[str,
     plan = build_plan(alone)
     exact = alone.gain * term.coefficient * exact_power(term.order, alone.sample_time, given.error)
     scenario = replace(given.scenario, sched=None)
-    errors = relative_errors(_ahead(plan, scenario), exact)
-    proved = plan.error_bound
-    if proved.truncation is None:
-        return errors, None
-    smallest = float(np.abs(exact).max(axis=1).min())
-    return errors, (proved.operator + proved.truncation) / smallest
+    return relative_errors(_ahead(plan, scenario), exact), _proved(plan, np.abs(exact))
+
+
+def _proved(plan: Plan, sizes: np.ndarray) -> float | None:
+    """The largest relative error that plan and certificate allow for the inputs whose exact outputs are
+    ``sizes``; None where nothing is proved.
+
+    An exponential memory's certificate knows more of step and ramp: they only rise, so that behind one
+    difference their relative error is at most that of the weights.
+    """
+    proved, samples = plan.error_bound, sizes.shape[1]
+    left_out = proved.truncation
+    if plan.exponential and samples <= plan.horizon:
+        left_out = proved.within_horizon
+    if left_out is None:
+        return None
+    found = {}
+    for name, largest in zip(INPUTS, sizes.max(axis=1)):
+        memory = left_out / largest
+        if name in ("step", "ramp"):
+            memory = min([memory, *(m.certificate.kernel for m in plan.memories if m.differences == 1)])
+        found[name] = memory + proved.operator / largest
+    return float(max(found.values()))
