@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from focgen.plan.execute import Modes, Past, scheduled_gain
+from focgen.plan.execute import BankRun, Latest, scheduled_gain
 from focgen.plan.model import Format, Plan, Sum
 from focgen.plan.scenario import nearest_raw
 
@@ -92,8 +92,8 @@ class _Window:
             return
         self.weights = np.array(table.weights[::-1], dtype=kind)[:, None]
         self.samples = np.zeros((table.last - table.first + 1, columns), kind)
-        self.memory = [Modes(bank, kind, columns) for bank in table.banks]
-        self.latest = Past(columns, kind)
+        self.memory = [BankRun(bank, kind, columns) for bank in table.banks]
+        self.latest = Latest(columns, kind)
         self.blocks = [(table.last - b.last, table.last - b.first + 1, b.align) for b in table.blocks]
 
     def __call__(self, x: np.ndarray) -> np.ndarray:

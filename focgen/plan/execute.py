@@ -129,8 +129,8 @@ class _Run:
     def _remembered(self, table: Sum) -> tuple[np.ndarray, dict]:
         """Taps, and modes sample by sample; at rest modes add nothing."""
         total, rest = self._by_taps(table)
-        memory = [_Modes(bank, self.kind, self.shape[0]) for bank in table.banks]
-        past = _Past(self.shape[0], self.kind)
+        memory = [BankRun(bank, self.kind, self.shape[0]) for bank in table.banks]
+        past = Latest(self.shape[0], self.kind)
         for k in range(self.shape[1]):
             for lane in self.starting.get(k, ()):
                 past.settle(lane, self.starts[lane, k].constant)
@@ -214,8 +214,8 @@ class _Run:
         past = np.zeros((lanes, lags + samples), self.kind)
         carry, out = np.zeros(lanes, self.kind), np.empty(self.shape, self.kind)
         table = _Recursion(plan.feedback.table, self.kind)
-        memory = [_Modes(bank, self.kind, lanes) for bank in plan.feedback.table.banks]
-        latest = _Past(lanes, self.kind)
+        memory = [BankRun(bank, self.kind, lanes) for bank in plan.feedback.table.banks]
+        latest = Latest(lanes, self.kind)
         for k in range(samples):
             for lane in self.starting.get(k, ()):
                 past[lane, k : k + lags] = self.v_rest[lane, k]
@@ -310,7 +310,7 @@ class _Recursion:
         return sum(_shift(products[:, a:b].sum(axis=1), align) for a, b, align in self.blocks)
 
 
-class _Past:
+class Latest:
     """The two latest values of a history, shape (lanes,)."""
 
     def __init__(self, lanes: int, kind: type):
@@ -323,7 +323,7 @@ class _Past:
         self.before, self.last = self.last, values.copy()
 
 
-class _Modes:
+class BankRun:
     """One bank, sample by sample; ``mean`` L and ``rest`` r have the shape (lanes, modes)."""
 
     def __init__(self, bank: Bank, kind: type, lanes: int):
@@ -338,7 +338,7 @@ class _Modes:
         self.mean[lane] = still if self.kind is not np.int64 else still << self.bank.up
         self.rest[lane] = 0
 
-    def step(self, past: _Past) -> np.ndarray:
+    def step(self, past: Latest) -> np.ndarray:
         """M of this sample, in counts of the total; then the means take in what is past."""
         u = past.last if self.bank.differences == 1 else past.last - past.before
         return self._whole(u[:, None]) if self.kind is np.int64 else self._floating(u[:, None])
