@@ -95,7 +95,9 @@ def _short(value: float) -> str:
 
 
 def _percent(value: float) -> str:
-    return f"{100 * value:+.2g} %" if abs(value) >= 1e-7 else "0"
+    if abs(value) < 1e-7:
+        return "0"
+    return f"{100 * value:+.0f} %" if abs(value) >= 0.1 else f"{100 * value:+.2g} %"
 
 
 def ideal_table(study: Study) -> TableOf:
