@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
+import focgen
 from focgen.fractional.exponential import fit_exponential
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
@@ -165,6 +166,21 @@ def test_multiplies_are_one_a_tap_and_two_an_exponential():
         assert multiplies(build_plan(paper_controller(length))) == length + 1
     found = row(Variant("exponential", "q31", 0.01, tolerance=1e-3, horizon=10_000), samples=100)
     assert found.multiplies == 2 * found.states + 2 and found.dc_bias == found.operator_bias == 0.0
+
+
+@pytest.mark.parametrize("memory", ["short", "exponential"])
+def test_cycles_and_bytes_are_those_that_cost_counts(tmp_path, memory):
+    pytest.importorskip("unicorn")
+    variant = Variant(memory, "q31", 0.01, length=40)
+    if memory == "exponential":
+        variant = Variant(memory, "q31", 0.01, tolerance=0.01, horizon=10_000)
+    found = read_row(answer(Job("row", replace(setup(samples=100), target="cortex-m4"), variant)))[0]
+    focgen.generate(variant_of(paper_controller(), variant), tmp_path, target="cortex-m4")
+    counted = focgen.cost(tmp_path, "cortex-m4").controllers[0].targets["cortex-m4"]
+    assert found.cycles == counted.cycles_per_step.mean > 100.0
+    assert found.instructions == counted.instructions_per_step.mean
+    assert (found.flash_bytes, found.ram_bytes) == (counted.flash_bytes, counted.ram_bytes)
+    assert found.stack_bytes == counted.stack_bytes and found.compiled_for.startswith("cortex-m4, ")
 
 
 @pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])

@@ -1,4 +1,4 @@
-"""The sweep: on several processes, on a Dask cluster, interrupted, and gone on with, it finds the same."""
+"""The sweep: by one process, by two, on a Dask cluster, interrupted and gone on with, it finds the same."""
 
 import os
 import shutil
@@ -34,9 +34,9 @@ CONTROLLER = paper_controller(sample_time=0.02, length=80, arithmetic="q15")
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    """The folder of the small study, done by one process."""
+    """The folder of the small study, done by two processes."""
     folder = tmp_path_factory.mktemp("alone")
-    focgen.study("memory", CONTROLLER, folder, jobs=1, **SMALL)
+    focgen.study("memory", CONTROLLER, folder, jobs=2, **SMALL)
     return folder
 
 
@@ -59,11 +59,6 @@ def counted(monkeypatch):
 def plainly(monkeypatch):
     """Pictures take longer than the rest, and have tests of their own."""
     monkeypatch.setattr(write, "_shown", lambda study: {})
-
-
-def test_two_processes_find_the_same(alone, tmp_path):
-    focgen.study("memory", CONTROLLER, tmp_path, jobs=2, **SMALL)
-    assert (tmp_path / "study.json").read_text() == alone
 
 
 def test_a_dask_cluster_finds_the_same(alone, tmp_path):
@@ -115,14 +110,6 @@ def test_what_has_changed_is_done_again():
     jobs += [Job("ideal", setup, variant), Job("row", setup, replace(variant, length=81))]
     assert len({job.key for job in jobs}) == len(jobs)
     assert Job("row", setup, variant).key == jobs[0].key
-
-
-def test_a_changed_controller_does_not_find_the_old_rows(done, tmp_path, counted):
-    shutil.copytree(done, tmp_path / "out")
-    few = {**SMALL, "lengths": (20,), "memories": ("short",), "arithmetics": ("f64",)}
-    other = replace(CONTROLLER, ranges=replace(CONTROLLER.ranges, output=(0.0, 9.0)))
-    focgen.study("memory", other, tmp_path / "out", jobs=1, **few)
-    assert {job.kind for job in counted} == {"row", "ideal", "plant"}
 
 
 def _files(folder):
@@ -195,6 +182,7 @@ def test_an_interrupted_and_a_killed_study_go_on(alone, tmp_path):
         found = {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/rows/[!.]*.json")}
         assert len(found) >= len(rows) + 2 and rows.items() <= found.items()
         rows = found
+    # the rest by one process: it finds what two have found
     focgen.study("memory", tmp_path / "controller.toml", tmp_path / "out", jobs=1, **SMALL)
     assert all(p.stat().st_mtime_ns == when for p, when in rows.items())
     assert (tmp_path / "out" / "study.json").read_text() == alone

@@ -12,7 +12,12 @@ from focgen.studies.model import Curves, Row, Study
 _COLOURS = {"f64": BLUE, "f32": GREEN, "q31": ORANGE, "q15": RED}
 _MOST_LINES = 5
 _LEAST = 1e-5  # % of the step: where the distance from the ideal is cut off
-_SHARES = {"multiplies": "multiplications a step", "cycles": "cycles a step", "ram_bytes": "state (bytes)"}
+_SHARES = {
+    "multiplies": "multiplications a step",
+    "cycles": "cycles a step",
+    "instructions": "instructions a step",
+    "ram_bytes": "state (bytes)",
+}
 
 
 def study_pictures(study: Study) -> dict[str, bytes]:
@@ -69,7 +74,7 @@ def _against(axis, rows: Sequence[Row], place: str, colour: str, label: str) -> 
 
 def fronts(study: Study) -> bytes:
     """Error against cycles (multiplications where no target is named) and against bytes of state."""
-    first = "cycles" if study.pareto.get("cycles") else "multiplies"
+    first = next((name for name in ("cycles", "instructions") if study.pareto[name]), "multiplies")
     with figure(1, 2, size=(7.6, 3.9), sharey=True) as (fig, axes):
         for axis, cost in zip(axes, (first, "ram_bytes")):
             _front(axis, study, cost)

@@ -21,6 +21,8 @@ _HEADS = (
     "multiplies",
     "state B",
     "flash B",
+    "stack B",
+    "instructions",
     "cycles",
 )
 
@@ -74,6 +76,8 @@ def _line(row: Row) -> tuple[str, ...]:
         shown(row.multiplies, str),
         shown(row.ram_bytes, str),
         shown(row.flash_bytes, str),
+        shown(row.stack_bytes, str),
+        shown(row.instructions, "{:.0f}".format),
         shown(row.cycles, "{:.0f}".format),
     )
 

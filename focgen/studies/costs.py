@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import platform
-import shutil
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from focgen.codegen.generate import folder_files
+from focgen.codegen.kernels import Kernels
 from focgen.codegen.manifest import sizes
 from focgen.compiler import find_compiler
 from focgen.control.files import controller_text
-from focgen.errors import FocgenError
+from focgen.errors import BuildError, FocgenError
+from focgen.output import write_files
 from focgen.plan.model import Plan
+from focgen.targets.cost import object_sizes
+from focgen.verification.costs import cost
 
 _FLAGS = ("-std=c99", "-Os", "-ffunction-sections", "-fdata-sections")
 
@@ -26,24 +29,29 @@ class Costs:
     multiplies: int
     ram_bytes: int
     table_bytes: int
-    flash_bytes: int | None
-    compiled_for: str | None
-    cycles: float | None
-    note: str | None
+    flash_bytes: int | None = None
+    stack_bytes: int | None = None
+    compiled_for: str | None = None
+    instructions: float | None = None
+    cycles: float | None = None
+    note: str | None = None
 
 
 def costs(plan: Plan, target: str | None) -> Costs:
-    """Count what ``plan`` costs; flash and cycles by compiling its C, for ``target`` or for this machine."""
-    size = sizes(plan)
+    """Count what ``plan`` costs: its C is compiled and run for ``target`` with that core's own kernels, or
+    only compiled for this machine.
+    """
+    kernels = Kernels(target)
+    size = sizes(plan, kernels)
+    counted = multiplies(plan), size["state_bytes"], size["table_bytes"]
     try:
-        flash, compiled_for, cycles = _compiled(plan, target)
-        note = None
+        files = folder_files(plan, controller_text(plan.controller).encode("utf-8"), kernels=kernels)
+        with tempfile.TemporaryDirectory(prefix="focgen-study-") as folder:
+            write_files(folder, files)
+            compiled = _on_host(Path(folder), plan.name) if target is None else _on_target(folder, target)
+        return replace(Costs(*counted), **compiled)
     except FocgenError as reason:
-        flash = compiled_for = cycles = None
-        note = f"not compiled: {reason}"
-    return Costs(
-        multiplies(plan), size["state_bytes"], size["table_bytes"], flash, compiled_for, cycles, note
-    )
+        return Costs(*counted, note=f"not compiled: {reason}")
 
 
 def multiplies(plan: Plan) -> int:
@@ -51,29 +59,26 @@ def multiplies(plan: Plan) -> int:
     return sum(s.taps + 2 * s.modes for s in plan.sums)
 
 
-def _compiled(plan: Plan, target: str | None) -> tuple[int | None, str | None, float | None]:
-    files = folder_files(plan, controller_text(plan.controller).encode("utf-8"))
-    with tempfile.TemporaryDirectory(prefix="focgen-study-") as scratch:
-        folder = Path(scratch)
-        for name, content in files.items():
-            place = folder / name
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
-        return _on_host(folder, plan.name)
+def _on_target(folder: str, target: str) -> dict:
+    found = cost(folder, target).controllers[0].targets[target]
+    if found.skipped is not None:
+        return {"note": f"no cycles on {target}: {found.skipped}"}
+    cycles = found.cycles_per_step
+    return {
+        "ram_bytes": found.ram_bytes,
+        "flash_bytes": found.flash_bytes,
+        "stack_bytes": found.stack_bytes,
+        "compiled_for": f"{target}, {found.compiler}",
+        "instructions": found.instructions_per_step.mean,
+        "cycles": None if cycles is None else cycles.mean,
+    }
 
 
-def _on_host(folder: Path, name: str) -> tuple[int | None, str | None, float | None]:
-    """Code and constants of the compiled C, as ``size`` counts them."""
-    if shutil.which("size") is None:
-        raise FocgenError("flash", "the tool `size` is not installed", "install binutils")
-    made = folder / f"{name}.o"
-    done = subprocess.run(
-        [*find_compiler(), *_FLAGS, "-c", str(folder / f"{name}.c"), "-o", str(made)],
-        capture_output=True,
-        text=True,
-    )
-    if done.returncode:
-        raise FocgenError("flash", "the C does not compile here", "look at the compiler named by CC")
-    counted = subprocess.run(["size", str(made)], capture_output=True, text=True, check=True).stdout
-    text, data = counted.splitlines()[1].split()[:2]
-    return int(text) + int(data), f"{platform.machine()}, -Os", None
+def _on_host(folder: Path, name: str) -> dict:
+    """Code, constants and data of the compiled C."""
+    made, source = folder / f"{name}.o", folder / f"{name}.c"
+    command = [*find_compiler(), *_FLAGS, "-c", str(source), "-o", str(made)]
+    if subprocess.run(command, capture_output=True).returncode:
+        raise BuildError("flash", "the C does not compile here", "set CC to another compiler")
+    found, _ = object_sizes(made.read_bytes())
+    return {"flash_bytes": sum(found.values()), "compiled_for": f"{platform.machine()}, -Os"}

@@ -98,8 +98,8 @@ class Row:
     sample time; ``phase_from_rad_s``: from this frequency to the band's end the phase stays within 2°.
     ``settling_s`` … ``stable``: see :class:`Loop`.
     ``states``: exponentials in all. ``multiplies``: multiplications of the operator in one step.
-    ``ram_bytes``: the state; ``table_bytes``: constant tables; ``flash_bytes``: code and tables,
-    compiled for ``compiled_for``; ``cycles``: one step on the target.
+    ``ram_bytes``: the state; ``table_bytes``: constant tables; ``flash_bytes``: code and tables, compiled
+    for ``compiled_for``; on a target also ``stack_bytes``, and ``instructions`` and ``cycles`` of a step.
     """
 
     memory: str
@@ -130,6 +130,8 @@ class Row:
     table_bytes: int | None = None
     flash_bytes: int | None = None
     compiled_for: str | None = None
+    stack_bytes: int | None = None
+    instructions: float | None = None
     cycles: float | None = None
     note: str | None = None
 

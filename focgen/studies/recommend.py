@@ -10,7 +10,7 @@ from focgen.studies.model import Band, Ideal, Row
 from focgen.studies.spectrum import PHASE
 
 SETTLING = 0.03  # of the ideal's
-COSTS = ("multiplies", "ram_bytes", "flash_bytes", "cycles")
+COSTS = ("multiplies", "ram_bytes", "flash_bytes", "instructions", "cycles")
 _ROUNDS = 7
 
 

@@ -24,6 +24,7 @@ from focgen.studies.spectrum import band_of
 from focgen.studies.store import Store
 from focgen.studies.sweep import Workers, sweep
 from focgen.studies.write import write
+from focgen.verification.costs import TARGETS
 
 SUBJECTS = ("memory",)
 SAMPLES = 10_000  # of the open-loop inputs
@@ -74,6 +75,8 @@ def study_memory(
             "has no fractional power of s, so no memory",
             "study a controller of fractional order",
         )
+    if target is not None and target not in TARGETS:
+        raise InputError("--target", f"is {target!r}", f"choose one of {', '.join(TARGETS)}")
     grid = grid_of(which, memories, lengths, tolerances, horizon, arithmetics, sample_times)
     model, notes = _rig(rig, which, controller)
     points = _setpoints(which, model, setpoints)
