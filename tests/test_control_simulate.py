@@ -15,6 +15,7 @@ from focgen.errors import ControllerError, DesignError, FocgenError, PlanError
 from focgen.fractional.transfer import TransferFunction
 from focgen.loop.simulate import simulate
 from focgen.report.control import simulation_pictures
+from focgen.report.control_summary import simulation_text
 from focgen.rig.files import write_rig
 from focgen.rig.model import UNITY, Actuator, Ranges
 from tests.conftest import paper_controller, paper_rig
@@ -42,6 +43,17 @@ def test_the_integrator_leaves_no_steady_error(steps):
     longer = simulate(paper_rig(), paper_controller(), POINTS, duration=4.0 * steps.duration)
     for late, early in zip(longer.setpoints, steps.setpoints):
         assert abs(late.steady_error) < 0.5 * abs(early.steady_error)
+
+
+def test_an_exponential_memory_runs_like_an_infinite_one(steps):
+    """In every arithmetic the loop is the ideal one's, which no exponentials are in."""
+    for arithmetic in ("f64", "f32", "q31", "q15"):
+        controller = paper_controller(memory="exponential", tolerance=1e-3, arithmetic=arithmetic)
+        found = simulate(paper_rig(), controller, POINTS)
+        step = found.ideal.output[-1]
+        near = 5e-3 if arithmetic == "q15" else 5e-4
+        assert np.abs(found.running.output - found.ideal.output).max() < near * step.max()
+        assert found.states == 13 and "13 exponentials" in simulation_text(found)
 
 
 def test_the_frozen_loop_stands_beside_it(steps):

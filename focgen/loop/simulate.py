@@ -65,6 +65,7 @@ class Simulation:
     ``running`` and ``ideal``: one column a set point, or one column in all where they are
     ``consecutive``; each set point lasts ``duration`` s. ``frozen`` (n, set points), None where unstable.
     ``nominal``: as ``running``, without the rig's ``effects``; None where it has none. ``holds``: all settle.
+    ``states``: how many exponentials the memory has, 0 where it is short and ``length`` counts.
     """
 
     rig: Rig
@@ -82,6 +83,12 @@ class Simulation:
     effects: tuple[str, ...]
     holds: bool
     notes: tuple[str, ...]
+    states: int = 0
+
+    @property
+    def remembers(self) -> str:
+        """What the controller's memory is, for people."""
+        return f"{self.states} exponentials" if self.states else f"memory {self.length}"
 
 
 def simulate(
@@ -240,6 +247,7 @@ class _Trial:
             tuple(str(effect["name"]) for effect in self.rig.effects),
             all(r.verdict == "settles" for r in results),
             notes,
+            self.plan.states,
         )
 
     def _planned(self, columns: int) -> PlanStepper:

@@ -25,7 +25,7 @@ def simulation_pictures(simulation: Simulation) -> dict[str, bytes]:
         bottom.set_ylabel(_label("command", units.output))
         bottom.set_xlabel("time (s)")
         effects = f"\nwith {', '.join(simulation.effects)}" if simulation.effects else ""
-        what = f"({simulation.arithmetic}, memory {simulation.length})"
+        what = f"({simulation.arithmetic}, {simulation.remembers})"
         top.set_title(f"Closed loop as it will run {what}{effects}")
         low, high = simulation.controller.ranges.output
         for limit in (low, high):

@@ -202,7 +202,9 @@ def simulation_payload(simulation: Simulation) -> dict:
         "consecutive": simulation.consecutive,
         "duration_s": simulation.duration,
         "arithmetic": simulation.arithmetic,
+        "memory": simulation.controller.memory,
         "length": simulation.length,
+        "states": simulation.states,
         "delay_samples": simulation.delay,
         "effects": list(simulation.effects),
         "notes": list(simulation.notes),
@@ -249,7 +251,7 @@ def setpoints_table(simulation: Simulation) -> TableOf:
     return TableOf(
         heads,
         rows,
-        f"Steps {order}, in {simulation.arithmetic} with memory {simulation.length}, "
+        f"Steps {order}, in {simulation.arithmetic} with {simulation.remembers}, "
         f"computation delay {simulation.delay}"
         + (f"; effects: {', '.join(simulation.effects)}" if simulation.effects else ""),
     )
