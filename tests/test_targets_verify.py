@@ -14,14 +14,15 @@ from focgen.control.files import controller_text
 from focgen.errors import PlanError
 from focgen.output import write_files
 from focgen.plan.build import build_plan
-from focgen.targets import toolchains
+from focgen.targets import avr, qemu, toolchains
 from focgen.targets.cores import CORES, core
+from focgen.targets.driver import Answers
 from focgen.targets.emulator import Machine, TargetFault
 from focgen.targets.legality import forbidden
 from focgen.targets.program import build
 from focgen.targets.run import TargetLibrary
-from focgen.verification import elsewhere
-from focgen.verification.compare import answered, cases_of, compare, with_states
+from focgen.verification.compare import answered, cases_of, compare, judged, with_states
+from focgen.verification.folder import read_folder
 from focgen.verification.host import Library
 from focgen.verification.verify import verify
 from tests.conftest import paper_controller
@@ -56,7 +57,7 @@ def agree(name: str, chain, plans, folder, samples: int, host: Library, worst: i
     for plan in plans:
         cases = cases_of(plan, samples, 3, worst)
         seen, scales = answered(library, plan, cases)
-        result = elsewhere.judged(plan, cases, seen, scales, None)
+        result = judged(plan, cases, seen, scales, None)
         result = with_states(plan, result, cases, seen, answered(host, plan, cases)[0])
         assert result.sound and result.samples >= samples, f"{plan.name} on {name}: {result.first or result}"
 
@@ -211,7 +212,67 @@ def test_instructions_that_the_core_does_not_have(built, runs_on, text, says, tm
     assert (not found) if says is None else any(one.startswith(says) for one in found), found
 
 
+# -------------------------------------------------------------- other emulators, where they are installed
+
+
+@pytest.mark.parametrize("name", [one.name for one in CORES if one.board])
+def test_qemu_says_the_same(some, name):
+    """Every arithmetic, on a board that starts from reset."""
+    if qemu.absent(core(name)):
+        pytest.skip(qemu.absent(core(name)))
+    plans, folder, _ = some
+    library = TargetLibrary(core(name), ZIG, plans, [folder] * len(plans))
+    for plan in plans:
+        cases = cases_of(plan, 160, 5, 160)
+        seen = qemu.traces(library.program, plan, [case.scenario for case in cases.cases])
+        result = judged(plan, cases, [Answers(trace, ()) for trace in seen], library.scales(plan), None)
+        assert result.sound and result.samples >= 160, f"{plan.name} on {name}: {result.first}"
+
+
+def test_qemu_sees_a_fault(tmp_path):
+    if qemu.absent(core("cortex-m3")):
+        pytest.skip(qemu.absent(core("cortex-m3")))
+    folder = sown(tmp_path, "q15", "spba.c", r"s->error_now = 0;", "*(volatile int *)0x90000000u = 1;")
+    read = read_folder(folder)
+    library = TargetLibrary(core("cortex-m3"), ZIG, [read.plan], [folder])
+    with pytest.raises(TargetFault, match="failed in QEMU"):
+        qemu.traces(library.program, read.plan, [cases_of(read.plan, 16, 0).cases[0].scenario])
+
+
+@pytest.mark.parametrize("arithmetic", ("q15", "q31", "f32"))
+def test_an_avr_says_the_same(arithmetic, tmp_path):
+    folder = generate(replace(filter_controller(), length=12), tmp_path, arithmetic).folder
+    plan = read_folder(folder).plan
+    if avr.missing(plan):
+        pytest.skip(avr.missing(plan))
+    found = verify(folder, 300, target="avr").targets["avr"]
+    assert found.sound and found.samples > 300 and "simavr" in found.tools[0]
+    path = folder / "filter.c"
+    path.write_text(path.read_text().replace("s->error[s->error_now] = e;", "(void)e;"))
+    assert verify(folder, 300, target="avr").targets["avr"].mismatches > 0
+
+
+def test_an_avr_has_no_double(tmp_path):
+    folder = generate(paper_controller(8), tmp_path, "f64").folder
+    assert "32 bits" in verify(folder, 100, target="avr").targets["avr"].skipped
+
+
+def test_an_avr_without_its_tools_is_named(tmp_path, monkeypatch):
+    folder = generate(paper_controller(8), tmp_path, "q15").folder
+    monkeypatch.setattr(avr.shutil, "which", lambda name: None)
+    assert "apt-get install gcc-avr" in verify(folder, 100, target="avr").targets["avr"].skipped
+
+
 # ------------------------------------------------------------------------------------------ the command
+
+
+def test_the_self_test_runs_on_the_core(tmp_path):
+    """Compiled as it is told it agrees; a changed weight shows."""
+    folder = generate(paper_controller(8), tmp_path, "f32", selftest=True).folder
+    assert verify(folder, 100, target="cortex-m4").targets["cortex-m4"].selftest == 0
+    path = folder / "spba.c"
+    path.write_text(path.read_text().replace("s->error[s->error_now] = e;", "(void)e;"))
+    assert verify(folder, 100, target="cortex-m4").targets["cortex-m4"].selftest != 0
 
 
 def test_the_command_names_its_tools(tmp_path, capsys):

@@ -8,7 +8,6 @@ from typing import Any
 from focgen.cli.outcome import Outcome
 from focgen.report.page import TableOf, text_table
 from focgen.targets.cost import COUNTED, Cost, PerStep, entry_of
-from focgen.targets.timing import HOW
 from focgen.verification.costs import COMPILERS, TARGETS, ControllerCost, cost
 
 HELP = "what one step of generated C costs on microcontrollers: instructions, cycles, flash, RAM, stack"
@@ -60,7 +59,7 @@ def _entry(one: ControllerCost) -> dict[str, Any]:
 
 def _text(controllers: tuple[ControllerCost, ...]) -> str:
     """The costs for people: a table, and under it how they were counted."""
-    rows, skipped, paths, compilers = [], {}, [], {}
+    rows, skipped, paths, compilers, hows = [], {}, [], {}, {}
     for one in controllers:
         title = f"{one.name} {one.arithmetic} {one.memory} {one.length}"
         for name, counted in one.targets.items():
@@ -69,13 +68,16 @@ def _text(controllers: tuple[ControllerCost, ...]) -> str:
                 continue
             rows.append((title, name, *_cells(counted, one.previous.get(name))))
             compilers[counted.compiler] = None
+            if counted.cycles_per_step is not None:
+                hows[counted.cycles_per_step.how] = None
             paths.append(f"{title}, {name}: {' > '.join(counted.stack_path)}")
     why = [f"{name} skipped: {reason}" for name, reason in skipped.items()]
     if not rows:
         return "\n".join(why)
     table = text_table(TableOf(_HEADS, tuple(rows)))
     stacks = ["", "deepest stack, each function with its bytes:", *(f"  {path}" for path in paths)]
-    how = ["", f"compiled by {', '.join(compilers)}", f"instructions: {COUNTED}", f"cycles: {HOW}"]
+    how = ["", f"compiled by {', '.join(compilers)}", f"instructions: {COUNTED}"]
+    how += [f"cycles: {one}" for one in hows]
     return "\n".join([table, *why, *stacks, *how])
 
 

@@ -14,7 +14,7 @@ class Core:
     ``zig`` and ``gcc`` are compiler flags; ``model`` unicorn's CPU model; ``board`` QEMU's machine. ``wide``:
     it has the 32-bit instructions of Thumb-2; ``divide``, ``dsp``, ``single``, ``double``: hardware division,
     the DSP extension, a floating-point unit for float, for double. ``unaligned``: single loads and stores may
-    be unaligned.
+    be unaligned. ``work``: where its board has large external memory, for inputs and results.
     """
 
     name: str
@@ -29,6 +29,12 @@ class Core:
     single: bool = False
     double: bool = False
     unaligned: bool = True
+    work: int = 0x2100_0000
+
+    @property
+    def results(self) -> int:
+        """Where results begin; ahead of it stands how many bytes they are."""
+        return self.work + (10 << 20)
 
     @property
     def arm(self) -> bool:
@@ -55,7 +61,7 @@ CORES = (
     Core(
         "cortex-m7", "Cortex-M7F", (*_HARD, "-mcpu=cortex_m7+fp_armv8d16"),
         ("-mthumb", "-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
-        "UC_CPU_ARM_CORTEX_M7", "mps2-an500", dsp=True, single=True, double=True,
+        "UC_CPU_ARM_CORTEX_M7", "mps2-an500", dsp=True, single=True, double=True, work=0x6000_0000,
     ),
     Core(
         "rv32imac", "RV32IMAC",

@@ -11,10 +11,11 @@ import numpy as np
 
 from focgen.errors import BuildError, MissingExtra
 from focgen.plan.model import Plan
+from focgen.targets import avr
 from focgen.targets.cores import Core
 from focgen.targets.run import TargetLibrary
 from focgen.targets.stack import Stack
-from focgen.targets.steps import StepCosts, step_costs
+from focgen.targets.steps import StepCosts, exercise, step_costs
 from focgen.targets.timing import HOW
 from focgen.targets.toolchains import Toolchain, compile_object
 
@@ -98,6 +99,32 @@ def cost_on(core: Core, chain: Toolchain, plan: Plan, folder: Path) -> Cost:
         deepest.bytes,
         deepest.path,
         _stack_seen(plan, stack, costs),
+    )
+
+
+def cost_on_avr(plan: Plan, folder: Path) -> Cost:
+    """Build a generated folder for an ATmega2560 and count: cycles by simavr, stack as the steps used it.
+
+    Raises BuildError where it does not compile; see :func:`focgen.targets.avr.missing` ahead of it.
+    """
+    why = avr.missing(plan)
+    if why:
+        return Cost(skipped=why)
+    library = avr.AvrLibrary(plan, folder)
+    around = max(plan.error_lags, plan.filtered_lags) + 65
+    run = library.run(exercise(plan, min(around, _FEW) + 1, 0))
+    sizes, _ = object_sizes(library.object)
+    own = {key: sizes[key] for key in ("code", "constants")}
+    flash = {**own, "compiler": library.flash - sum(own.values())}
+    return Cost(
+        compiler=avr.tools(),
+        cycles_per_step=_per_step(run.cycles[0, 1:], avr.HOW),
+        flash_bytes=library.flash,
+        flash=flash,
+        ram_bytes=len(run.answers.states[0]) + sizes["data"],
+        stack_bytes=run.stack,
+        stack_path=(f"as used by the measured steps {run.stack}",),
+        stack_seen=run.stack,
     )
 
 

@@ -37,11 +37,15 @@ class DriverContext:
 
 def driver(plan: Plan) -> str:
     """C that runs a plan's controller over arrays."""
+    return render("driver.c.jinja", driver_context(plan))
+
+
+def driver_context(plan: Plan) -> DriverContext:
+    """What a driver asks for of a plan."""
     scheduled, integral = plan.schedule is not None, plan.integrator is not None
     held = f"({plan.name}_flags(state) & {plan.name}_FLAG_INVALID) ? 0 : " if plan.floating else ""
     scales = tuple(header_scales(plan))
-    context = DriverContext(plan.name, plan.increment.ctype, scheduled, integral, held, scales)
-    return render("driver.c.jinja", context)
+    return DriverContext(plan.name, plan.increment.ctype, scheduled, integral, held, scales)
 
 
 def header_scales(plan: Plan) -> dict[str, float]:

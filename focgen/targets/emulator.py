@@ -21,7 +21,7 @@ from focgen.compiler import compile_shared
 from focgen.errors import FocgenError, MissingExtra
 from focgen.targets.cores import Core
 from focgen.targets.legality import memory_accesses
-from focgen.targets.program import FLASH, FLASH_SIZE, RAM, RAM_SIZE, STACK, WORK, WORK_SIZE, Program
+from focgen.targets.program import FLASH, FLASH_SIZE, RAM, RAM_SIZE, STACK, WORK_SIZE, Program
 from focgen.targets.toolchains import cache_folder
 
 PAINT = 0xA5
@@ -143,7 +143,7 @@ class Machine:
             machine.ctl_set_cpu_model(getattr(uc.riscv_const, self.core.model))
         machine.mem_map(FLASH, FLASH_SIZE, uc.UC_PROT_READ | uc.UC_PROT_EXEC)
         machine.mem_map(RAM, RAM_SIZE, uc.UC_PROT_READ | uc.UC_PROT_WRITE)
-        machine.mem_map(WORK, WORK_SIZE, uc.UC_PROT_READ | uc.UC_PROT_WRITE)
+        machine.mem_map(self.core.work, WORK_SIZE, uc.UC_PROT_READ | uc.UC_PROT_WRITE)
         return machine
 
     def write(self, address: int, content: bytes) -> None:

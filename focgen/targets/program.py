@@ -19,8 +19,8 @@ FLASH, FLASH_SIZE = 0x0000_0000, 4 << 20
 RAM, RAM_SIZE = 0x2000_0000, 4 << 20
 STACK = RAM + RAM_SIZE
 """The stack begins at the end of RAM and grows downwards."""
-WORK, WORK_SIZE = 0x2100_0000, 16 << 20
-"""Where inputs and results stand: a board's external memory."""
+WORK_SIZE = 16 << 20
+"""Inputs and results stand in a board's external memory."""
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,7 @@ class TargetContext:
     results: int
     stack: int
     fpu: bool
-
-
-RESULTS = WORK + (10 << 20)
-"""Where results begin; ahead of it stands how many bytes they are."""
+    selftest: bool
 
 
 @dataclass(frozen=True)
@@ -118,14 +115,16 @@ class LinkContext:
 
 
 def build(core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path],
-          drivers: Sequence[str], flags: Sequence[str] = EXACT) -> Program:  # fmt: skip
-    """Compile and link the C of plans, one folder each, with the ``drivers`` that run them.
+          drivers: Sequence[str], flags: Sequence[str] = EXACT,
+          selftest: bool = False) -> Program:  # fmt: skip
+    """Compile and link the C of plans, one folder each, with the ``drivers`` that run them, and their
+    self-tests where they are to be run, too.
 
     Raises BuildError where they do not compile, MissingExtra without pyelftools.
     """
     names = tuple(plan.name for plan in plans)
-    context = TargetContext(names, tuple((p.name, p.increment.ctype) for p in plans), WORK, RESULTS, STACK,
-                            core.single)  # fmt: skip
+    increments = tuple((p.name, p.increment.ctype) for p in plans)
+    context = TargetContext(names, increments, core.work, core.results, STACK, core.single, selftest)
     with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
         base, sources = Path(scratch), []
         (base / "target.c").write_text(render("target.c.jinja", context))
@@ -134,6 +133,7 @@ def build(core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence
         for plan, folder, text in zip(plans, folders, drivers):
             (base / f"{plan.name}_driver.c").write_text(text)
             sources += [Path(folder) / f"{plan.name}.c", base / f"{plan.name}_driver.c"]
+            sources += [Path(folder) / f"{plan.name}_selftest.c"] if selftest else []
         link(chain, core, [base / "target.c", *sources], base / "target.ld", base / "target.elf",
              "focgen_start", list(folders), flags)  # fmt: skip
         return read_program(core, chain, names, (base / "target.elf").read_bytes())

@@ -15,7 +15,7 @@ from focgen.targets.cores import Core
 from focgen.targets.driver import DTYPES, RESUME, Answers, driver, header_scales, lane_of, taps
 from focgen.targets.emulator import Executed, Machine, TargetFault
 from focgen.targets.legality import forbidden
-from focgen.targets.program import RESULTS, WORK, WORK_SIZE, Program, build
+from focgen.targets.program import WORK_SIZE, Program, build
 from focgen.targets.toolchains import EXACT, Toolchain
 
 _DESCRIPTOR = "<10I"
@@ -41,19 +41,20 @@ class Job:
 class Work:
     """Lays out jobs in a board's memory: descriptors, then inputs; results apart from them."""
 
-    def __init__(self, jobs: int):
-        self._in = WORK + 4 + jobs * struct.calcsize(_DESCRIPTOR)
-        self._out = RESULTS
+    def __init__(self, core: Core, jobs: int):
+        self._core = core
+        self._in = core.work + 4 + jobs * struct.calcsize(_DESCRIPTOR)
+        self._out = core.results
 
     @property
     def results(self) -> int:
         """Bytes of all results so far."""
-        return self._out - RESULTS
+        return self._out - self._core.results
 
     @property
     def fits(self) -> bool:
         """Whether everything so far has room."""
-        return self._in <= RESULTS - 8 and self._out <= WORK + WORK_SIZE
+        return self._in <= self._core.results - 8 and self._out <= self._core.work + WORK_SIZE
 
     def add(self, index: int, plan: Plan, scenario: Scenario, lane: int) -> Job:
         """Place one lane of plan number ``index``."""
@@ -94,9 +95,10 @@ class TargetLibrary:
     """
 
     def __init__(self, core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path],
-                 flags: Sequence[str] = EXACT):  # fmt: skip
+                 flags: Sequence[str] = EXACT, selftest: bool = False):  # fmt: skip
         self.plans = tuple(plans)
-        self.program: Program = build(core, chain, plans, folders, [driver(p) for p in plans], flags)
+        self.program: Program = build(core, chain, plans, folders, [driver(p) for p in plans], flags,
+                                      selftest)  # fmt: skip
         self.core, self.chain = core, chain
         self.machine = Machine(self.program)
         self.machine.watch()
@@ -118,7 +120,7 @@ class TargetLibrary:
         for lane in range(scenario.lanes):
             job = self._placed(self._index(plan), plan, scenario, lane)
             limit = PATIENCE + job.count * (200 + taps(plan)) * 2e-5
-            self.machine.call("focgen_run", WORK + 4, seconds=limit)
+            self.machine.call("focgen_run", self.core.work + 4, seconds=limit)
             lanes.append(results(plan, job, self.machine.read))
             states.append(self._state(plan))
         u, d, flags = (np.stack(part) for part in zip(*lanes))
@@ -140,9 +142,9 @@ class TargetLibrary:
                 self.machine.write(words[5], bytes([RESUME]))
             if k == 1:
                 self.machine.paint_stack()
-            self.machine.write(WORK + 4, struct.pack(_DESCRIPTOR, *words))
+            self.machine.write(self.core.work + 4, struct.pack(_DESCRIPTOR, *words))
             self.machine.forget()
-            self.machine.call("focgen_run", WORK + 4, seconds=PATIENCE)
+            self.machine.call("focgen_run", self.core.work + 4, seconds=PATIENCE)
             if k:
                 yield self.machine.executed()
 
@@ -150,25 +152,32 @@ class TargetLibrary:
         return [p.name for p in self.plans].index(plan.name)
 
     def _placed(self, index: int, plan: Plan, scenario: Scenario, lane: int) -> Job:
-        work = Work(1)
+        work = Work(self.core, 1)
         job = work.add(index, plan, scenario, lane)
         if not work.fits:
             raise TargetFault(f"{job.count} samples a run do not fit a board's memory: take fewer --samples")
-        self.machine.write(WORK, struct.pack("<I", 1) + job.descriptor)
+        self.machine.write(self.core.work, struct.pack("<I", 1) + job.descriptor)
         for address, content in job.inputs:
             self.machine.write(address, content)
         return job
+
+    def selftest(self, plan: Plan) -> int:
+        """What NAME_selftest() returns there: 0, or the first step that is wrong."""
+        found = self.machine.call("focgen_selftest", self._index(plan))
+        return found - (1 << 32) if found >> 31 else found
 
     def state_bytes(self, plan: Plan) -> int:
         """sizeof(NAME_state) there."""
         return len(self._state(plan))
 
     def _state(self, plan: Plan) -> bytes:
-        place = self.machine.call("focgen_bytes", self._index(plan), RESULTS - 4)
-        return self.machine.read(place, *struct.unpack("<I", self.machine.read(RESULTS - 4, 4)))
+        ahead = self.core.results - 4
+        place = self.machine.call("focgen_bytes", self._index(plan), ahead)
+        return self.machine.read(place, *struct.unpack("<I", self.machine.read(ahead, 4)))
 
     def scales(self, plan: Plan) -> dict[str, float]:
         """What the header's macros for LSBs and sample time are."""
         names = list(header_scales(plan))
-        self.machine.call("focgen_scale", self._index(plan), RESULTS)
-        return dict(zip(names, np.frombuffer(self.machine.read(RESULTS, 8 * len(names))).tolist()))
+        self.machine.call("focgen_scale", self._index(plan), self.core.results)
+        found = np.frombuffer(self.machine.read(self.core.results, 8 * len(names)))
+        return dict(zip(names, found.tolist()))

@@ -12,7 +12,7 @@ from pathlib import Path
 from focgen.errors import InputError, MissingExtra
 from focgen.output import write_file
 from focgen.targets.cores import EMULATED, core
-from focgen.targets.cost import Cost, cost_of, cost_on, entry_of
+from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr, entry_of
 from focgen.targets.emulator import emulator_title
 from focgen.targets.toolchains import Toolchain, toolchains
 from focgen.verification.folder import GeneratedFolder, read_folder
@@ -94,7 +94,7 @@ def _counted(read: GeneratedFolder, names: Sequence[str], compiler: str, other: 
 
 def _on(name: str, read: GeneratedFolder, compiler: str) -> Cost:
     if name == "avr":
-        return Cost(skipped="not part of this version")
+        return cost_on_avr(read.plan, read.path)
     one = core(name)
     try:
         emulator_title()

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from focgen.errors import MissingExtra
 from focgen.plan.model import Plan
+from focgen.targets import avr, qemu
 from focgen.targets.cores import Core, core
-from focgen.targets.driver import Answers, taps
+from focgen.targets.driver import Answers, header_scales, taps
 from focgen.targets.emulator import TargetFault, emulator_title
 from focgen.targets.run import TargetLibrary
 from focgen.targets.toolchains import absent, toolchains
@@ -42,15 +43,33 @@ def on_core(name: str, read: GeneratedFolder, samples: int | None, seed: int) ->
     host = _on_host(read, cases)
     results = []
     for chain in chains:
-        library = TargetLibrary(one, chain, [plan], [read.path])
+        library = TargetLibrary(one, chain, [plan], [read.path], selftest=read.selftest)
         result = _observed(plan, library, cases, host, read)
         results.append(replace(result, tools=(f"{chain.title}, {title}",), illegal=library.illegal()))
-    return replace(_joined(results), absent=absent(one))
+        if qemu.absent(one) is None:
+            again = _in_qemu(plan, library, cases, read)
+            results.append(replace(again, tools=(f"{chain.title}, {qemu.title()}",)))
+    lacking = qemu.absent(one) if one.arm else None
+    return replace(_joined(results), absent=(*absent(one), *([lacking] if lacking else [])))
 
 
 def on_avr(read: GeneratedFolder, samples: int | None, seed: int) -> TargetResult:
-    """A folder's C on an AVR."""
-    return TargetResult(skipped="not part of this version")
+    """A folder's C on an AVR, where avr-gcc and simavr are installed.
+
+    The header's scales are of type double, which has 32 bits there: they are looked at elsewhere.
+    """
+    plan = read.plan
+    why = avr.missing(plan)
+    if why:
+        return TargetResult(skipped=why)
+    count = max(100, min(_MOST, _SOFT_BUDGET // (50 + taps(plan)))) if samples is None else samples
+    cases = cases_of(plan, count, seed, None if count >= _THOROUGH else max(count, _least(plan)))
+    library = avr.AvrLibrary(plan, read.path)
+    try:
+        seen = [library.answers(plan, case.scenario) for case in cases.cases]
+    except TargetFault as how:
+        return replace(failed(how), tools=(avr.tools(),))
+    return replace(judged(plan, cases, seen, header_scales(plan), read), tools=(avr.tools(),))
 
 
 def default_samples(plan: Plan, one: Core) -> int:
@@ -78,10 +97,20 @@ def _observed(plan: Plan, library: TargetLibrary, cases: Cases, host: list[Answe
               read: GeneratedFolder) -> TargetResult:  # fmt: skip
     try:
         seen, scales = answered(library, plan, cases)
+        said = library.selftest(plan) if read.selftest else None
     except TargetFault as how:
         return failed(how)
-    result = judged(plan, cases, seen, scales, read)
+    result = replace(judged(plan, cases, seen, scales, read), selftest=said)
     return with_states(plan, result, cases, seen, host) if host else result
+
+
+def _in_qemu(plan: Plan, library: TargetLibrary, cases: Cases, read: GeneratedFolder) -> TargetResult:
+    """The same program once more, in another emulator."""
+    try:
+        seen = qemu.traces(library.program, plan, [case.scenario for case in cases.cases])
+    except TargetFault as how:
+        return failed(how)
+    return judged(plan, cases, [Answers(trace, ()) for trace in seen], library.scales(plan), read)
 
 
 def _joined(results: list[TargetResult]) -> TargetResult:
@@ -94,5 +123,6 @@ def _joined(results: list[TargetResult]) -> TargetResult:
         within=all(r.within for r in results),
         first=next((f"{r.tools[0]}: {r.first}" for r in results if r.first), None),
         tools=tuple(t for r in results for t in r.tools),
+        selftest=next((r.selftest for r in results if r.selftest), worst.selftest),
         illegal=tuple(dict.fromkeys(i for r in results for i in r.illegal)),
     )

@@ -1,0 +1,189 @@
+"""Controllers on an AVR, the ATmega2560: avr-gcc compiles, simavr emulates, where both are installed.
+
+simavr counts cycles, instruction by instruction, as the data sheet gives them. Its ``double`` has 32 bits, so
+controllers in f64 cannot be what they are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import shutil
+import struct
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from focgen.codegen.render import render
+from focgen.codegen.state import state_bytes
+from focgen.compiler import find_compiler
+from focgen.errors import BuildError
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Scenario, Trace
+from focgen.targets.driver import DTYPES, RESUME, Answers, driver_context, lane_of
+from focgen.targets.emulator import TargetFault
+from focgen.targets.toolchains import cache_folder
+
+MCU = "atmega2560"
+APT = "apt-get install gcc-avr avr-libc simavr libsimavr-dev libelf-dev"
+FLAGS = (f"-mmcu={MCU}", "-Os", "-std=gnu99", "-ffp-contract=off")
+"""At -O2 avr-gcc 5.4 reads tables in flash wrongly; -Os is what Arduino and PlatformIO compile with."""
+HOW = "cycles counted by simavr, from the call of the step to its return"
+_RAM = 8192 - 256  # bytes; some for the stack and for what feeds the step
+_DATA = 0x80_0000  # where ELF files of AVRs place memory
+_END_OF_LANE = 8
+
+
+@dataclass(frozen=True, eq=False)
+class AvrRun:
+    """``answers`` of every lane, ``cycles`` of every step (lanes, samples), ``stack`` bytes used at most."""
+
+    answers: Answers
+    cycles: np.ndarray
+    stack: int
+
+
+def missing(plan: Plan) -> str | None:
+    """Why nothing can run on an AVR, or not this plan; None where it can."""
+    if plan.arithmetic == "f64":
+        return "an AVR's double has 32 bits: f64 cannot be had there"
+    if state_bytes(plan) > _RAM:
+        return f"the state has {state_bytes(plan)} bytes, an ATmega2560 8192 bytes of RAM"
+    if shutil.which("avr-gcc") is None or not _simulator():
+        return f"needs avr-gcc and simavr ({APT})"
+    if find_spec("elftools") is None:
+        return "needs pyelftools (pip install 'focgen[targets]')"
+    return None
+
+
+def tools() -> str:
+    """Names and versions of compiler and emulator."""
+    version = subprocess.run(["avr-gcc", "-dumpversion"], capture_output=True, text=True).stdout.strip()
+    return f"avr-gcc {version}, simavr ({MCU})"
+
+
+@cache
+def _simulator() -> Path | None:
+    """The program that feeds simavr, compiled once; None where simavr's library is not installed."""
+    source = Path(__file__).with_name("simavr_run.c")
+    target = cache_folder() / f"simavr_run-{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}"
+    if not target.is_file():
+        part = target.with_name(f"{target.name}.part")
+        command = [*find_compiler(), "-O2", "-I/usr/include/simavr", str(source), "-o", str(part)]
+        if subprocess.run([*command, "-lsimavr", "-lelf"], capture_output=True).returncode:
+            return None
+        part.replace(target)
+    return target
+
+
+class AvrLibrary:
+    """The C of a plan on an emulated ATmega2560; ``flash``: bytes that it adds to an empty program.
+
+    Raises BuildError where it does not compile.
+    """
+
+    def __init__(self, plan: Plan, folder: Path):
+        self.plan, self.folder = plan, folder
+        with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+            feeder, idle = Path(scratch) / "feeder.c", Path(scratch) / "idle.c"
+            feeder.write_text(render("avr.c.jinja", driver_context(plan)))
+            idle.write_text("int main(void) { for (;;) { } }\n")
+            own = folder / f"{plan.name}.c"
+            self.elf = _compiled([feeder, own], folder)
+            self.object = _compiled([own], folder, "-c")
+            around = _flash(_compiled([feeder], folder, "-c")) - _flash(_compiled([idle], folder, "-c"))
+            self.flash = _flash(self.elf) - _flash(_compiled([idle], folder)) - around
+        self._symbols = _symbols(self.elf)
+        signal, increment = (DTYPES[f.ctype]().itemsize for f in (plan.output, plan.increment))
+        self._in, self._out = 7 * signal + 1, signal + increment + 1
+
+    def answers(self, plan: Plan, scenario: Scenario) -> Answers:
+        """Run raw inputs, as the host's library does."""
+        return self.run(scenario).answers
+
+    def run(self, scenario: Scenario) -> AvrRun:
+        """Run raw inputs. Raises TargetFault where the program crashes or does not return."""
+        lanes = range(scenario.lanes)
+        inputs = b"".join(self._records(scenario, lane) for lane in lanes)
+        found = self._simulated(inputs, scenario.samples * scenario.lanes)
+        size, count = self._out + 4, scenario.samples
+        state = self._symbols["tried"][1]
+        rows, states, at = [], [], 0
+        for _ in lanes:
+            rows.append(np.frombuffer(found[at : at + count * size], self._kind()))
+            at += count * size
+            states.append(found[at : at + state])
+            at += state
+        table = np.stack(rows)
+        d = table["d"] if self.plan.integrator else table["u"]
+        trace = Trace(table["u"].copy(), d.copy(), table["flags"].copy())
+        return AvrRun(Answers(trace, tuple(states)), table["cycles"].astype(np.int64),
+                      struct.unpack("<I", found[at : at + 4])[0])  # fmt: skip
+
+    def _kind(self) -> np.dtype:
+        fields = [("u", DTYPES[self.plan.output.ctype]), ("d", DTYPES[self.plan.increment.ctype])]
+        return np.dtype([*fields, ("flags", np.uint8), ("cycles", np.uint32)])
+
+    def _records(self, scenario: Scenario, number: int) -> bytes:
+        """What the emulator puts in memory, sample by sample."""
+        lane, kind = lane_of(self.plan, scenario, number), DTYPES[self.plan.output.ctype]
+        fields = [("ref", kind), ("meas", kind), ("sched", kind), ("event", np.uint8), ("given", kind, 4)]
+        records = np.zeros(scenario.samples, np.dtype(fields))
+        for name in records.dtype.names:
+            records[name] = getattr(lane, name)
+        records["event"][1:] |= RESUME
+        records["event"][-1] |= _END_OF_LANE
+        return records.tobytes()
+
+    def _simulated(self, inputs: bytes, samples: int) -> bytes:
+        cell, (state, size), free = self._symbols["cell"][0], self._symbols["tried"], self._symbols["_end"][0]
+        with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+            base = Path(scratch)
+            (base / "avr.elf").write_bytes(self.elf)
+            (base / "inputs").write_bytes(inputs)
+            numbers = [cell, self._in, self._out, state, size, free]
+            command = [str(_simulator()), str(base / "avr.elf"), MCU, *map(str, numbers)]
+            try:
+                done = subprocess.run([*command, str(base / "inputs"), str(base / "results")],
+                                      capture_output=True, timeout=60.0 + samples * 20.0)  # fmt: skip
+            except subprocess.TimeoutExpired:
+                raise TargetFault(f"did not return within {60.0 + samples * 20.0:g} s") from None
+            if done.returncode:
+                said = {3: "did not return within 200 million cycles", 4: "crashed in the emulator"}
+                raise TargetFault(said.get(done.returncode, f"could not be emulated ({done.returncode})"))
+            return (base / "results").read_bytes()
+
+
+def _compiled(sources: list[Path], folder: Path, *more: str) -> bytes:
+    """A program, or with -c an object file."""
+    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+        target = Path(scratch) / "out.elf"
+        parts = ["avr-gcc", *FLAGS, *more, f"-I{folder}", *map(str, sources), "-o", str(target), "-lm"]
+        done = subprocess.run(parts, capture_output=True, text=True)
+        if done.returncode:
+            said = [line for line in done.stderr.splitlines() if "error" in line] or ["it says nothing"]
+            raise BuildError(str(sources[-1]), f"avr-gcc: {said[0].strip()}", "take a shorter memory or q15")
+        return target.read_bytes()
+
+
+def _elf(content: bytes):
+    from elftools.elf.elffile import ELFFile
+
+    return ELFFile(io.BytesIO(content))
+
+
+def _flash(elf: bytes) -> int:
+    """Bytes of everything that is loaded into flash."""
+    sections = _elf(elf).iter_sections()
+    return sum(s["sh_size"] for s in sections if s["sh_flags"] & 2 and s["sh_type"] != "SHT_NOBITS")
+
+
+def _symbols(elf: bytes) -> dict[str, tuple[int, int]]:
+    """Address in memory and size of every object."""
+    table = _elf(elf).get_section_by_name(".symtab")
+    return {s.name: (s["st_value"] - _DATA, s["st_size"]) for s in table.iter_symbols()}
