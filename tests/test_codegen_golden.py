@@ -18,22 +18,20 @@ from focgen.cli.main import main
 from focgen.output import write_files
 from tests.c_code import STRICT, compiler, run
 
-ARITHMETICS = ("f64", "f32", "q31", "q15")
+FORMS = ("f64", "f32", "q31", "q15", "exp_f32", "exp_q31")
+EXPONENTIAL = ["--memory", "exponential", "--tolerance", "1e-3", "--horizon", "100000"]
 GOLDEN = Path(__file__).parent / "golden"
 CONTROLLER = GOLDEN / "finger.toml"
 
 
-def generated(arithmetic: str, out: Path) -> dict[str, bytes]:
-    argv = [
-        "generate",
-        str(CONTROLLER),
-        "--out",
-        str(out),
-        "--arithmetic",
-        arithmetic,
-        "--name",
-        f"finger_{arithmetic}",
-    ]
+def options(form: str) -> list[str]:
+    """The arithmetic, with an exponential memory where the form says so."""
+    memory = EXPONENTIAL if form.startswith("exp") else []
+    return ["--arithmetic", form.split("_")[-1], "--name", f"finger_{form}", *memory]
+
+
+def generated(form: str, out: Path) -> dict[str, bytes]:
+    argv = ["generate", str(CONTROLLER), "--out", str(out), *options(form)]
     assert main(argv) == 0
     return {str(p.relative_to(out)): p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
 
@@ -49,12 +47,14 @@ def alike(one, other) -> bool:
     return one == other
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-def test_the_text_is_the_golden_one(arithmetic, tmp_path, request):
-    found, folder = generated(arithmetic, tmp_path / "out"), GOLDEN / f"finger_{arithmetic}"
+@pytest.mark.parametrize("form", FORMS)
+def test_the_text_is_the_golden_one(form, tmp_path, request):
+    found, folder = generated(form, tmp_path / "out"), GOLDEN / f"finger_{form}"
+    memory = [("foc_memory.h", "c_runtime/foc_memory.h")] * form.startswith("exp")
     for copied, source in (
         ("foc_rt.h", "c_runtime/foc_rt.h"),
         ("controller.toml", "tests/golden/finger.toml"),
+        *memory,
     ):
         assert found.pop(copied) == (GOLDEN.parents[1] / source).read_bytes()
     if request.config.getoption("--update-golden"):
@@ -86,11 +86,11 @@ def test_the_text_for_a_core_is_the_golden_one(tmp_path, request):
 
 
 @pytest.mark.parametrize("name", ["gcc", "clang"])
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-def test_it_compiles_without_a_warning(name, arithmetic, tmp_path):
+@pytest.mark.parametrize("form", FORMS)
+def test_it_compiles_without_a_warning(name, form, tmp_path):
     command = compiler(name)
-    generated(arithmetic, tmp_path)
-    source = tmp_path / f"finger_{arithmetic}.c"
+    generated(form, tmp_path)
+    source = tmp_path / f"finger_{form}.c"
     for level in ("-O0", "-O2"):
         run(*command, *STRICT, level, "-c", source, "-o", tmp_path / "x.o")
     example = tmp_path / "example" / "main.c"
@@ -119,21 +119,12 @@ def test_the_header_serves_cpp(tmp_path):
     assert "finger_q31_init" in run("nm", tmp_path / "x.o").split()
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-def test_the_same_input_gives_the_same_bytes(arithmetic, tmp_path):
+@pytest.mark.parametrize("form", FORMS)
+def test_the_same_input_gives_the_same_bytes(form, tmp_path):
     """Twice here, and in a process with another seed for its hashes, from another place."""
-    first, second = generated(arithmetic, tmp_path / "one"), generated(arithmetic, tmp_path / "two" / "deep")
+    first, second = generated(form, tmp_path / "one"), generated(form, tmp_path / "two" / "deep")
     assert first == second
-    argv = [
-        "generate",
-        str(CONTROLLER),
-        "--out",
-        "three",
-        "--arithmetic",
-        arithmetic,
-        "--name",
-        f"finger_{arithmetic}",
-    ]
+    argv = ["generate", str(CONTROLLER), "--out", "three", *options(form)]
     environment = {**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo"}
     subprocess.run(
         [sys.executable, "-m", "focgen", *argv],
@@ -153,9 +144,9 @@ def test_nothing_in_the_text_tells_when_or_where(tmp_path):
         ), name
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-def test_c_is_plain_ascii_in_lines_of_bearable_length(arithmetic, tmp_path):
-    for name, content in generated(arithmetic, tmp_path).items():
+@pytest.mark.parametrize("form", FORMS)
+def test_c_is_plain_ascii_in_lines_of_bearable_length(form, tmp_path):
+    for name, content in generated(form, tmp_path).items():
         if name.endswith((".c", ".h")):
             lines = content.decode("ascii").splitlines()
             assert max(map(len, lines)) <= 110, max(lines, key=len)

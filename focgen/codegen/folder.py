@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import focgen
+from focgen.codegen.banks import time_constant
 from focgen.codegen.formulas import transfer_text
 from focgen.codegen.guard import unusable_text
-from focgen.codegen.kernels import PORTABLE, Kernels
-from focgen.codegen.literals import comment, quantity
+from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
+from focgen.codegen.literals import comment, quantity, wrapped
 from focgen.codegen.manifest import sizes
 from focgen.plan.canonical import memory_bias
 from focgen.plan.model import Plan
@@ -44,6 +45,7 @@ class ReadmeContext:
     exponential: bool
     memory: str
     within_horizon: str
+    memory_section: str
     signals: list[Signal]
     scheduled: bool
     integral: bool
@@ -81,6 +83,7 @@ def readme_context(
         exponential=plan.exponential,
         memory=_memory(plan),
         within_horizon=_quantity(bound.within_horizon or 0.0, operator_unit),
+        memory_section=_memory_section(plan),
         signals=_signals(plan),
         scheduled=plan.schedule is not None,
         integral=plan.integrator is not None,
@@ -97,7 +100,7 @@ def readme_context(
         biases=_biases(plan),
         unit=unit,
         selftest=selftest,
-        files=[f"{plan.name}.h", f"{plan.name}.c", "foc_rt.h", *kernels.headers(plan)],
+        files=[f"{plan.name}.h", f"{plan.name}.c", *runtime_files(plan, kernels)],
     )
 
 
@@ -133,6 +136,42 @@ def _tightest(plan: Plan) -> str:
         return ""
     proof = min(plan.proofs, key=lambda p: p.margin_bits)
     return f"`{proof.node}`, {proof.worst} of {proof.limit} ({proof.ctype})"
+
+
+def _memory_section(plan: Plan) -> str:
+    """What an exponential memory is and what holds of it, as a paragraph; empty for a short one."""
+    if not plan.states:
+        return ""
+    orders = ", ".join(
+        f"s^{m.order:g} to {m.tolerance:.2g} with {m.states} modes" for m in plan.memories
+    )
+    words = (
+        f"The memory is a sum of exponentials. Every fractional power of s keeps a few means of its history, each over a"
+        f" time of its own ({_times(plan)}); the weights that the past has through them follow the exact ones for"
+        f" {plan.horizon} samples: {orders} (relative error, proved for every lag). Nothing is cut off, so a constant is"
+        " remembered without an error, and a step costs the same however far the memory reaches. Means cannot leave the"
+        " range of what they average: the bounds above hold for any number of samples."
+        f"{_SLOW[plan.arithmetic] * _has_slow(plan)}"
+    )
+    return "\n".join(wrapped(words.split(" "), 116))
+
+
+_SLOW = {
+    "f64": "",
+    "f32": " The slow means are compensated sums of two floats: one alone would stand still.",
+    "q31": " The slow means' rates have more bits than the others'.",
+    "q15": " The slow means are 64 bits wide.",
+}
+
+
+def _has_slow(plan: Plan) -> bool:
+    return any(b.compensated or b.rate_shift or b.to_drive > b.drive.bits for s in plan.sums for b in s.banks)
+
+
+def _times(plan: Plan) -> str:
+    """The shortest and the longest time constant."""
+    rates = [q for table in plan.sums for bank in table.banks for q in bank.real_rates]
+    return f"{time_constant(plan, max(rates)):.2g} s to {time_constant(plan, min(rates)):.2g} s"
 
 
 def _biases(plan: Plan) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from focgen.codegen.folder import example_context, readme_context
 from focgen.codegen.header import header_context
-from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels
+from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels, runtime_files
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.codegen.names import check_name
 from focgen.codegen.render import render
@@ -99,11 +99,6 @@ def folder_files(
         "example/main.c": render("main.c.jinja", example_context(plan, title)),
         **(selftest_files(plan, digest) if selftest else {}),
     }
-
-
-def runtime_files(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[str, ...]:
-    """The files of the runtime that a plan's C includes."""
-    return ("foc_rt.h", *["foc_memory.h"] * (plan.states > 0), *kernels.headers(plan))
 
 
 def _source(controller: Controller | str | Path) -> tuple[bytes, Controller, str]:

@@ -68,6 +68,11 @@ class Kernels:
 PORTABLE = Kernels()
 
 
+def runtime_files(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[str, ...]:
+    """The files of the runtime that a plan's C includes."""
+    return ("foc_rt.h", *["foc_memory.h"] * (plan.states > 0), *kernels.headers(plan))
+
+
 def named_sums(plan: Plan) -> dict[str, Sum]:
     """A plan's history sums by the name their tables have in C."""
     found = {

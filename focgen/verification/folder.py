@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from focgen.codegen.generate import runtime_files
-from focgen.codegen.kernels import Kernels
+from focgen.codegen.kernels import Kernels, runtime_files
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.control.controller import Controller
 from focgen.control.files import read_controller
