@@ -177,8 +177,8 @@ def sow(folder: Path, name: str, fault: Fault) -> None:
     after, places = re.subn(fault.pattern.replace("@", name), fault.by.replace("@", name), before)
     assert places and after != before, f"{fault}: nothing to change"
     path.write_text(after)
-    if fault.file == "foc_rt.h":
-        rewrite(folder, lambda manifest: manifest["inputs"].update({"foc_rt.h": sha256(after)}))
+    if fault.file.startswith("foc_"):
+        rewrite(folder, lambda manifest: manifest["inputs"].update({fault.file: sha256(after)}))
 
 
 def rewrite(folder: Path, change) -> None:
