@@ -126,6 +126,7 @@ static const FOC_ROM float finger_exp_f32_slopes[2] = {
     -8.00000191f, -3.49999905f,
 };
 
+/* The taps, and what the modes remember; their means then take up the sample before this one. */
 static float finger_exp_f32_numerator_sum(finger_exp_f32_state *s)
 {
     const float past = s->error[foc_ring_slot(s->error_now, finger_exp_f32_ERRORS, 1)];
@@ -138,6 +139,7 @@ static float finger_exp_f32_numerator_sum(finger_exp_f32_state *s)
     return sum;
 }
 
+/* The taps, and what the modes remember; their means then take up the sample before this one. */
 static float finger_exp_f32_integrand_sum(finger_exp_f32_state *s)
 {
     const float past = s->error[foc_ring_slot(s->error_now, finger_exp_f32_ERRORS, 1)];
@@ -150,6 +152,7 @@ static float finger_exp_f32_integrand_sum(finger_exp_f32_state *s)
     return sum;
 }
 
+/* The taps, and what the modes remember; their means then take up the sample before this one. */
 static float finger_exp_f32_denominator_sum(finger_exp_f32_state *s)
 {
     const float past = s->filtered[foc_ring_slot(s->filtered_now, finger_exp_f32_FILTERED, 1)];

@@ -144,6 +144,7 @@ static const FOC_ROM uint8_t finger_exp_q31_shifts[2] = {
     30, 32,
 };
 
+/* The taps, and what the modes remember; their means then take up the sample before this one. */
 static int64_t finger_exp_q31_numerator_sum(finger_exp_q31_state *s)
 {
     const int32_t past = s->error[foc_ring_slot(s->error_now, finger_exp_q31_ERRORS, 1)];
@@ -156,6 +157,7 @@ static int64_t finger_exp_q31_numerator_sum(finger_exp_q31_state *s)
     return sum; /* |sum| <= 117750599487204022 < 2^63, counts of 2^-60 */
 }
 
+/* The taps, and what the modes remember; their means then take up the sample before this one. */
 static int64_t finger_exp_q31_integrand_sum(finger_exp_q31_state *s)
 {
     const int32_t past = s->error[foc_ring_slot(s->error_now, finger_exp_q31_ERRORS, 1)];
@@ -168,6 +170,7 @@ static int64_t finger_exp_q31_integrand_sum(finger_exp_q31_state *s)
     return sum; /* |sum| <= 5540664545178804 < 2^63, counts of 2^-63 */
 }
 
+/* The taps, and what the modes remember; their means then take up the sample before this one. */
 static int64_t finger_exp_q31_denominator_sum(finger_exp_q31_state *s)
 {
     const int32_t past = s->filtered[foc_ring_slot(s->filtered_now, finger_exp_q31_FILTERED, 1)];
