@@ -1,6 +1,6 @@
 /* main.c: how a program calls the controller "finger". Yours to change.
  *
- *   cc -std=c99 -O2 -ffp-contract=off -I.. main.c ../finger_exp_f32.c -o main && ./main
+ *   cc -std=c99 -O2 -ffp-contract=off -I.. main.c ../finger_f32.c -o main && ./main
  *
  * There is no plant: the measurement stays where it is. Read your sensor where this program prints.
  *
@@ -8,22 +8,22 @@
  */
 #include <stdio.h>
 
-#include "finger_exp_f32.h"
+#include "finger_f32.h"
 
 int main(void)
 {
-    static finger_exp_f32_state controller; /* too large for some stacks */
-    const finger_exp_f32_sig ref = 0.01f; /* 0.01 1/mm */
-    const finger_exp_f32_sig meas = 0.0f;
-    const finger_exp_f32_sig sched = 0.125f;
+    static finger_f32_state controller; /* too large for some stacks */
+    const finger_f32_sig ref = 0.01f; /* 0.01 1/mm */
+    const finger_f32_sig meas = 0.0f;
+    const finger_f32_sig sched = 0.125f;
     int k;
 
-    finger_exp_f32_init(&controller);
-    for (k = 0; k < 10; k++) { /* a timer calls this every finger_exp_f32_SAMPLE_TIME seconds */
-        const finger_exp_f32_sig u = finger_exp_f32_step(&controller, ref, meas, sched);
+    finger_f32_init(&controller);
+    for (k = 0; k < 10; k++) { /* a timer calls this every finger_f32_SAMPLE_TIME seconds */
+        const finger_f32_sig u = finger_f32_step(&controller, ref, meas, sched);
 
-        printf("%2d  %.9g V%s\n", k, (double)u * (double)finger_exp_f32_U_LSB,
-               finger_exp_f32_flags(&controller) & finger_exp_f32_FLAG_HIGH ? "  at its upper end" : "");
+        printf("%2d  %.9g V%s\n", k, (double)u * (double)finger_f32_U_LSB,
+               finger_f32_flags(&controller) & finger_f32_FLAG_HIGH ? "  at its upper end" : "");
     }
     return 0;
 }

@@ -1,4 +1,4 @@
-/* finger_exp_q31.c: one step of the controller "finger", q31.
+/* finger_q31.c: one step of the controller "finger", q31.
  *
  *   u / (ref - meas) = g(sched) * (0.4 s^0.6 + 1 + 0.5 s^-0.4) / (0.05 s^0.9 + 1) * 1/s
  *
@@ -17,20 +17,20 @@
  *
  * SPDX-License-Identifier: 0BSD
  */
-#include "finger_exp_q31.h"
+#include "finger_q31.h"
 
 #include "foc_memory.h"
 #include "foc_rt.h"
 
 #if FOC_RT_VERSION != 1
-#error "foc_rt.h is not the one that came with finger_exp_q31.c: run focgen generate again and copy both"
+#error "foc_rt.h is not the one that came with finger_q31.c: run focgen generate again and copy both"
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
    Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
    s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
    weight of lag 0. Oldest first, lags 1 ... 0. */
-static const FOC_ROM int32_t finger_exp_q31_numerator[2] = {
+static const FOC_ROM int32_t finger_q31_numerator[2] = {
     /* lag 1: counts of 2^-30 */
     -1638366752,
     /* lag 0: counts of 2^-30 */
@@ -38,7 +38,7 @@ static const FOC_ROM int32_t finger_exp_q31_numerator[2] = {
 };
 
 /* Its blocks, whose sums meet at counts of 2^-60; beside each the most its sum can be. */
-static const FOC_ROM foc_block finger_exp_q31_numerator_blocks[2] = {
+static const FOC_ROM foc_block finger_q31_numerator_blocks[2] = {
     /* oldest lag, taps, shift */
     {1, 1, 6},       /* |sum| <= 2814692648460517088 < 2^63 */
     {0, 1, 6},       /* |sum| <= 3258680398585799484 < 2^63 */
@@ -48,7 +48,7 @@ static const FOC_ROM foc_block finger_exp_q31_numerator_blocks[2] = {
    modes with their rate and weight, and beside each its time constant.
    Rates are counts of 2^-31, weights of 2^-32;
    |mean| <= 1844674409088942080 < 2^63, |drive| <= 1546188228 < 2^31. */
-static const FOC_ROM foc_mode_q31 finger_exp_q31_numerator_modes[11] = {
+static const FOC_ROM foc_mode_q31 finger_q31_numerator_modes[11] = {
     {1622968474, 524121497}, /* 0.007094 s */
     { 775693836, 799498642}, /* 0.02231 s */
     { 292903474, 586868409}, /* 0.06819 s */
@@ -66,7 +66,7 @@ static const FOC_ROM foc_mode_q31 finger_exp_q31_numerator_modes[11] = {
    Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
    s; the modes below remember the rest. The weight of lag j is their sum times h/2 over 4.15479, the
    denominator's weight of lag 0. Oldest first, lags 1 ... 0. */
-static const FOC_ROM int32_t finger_exp_q31_integrand[2] = {
+static const FOC_ROM int32_t finger_q31_integrand[2] = {
     /* lag 1: counts of 2^-37 */
     -1310693402,
     /* lag 0: counts of 2^-37 */
@@ -74,7 +74,7 @@ static const FOC_ROM int32_t finger_exp_q31_integrand[2] = {
 };
 
 /* Its blocks, whose sums meet at counts of 2^-63; beside each the most its sum can be. */
-static const FOC_ROM foc_block finger_exp_q31_integrand_blocks[2] = {
+static const FOC_ROM foc_block finger_q31_integrand_blocks[2] = {
     /* oldest lag, taps, shift */
     {1, 1, 10},      /* |sum| <= 2251754119455608438 < 2^63 */
     {0, 1, 10},      /* |sum| <= 2251754119455608438 < 2^63 */
@@ -84,7 +84,7 @@ static const FOC_ROM foc_block finger_exp_q31_integrand_blocks[2] = {
    modes with their rate and weight, and beside each its time constant.
    Rates are counts of 2^-31, weights of 2^-40;
    |mean| <= 1844674409088942080 < 2^63, |drive| <= 1546188228 < 2^31. */
-static const FOC_ROM foc_mode_q31 finger_exp_q31_integrand_modes[11] = {
+static const FOC_ROM foc_mode_q31 finger_q31_integrand_modes[11] = {
     {1622968474,  838594396}, /* 0.007094 s */
     { 775693836, 1279197827}, /* 0.02231 s */
     { 292903474,  938989454}, /* 0.06819 s */
@@ -102,7 +102,7 @@ static const FOC_ROM foc_mode_q31 finger_exp_q31_integrand_modes[11] = {
    Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
    s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
    weight of lag 0. Oldest first, lag 1 only. */
-static const FOC_ROM int32_t finger_exp_q31_denominator[1] = {
+static const FOC_ROM int32_t finger_q31_denominator[1] = {
     /* lag 1: counts of 2^-31 */
     -1630613880,
 };
@@ -111,7 +111,7 @@ static const FOC_ROM int32_t finger_exp_q31_denominator[1] = {
    modes with their rate and weight, and beside each its time constant.
    Rates are counts of 2^-31, weights of 2^-35;
    |mean| <= 2305843008139952128 < 2^63, |drive| <= 2147483647 < 2^31. */
-static const FOC_ROM foc_mode_q31 finger_exp_q31_denominator_modes[12] = {
+static const FOC_ROM foc_mode_q31 finger_q31_denominator_modes[12] = {
     {1795361154, 754008407}, /* 0.005531 s */
     { 986322012, 901480707}, /* 0.01626 s */
     { 422415627, 534662991}, /* 0.04566 s */
@@ -128,83 +128,83 @@ static const FOC_ROM foc_mode_q31 finger_exp_q31_denominator_modes[12] = {
 
 /* Gain schedule, linear between breakpoints (bar) and held beyond them. The table holds the gains times h/2.
    0.05: 500,  0.1: 420,  0.2: 350 */
-static const FOC_ROM int32_t finger_exp_q31_points[3] = {
+static const FOC_ROM int32_t finger_q31_points[3] = {
     /* counts of 2^-32 bar */
     214748365, 429496730, 858993459,
 };
-static const FOC_ROM int32_t finger_exp_q31_gains[3] = {
+static const FOC_ROM int32_t finger_q31_gains[3] = {
     /* counts of 2^-29 */
     1342177280, 1127428915,  939524096,
 };
-static const FOC_ROM int32_t finger_exp_q31_slopes[2] = {
+static const FOC_ROM int32_t finger_q31_slopes[2] = {
     /* from each breakpoint to the next, before its shift */
     -1073741824, -1879048193,
 };
-static const FOC_ROM uint8_t finger_exp_q31_shifts[2] = {
+static const FOC_ROM uint8_t finger_q31_shifts[2] = {
     30, 32,
 };
 
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
-static int64_t finger_exp_q31_numerator_sum(finger_exp_q31_state *s)
+static int64_t finger_q31_numerator_sum(finger_q31_state *s)
 {
-    const int32_t past = s->error[foc_ring_slot(s->error_now, finger_exp_q31_ERRORS, 1)];
-    int64_t sum = foc_sum_q31(finger_exp_q31_numerator, finger_exp_q31_numerator_blocks, 2, s->error,
-                              finger_exp_q31_ERRORS, s->error_now);
+    const int32_t past = s->error[foc_ring_slot(s->error_now, finger_q31_ERRORS, 1)];
+    int64_t sum = foc_sum_q31(finger_q31_numerator, finger_q31_numerator_blocks, 2, s->error,
+                              finger_q31_ERRORS, s->error_now);
 
     /* |sum of the modes| <= 4051207700309035188 < 2^63 */
-    sum += foc_shift64(foc_modes_q31(finger_exp_q31_numerator_modes, s->numerator_means, 11, past, 30,
-                       31, 0), 7);
+    sum += foc_shift64(foc_modes_q31(finger_q31_numerator_modes, s->numerator_means, 11, past, 30, 31,
+                       0), 7);
     return sum; /* |sum| <= 117750599487204022 < 2^63, counts of 2^-60 */
 }
 
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
-static int64_t finger_exp_q31_integrand_sum(finger_exp_q31_state *s)
+static int64_t finger_q31_integrand_sum(finger_q31_state *s)
 {
-    const int32_t past = s->error[foc_ring_slot(s->error_now, finger_exp_q31_ERRORS, 1)];
-    int64_t sum = foc_sum_q31(finger_exp_q31_integrand, finger_exp_q31_integrand_blocks, 2, s->error,
-                              finger_exp_q31_ERRORS, s->error_now);
+    const int32_t past = s->error[foc_ring_slot(s->error_now, finger_q31_ERRORS, 1)];
+    int64_t sum = foc_sum_q31(finger_q31_integrand, finger_q31_integrand_blocks, 2, s->error,
+                              finger_q31_ERRORS, s->error_now);
 
     /* |sum of the modes| <= 6481932318020555136 < 2^63 */
-    sum += foc_shift64(foc_modes_q31(finger_exp_q31_integrand_modes, s->integrand_means, 11, past, 30,
-                       31, 0), 12);
+    sum += foc_shift64(foc_modes_q31(finger_q31_integrand_modes, s->integrand_means, 11, past, 30, 31,
+                       0), 12);
     return sum; /* |sum| <= 5540664545178804 < 2^63, counts of 2^-63 */
 }
 
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
-static int64_t finger_exp_q31_denominator_sum(finger_exp_q31_state *s)
+static int64_t finger_q31_denominator_sum(finger_q31_state *s)
 {
-    const int32_t past = s->filtered[foc_ring_slot(s->filtered_now, finger_exp_q31_FILTERED, 1)];
-    int64_t sum = foc_dot_q31(finger_exp_q31_denominator, 1, s->filtered, finger_exp_q31_FILTERED,
+    const int32_t past = s->filtered[foc_ring_slot(s->filtered_now, finger_q31_FILTERED, 1)];
+    int64_t sum = foc_dot_q31(finger_q31_denominator, 1, s->filtered, finger_q31_FILTERED,
                               s->filtered_now, 1);
 
     /* |sum of the modes| <= 5599102851903650621 < 2^63 */
-    sum += foc_shift64(foc_modes_q31(finger_exp_q31_denominator_modes, s->denominator_means, 12, past,
-                       30, 31, 0), 3);
+    sum += foc_shift64(foc_modes_q31(finger_q31_denominator_modes, s->denominator_means, 12, past, 30,
+                       31, 0), 3);
     return sum; /* |sum| <= 4201604499989790568 < 2^63, counts of 2^-60 */
 }
 
 /* Take the error of one more sample; return the filtered error v, counts of 2^-29. */
-static int32_t finger_exp_q31_filter(finger_exp_q31_state *s, int32_t e)
+static int32_t finger_q31_filter(finger_q31_state *s, int32_t e)
 {
     int64_t r;
     int64_t x;
     int64_t rounded;
     int32_t v;
 
-    s->error_now = foc_ring_next(s->error_now, finger_exp_q31_ERRORS);
+    s->error_now = foc_ring_next(s->error_now, finger_q31_ERRORS);
     s->error[s->error_now] = e;
-    x = finger_exp_q31_numerator_sum(s);
+    x = finger_q31_numerator_sum(s);
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
-    r = finger_exp_q31_integrand_sum(s);
+    r = finger_q31_integrand_sum(s);
     /* |sum| <= 6353763467691738476 < 2^63 */
     s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-6342682138601380864),
                            6342682138601380864);
     s->inner_input = r;
     x += foc_shift64(s->inner, 3);
 
-    s->filtered_now = foc_ring_next(s->filtered_now, finger_exp_q31_FILTERED);
-    x = x - finger_exp_q31_denominator_sum(s) + s->carry; /* |x| <= 5112190365919384461 < 2^63 */
+    s->filtered_now = foc_ring_next(s->filtered_now, finger_q31_FILTERED);
+    x = x - finger_q31_denominator_sum(s) + s->carry; /* |x| <= 5112190365919384461 < 2^63 */
     rounded = foc_shift64(x, 31);
     s->carry = x - rounded * ((int64_t)1 << 31); /* the next sample takes up what rounding drops */
     v = foc_sat32(rounded);
@@ -213,32 +213,32 @@ static int32_t finger_exp_q31_filter(finger_exp_q31_state *s, int32_t e)
 }
 
 /* The filtered error times the gain times h/2; |d| <= 2882303763664601088 < 2^63, counts of 2^-58 V. */
-static int64_t finger_exp_q31_increment(int32_t gain, int32_t v)
+static int64_t finger_q31_increment(int32_t gain, int32_t v)
 {
     return (int64_t)gain * v;
 }
 
 /* The flags of an output at its ends. */
-static uint8_t finger_exp_q31_ends(int32_t u)
+static uint8_t finger_q31_ends(int32_t u)
 {
     unsigned flags = 0;
 
-    if (u >= finger_exp_q31_U_MAX) {
-        flags |= finger_exp_q31_FLAG_HIGH;
+    if (u >= finger_q31_U_MAX) {
+        flags |= finger_q31_FLAG_HIGH;
     }
-    if (u <= finger_exp_q31_U_MIN) {
-        flags |= finger_exp_q31_FLAG_LOW;
+    if (u <= finger_q31_U_MIN) {
+        flags |= finger_q31_FLAG_LOW;
     }
     return (uint8_t)flags;
 }
 
 /* As if the error had been e for ever. */
-static void finger_exp_q31_settle(finger_exp_q31_state *s, int32_t e)
+static void finger_q31_settle(finger_q31_state *s, int32_t e)
 {
     const int32_t v = foc_sat32(foc_shift64((int64_t)1073741824 * e, 37)); /* e times 1 */
     uint16_t i;
 
-    for (i = 0; i < finger_exp_q31_ERRORS; i++) {
+    for (i = 0; i < finger_q31_ERRORS; i++) {
         s->error[i] = e;
     }
     s->error_now = 0;
@@ -248,7 +248,7 @@ static void finger_exp_q31_settle(finger_exp_q31_state *s, int32_t e)
     for (i = 0; i < 11; i++) {
         s->integrand_means[i] = (int64_t)e * ((int64_t)1 << 30);
     }
-    for (i = 0; i < finger_exp_q31_FILTERED; i++) {
+    for (i = 0; i < finger_q31_FILTERED; i++) {
         s->filtered[i] = v;
     }
     s->filtered_now = 0;
@@ -257,44 +257,43 @@ static void finger_exp_q31_settle(finger_exp_q31_state *s, int32_t e)
     }
     s->carry = 0;
     s->inner = 0;
-    s->inner_input = finger_exp_q31_integrand_sum(s);
+    s->inner_input = finger_q31_integrand_sum(s);
     s->increment = 0;
     s->resting = v;
     s->starting = 1; /* the first step completes it: only then the gain is known */
     s->flags = 0;
 }
 
-void finger_exp_q31_init(finger_exp_q31_state *s)
+void finger_q31_init(finger_q31_state *s)
 {
-    finger_exp_q31_settle(s, 0);
+    finger_q31_settle(s, 0);
     s->integral = 0; /* 0 V */
 }
 
-void finger_exp_q31_reset(finger_exp_q31_state *s, finger_exp_q31_sig ref, finger_exp_q31_sig meas,
-                          finger_exp_q31_sig u0)
+void finger_q31_reset(finger_q31_state *s, finger_q31_sig ref, finger_q31_sig meas, finger_q31_sig u0)
 {
-    const int32_t r = foc_clamp32(ref, finger_exp_q31_REF_MIN, finger_exp_q31_REF_MAX);
-    const int32_t m = foc_clamp32(meas, finger_exp_q31_MEAS_MIN, finger_exp_q31_MEAS_MAX);
+    const int32_t r = foc_clamp32(ref, finger_q31_REF_MIN, finger_q31_REF_MAX);
+    const int32_t m = foc_clamp32(meas, finger_q31_MEAS_MIN, finger_q31_MEAS_MAX);
 
-    finger_exp_q31_settle(s, r - m);
-    finger_exp_q31_track(s, u0);
+    finger_q31_settle(s, r - m);
+    finger_q31_track(s, u0);
 }
 
-finger_exp_q31_sig finger_exp_q31_step(finger_exp_q31_state *s, finger_exp_q31_sig ref,
-                                       finger_exp_q31_sig meas, finger_exp_q31_sig sched)
+finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q31_sig meas,
+                               finger_q31_sig sched)
 {
-    const int32_t r = foc_clamp32(ref, finger_exp_q31_REF_MIN, finger_exp_q31_REF_MAX);
-    const int32_t m = foc_clamp32(meas, finger_exp_q31_MEAS_MIN, finger_exp_q31_MEAS_MAX);
-    const int32_t at = foc_clamp32(sched, finger_exp_q31_SCHED_MIN, finger_exp_q31_SCHED_MAX);
-    const int32_t gain = foc_schedule_q31(at, finger_exp_q31_points, finger_exp_q31_gains,
-                                          finger_exp_q31_slopes, finger_exp_q31_shifts, 3);
-    const int32_t v = finger_exp_q31_filter(s, r - m);
-    const int64_t d = finger_exp_q31_increment(gain, v);
+    const int32_t r = foc_clamp32(ref, finger_q31_REF_MIN, finger_q31_REF_MAX);
+    const int32_t m = foc_clamp32(meas, finger_q31_MEAS_MIN, finger_q31_MEAS_MAX);
+    const int32_t at = foc_clamp32(sched, finger_q31_SCHED_MIN, finger_q31_SCHED_MAX);
+    const int32_t gain = foc_schedule_q31(at, finger_q31_points, finger_q31_gains, finger_q31_slopes,
+                                          finger_q31_shifts, 3);
+    const int32_t v = finger_q31_filter(s, r - m);
+    const int64_t d = finger_q31_increment(gain, v);
     unsigned flags = 0;
     int32_t u;
 
     if (s->starting) { /* the sample before had the same gain */
-        s->increment = finger_exp_q31_increment(gain, s->resting);
+        s->increment = finger_q31_increment(gain, s->resting);
         s->starting = 0;
     }
     /* |sum| <= 8646911282940739584 < 2^63 */
@@ -303,21 +302,21 @@ finger_exp_q31_sig finger_exp_q31_step(finger_exp_q31_state *s, finger_exp_q31_s
     u = foc_sat32(foc_shift64(s->integral, 31));
 
     if (r != ref || m != meas || at != sched) {
-        flags |= finger_exp_q31_FLAG_INPUT;
+        flags |= finger_q31_FLAG_INPUT;
     }
-    if (at < finger_exp_q31_points[0] || at > finger_exp_q31_points[2]) {
-        flags |= finger_exp_q31_FLAG_SCHEDULE;
+    if (at < finger_q31_points[0] || at > finger_q31_points[2]) {
+        flags |= finger_q31_FLAG_SCHEDULE;
     }
-    s->flags = (uint8_t)(flags | finger_exp_q31_ends(u));
+    s->flags = (uint8_t)(flags | finger_q31_ends(u));
     return u;
 }
 
-void finger_exp_q31_track(finger_exp_q31_state *s, finger_exp_q31_sig u_applied)
+void finger_q31_track(finger_q31_state *s, finger_q31_sig u_applied)
 {
-    s->integral = (int64_t)foc_clamp32(u_applied, finger_exp_q31_U_MIN, finger_exp_q31_U_MAX) * ((int64_t)1 << 31);
+    s->integral = (int64_t)foc_clamp32(u_applied, finger_q31_U_MIN, finger_q31_U_MAX) * ((int64_t)1 << 31);
 }
 
-uint8_t finger_exp_q31_flags(const finger_exp_q31_state *s)
+uint8_t finger_q31_flags(const finger_q31_state *s)
 {
     return s->flags;
 }

@@ -1,4 +1,4 @@
-/* finger_exp_f32.c: one step of the controller "finger", f32.
+/* finger_f32.c: one step of the controller "finger", f32.
  *
  *   u / (ref - meas) = g(sched) * (0.4 s^0.6 + 1 + 0.5 s^-0.4) / (0.05 s^0.9 + 1) * 1/s
  *
@@ -17,26 +17,26 @@
  *
  * SPDX-License-Identifier: 0BSD
  */
-#include "finger_exp_f32.h"
+#include "finger_f32.h"
 
 #include "foc_memory.h"
 #include "foc_rt.h"
 
 #if FOC_RT_VERSION != 1
-#error "foc_rt.h is not the one that came with finger_exp_f32.c: run focgen generate again and copy both"
+#error "foc_rt.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
    Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
    s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
    weight of lag 0. Oldest first, lags 1 ... 0. */
-static const FOC_ROM float finger_exp_f32_numerator[2] = {
+static const FOC_ROM float finger_f32_numerator[2] = {
     -1.52584791f,  1.76653421f,
 };
 
 /* How the numerator's s^0.6 remembers its history:
    modes with their rate and weight, and beside each its time constant. */
-static const FOC_ROM foc_mode_f32 finger_exp_f32_numerator_modes[3] = {
+static const FOC_ROM foc_mode_f32 finger_f32_numerator_modes[3] = {
     {0.755753577f, 0.122048564f}, /* 0.007094 s */
     {0.361210585f, 0.186128154f}, /* 0.02231 s */
     {0.136393815f, 0.136656895f}, /* 0.06819 s */
@@ -44,7 +44,7 @@ static const FOC_ROM foc_mode_f32 finger_exp_f32_numerator_modes[3] = {
 
 /* How the numerator's s^0.6 remembers its history:
    slow modes with their rate and weight, and beside each its time constant. */
-static const FOC_ROM foc_mode_f32 finger_exp_f32_numerator_slow_modes[8] = {
+static const FOC_ROM foc_mode_f32 finger_f32_numerator_slow_modes[8] = {
     {  0.0469366312f,  0.0786029547f}, /* 0.208 s */
     {  0.0156345163f,  0.0419934988f}, /* 0.6346 s */
     { 0.00514915632f,   0.021682458f}, /* 1.937 s */
@@ -59,13 +59,13 @@ static const FOC_ROM foc_mode_f32 finger_exp_f32_numerator_slow_modes[8] = {
    Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
    s; the modes below remember the rest. The weight of lag j is their sum times h/2 over 4.15479, the
    denominator's weight of lag 0. Oldest first, lags 1 ... 0. */
-static const FOC_ROM float finger_exp_f32_integrand[2] = {
+static const FOC_ROM float finger_f32_integrand[2] = {
     -0.00953654945f,  0.00953654945f,
 };
 
 /* How the integrand's s^0.6 remembers its history:
    modes with their rate and weight, and beside each its time constant. */
-static const FOC_ROM foc_mode_f32 finger_exp_f32_integrand_modes[3] = {
+static const FOC_ROM foc_mode_f32 finger_f32_integrand_modes[3] = {
     {0.755753577f, 0.000762803538f}, /* 0.007094 s */
     {0.361210585f,  0.00116330094f}, /* 0.02231 s */
     {0.136393815f,  0.00085410563f}, /* 0.06819 s */
@@ -73,7 +73,7 @@ static const FOC_ROM foc_mode_f32 finger_exp_f32_integrand_modes[3] = {
 
 /* How the integrand's s^0.6 remembers its history:
    slow modes with their rate and weight, and beside each its time constant. */
-static const FOC_ROM foc_mode_f32 finger_exp_f32_integrand_slow_modes[8] = {
+static const FOC_ROM foc_mode_f32 finger_f32_integrand_slow_modes[8] = {
     {  0.0469366312f, 0.000491268467f}, /* 0.208 s */
     {  0.0156345163f, 0.000262459362f}, /* 0.6346 s */
     { 0.00514915632f, 0.000135515365f}, /* 1.937 s */
@@ -88,13 +88,13 @@ static const FOC_ROM foc_mode_f32 finger_exp_f32_integrand_slow_modes[8] = {
    Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
    s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
    weight of lag 0. Oldest first, lag 1 only. */
-static const FOC_ROM float finger_exp_f32_denominator[1] = {
+static const FOC_ROM float finger_f32_denominator[1] = {
     -0.759313762f,
 };
 
 /* How the denominator's s^0.9 remembers its history:
    modes with their rate and weight, and beside each its time constant. */
-static const FOC_ROM foc_mode_f32 finger_exp_f32_denominator_modes[4] = {
+static const FOC_ROM foc_mode_f32 finger_f32_denominator_modes[4] = {
     { 0.836030185f,  0.0219444279f}, /* 0.005531 s */
     { 0.459291965f,  0.0262366589f}, /* 0.01626 s */
     {   0.1967026f,  0.0155607117f}, /* 0.04566 s */
@@ -103,7 +103,7 @@ static const FOC_ROM foc_mode_f32 finger_exp_f32_denominator_modes[4] = {
 
 /* How the denominator's s^0.9 remembers its history:
    slow modes with their rate and weight, and beside each its time constant. */
-static const FOC_ROM foc_mode_f32 finger_exp_f32_denominator_slow_modes[8] = {
+static const FOC_ROM foc_mode_f32 finger_f32_denominator_slow_modes[8] = {
     {  0.0276568104f,  0.00298756175f}, /* 0.3566 s */
     { 0.00998810865f,  0.00120762351f}, /* 0.9962 s */
     { 0.00358633557f, 0.000482297386f}, /* 2.783 s */
@@ -116,106 +116,104 @@ static const FOC_ROM foc_mode_f32 finger_exp_f32_denominator_slow_modes[8] = {
 
 /* Gain schedule, linear between breakpoints (bar) and held beyond them. The table holds the gains times h/2.
    0.05: 500,  0.1: 420,  0.2: 350 */
-static const FOC_ROM float finger_exp_f32_points[3] = {
+static const FOC_ROM float finger_f32_points[3] = {
     0.0500000007f,  0.100000001f,  0.200000003f,
 };
-static const FOC_ROM float finger_exp_f32_gains[3] = {
+static const FOC_ROM float finger_f32_gains[3] = {
           2.5f, 2.0999999f,      1.75f,
 };
-static const FOC_ROM float finger_exp_f32_slopes[2] = {
+static const FOC_ROM float finger_f32_slopes[2] = {
     -8.00000191f, -3.49999905f,
 };
 
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
-static float finger_exp_f32_numerator_sum(finger_exp_f32_state *s)
+static float finger_f32_numerator_sum(finger_f32_state *s)
 {
-    const float past = s->error[foc_ring_slot(s->error_now, finger_exp_f32_ERRORS, 1)];
-    float sum = foc_dot_f32(finger_exp_f32_numerator, 2, s->error, finger_exp_f32_ERRORS, s->error_now,
-                            1);
+    const float past = s->error[foc_ring_slot(s->error_now, finger_f32_ERRORS, 1)];
+    float sum = foc_dot_f32(finger_f32_numerator, 2, s->error, finger_f32_ERRORS, s->error_now, 1);
 
-    sum += foc_modes_f32(finger_exp_f32_numerator_modes, s->numerator_means, 3, past);
-    sum += foc_slow_modes_f32(finger_exp_f32_numerator_slow_modes, s->numerator_slow_means,
+    sum += foc_modes_f32(finger_f32_numerator_modes, s->numerator_means, 3, past);
+    sum += foc_slow_modes_f32(finger_f32_numerator_slow_modes, s->numerator_slow_means,
                               s->numerator_slow_rests, 8, past);
     return sum;
 }
 
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
-static float finger_exp_f32_integrand_sum(finger_exp_f32_state *s)
+static float finger_f32_integrand_sum(finger_f32_state *s)
 {
-    const float past = s->error[foc_ring_slot(s->error_now, finger_exp_f32_ERRORS, 1)];
-    float sum = foc_dot_f32(finger_exp_f32_integrand, 2, s->error, finger_exp_f32_ERRORS, s->error_now,
-                            1);
+    const float past = s->error[foc_ring_slot(s->error_now, finger_f32_ERRORS, 1)];
+    float sum = foc_dot_f32(finger_f32_integrand, 2, s->error, finger_f32_ERRORS, s->error_now, 1);
 
-    sum += foc_modes_f32(finger_exp_f32_integrand_modes, s->integrand_means, 3, past);
-    sum += foc_slow_modes_f32(finger_exp_f32_integrand_slow_modes, s->integrand_slow_means,
+    sum += foc_modes_f32(finger_f32_integrand_modes, s->integrand_means, 3, past);
+    sum += foc_slow_modes_f32(finger_f32_integrand_slow_modes, s->integrand_slow_means,
                               s->integrand_slow_rests, 8, past);
     return sum;
 }
 
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
-static float finger_exp_f32_denominator_sum(finger_exp_f32_state *s)
+static float finger_f32_denominator_sum(finger_f32_state *s)
 {
-    const float past = s->filtered[foc_ring_slot(s->filtered_now, finger_exp_f32_FILTERED, 1)];
-    float sum = foc_dot_f32(finger_exp_f32_denominator, 1, s->filtered, finger_exp_f32_FILTERED,
+    const float past = s->filtered[foc_ring_slot(s->filtered_now, finger_f32_FILTERED, 1)];
+    float sum = foc_dot_f32(finger_f32_denominator, 1, s->filtered, finger_f32_FILTERED,
                             s->filtered_now, 1);
 
-    sum += foc_modes_f32(finger_exp_f32_denominator_modes, s->denominator_means, 4, past);
-    sum += foc_slow_modes_f32(finger_exp_f32_denominator_slow_modes, s->denominator_slow_means,
+    sum += foc_modes_f32(finger_f32_denominator_modes, s->denominator_means, 4, past);
+    sum += foc_slow_modes_f32(finger_f32_denominator_slow_modes, s->denominator_slow_means,
                               s->denominator_slow_rests, 8, past);
     return sum;
 }
 
 /* Take the error of one more sample; return the filtered error v. */
-static float finger_exp_f32_filter(finger_exp_f32_state *s, float e)
+static float finger_f32_filter(finger_f32_state *s, float e)
 {
     float r;
     float x;
     float v;
 
-    s->error_now = foc_ring_next(s->error_now, finger_exp_f32_ERRORS);
+    s->error_now = foc_ring_next(s->error_now, finger_f32_ERRORS);
     s->error[s->error_now] = e;
-    x = finger_exp_f32_numerator_sum(s);
+    x = finger_f32_numerator_sum(s);
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
-    r = finger_exp_f32_integrand_sum(s);
+    r = finger_f32_integrand_sum(s);
     s->inner = foc_clamp_f32(s->inner + (r + s->inner_input), (-0.687674999f), 0.687674999f);
     s->inner_input = r;
     x += s->inner;
 
-    s->filtered_now = foc_ring_next(s->filtered_now, finger_exp_f32_FILTERED);
-    x -= finger_exp_f32_denominator_sum(s);
+    s->filtered_now = foc_ring_next(s->filtered_now, finger_f32_FILTERED);
+    x -= finger_f32_denominator_sum(s);
     v = x;
     s->filtered[s->filtered_now] = v;
     return v;
 }
 
 /* The filtered error times the gain times h/2; in V. */
-static float finger_exp_f32_increment(float gain, float v)
+static float finger_f32_increment(float gain, float v)
 {
     return gain * v;
 }
 
 /* The flags of an output at its ends. */
-static uint8_t finger_exp_f32_ends(float u)
+static uint8_t finger_f32_ends(float u)
 {
     unsigned flags = 0;
 
-    if (u >= finger_exp_f32_U_MAX) {
-        flags |= finger_exp_f32_FLAG_HIGH;
+    if (u >= finger_f32_U_MAX) {
+        flags |= finger_f32_FLAG_HIGH;
     }
-    if (u <= finger_exp_f32_U_MIN) {
-        flags |= finger_exp_f32_FLAG_LOW;
+    if (u <= finger_f32_U_MIN) {
+        flags |= finger_f32_FLAG_LOW;
     }
     return (uint8_t)flags;
 }
 
 /* As if the error had been e for ever. */
-static void finger_exp_f32_settle(finger_exp_f32_state *s, float e)
+static void finger_f32_settle(finger_f32_state *s, float e)
 {
     const float v = 1.0f * e; /* e times 1 */
     uint16_t i;
 
-    for (i = 0; i < finger_exp_f32_ERRORS; i++) {
+    for (i = 0; i < finger_f32_ERRORS; i++) {
         s->error[i] = e;
     }
     s->error_now = 0;
@@ -233,7 +231,7 @@ static void finger_exp_f32_settle(finger_exp_f32_state *s, float e)
         s->integrand_slow_means[i] = e;
         s->integrand_slow_rests[i] = 0.0f;
     }
-    for (i = 0; i < finger_exp_f32_FILTERED; i++) {
+    for (i = 0; i < finger_f32_FILTERED; i++) {
         s->filtered[i] = v;
     }
     s->filtered_now = 0;
@@ -245,7 +243,7 @@ static void finger_exp_f32_settle(finger_exp_f32_state *s, float e)
         s->denominator_slow_rests[i] = 0.0f;
     }
     s->inner = 0.0f;
-    s->inner_input = finger_exp_f32_integrand_sum(s);
+    s->inner_input = finger_f32_integrand_sum(s);
     s->increment = 0.0f;
     s->resting = v;
     s->starting = 1; /* the first step completes it: only then the gain is known */
@@ -253,72 +251,71 @@ static void finger_exp_f32_settle(finger_exp_f32_state *s, float e)
 }
 
 /* An input of the step cannot be used: the output stays, and so does everything else. */
-static finger_exp_f32_sig finger_exp_f32_hold(finger_exp_f32_state *s)
+static finger_f32_sig finger_f32_hold(finger_f32_state *s)
 {
     const float u = s->integral;
 
-    s->flags = (uint8_t)(finger_exp_f32_FLAG_INVALID | finger_exp_f32_ends(u));
+    s->flags = (uint8_t)(finger_f32_FLAG_INVALID | finger_f32_ends(u));
     return u;
 }
 
-void finger_exp_f32_init(finger_exp_f32_state *s)
+void finger_f32_init(finger_f32_state *s)
 {
-    finger_exp_f32_settle(s, 0.0f);
+    finger_f32_settle(s, 0.0f);
     s->integral = 0.0f; /* 0 V */
 }
 
-void finger_exp_f32_reset(finger_exp_f32_state *s, finger_exp_f32_sig ref, finger_exp_f32_sig meas,
-                          finger_exp_f32_sig u0)
+void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas, finger_f32_sig u0)
 {
     const int known = foc_usable_f32(ref) && foc_usable_f32(meas);
 
-    finger_exp_f32_settle(s, known ? ref - meas : 0.0f);
+    finger_f32_settle(s, known ? ref - meas : 0.0f);
     s->integral = 0.0f; /* where u0 cannot be used */
-    finger_exp_f32_track(s, u0);
+    finger_f32_track(s, u0);
     if (!known) {
-        s->flags = finger_exp_f32_FLAG_INVALID;
+        s->flags = finger_f32_FLAG_INVALID;
     }
 }
 
-finger_exp_f32_sig finger_exp_f32_step(finger_exp_f32_state *s, finger_exp_f32_sig ref,
-                                       finger_exp_f32_sig meas, finger_exp_f32_sig sched)
+finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas,
+                               finger_f32_sig sched)
 {
     if (!foc_usable_f32(ref) || !foc_usable_f32(meas) || !foc_usable_f32(sched)) {
-        return finger_exp_f32_hold(s);
+        return finger_f32_hold(s);
     }
 
-    const float gain = foc_schedule_f32(sched, finger_exp_f32_points, finger_exp_f32_gains,
-                                        finger_exp_f32_slopes, 3);
-    const float v = finger_exp_f32_filter(s, ref - meas);
-    const float d = finger_exp_f32_increment(gain, v);
+    const float gain = foc_schedule_f32(sched, finger_f32_points, finger_f32_gains, finger_f32_slopes,
+                                        3);
+    const float v = finger_f32_filter(s, ref - meas);
+    const float d = finger_f32_increment(gain, v);
     unsigned flags = 0;
     float u;
 
     if (s->starting) { /* the sample before had the same gain */
-        s->increment = finger_exp_f32_increment(gain, s->resting);
+        s->increment = finger_f32_increment(gain, s->resting);
         s->starting = 0;
     }
     s->integral = foc_clamp_f32(s->integral + (d + s->increment), 0.0f, 10.0f);
     s->increment = d;
     u = s->integral;
 
-    if (sched < finger_exp_f32_points[0] || sched > finger_exp_f32_points[2]) {
-        flags |= finger_exp_f32_FLAG_SCHEDULE;
+    if (sched < finger_f32_points[0] || sched > finger_f32_points[2]) {
+        flags |= finger_f32_FLAG_SCHEDULE;
     }
-    s->flags = (uint8_t)(flags | finger_exp_f32_ends(u));
+    s->flags = (uint8_t)(flags | finger_f32_ends(u));
     return u;
 }
 
-void finger_exp_f32_track(finger_exp_f32_state *s, finger_exp_f32_sig u_applied)
+void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied)
 {
     if (!foc_usable_f32(u_applied)) {
-        s->flags = (uint8_t)(s->flags | finger_exp_f32_FLAG_INVALID);
+        s->flags = (uint8_t)(s->flags | finger_f32_FLAG_INVALID);
         return;
     }
-    s->integral = foc_clamp_f32(u_applied, finger_exp_f32_U_MIN, finger_exp_f32_U_MAX);
+    s->integral = foc_clamp_f32(u_applied, finger_f32_U_MIN, finger_f32_U_MAX);
 }
 
-uint8_t finger_exp_f32_flags(const finger_exp_f32_state *s)
+uint8_t finger_f32_flags(const finger_f32_state *s)
 {
     return s->flags;
 }
