@@ -2,8 +2,9 @@
  *
  * SPDX-License-Identifier: 0BSD
  *
- * A fractional power of s remembers all that has been. A bank of modes stands for its past: each keeps a mean
- * of the history, weighted by powers of its pole p, and takes part by how far the latest value u is from it:
+ * A fractional power of s remembers all that has been. A bank of modes stands for its past: each keeps a
+ * mean of the history, weighted by powers of its pole p, and takes part by how far the latest value u is
+ * from it:
  *
  *     drive = u - mean;    sum += weight * drive;    mean += rate * drive;    rate = 1 - p
  *
@@ -18,9 +19,10 @@
 
 /* --- Fixed point ----------------------------------------------------------------------------------- */
 
-/* A mean has `up` bits more than u. The drive is the only thing that is rounded, by half a count, however slow
-   the mode is: mean += rate * drive is exact where rate_shift is 0, and 2^-rate_shift of it elsewhere. All
-   products, sums and means fit their types (proved). */
+/* A mean has `up` bits more than u. Where rate_shift is 0 the drive is all that is rounded, by half a count,
+   and mean += rate * drive is exact: no mode is too slow to move. Where the rates of slow modes have
+   rate_shift more bits, the product loses those again, rounded. All products, sums and means fit their types
+   (proved). */
 typedef struct {
     int32_t rate;
     int32_t weight;
