@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.bootstrap import threshold
+from focgen.diagnosis.diagnose import THRESHOLD, diagnose, explain_all
+from focgen.diagnosis.explain import clues_for
 from focgen.errors import FocgenError
 from focgen.rig.files import read_rig
 from focgen.rig.replay import replay
@@ -94,3 +96,11 @@ def test_session_state_carries_on(tmp_path):
     rig = read_rig(tmp_path / "augmented.toml")
     assert [e["name"] for e in rig.effects] == ["gain_drift"]
     assert rig.effects[0]["clock"] > 300
+
+
+def test_noise_alone_gathers_little_evidence():
+    explained = explain_all(RIG, session(11, zone=0.045), THRESHOLD)[1]
+    clues = [c for c in clues_for(explained.segment, RIG) if c.form.seen is None]
+    asked = threshold(explained, clues, 6, 0.0)
+    assert 0 <= asked < 40 < explained.causes[0].gain
+    assert threshold(explained, clues, 2, 1e6) == 1e6

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from focgen.diagnosis import compose, verdict
-from focgen.diagnosis.explain import Explanation, explain
+from focgen.diagnosis.bootstrap import threshold as bootstrapped
+from focgen.diagnosis.explain import Explanation, clues_for, explain
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
 from focgen.diagnosis.segments import cuts, make
@@ -34,7 +35,8 @@ def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out
 
     ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures; ``controller``: of
     closed-loop logs, whose own departures are then looked for too; ``first``, ``last``: s within each experiment;
-    ``bootstrap``: sessions simulated from the nominal rig to set the threshold of evidence by (0: the built-in one).
+    ``bootstrap``: sessions simulated from the nominal rig to set the threshold of evidence by, at least 2
+    (0: the built-in one).
     ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how strong it is.
     ``pictures``: whether to draw them.
     Raises RigError, LogError, ControllerError for files that cannot be used, FocgenError for an unknown effect.
@@ -43,7 +45,7 @@ def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
     logs = _usable(experiments(rig, logs, first, last))
     ran = running(read_controller(controller), logs) if controller is not None else None
-    explanations = explain_all(rig, logs, THRESHOLD, only)
+    explanations = explain_all(rig, logs, THRESHOLD, only, bootstrap)
     rigs, diagnosis, evidence = verdict.reach(rig, logs, compose.compose(rig, explanations, logs), explanations, ran)
     if out is not None:
         from focgen.diagnosis.write import write
@@ -73,13 +75,20 @@ def _check(only: Sequence[str] | None) -> None:
 
 
 def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float,
-                only: Sequence[str] | None = None) -> tuple[Explanation, ...]:
-    """Explain segment after segment, each on what the one before it gives freed of noise."""
+                only: Sequence[str] | None = None, draws: int = 0) -> tuple[Explanation, ...]:
+    """Explain segment after segment, each on what the one before it gives freed of noise. ``draws``: sessions simulated
+    for the threshold of each; where it comes out higher than ``threshold``, the segment is explained anew."""
     roles, x, found, trusted = cuts(logs), None, [], True
     for entry, exit in zip(roles, roles[1:]):
         segment = make(logs, entry, exit, x)
         say(f"{entry} to {exit}")
-        found.append(explain(rig, segment, logs, threshold, only, trusted))
+        e = explain(rig, segment, logs, threshold, only, trusted)
+        if draws > 1 and e.causes and only is None:
+            clues = [c for c in clues_for(e.segment, rig) if c.form.seen is None]
+            asked = bootstrapped(e, clues, draws, threshold)
+            if min(c.gain for c in e.causes) < asked:
+                e = explain(rig, segment, logs, asked, only, trusted)
+        found.append(e)
         best = found[-1].best
         response = best.problem.references.clocks["response"]
         trusted = found[-1].left.share < UNTRUSTED

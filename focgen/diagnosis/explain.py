@@ -27,6 +27,7 @@ _MENDING = 0.6  # of the best further family's evidence: a form of a family foun
 _WHOLE = 0.5  # of what inputs foretell of a residual: a further family has to explain as much
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 _SHARE = (0.06, 0.15)  # of the gap that a further family has to close, and one that is easily confused with those found
+_ASTRAY = 1.1  # of the sum of squares without a rounding: beyond it the rounding is left to the end
 _SWAPS = 3
 _MENDED = 3  # rivals that get a second form where the best has one
 _VISIBLE = (0.015, 0.05)  # of the remaining mean square, the first effect and any further: below, one is of no use
@@ -123,6 +124,9 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     segment, given = problem.segment, problem.nominal()
     rankings: list[Ranking] = []
     base, vector = _seen(problem, given, clues)
+    seen = base if len(base.clues) and _misled(problem, base, vector) else None
+    if seen is not None:
+        values, base, vector = vector[len(given):], problem, given
     while len(rankings) < _DEPTH:
         untried = [c for c in clues if c not in base.clues and not c.form.seen]
         rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
@@ -137,6 +141,8 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     best = _dropped(rankings[-1].base, weighing, threshold)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     best, causes = _doubted(best, nominal, rankings, clues, weighing)
+    if seen is not None:
+        best, causes = _beside(best, seen.clues, values, causes, weighing)
     response = problem.references.clocks["response"]
     return Explanation(segment, given, nominal, best, weighing.ar, causes,
                        leftover(segment, weighed(best), response),
@@ -153,6 +159,23 @@ def _seen(problem: Problem, given: np.ndarray, clues: Sequence[Clue]) -> tuple[P
             scaled = [v / problem.references.scale(p, slot) for p, v in zip(clue.form.parameters, values)]
             base, vector = base.with_clues([*base.clues, clue]), np.r_[vector, scaled]
     return base, vector
+
+
+def _misled(problem: Problem, seen: Problem, vector: np.ndarray) -> bool:
+    """Whether a fit with a rounding goes astray, as where the rest of the model is far off: its steps have no slope."""
+    plain = fit(problem, problem.nominal(), Weighing(np.ones(1)), 6)
+    return fit(seen, vector, Weighing(np.ones(1)), 6).sse > _ASTRAY * plain.sse
+
+
+def _beside(best: Fit, clues: Sequence[Clue], values: np.ndarray, causes: tuple[Cause, ...],
+            weighing: Weighing) -> tuple[Fit, tuple[Cause, ...]]:
+    """With what was seen in the output itself put to what was found without it: a cause, and where it brings the model
+    closer a part of it."""
+    problem = best.problem.with_clues([*best.problem.clues, *clues])
+    both = fit(problem, np.r_[best.vector, values], weighing, 0)
+    added = tuple(Cause((Rival(c.effect, c.stage, 0.0, 0.0, both),), 0.0, 0.0) for c in clues)
+    closer = np.mean(weighed(both) ** 2) < np.mean(weighed(best) ** 2)
+    return both if closer else best, (*causes, *added)
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
