@@ -26,7 +26,8 @@ _MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of o
 _MENDING = 0.6  # of the best further family's evidence: a form of a family found already then goes first
 _WHOLE = 0.5  # of what inputs foretell of a residual: a further family has to explain as much
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
-_SHARE = (0.06, 0.15)  # of the gap that a further family has to close, and one that is easily confused with those found
+_SHARE = (0.06, 0.15)  # of the gap that a further family has to close, and one that is easily confused with those found,
+_MERGED = (0.15, 0.25)  # where the stages are merged
 _ASTRAY = 1.1  # of the sum of squares without a rounding: beyond it the rounding is left to the end
 _SWAPS = 3
 _MENDED = 3  # rivals that get a second form where the best has one
@@ -230,7 +231,8 @@ def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
     noise = now * (1.0 - foretold(winner.problem.segment, weighed(rankings[-1].base), response))
     name, *others = (c.effect for c in reversed(winner.problem.clues))
     alike = any(name in library()[o].confused_with or o in library()[name].confused_with for o in others)
-    return now - then < _SHARE[alike] * (first - min(noise, then))
+    asked = _MERGED if len(winner.problem.segment.stages) > 1 else _SHARE
+    return now - then < asked[alike] * (first - min(noise, then))
 
 
 def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:

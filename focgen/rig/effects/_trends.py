@@ -37,7 +37,7 @@ def forms(slot, level, onto):
         Form("linear", slot, (Parameter("rate", time=-1, starts=(0.1,), **size),), act(_linear)),
         Form("settling", slot, (
             Parameter("size", starts=(0.1, 0.1), **size),
-            Parameter("time", time=1, clock="session", lower=0.02, upper=5.0, starts=(0.1, 0.5), log=True),
+            Parameter("time", time=1, clock="session", lower=0.08, upper=5.0, starts=(0.1, 0.5), log=True),
         ), act(_settling)),
         Form("bending", slot, (
             Parameter("rate", time=-1, starts=(0.1,), **size),
