@@ -32,7 +32,7 @@ _ASTRAY = 1.1  # of the sum of squares without a rounding: beyond it the roundin
 _SWAPS = 3
 _MENDED = 3  # rivals that get a second form where the best has one
 _VISIBLE = (0.015, 0.05)  # of the remaining mean square, the first effect and any further: below, one is of no use
-_KNOWN = 0.3  # of what an effect takes from a residual has to be foretold by inputs
+_KNOWN = 0.12  # of what an effect takes from a residual has to be foretold by inputs
 _NOISY = (0.15, 0.03)  # the same where the input is measured, its noise still in it or not: that looks like a small effect
 
 
