@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -37,21 +38,23 @@ NAMES = [one.name for one in CORES]
 ZIG = toolchains.toolchains(core("cortex-m3"))[0]
 
 
-def written(controllers, folder, arithmetics=ARITHMETICS):
+def written(controllers, folder, arithmetics=ARITHMETICS, memory="short"):
     """Plans of every controller in every arithmetic that can carry it, and their C in one folder."""
     plans = []
     for controller in controllers:
         for arithmetic in arithmetics:
+            name = f"{controller.name}_{arithmetic}_{memory}"
             try:
-                plans.append(build_plan(controller, arithmetic, name=f"{controller.name}_{arithmetic}"))
+                plans.append(build_plan(controller, arithmetic, name=name, memory=memory))
             except PlanError:
                 continue
             write_files(folder, folder_files(plans[-1], controller_text(controller).encode()))
     return plans
 
 
-def agree(name: str, chain, plans, folder, samples: int, host: Library, worst: int | None) -> None:
-    """Every sample of every plan, and the state's bytes after every run."""
+def agree(name: str, chain, plans, folder, samples: int, host: Library, worst: int | None) -> Counter:
+    """Every sample of every plan, and the state's bytes after every run; how many there were by arithmetic."""
+    counted = Counter()
     library = TargetLibrary(core(name), chain, plans, [folder] * len(plans))
     assert library.illegal() == ()
     for plan in plans:
@@ -60,13 +63,18 @@ def agree(name: str, chain, plans, folder, samples: int, host: Library, worst: i
         result = judged(plan, cases, seen, scales, None)
         result = with_states(plan, result, cases, seen, answered(host, plan, cases)[0])
         assert result.sound and result.samples >= samples, f"{plan.name} on {name}: {result.first or result}"
+        counted[plan.arithmetic] += result.samples
+    return counted
 
 
 @pytest.fixture(scope="module")
 def some(tmp_path_factory):
-    """A schedule with an integrator, and a recursion with terms of negative order, in every arithmetic."""
+    """A schedule with an integrator, and a recursion with terms of negative order, in every arithmetic; the
+    former with exponential memory, too.
+    """
     folder = tmp_path_factory.mktemp("some")
     plans = written([paper_controller(16), replace(filter_controller(), length=12)], folder)
+    plans += written([paper_controller(16)], folder, memory="exponential")
     return plans, folder, Library(plans, [folder] * len(plans))
 
 
@@ -79,14 +87,13 @@ def test_every_arithmetic_agrees_in_every_bit(some, name):
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("batch", range(2))
-def test_random_controllers_agree_in_every_bit_on_every_core(name, batch, tmp_path):
-    """At least 100,000 samples of every arithmetic."""
-    controllers = [replace(random_controller(seed, 40), length=min(random_controller(seed, 40).length, 40))
-                   for seed in range(2000 + 10 * batch, 2010 + 10 * batch)]  # fmt: skip
-    plans = written(controllers, tmp_path)
+@pytest.mark.parametrize("memory", ("short", "exponential"))
+def test_random_controllers_agree_in_every_bit_on_every_core(name, memory, tmp_path):
+    """At least 100,000 samples of every arithmetic and form of memory."""
+    plans = written([random_controller(seed, 40) for seed in range(2000, 2010)], tmp_path, memory=memory)
     host = Library(plans, [tmp_path] * len(plans))
-    agree(name, ZIG, plans, tmp_path, 6000, host, worst=6000)
+    counted = agree(name, ZIG, plans, tmp_path, 6000, host, worst=6000)
+    assert all(counted[arithmetic] >= 100_000 for arithmetic in ARITHMETICS), counted
 
 
 # ------------------------------------------------------------------------- what shows on the target only

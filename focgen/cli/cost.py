@@ -61,7 +61,8 @@ def _text(controllers: tuple[ControllerCost, ...]) -> str:
     """The costs for people: a table, and under it how they were counted."""
     rows, skipped, paths, compilers, hows = [], {}, [], {}, {}
     for one in controllers:
-        title = f"{one.name} {one.arithmetic} {one.memory} {one.length}"
+        length = f" {one.length}" if one.memory == "short" else ""
+        title = f"{one.name} {one.arithmetic} {one.memory}{length}"
         for name, counted in one.targets.items():
             if counted.skipped is not None:
                 skipped[name] = counted.skipped
