@@ -160,6 +160,8 @@ def test_events_while_nothing_can_be_measured():
     after[0, 7] = 0.01
     seen = execute(plan, Scenario(after, still, sched, resets[:1], tracks[:2]))
     assert seen.u[0, 7] == 4.0 and not seen.d.any()
+    seen = execute(plan, Scenario(after, still, sched, (), (Track(0, 1, 2.0), Track(0, 3, INF))))
+    assert seen.u[0, 6:].tolist() == [2.0, 2.0]
 
 
 def test_what_is_strewn_is_of_every_kind():

@@ -96,7 +96,7 @@ def holding(
     ``execute`` runs a scenario that has none. d is 0 where a step was left out.
     """
     order = np.argsort(invalid, axis=1, kind="stable")  # the good ones first, in their order
-    ran = execute(plan, _without(scenario, invalid, order))
+    ran = execute(plan, _without(plan, scenario, invalid, order))
     u, d, flags = (np.zeros_like(part) for part in (ran.u, ran.d, ran.flags))
     for whole, part in ((u, ran.u), (d, ran.d), (flags, ran.flags)):
         np.put_along_axis(whole, order, part, axis=1)
@@ -107,7 +107,7 @@ def holding(
     return Trace(u, np.where(invalid, d.dtype.type(0), d), flags)
 
 
-def _without(scenario: Scenario, invalid: np.ndarray, order: np.ndarray) -> Scenario:
+def _without(plan: Plan, scenario: Scenario, invalid: np.ndarray, order: np.ndarray) -> Scenario:
     """The good samples of each lane, then zeros; an event comes before the next good sample."""
     signals = {
         name: np.take_along_axis(np.where(invalid, values.dtype.type(0), values), order, axis=1)
@@ -119,6 +119,8 @@ def _without(scenario: Scenario, invalid: np.ndarray, order: np.ndarray) -> Scen
     tracks: dict[tuple[int, int], Track] = {}
     for event in events(scenario):
         at = event.lane, int(place[event.lane, event.sample])
+        if isinstance(event, Track) and not usable(event.u, plan.output):
+            continue  # and must not displace one that is usable
         if isinstance(event, Reset):
             tracks.pop(at, None)  # what was tracked before is forgotten
         (resets if isinstance(event, Reset) else tracks)[at] = replace(event, sample=at[1])

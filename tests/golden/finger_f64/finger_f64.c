@@ -208,7 +208,7 @@ finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f
     unsigned flags = 0;
     double u;
 
-    if (s->starting) { /* the sample before had the same gain */
+    if (s->starting != 0u) { /* the sample before had the same gain */
         s->increment = finger_f64_increment(gain, s->resting);
         s->starting = 0;
     }

@@ -259,7 +259,7 @@ finger_q15_sig finger_q15_step(finger_q15_state *s, finger_q15_sig ref, finger_q
     unsigned flags = 0;
     int16_t u;
 
-    if (s->starting) { /* the sample before had the same gain */
+    if (s->starting != 0u) { /* the sample before had the same gain */
         s->increment = finger_q15_increment(gain, s->resting);
         s->starting = 0;
     }
