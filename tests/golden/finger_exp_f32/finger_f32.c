@@ -291,7 +291,7 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
     unsigned flags = 0;
     float u;
 
-    if (s->starting) { /* the sample before had the same gain */
+    if (s->starting != 0u) { /* the sample before had the same gain */
         s->increment = finger_f32_increment(gain, s->resting);
         s->starting = 0;
     }

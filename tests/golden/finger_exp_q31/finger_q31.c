@@ -292,7 +292,7 @@ finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q
     unsigned flags = 0;
     int32_t u;
 
-    if (s->starting) { /* the sample before had the same gain */
+    if (s->starting != 0u) { /* the sample before had the same gain */
         s->increment = finger_q31_increment(gain, s->resting);
         s->starting = 0;
     }

@@ -356,7 +356,7 @@ finger_m4_sig finger_m4_step(finger_m4_state *s, finger_m4_sig ref, finger_m4_si
     unsigned flags = 0;
     int16_t u;
 
-    if (s->starting) { /* the sample before had the same gain */
+    if (s->starting != 0u) { /* the sample before had the same gain */
         s->increment = finger_m4_increment(gain, s->resting);
         s->starting = 0;
     }
