@@ -92,5 +92,6 @@ def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float,
         best = found[-1].best
         response = best.problem.references.clocks["response"]
         trusted = found[-1].left.share < UNTRUSTED
-        x = freed(segment, best.problem.simulate(best.vector), response, found[-1].left.share)
+        x = freed(segment, best.problem.simulate(best.vector), response, found[-1].left.share,
+                  not verdict.is_unknown(found[-1]))
     return tuple(found)

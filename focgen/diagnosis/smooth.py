@@ -13,14 +13,18 @@ from scipy.signal import savgol_filter
 from focgen.diagnosis.segments import Segment
 
 
+_RIGHT = 0.03  # of the residual foretold by inputs: below it the simulation is the better measurement
 WRONG = 0.05  # of the residual foretold by inputs: beyond it the simulation is not to be relied on
 
 
-def freed(segment: Segment, simulated: np.ndarray, response: float, left: float) -> np.ndarray:
+def freed(segment: Segment, simulated: np.ndarray, response: float, left: float, noise: bool) -> np.ndarray:
     """The segment's output: as simulated, plus the residual below the pace of the rig; ``response`` in s.
 
-    ``left``: the share of the residual that inputs foretell; where there is one, little is smoothed away.
+    ``left``: the share of the residual that inputs foretell; where there is one, little is smoothed away, and where
+    there is none and the residual is but ``noise``, all of it is.
     """
+    if noise and left < _RIGHT:
+        return simulated
     residual = segment.parts(segment.y - simulated)
     if left > WRONG:
         return simulated + np.concatenate([savgol_filter(p, 7, 3) if len(p) > 7 else p for p in residual])
