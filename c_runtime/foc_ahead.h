@@ -36,11 +36,11 @@ typedef struct {
 #include "foc_tiles.h"
 
 /* The tile of a ring in which a run begins; `now` is any slot of the present group. */
-static inline uint16_t foc_run_start(uint16_t back, uint16_t size, uint16_t now)
+static inline unsigned foc_run_start(unsigned back, unsigned size, unsigned now)
 {
     const unsigned next = now / 4u + 1u; /* the group in the making */
 
-    return (uint16_t)((next >= back ? next : next + size / 4u) - back);
+    return (next >= back ? next : next + size / 4u) - back;
 }
 
 /* --- q15 ------------------------------------------------------------------------------------------ */
@@ -49,15 +49,17 @@ static inline uint16_t foc_run_start(uint16_t back, uint16_t size, uint16_t now)
 static inline void foc_run_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *run,
                                const int16_t *ring, uint16_t size, uint16_t now)
 {
-    const uint16_t tiles = run->tiles;
-    const uint16_t start = foc_run_start(run->back, size, now);
-    const uint16_t straight = (uint16_t)(size / 4u - start);
-    const uint16_t wrap = tiles < straight ? tiles : straight;
+    const unsigned start = foc_run_start(run->back, size, now);
+    const unsigned tiles = run->tiles;
+    const unsigned straight = size / 4u - start;
 
     weights += run->weights;
-    foc_tiles_q15(&ahead[8], weights, &ring[4u * start], wrap);
-    if (wrap < tiles) {
-        foc_tiles_q15(&ahead[8], &weights[4u * wrap], ring, (uint16_t)(tiles - wrap));
+    ring += 4u * start;
+    if (tiles <= straight) {
+        foc_tiles_q15(&ahead[8], weights, ring, tiles);
+    } else { /* the ring's end divides it */
+        foc_tiles_q15(&ahead[8], weights, ring, straight);
+        foc_tiles_q15(&ahead[8], &weights[4u * straight], ring - 4u * start, tiles - straight);
     }
     if (run->ends != 0u) {
         const uint8_t shift = run->shift;
@@ -73,14 +75,31 @@ static inline void foc_run_q15(int32_t *ahead, const FOC_ROM int16_t *weights, c
     }
 }
 
+/* Runs from ... to - 1, one after another. */
+static inline void foc_runs_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *runs,
+                                unsigned from, unsigned to, const int16_t *ring, uint16_t size, uint16_t now)
+{
+#ifdef FOC_HAS_WORK_Q15
+    if (from < to) {
+        foc_work work = {ahead, weights, &runs[from], &runs[to], ring, size / 4u, now / 4u + 1u};
+
+        foc_work_q15(&work);
+    }
+#else
+    for (; from < to; from++) {
+        foc_run_q15(ahead, weights, &runs[from], ring, size, now);
+    }
+#endif
+}
+
 /* A step's share: runs[slices[p]] up to runs[slices[p + 1]] in step p of a group. ahead[0 ... 3] are the far
    sums of the present group's steps, of which step p adds ahead[p] to its near lags. */
 static inline void foc_ahead_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *runs,
                                  const FOC_ROM uint8_t *slices, const int16_t *ring, uint16_t size,
                                  uint16_t now)
 {
-    const uint16_t step = now & 3u;
-    uint16_t i;
+    const unsigned step = now & 3u;
+    unsigned i;
 
     if (step == 0u) {
         for (i = 0; i < 4u; i++) {
@@ -88,23 +107,19 @@ static inline void foc_ahead_q15(int32_t *ahead, const FOC_ROM int16_t *weights,
             ahead[4u + i] = 0;
         }
     }
-    for (i = slices[step]; i < slices[step + 1u]; i++) {
-        foc_run_q15(ahead, weights, &runs[i], ring, size, now);
-    }
+    foc_runs_q15(ahead, weights, runs, slices[step], slices[step + 1u], ring, size, now);
 }
 
 /* After every sample of the ring has been set to the same value and `now` to its last slot. */
 static inline void foc_rest_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *runs,
                                 const FOC_ROM uint8_t *slices, const int16_t *ring, uint16_t size)
 {
-    uint16_t i;
+    unsigned i;
 
     for (i = 4; i < 12u; i++) {
         ahead[i] = 0;
     }
-    for (i = 0; i < slices[4]; i++) {
-        foc_run_q15(ahead, weights, &runs[i], ring, size, (uint16_t)(size - 1u));
-    }
+    foc_runs_q15(ahead, weights, runs, 0, slices[4], ring, size, (uint16_t)(size - 1u));
     for (i = 0; i < 4u; i++) {
         ahead[i] = ahead[4u + i];
     }
@@ -132,15 +147,17 @@ static inline const int16_t *foc_latest_q15(int16_t *copy, uint16_t count, const
 static inline void foc_run_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *run,
                                const int32_t *ring, uint16_t size, uint16_t now)
 {
-    const uint16_t tiles = run->tiles;
-    const uint16_t start = foc_run_start(run->back, size, now);
-    const uint16_t straight = (uint16_t)(size / 4u - start);
-    const uint16_t wrap = tiles < straight ? tiles : straight;
+    const unsigned start = foc_run_start(run->back, size, now);
+    const unsigned tiles = run->tiles;
+    const unsigned straight = size / 4u - start;
 
     weights += run->weights;
-    foc_tiles_q31(&ahead[8], weights, &ring[4u * start], wrap);
-    if (wrap < tiles) {
-        foc_tiles_q31(&ahead[8], &weights[4u * wrap], ring, (uint16_t)(tiles - wrap));
+    ring += 4u * start;
+    if (tiles <= straight) {
+        foc_tiles_q31(&ahead[8], weights, ring, tiles);
+    } else { /* the ring's end divides it */
+        foc_tiles_q31(&ahead[8], weights, ring, straight);
+        foc_tiles_q31(&ahead[8], &weights[4u * straight], ring - 4u * start, tiles - straight);
     }
     if (run->ends != 0u) {
         const uint8_t shift = run->shift;
@@ -156,12 +173,29 @@ static inline void foc_run_q31(int64_t *ahead, const FOC_ROM int32_t *weights, c
     }
 }
 
+/* Runs from ... to - 1, one after another. */
+static inline void foc_runs_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *runs,
+                                unsigned from, unsigned to, const int32_t *ring, uint16_t size, uint16_t now)
+{
+#ifdef FOC_HAS_WORK_Q31
+    if (from < to) {
+        foc_work work = {ahead, weights, &runs[from], &runs[to], ring, size / 4u, now / 4u + 1u};
+
+        foc_work_q31(&work);
+    }
+#else
+    for (; from < to; from++) {
+        foc_run_q31(ahead, weights, &runs[from], ring, size, now);
+    }
+#endif
+}
+
 static inline void foc_ahead_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *runs,
                                  const FOC_ROM uint8_t *slices, const int32_t *ring, uint16_t size,
                                  uint16_t now)
 {
-    const uint16_t step = now & 3u;
-    uint16_t i;
+    const unsigned step = now & 3u;
+    unsigned i;
 
     if (step == 0u) {
         for (i = 0; i < 4u; i++) {
@@ -169,22 +203,18 @@ static inline void foc_ahead_q31(int64_t *ahead, const FOC_ROM int32_t *weights,
             ahead[4u + i] = 0;
         }
     }
-    for (i = slices[step]; i < slices[step + 1u]; i++) {
-        foc_run_q31(ahead, weights, &runs[i], ring, size, now);
-    }
+    foc_runs_q31(ahead, weights, runs, slices[step], slices[step + 1u], ring, size, now);
 }
 
 static inline void foc_rest_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *runs,
                                 const FOC_ROM uint8_t *slices, const int32_t *ring, uint16_t size)
 {
-    uint16_t i;
+    unsigned i;
 
     for (i = 4; i < 12u; i++) {
         ahead[i] = 0;
     }
-    for (i = 0; i < slices[4]; i++) {
-        foc_run_q31(ahead, weights, &runs[i], ring, size, (uint16_t)(size - 1u));
-    }
+    foc_runs_q31(ahead, weights, runs, 0, slices[4], ring, size, (uint16_t)(size - 1u));
     for (i = 0; i < 4u; i++) {
         ahead[i] = ahead[4u + i];
     }
@@ -211,15 +241,17 @@ static inline const int32_t *foc_latest_q31(int32_t *copy, uint16_t count, const
 static inline void foc_run_f32(float *ahead, const FOC_ROM float *weights, const FOC_ROM foc_run *run,
                                const float *ring, uint16_t size, uint16_t now)
 {
-    const uint16_t tiles = run->tiles;
-    const uint16_t start = foc_run_start(run->back, size, now);
-    const uint16_t straight = (uint16_t)(size / 4u - start);
-    const uint16_t wrap = tiles < straight ? tiles : straight;
+    const unsigned start = foc_run_start(run->back, size, now);
+    const unsigned tiles = run->tiles;
+    const unsigned straight = size / 4u - start;
 
     weights += run->weights;
-    foc_tiles_f32(&ahead[4], weights, &ring[4u * start], wrap);
-    if (wrap < tiles) {
-        foc_tiles_f32(&ahead[4], &weights[4u * wrap], ring, (uint16_t)(tiles - wrap));
+    ring += 4u * start;
+    if (tiles <= straight) {
+        foc_tiles_f32(&ahead[4], weights, ring, tiles);
+    } else { /* the ring's end divides it */
+        foc_tiles_f32(&ahead[4], weights, ring, straight);
+        foc_tiles_f32(&ahead[4], &weights[4u * straight], ring - 4u * start, tiles - straight);
     }
 }
 
@@ -227,8 +259,8 @@ static inline void foc_ahead_f32(float *ahead, const FOC_ROM float *weights, con
                                  const FOC_ROM uint8_t *slices, const float *ring, uint16_t size,
                                  uint16_t now)
 {
-    const uint16_t step = now & 3u;
-    uint16_t i;
+    const unsigned step = now & 3u;
+    unsigned i;
 
     if (step == 0u) {
         for (i = 0; i < 4u; i++) {
@@ -244,7 +276,7 @@ static inline void foc_ahead_f32(float *ahead, const FOC_ROM float *weights, con
 static inline void foc_rest_f32(float *ahead, const FOC_ROM float *weights, const FOC_ROM foc_run *runs,
                                 const FOC_ROM uint8_t *slices, const float *ring, uint16_t size)
 {
-    uint16_t i;
+    unsigned i;
 
     for (i = 4; i < 8u; i++) {
         ahead[i] = 0.0f;

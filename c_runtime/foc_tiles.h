@@ -31,7 +31,7 @@
 
 #ifndef FOC_HAS_TILES_Q15
 static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, const int16_t *x,
-                                 uint16_t tiles)
+                                 unsigned tiles)
 {
     int32_t s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
     int32_t a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
@@ -70,7 +70,7 @@ static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, c
 
 #ifndef FOC_HAS_TILES_Q31
 static inline void foc_tiles_q31(int64_t *sum, const FOC_ROM int32_t *weights, const int32_t *x,
-                                 uint16_t tiles)
+                                 unsigned tiles)
 {
     int64_t s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
     int32_t a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
@@ -108,7 +108,7 @@ static inline void foc_tiles_q31(int64_t *sum, const FOC_ROM int32_t *weights, c
 #endif
 
 #ifndef FOC_HAS_TILES_F32
-static inline void foc_tiles_f32(float *sum, const FOC_ROM float *weights, const float *x, uint16_t tiles)
+static inline void foc_tiles_f32(float *sum, const FOC_ROM float *weights, const float *x, unsigned tiles)
 {
     float s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
     float a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */

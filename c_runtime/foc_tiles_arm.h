@@ -10,6 +10,17 @@
 #ifndef FOC_TILES_ARM_H
 #define FOC_TILES_ARM_H
 
+/* All runs of one step: foc_work_X does them in turn, as foc_run_X in foc_ahead.h would. */
+typedef struct {
+    void *ahead;
+    const void *weights;
+    const foc_run *run; /* the next one */
+    const foc_run *end;
+    const void *ring;
+    uint32_t tiles; /* of the ring */
+    uint32_t next;  /* the group in the making */
+} foc_work;
+
 /* A function that is its assembly text and nothing else; no compiler may look through it. */
 #if defined(__clang__)
 #define FOC_ASSEMBLY static __attribute__((naked, noinline, unused))
@@ -20,17 +31,36 @@
 /* --- Cortex-M4, M7, M33: two products an instruction ------------------------------------------------- */
 
 #if defined(__ARM_FEATURE_DSP) && defined(__thumb2__)
-#define FOC_HAS_TILES_Q15
+#define FOC_HAS_WORK_Q15
 /* Weights 2n and 2n+1 stand in one word, which sums 0 and 2 take as it is; sums 1 and 3 take 2n+1 and
    2n+2, packed the other way round for the crosswise product. 16 cycles a tile. */
-FOC_ASSEMBLY void foc_tiles_q15(int32_t *sum, const int16_t *weights, const int16_t *x, uint32_t tiles)
+FOC_ASSEMBLY void foc_work_q15(foc_work *work)
 {
     __asm__ volatile(
         ".syntax unified\n"
-        "push {r0, r4-r11, lr}\n"
+        "push {r0-r2, r4-r11, lr}\n"
+        "9:\n"
+        "ldr lr, [sp]\n" /* work */
+        "ldmia lr, {r0, r1, r2, r3, r8, r9, r10}\n" /* ahead, weights, run, end, ring, tiles of it, next group */
+        "ldrh r4, [r2, #0]\n"
+        "ldrh r3, [r2, #2]\n"
+        "ldrh r5, [r2, #4]\n"
+        "add r1, r1, r4, lsl #1\n"
+        "subs r5, r10, r5\n" /* the tile it begins at */
+        "it mi\n"
+        "addmi r5, r5, r9\n"
+        "sub r9, r9, r5\n" /* tiles to the ring's end */
+        "add r2, r8, r5, lsl #3\n"
+        "subs r10, r3, r9\n"
+        "it ls\n"
+        "movls r10, #0\n"
+        "sub r3, r3, r10\n"
+        "str r10, [sp, #4]\n" /* tiles after the ring's end */
+        "adds r0, #32\n"
         "ldmia r0, {r4-r7}\n"
         "ldmia r1!, {r10, r11}\n"
         "pkhbt r0, r11, r10\n" /* weights 2 and 1 */
+        "6:\n"
         "lsrs r3, r3, #1\n"
         "bcc 1f\n"
         "ldmia r2!, {r8, r9}\n"
@@ -106,8 +136,54 @@ FOC_ASSEMBLY void foc_tiles_q15(int32_t *sum, const int16_t *weights, const int1
         "subs r3, r3, #1\n"
         "bne 2b\n"
         "4:\n"
-        "pop {r0}\n"
+        "ldr r3, [sp, #4]\n"
+        "cmp r3, #0\n"
+        "beq 7f\n"
+        "movs r2, #0\n"
+        "str r2, [sp, #4]\n"
+        "ldr r2, [sp]\n"
+        "ldr r2, [r2, #16]\n" /* on from the ring's beginning */
+        "b 6b\n"
+        "7:\n"
+        "ldr lr, [sp]\n"
+        "ldr r0, [lr]\n"
+        "ldr r2, [lr, #8]\n"
+        "ldrh r3, [r2, #6]\n"
+        "adds r2, #8\n"
+        "str r2, [lr, #8]\n"
+        "tst r3, #256\n" /* is the block complete? */
+        "beq 8f\n"
+        "uxtb r8, r3\n"
+        "movs r9, #1\n"
+        "lsl r9, r9, r8\n"
+        "lsr r9, r9, #1\n"
+        "add r4, r4, r9\n"
+        "add r5, r5, r9\n"
+        "add r6, r6, r9\n"
+        "add r7, r7, r9\n"
+        "asr r4, r4, r8\n"
+        "asr r5, r5, r8\n"
+        "asr r6, r6, r8\n"
+        "asr r7, r7, r8\n"
+        "add r9, r0, #16\n"
+        "ldmia r9, {r8, r10, r11, r12}\n"
+        "add r4, r4, r8\n"
+        "add r5, r5, r10\n"
+        "add r6, r6, r11\n"
+        "add r7, r7, r12\n"
+        "stmia r9, {r4-r7}\n"
+        "movs r4, #0\n"
+        "movs r5, #0\n"
+        "movs r6, #0\n"
+        "movs r7, #0\n"
+        "8:\n"
+        "add r0, r0, #32\n"
         "stmia r0, {r4-r7}\n"
+        "ldr lr, [sp]\n"
+        "ldrd r2, r3, [lr, #8]\n"
+        "cmp r2, r3\n"
+        "bne 9b\n"
+        "add sp, #12\n"
         "pop {r4-r11, pc}\n"
     );
 }
@@ -116,14 +192,33 @@ FOC_ASSEMBLY void foc_tiles_q15(int32_t *sum, const int16_t *weights, const int1
 /* --- Cortex-M3 ------------------------------------------------------------------------------------- */
 
 #if !defined(__ARM_FEATURE_DSP) && defined(__thumb2__)
-#define FOC_HAS_TILES_Q15
+#define FOC_HAS_WORK_Q15
 /* Loads stand side by side, where all but the first take one cycle. 42 cycles a tile. */
-FOC_ASSEMBLY void foc_tiles_q15(int32_t *sum, const int16_t *weights, const int16_t *x, uint32_t tiles)
+FOC_ASSEMBLY void foc_work_q15(foc_work *work)
 {
     __asm__ volatile(
         ".syntax unified\n"
-        "push {r0, r4-r11, lr}\n"
+        "push {r0-r2, r4-r11, lr}\n"
+        "9:\n"
+        "ldr lr, [sp]\n" /* work */
+        "ldmia lr, {r0, r1, r2, r3, r8, r9, r10}\n" /* ahead, weights, run, end, ring, tiles of it, next group */
+        "ldrh r4, [r2, #0]\n"
+        "ldrh r3, [r2, #2]\n"
+        "ldrh r5, [r2, #4]\n"
+        "add r1, r1, r4, lsl #1\n"
+        "subs r5, r10, r5\n" /* the tile it begins at */
+        "it mi\n"
+        "addmi r5, r5, r9\n"
+        "sub r9, r9, r5\n" /* tiles to the ring's end */
+        "add r2, r8, r5, lsl #3\n"
+        "subs r10, r3, r9\n"
+        "it ls\n"
+        "movls r10, #0\n"
+        "sub r3, r3, r10\n"
+        "str r10, [sp, #4]\n" /* tiles after the ring's end */
+        "adds r0, #32\n"
         "ldmia r0, {r4-r7}\n"
+        "6:\n"
         "ldrsh r8, [r1, #2]\n"
         "ldrsh r9, [r1, #4]\n"
         "ldrsh r10, [r1, #6]\n"
@@ -336,8 +431,54 @@ FOC_ASSEMBLY void foc_tiles_q15(int32_t *sum, const int16_t *weights, const int1
         "add r2, r2, #64\n"
         "subs r3, r3, #1\n"
         "bne 1b\n"
-        "pop {r0}\n"
+        "ldr r3, [sp, #4]\n"
+        "cmp r3, #0\n"
+        "beq 7f\n"
+        "movs r2, #0\n"
+        "str r2, [sp, #4]\n"
+        "ldr r2, [sp]\n"
+        "ldr r2, [r2, #16]\n" /* on from the ring's beginning */
+        "b 6b\n"
+        "7:\n"
+        "ldr lr, [sp]\n"
+        "ldr r0, [lr]\n"
+        "ldr r2, [lr, #8]\n"
+        "ldrh r3, [r2, #6]\n"
+        "adds r2, #8\n"
+        "str r2, [lr, #8]\n"
+        "tst r3, #256\n" /* is the block complete? */
+        "beq 8f\n"
+        "uxtb r8, r3\n"
+        "movs r9, #1\n"
+        "lsl r9, r9, r8\n"
+        "lsr r9, r9, #1\n"
+        "add r4, r4, r9\n"
+        "add r5, r5, r9\n"
+        "add r6, r6, r9\n"
+        "add r7, r7, r9\n"
+        "asr r4, r4, r8\n"
+        "asr r5, r5, r8\n"
+        "asr r6, r6, r8\n"
+        "asr r7, r7, r8\n"
+        "add r9, r0, #16\n"
+        "ldmia r9, {r8, r10, r11, r12}\n"
+        "add r4, r4, r8\n"
+        "add r5, r5, r10\n"
+        "add r6, r6, r11\n"
+        "add r7, r7, r12\n"
+        "stmia r9, {r4-r7}\n"
+        "movs r4, #0\n"
+        "movs r5, #0\n"
+        "movs r6, #0\n"
+        "movs r7, #0\n"
+        "8:\n"
+        "add r0, r0, #32\n"
         "stmia r0, {r4-r7}\n"
+        "ldr lr, [sp]\n"
+        "ldrd r2, r3, [lr, #8]\n"
+        "cmp r2, r3\n"
+        "bne 9b\n"
+        "add sp, #12\n"
         "pop {r4-r11, pc}\n"
     );
 }
@@ -346,17 +487,36 @@ FOC_ASSEMBLY void foc_tiles_q15(int32_t *sum, const int16_t *weights, const int1
 /* --- Cortex-M3 and above: 32 x 32 + 64 bits in one instruction ---------------------------------------- */
 
 #if defined(__thumb2__)
-#define FOC_HAS_TILES_Q31
+#define FOC_HAS_WORK_Q31
 /* Eight registers of sums leave three for weights and one for a sample; the weights change places with
    each sample and are back after three tiles. 32 cycles a tile on a Cortex-M4. */
-FOC_ASSEMBLY void foc_tiles_q31(int64_t *sum, const int32_t *weights, const int32_t *x, uint32_t tiles)
+FOC_ASSEMBLY void foc_work_q31(foc_work *work)
 {
     __asm__ volatile(
         ".syntax unified\n"
-        "push {r0, r4-r11, lr}\n"
-        "add lr, r2, r3, lsl #4\n"
-        "push {lr}\n" /* where x ends */
+        "push {r0-r2, r4-r11, lr}\n"
+        "9:\n"
+        "ldr lr, [sp]\n" /* work */
+        "ldmia lr, {r0, r1, r2, r3, r8, r9, r10}\n" /* ahead, weights, run, end, ring, tiles of it, next group */
+        "ldrh r4, [r2, #0]\n"
+        "ldrh r3, [r2, #2]\n"
+        "ldrh r5, [r2, #4]\n"
+        "add r1, r1, r4, lsl #2\n"
+        "subs r5, r10, r5\n" /* the tile it begins at */
+        "it mi\n"
+        "addmi r5, r5, r9\n"
+        "sub r9, r9, r5\n" /* tiles to the ring's end */
+        "add r2, r8, r5, lsl #4\n"
+        "subs r10, r3, r9\n"
+        "it ls\n"
+        "movls r10, #0\n"
+        "sub r3, r3, r10\n"
+        "str r10, [sp, #4]\n" /* tiles after the ring's end */
+        "adds r0, #64\n"
         "ldmia r0, {r4-r11}\n"
+        "6:\n"
+        "add lr, r2, r3, lsl #4\n"
+        "str lr, [sp, #8]\n" /* where x ends */
         "movw r12, #43691\n"
         "mul r12, r3, r12\n"
         "lsr r12, r12, #17\n"
@@ -459,12 +619,88 @@ FOC_ASSEMBLY void foc_tiles_q31(int64_t *sum, const int32_t *weights, const int3
         "smlal r4, r5, r12, lr\n"
         "adds r1, #48\n"
         "adds r2, #48\n"
-        "ldr lr, [sp]\n"
+        "ldr lr, [sp, #8]\n"
         "cmp r2, lr\n"
         "bne 3b\n"
-        "pop {lr}\n"
-        "pop {r0}\n"
+        "ldr r3, [sp, #4]\n"
+        "cmp r3, #0\n"
+        "beq 7f\n"
+        "movs r2, #0\n"
+        "str r2, [sp, #4]\n"
+        "ldr r2, [sp]\n"
+        "ldr r2, [r2, #16]\n" /* on from the ring's beginning */
+        "subs r1, #16\n"
+        "b 6b\n"
+        "7:\n"
+        "ldr lr, [sp]\n"
+        "ldr r0, [lr]\n"
+        "ldr r2, [lr, #8]\n"
+        "ldrh r3, [r2, #6]\n"
+        "adds r2, #8\n"
+        "str r2, [lr, #8]\n"
+        "tst r3, #256\n" /* is the block complete? */
+        "beq 8f\n"
+        "uxtb r3, r3\n"
+        "movs r1, #1\n"
+        "lsl r1, r1, r3\n"
+        "lsr r1, r1, #1\n"
+        "rsb r12, r3, #32\n"
+        "adds r4, r4, r1\n"
+        "adc r5, r5, #0\n"
+        "lsr r4, r4, r3\n"
+        "lsl r2, r5, r12\n"
+        "orr r4, r4, r2\n"
+        "asr r5, r5, r3\n"
+        "ldrd r2, lr, [r0, #32]\n"
+        "adds r4, r4, r2\n"
+        "adc r5, r5, lr\n"
+        "strd r4, r5, [r0, #32]\n"
+        "movs r4, #0\n"
+        "movs r5, #0\n"
+        "adds r6, r6, r1\n"
+        "adc r7, r7, #0\n"
+        "lsr r6, r6, r3\n"
+        "lsl r2, r7, r12\n"
+        "orr r6, r6, r2\n"
+        "asr r7, r7, r3\n"
+        "ldrd r2, lr, [r0, #40]\n"
+        "adds r6, r6, r2\n"
+        "adc r7, r7, lr\n"
+        "strd r6, r7, [r0, #40]\n"
+        "movs r6, #0\n"
+        "movs r7, #0\n"
+        "adds r8, r8, r1\n"
+        "adc r9, r9, #0\n"
+        "lsr r8, r8, r3\n"
+        "lsl r2, r9, r12\n"
+        "orr r8, r8, r2\n"
+        "asr r9, r9, r3\n"
+        "ldrd r2, lr, [r0, #48]\n"
+        "adds r8, r8, r2\n"
+        "adc r9, r9, lr\n"
+        "strd r8, r9, [r0, #48]\n"
+        "movs r8, #0\n"
+        "movs r9, #0\n"
+        "adds r10, r10, r1\n"
+        "adc r11, r11, #0\n"
+        "lsr r10, r10, r3\n"
+        "lsl r2, r11, r12\n"
+        "orr r10, r10, r2\n"
+        "asr r11, r11, r3\n"
+        "ldrd r2, lr, [r0, #56]\n"
+        "adds r10, r10, r2\n"
+        "adc r11, r11, lr\n"
+        "strd r10, r11, [r0, #56]\n"
+        "movs r10, #0\n"
+        "movs r11, #0\n"
+        "8:\n"
+        "add r0, r0, #64\n"
         "stmia r0, {r4-r11}\n"
+        "ldr lr, [sp]\n"
+        "ldrd r2, r3, [lr, #8]\n"
+        "cmp r2, r3\n"
+        "bne 9b\n"
+        "add sp, #12\n"
         "pop {r4-r11, pc}\n"
     );
 }
@@ -475,7 +711,7 @@ FOC_ASSEMBLY void foc_tiles_q31(int64_t *sum, const int32_t *weights, const int3
 #if defined(__thumb2__) && defined(__ARM_FP) && ((__ARM_FP & 4) != 0)
 #define FOC_HAS_TILES_F32
 /* 42 cycles a tile. Each sum takes its products in turn, from the oldest sample to the newest. */
-FOC_ASSEMBLY void foc_tiles_f32(float *sum, const float *weights, const float *x, uint32_t tiles)
+FOC_ASSEMBLY void foc_tiles_f32(float *sum, const float *weights, const float *x, unsigned tiles)
 {
     __asm__ volatile(
         ".syntax unified\n"
@@ -609,7 +845,7 @@ FOC_ASSEMBLY void foc_tiles_f32(float *sum, const float *weights, const float *x
 #define FOC_HAS_TILES_Q15
 /* A product overwrites a factor, so the last use of each is its own and the others are copied. Two samples
    and two weights come in a word each. 59 cycles a tile. */
-FOC_ASSEMBLY void foc_tiles_q15(int32_t *sum, const int16_t *weights, const int16_t *x, uint32_t tiles)
+FOC_ASSEMBLY void foc_tiles_q15(int32_t *sum, const int16_t *weights, const int16_t *x, unsigned tiles)
 {
     __asm__ volatile(
         ".syntax unified\n"

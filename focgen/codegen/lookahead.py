@@ -21,6 +21,7 @@ AHEAD = 4
 NEAR, NEAR_FLOATING = 16, 8  # lags summed in their own step; 8 at least, as the others are not known before
 SHORTEST = 32  # far lags below which looking ahead does not pay
 _LONGEST = 65_000  # the runs count weights in 16 bits
+_WIDEST = 31  # bits that a block may be shifted by
 _RUN = 4  # what a run costs beside its tiles, in tiles: calls, the ring's end, rounding
 
 
@@ -59,14 +60,15 @@ class LookAhead:
 
 
 def look_ahead(table: Sum) -> LookAhead | None:
-    """Lay a sum out; None where it is too short, or too long, for it to pay."""
+    """Lay a sum out; None where it is too short for that to pay, too long, or
+    shifted by more than the runtime's tiles can."""
     near_lags = NEAR_FLOATING if table.total.floating else NEAR
     if table.last - near_lags + 1 < SHORTEST or table.last > _LONGEST:
         return None
     blocks = [part for block in table.blocks for part in _parted(block) if any(part.weights)]
     far = tuple(block for block in blocks if block.first >= near_lags)
     near = tuple(block for block in blocks if block.first < near_lags)
-    if not far:
+    if not far or any(block.align > _WIDEST for block in far):
         return None
     runs, slices = _shared([_whole(block) for block in far])
     return LookAhead(
