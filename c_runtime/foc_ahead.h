@@ -16,23 +16,13 @@
  * floating point gives the bits of the plain sum, and integers are exact in any order. It costs 12 more sums
  * of state (8 in floating point), up to 7 zeros a block in the table, and a ring of a multiple of 4 samples.
  *
- * A tile is four samples times four sums. Weights stand oldest first: tile by tile, sum i of the group takes
- * weights[j + 4 - i] for sample j, so each sum sees the same weights one place on. Zeros fill both ends.
+ * The work comes in tiles of four samples times four sums, whose layout is told in foc_tiles.h. Each of the
+ * four sums sees the same weights one place on; zeros fill both ends.
  */
 #ifndef FOC_AHEAD_H
 #define FOC_AHEAD_H
 
 #include "foc_rt.h"
-
-/* Tiles that follow each other in one block and one step. */
-typedef struct {
-    uint16_t weights; /* where its weights begin */
-    uint16_t tiles;   /* how many, at least 1 */
-    uint16_t back;    /* how many tiles its oldest is before the group in the making, at least 2 */
-    uint8_t shift;    /* from the block's scale to the total's */
-    uint8_t ends;     /* 1: the block is complete */
-} foc_run;
-
 #include "foc_tiles.h"
 
 /* The tile of a ring in which a run begins; `now` is any slot of the present group. */
@@ -45,6 +35,45 @@ static inline unsigned foc_run_start(unsigned back, unsigned size, unsigned now)
 
 /* --- q15 ------------------------------------------------------------------------------------------ */
 
+#ifndef FOC_HAS_TILES_Q15
+static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, const int16_t *x,
+                                 unsigned tiles)
+{
+    int32_t s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
+    int32_t a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
+
+    weights += 4;
+    for (; tiles > 0u; tiles--) {
+        d = weights[0];
+        s0 += d * x[0];
+        s1 += c * x[0];
+        s2 += b * x[0];
+        s3 += a * x[0];
+        a = weights[1];
+        s0 += a * x[1];
+        s1 += d * x[1];
+        s2 += c * x[1];
+        s3 += b * x[1];
+        b = weights[2];
+        s0 += b * x[2];
+        s1 += a * x[2];
+        s2 += d * x[2];
+        s3 += c * x[2];
+        c = weights[3];
+        s0 += c * x[3];
+        s1 += b * x[3];
+        s2 += a * x[3];
+        s3 += d * x[3];
+        weights += 4;
+        x += 4;
+    }
+    sum[0] = s0;
+    sum[1] = s1;
+    sum[2] = s2;
+    sum[3] = s3;
+}
+#endif
+
 /* One run: ahead[8 ... 11] are the sums of its block, ahead[4 ... 7] of the blocks complete. */
 static inline void foc_run_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *run,
                                const int16_t *ring, uint16_t size, uint16_t now)
@@ -52,6 +81,7 @@ static inline void foc_run_q15(int32_t *ahead, const FOC_ROM int16_t *weights, c
     const unsigned start = foc_run_start(run->back, size, now);
     const unsigned tiles = run->tiles;
     const unsigned straight = size / 4u - start;
+    unsigned i;
 
     weights += run->weights;
     ring += 4u * start;
@@ -62,16 +92,10 @@ static inline void foc_run_q15(int32_t *ahead, const FOC_ROM int16_t *weights, c
         foc_tiles_q15(&ahead[8], &weights[4u * straight], ring - 4u * start, tiles - straight);
     }
     if (run->ends != 0u) {
-        const uint8_t shift = run->shift;
-
-        ahead[4] += foc_shift32(ahead[8], shift);
-        ahead[5] += foc_shift32(ahead[9], shift);
-        ahead[6] += foc_shift32(ahead[10], shift);
-        ahead[7] += foc_shift32(ahead[11], shift);
-        ahead[8] = 0;
-        ahead[9] = 0;
-        ahead[10] = 0;
-        ahead[11] = 0;
+        for (i = 0; i < 4u; i++) {
+            ahead[4u + i] += foc_shift32(ahead[8u + i], run->shift);
+            ahead[8u + i] = 0;
+        }
     }
 }
 
@@ -144,12 +168,52 @@ static inline const int16_t *foc_latest_q15(int16_t *copy, uint16_t count, const
 
 /* --- q31 ------------------------------------------------------------------------------------------ */
 
+#ifndef FOC_HAS_TILES_Q31
+static inline void foc_tiles_q31(int64_t *sum, const FOC_ROM int32_t *weights, const int32_t *x,
+                                 unsigned tiles)
+{
+    int64_t s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
+    int32_t a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
+
+    weights += 4;
+    for (; tiles > 0u; tiles--) {
+        d = weights[0];
+        s0 += (int64_t)d * x[0];
+        s1 += (int64_t)c * x[0];
+        s2 += (int64_t)b * x[0];
+        s3 += (int64_t)a * x[0];
+        a = weights[1];
+        s0 += (int64_t)a * x[1];
+        s1 += (int64_t)d * x[1];
+        s2 += (int64_t)c * x[1];
+        s3 += (int64_t)b * x[1];
+        b = weights[2];
+        s0 += (int64_t)b * x[2];
+        s1 += (int64_t)a * x[2];
+        s2 += (int64_t)d * x[2];
+        s3 += (int64_t)c * x[2];
+        c = weights[3];
+        s0 += (int64_t)c * x[3];
+        s1 += (int64_t)b * x[3];
+        s2 += (int64_t)a * x[3];
+        s3 += (int64_t)d * x[3];
+        weights += 4;
+        x += 4;
+    }
+    sum[0] = s0;
+    sum[1] = s1;
+    sum[2] = s2;
+    sum[3] = s3;
+}
+#endif
+
 static inline void foc_run_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *run,
                                const int32_t *ring, uint16_t size, uint16_t now)
 {
     const unsigned start = foc_run_start(run->back, size, now);
     const unsigned tiles = run->tiles;
     const unsigned straight = size / 4u - start;
+    unsigned i;
 
     weights += run->weights;
     ring += 4u * start;
@@ -160,16 +224,10 @@ static inline void foc_run_q31(int64_t *ahead, const FOC_ROM int32_t *weights, c
         foc_tiles_q31(&ahead[8], &weights[4u * straight], ring - 4u * start, tiles - straight);
     }
     if (run->ends != 0u) {
-        const uint8_t shift = run->shift;
-
-        ahead[4] += foc_shift64(ahead[8], shift);
-        ahead[5] += foc_shift64(ahead[9], shift);
-        ahead[6] += foc_shift64(ahead[10], shift);
-        ahead[7] += foc_shift64(ahead[11], shift);
-        ahead[8] = 0;
-        ahead[9] = 0;
-        ahead[10] = 0;
-        ahead[11] = 0;
+        for (i = 0; i < 4u; i++) {
+            ahead[4u + i] += foc_shift64(ahead[8u + i], run->shift);
+            ahead[8u + i] = 0;
+        }
     }
 }
 
@@ -237,6 +295,44 @@ static inline const int32_t *foc_latest_q31(int32_t *copy, uint16_t count, const
 }
 
 /* --- f32: one block, so ahead[4 ... 7] are its sums ----------------------------------------------- */
+
+#ifndef FOC_HAS_TILES_F32
+static inline void foc_tiles_f32(float *sum, const FOC_ROM float *weights, const float *x, unsigned tiles)
+{
+    float s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
+    float a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
+
+    weights += 4;
+    for (; tiles > 0u; tiles--) {
+        d = weights[0];
+        s0 += d * x[0];
+        s1 += c * x[0];
+        s2 += b * x[0];
+        s3 += a * x[0];
+        a = weights[1];
+        s0 += a * x[1];
+        s1 += d * x[1];
+        s2 += c * x[1];
+        s3 += b * x[1];
+        b = weights[2];
+        s0 += b * x[2];
+        s1 += a * x[2];
+        s2 += d * x[2];
+        s3 += c * x[2];
+        c = weights[3];
+        s0 += c * x[3];
+        s1 += b * x[3];
+        s2 += a * x[3];
+        s3 += d * x[3];
+        weights += 4;
+        x += 4;
+    }
+    sum[0] = s0;
+    sum[1] = s1;
+    sum[2] = s2;
+    sum[3] = s3;
+}
+#endif
 
 static inline void foc_run_f32(float *ahead, const FOC_ROM float *weights, const FOC_ROM foc_run *run,
                                const float *ring, uint16_t size, uint16_t now)

@@ -198,10 +198,10 @@ FAULTS = {
     "a tile too early": ("foc_ahead.h", "now / 4u + 1u", "now / 4u"),
     "a sum of the step before": ("k.c", "ahead[s->error_now & 3u]", "ahead[(s->error_now + 1u) & 3u]"),
     "no turn": ("foc_ahead.h", "if (step == 0u) {", "if (step == 1u) {"),
-    "the block's sum kept": ("foc_ahead.h", "ahead[9] = 0;", ""),
-    "the ring's end": ("foc_ahead.h", "if (wrap < tiles) {", "if (wrap + 1u < tiles) {"),
-    "a weight beside": ("foc_tiles.h", "d = weights[0];", "d = weights[1];"),
-    "no rest": ("foc_ahead.h", "i < slices[4]", "i < slices[3]"),
+    "the block's sum kept": ("foc_ahead.h", "ahead[8u + i] = 0;", ""),
+    "the ring's end": ("foc_ahead.h", "if (tiles <= straight) {", "if (tiles <= straight + 1u) {"),
+    "a weight beside": ("foc_ahead.h", "d = weights[0];", "d = weights[1];"),
+    "no rest": ("foc_ahead.h", "0, slices[4]", "0, slices[3]"),
     "the latest samples": ("foc_ahead.h", "copy[i] = ring[slot];", "copy[i] = ring[0];"),
 }
 

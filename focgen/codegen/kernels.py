@@ -29,6 +29,20 @@ _AHEAD = {
 _LONG = {("cortex-m0plus", "q31")}  # no product of 64 bits: halves, by hand
 
 
+_FILES = {
+    ("cortex-m0plus", "q15"): "foc_m0_q15.h",
+    ("cortex-m0plus", "q31"): "foc_m0_q31.h",
+    ("cortex-m3", "q15"): "foc_m3_q15.h",
+    ("cortex-m3", "q31"): "foc_m3_q31.h",
+    ("cortex-m4", "q15"): "foc_m4_q15.h",
+    ("cortex-m4", "q31"): "foc_m3_q31.h",
+    ("cortex-m4", "f32"): "foc_m4_f32.h",
+    ("cortex-m7", "q15"): "foc_m4_q15.h",
+    ("cortex-m7", "q31"): "foc_m3_q31.h",
+    ("cortex-m7", "f32"): "foc_m4_f32.h",
+}
+
+
 @dataclass(frozen=True)
 class Kernels:
     """How a plan's sums are computed on ``target``; None: everywhere, in portable C."""
@@ -59,10 +73,12 @@ class Kernels:
         return any(self.ahead(plan, s) for s in named_sums(plan).values() if s.history == history)
 
     def headers(self, plan: Plan) -> tuple[str, ...]:
-        """The runtime's headers beside ``foc_rt.h``."""
+        """The runtime's headers beside ``foc_rt.h``; what the source includes stands before ``foc_tiles.h``."""
         looks = any(self.ahead(plan, s) for s in named_sums(plan).values())
-        first = "foc_ahead.h" if looks else "foc_long.h"
-        return (first, "foc_tiles.h", "foc_tiles_arm.h") if looks or self.long(plan) else ()
+        if not looks and not self.long(plan):
+            return ()
+        own = _FILES.get((self.target, plan.arithmetic))
+        return (*((own,) if own else ()), "foc_ahead.h" if looks else "foc_long.h", "foc_tiles.h")
 
 
 PORTABLE = Kernels()

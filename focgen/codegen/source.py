@@ -99,7 +99,7 @@ class SourceContext:
     increment: str
     increment_about: str
     product: str
-    kernels: str
+    kernels: tuple[str, ...]
     target: str
     error_start: str
     filtered_start: str
@@ -143,7 +143,7 @@ def source_context(
         increment=plan.increment.ctype,
         increment_about=_increment_about(plan),
         product=_product(plan),
-        kernels=kernels.headers(plan)[0] if kernels.headers(plan) else "",
+        kernels=kernels.headers(plan)[:-1],
         target=kernels.target or "",
         error_start=_start(plan, kernels, "error"),
         filtered_start=_start(plan, kernels, "filtered"),

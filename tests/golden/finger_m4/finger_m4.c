@@ -17,13 +17,14 @@
 #include "finger_m4.h"
 
 #include "foc_rt.h"
-#include "foc_ahead.h" /* the sums in cortex-m4's own instructions; the same bits everywhere */
+#include "foc_m4_q15.h" /* the sums in cortex-m4's own instructions; the same bits everywhere */
+#include "foc_ahead.h"
 
 #if FOC_RT_VERSION != 1
 #error "foc_rt.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
 #endif
 #if FOC_TILES_VERSION != 1
-#error "foc_ahead.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
+#error "foc_tiles.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
