@@ -79,10 +79,12 @@ def test_the_text_for_a_core_is_the_golden_one(tmp_path, request):
     assert main(["generate", str(CONTROLLER), "--out", str(tmp_path), *options]) == 0
     folder, names = GOLDEN / "finger_m4", ("finger_m4.c", "finger_m4.h", "README.md")
     found = {name: (tmp_path / name).read_bytes() for name in names}
-    found["kernels.json"] = json.dumps(json.loads((tmp_path / "manifest.json").read_text())["kernels"], indent=2).encode()
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    found["kernels.json"] = json.dumps(manifest["kernels"], indent=2).encode()
     if request.config.getoption("--update-golden"):
         write_files(folder, found)
-    assert {p.name: p.read_bytes().decode() for p in folder.iterdir()} == {n: t.decode() for n, t in found.items()}
+    golden = {p.name: p.read_bytes().decode() for p in folder.iterdir()}
+    assert golden == {name: text.decode() for name, text in found.items()}
     for name in ("foc_ahead.h", "foc_tiles.h", "foc_m4_q15.h"):
         assert (tmp_path / name).read_bytes() == (GOLDEN.parents[1] / "c_runtime" / name).read_bytes()
         lines = (tmp_path / name).read_text(encoding="ascii").splitlines()

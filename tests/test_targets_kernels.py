@@ -1,4 +1,4 @@
-"""Every core's own kernels, in the emulator: the bits of the reference, aligned accesses, a step without bursts."""
+"""Every core's own kernels, emulated: the bits of the reference, aligned accesses, a step without bursts."""
 
 from __future__ import annotations
 
@@ -83,7 +83,8 @@ def agrees(plan, library, seed: int) -> None:
     seen, expected = library.run(plan, scenario), execute(plan, scenario)
     parts = ("u", "flags", "d") if plan.integrator else ("u", "flags")
     for part in parts:
-        assert np.array_equal(getattr(seen, part), getattr(expected, part)), f"{plan.name}, {plan.length}: {part}"
+        same = np.array_equal(getattr(seen, part), getattr(expected, part))
+        assert same, f"{plan.name}, {plan.length}: {part}"
 
 
 RESETS = [(0, 133), (0, 134), (0, 171), (0, 240), (1, 7), (1, 150), (1, 213)]
@@ -103,9 +104,13 @@ def test_many_controllers_on_the_core(name, arithmetic, compiler, tmp_path):
 
 
 REACH = {  # cycles of the model a tap, the loop included
-    ("cortex-m4", "q15"): 1.6, ("cortex-m4", "q31"): 2.9, ("cortex-m4", "f32"): 3.1, ("cortex-m3", "q15"): 3.1,
-    ("cortex-m0plus", "q15"): 5.6, ("cortex-m0plus", "q31"): 45.0,
-}  # fmt: skip
+    ("cortex-m4", "q15"): 1.6,
+    ("cortex-m4", "q31"): 2.9,
+    ("cortex-m4", "f32"): 3.1,
+    ("cortex-m3", "q15"): 3.1,
+    ("cortex-m0plus", "q15"): 5.6,
+    ("cortex-m0plus", "q31"): 45.0,
+}
 
 
 @pytest.mark.parametrize(("name", "arithmetic"), REACH)

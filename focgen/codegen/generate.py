@@ -57,8 +57,8 @@ def generate(
     ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one, ``tolerance`` (1e-8 … 0.1) and
     ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier) default to the controller's own.
     ``selftest`` adds NAME_selftest.c and .h.
-    ``target`` names a core whose own instructions and loads the history sums shall use; without it they take
-    their portable form. The bits are the same.
+    ``target`` names a core whose own instructions the history sums shall use; without it they take their
+    portable form. The bits are the same.
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be

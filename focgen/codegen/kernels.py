@@ -73,7 +73,7 @@ class Kernels:
         return any(self.ahead(plan, s) for s in named_sums(plan).values() if s.history == history)
 
     def headers(self, plan: Plan) -> tuple[str, ...]:
-        """The runtime's headers beside ``foc_rt.h``; what the source includes stands before ``foc_tiles.h``."""
+        """The runtime's headers beside ``foc_rt.h``; the source includes all but the last."""
         looks = any(self.ahead(plan, s) for s in named_sums(plan).values())
         if not looks and not self.long(plan):
             return ()

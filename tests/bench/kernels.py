@@ -1,4 +1,4 @@
-"""History sums: ns a tap on this computer beside others, and cycles a tap of every core's kernels by the model.
+"""History sums: ns a tap on this computer beside others; cycles a tap of every core's kernels by the model.
 
 On this computer: the generated step, portable and as it stands in a folder for a core (there the C behind the
 core's macros), beside a ring with a modulo for each tap and :func:`scipy.signal.lfilter` over a whole
@@ -25,12 +25,19 @@ from tests.conftest import paper_controller
 
 LENGTH = 1024
 STEPS = 20_000
-STEPS_ON_CORE = 1028  # once round the ring
+ON_CORE = (68, 1028)  # steps: once round the ring of 64 and of 1024 past samples
 TYPES = {"q15": "int16_t", "q31": "int32_t", "f32": "float"}
 SUMS = {"q15": "int32_t", "q31": "int64_t", "f32": "float"}
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
-CORES = [("cortex-m4", "q15", 1.6), ("cortex-m4", "q31", 2.9), ("cortex-m4", "f32", 3.1), ("cortex-m3", "q15", 3.1),
-         ("cortex-m3", "q31", None), ("cortex-m0plus", "q15", 5.6), ("cortex-m0plus", "q31", 45.0)]  # fmt: skip
+CORES = (
+    ("cortex-m4", "q15", 1.6),
+    ("cortex-m4", "q31", 2.9),
+    ("cortex-m4", "f32", 3.1),
+    ("cortex-m3", "q15", 3.1),
+    ("cortex-m3", "q31", None),
+    ("cortex-m0plus", "q15", 5.6),
+    ("cortex-m0plus", "q31", 45.0),
+)
 
 _NAIVE = """
 static {x} history[{n}];
@@ -68,8 +75,7 @@ void {name}_many({x} *e, {x} *u, int count)
 def controller(length: int, transfer=None):
     """The paper's, without its schedule: one sum and an integrator; or with another transfer function."""
     changes = {"transfer": transfer} if transfer else {}
-    base = paper_controller(length, **changes)
-    return paper_controller(length, gain=25.0, ranges=type(base.ranges)(*vars(base.ranges).values()), **changes)
+    return paper_controller(length, gain=25.0, **changes)
 
 
 def best(call, repeats: int = 5) -> float:
@@ -84,7 +90,8 @@ def best(call, repeats: int = 5) -> float:
 
 def on_host() -> list[str]:
     """ns a tap on this computer."""
-    lines = [f"  {'':<6}{'generated':>11}{'look-ahead':>12}{'modulo ring':>13}{'lfilter':>9}   ns a tap, L = {LENGTH}"]
+    heads = f"{'generated':>11}{'look-ahead':>12}{'modulo ring':>13}{'lfilter':>9}"
+    lines = [f"  {'':<6}{heads}   ns a tap, L = {LENGTH}"]
     for arithmetic in TYPES:
         times = _host(arithmetic)
         lines.append(f"  {arithmetic:<6}{times[0]:>11.3f}{times[1]:>12.3f}{times[2]:>13.3f}{times[3]:>9.3f}")
@@ -92,42 +99,60 @@ def on_host() -> list[str]:
 
 
 def _host(arithmetic: str) -> tuple[float, ...]:
-    x, taps = TYPES[arithmetic], LENGTH + 1
+    x, total = TYPES[arithmetic], SUMS[arithmetic]
     plans = [build_plan(controller(LENGTH), arithmetic, name=name) for name in ("plain", "ahead")]
-    ffi = FFI()
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        for plan, target in zip(plans, (None, "cortex-m4")):
-            write_files(folder, folder_files(plan, b"", kernels=Kernels(target)))
-            (folder / f"{plan.name}_many.c").write_text(_RUN.format(name=plan.name, x=x))
-            ffi.cdef(f"void {plan.name}_many({x} *, {x} *, int);")
-        weights = plans[0].direct.weights
-        table = ", ".join(map(repr, weights))
-        naive = f"#include <stdint.h>\nstatic const {x} weights[{taps}] = {{{table}}};\n"
-        naive += _NAIVE.format(x=x, s=SUMS[arithmetic], n=taps)
-        naive += f"void naive_many({x} *e, {SUMS[arithmetic]} *u, int count)"
-        naive += " { int k; for (k = 0; k < count; k++) u[k] = naive_step(e[k]); }\n"
-        (folder / "naive.c").write_text(naive)
-        ffi.cdef(f"void naive_many({x} *, {SUMS[arithmetic]} *, int);")
-        sources = [*folder.glob("*_many.c"), *(folder / f"{p.name}.c" for p in plans), folder / "naive.c"]
-        compile_shared(sources, folder / "all.so", FLAGS, [folder])
-        library = ffi.dlopen(str(folder / "all.so"))
-        e = np.random.default_rng(1).integers(0, 2, STEPS).astype(
-            {"float": np.float32}.get(x, x.removesuffix("_t")))
-        u, s = np.empty_like(e), np.empty(STEPS, {"float": np.float32}.get(SUMS[arithmetic], SUMS[arithmetic][:-2]))
-        to = lambda a, t: ffi.cast(f"{t} *", a.ctypes.data)  # noqa: E731
-        calls = [lambda n=n: getattr(library, f"{n}_many")(to(e, x), to(u, x), STEPS) for n in ("plain", "ahead")]
-        calls.append(lambda: library.naive_many(to(e, x), to(s, SUMS[arithmetic]), STEPS))
+        ffi, library = _compiled(plans, arithmetic, Path(scratch))
+    e = np.random.default_rng(1).integers(0, 2, STEPS).astype(_dtype(x))
+    u, sums = np.empty_like(e), np.empty(STEPS, _dtype(total))
+
+    def many(name: str, out: np.ndarray, ctype: str):
+        arrays = ffi.cast(f"{x} *", e.ctypes.data), ffi.cast(f"{ctype} *", out.ctypes.data)
+        return lambda: getattr(library, f"{name}_many")(*arrays, STEPS)
+
     values = np.array(plans[0].direct.values, np.float32 if arithmetic == "f32" else np.float64)
-    calls.append(lambda: lfilter(values, [values.dtype.type(1)], e.astype(values.dtype)))
-    return tuple(best(call) / STEPS / taps * 1e9 for call in calls)
+    whole = e.astype(values.dtype)
+    calls = [many("plain", u, x), many("ahead", u, x), many("naive", sums, total)]
+    calls.append(lambda: lfilter(values, [values.dtype.type(1)], whole))
+    return tuple(best(call) / STEPS / (LENGTH + 1) * 1e9 for call in calls)
+
+
+def _dtype(ctype: str):
+    return np.float32 if ctype == "float" else ctype.removesuffix("_t")
+
+
+def _compiled(plans, arithmetic: str, folder: Path):
+    """The portable controller, the one for a core, and the naive sum, as one library."""
+    x, total, weights = TYPES[arithmetic], SUMS[arithmetic], plans[0].direct.weights
+    ffi = FFI()
+    for plan, target in zip(plans, (None, "cortex-m4")):
+        write_files(folder, folder_files(plan, b"", kernels=Kernels(target)))
+        (folder / f"{plan.name}_many.c").write_text(_RUN.format(name=plan.name, x=x))
+        ffi.cdef(f"void {plan.name}_many({x} *, {x} *, int);")
+    table = ", ".join(map(repr, weights))
+    (folder / "naive_many.c").write_text(
+        f"#include <stdint.h>\nstatic const {x} weights[{len(weights)}] = {{{table}}};\n"
+        + _NAIVE.format(x=x, s=total, n=len(weights))
+        + f"void naive_many({x} *e, {total} *u, int count)\n"
+        + "{ int k; for (k = 0; k < count; k++) u[k] = naive_step(e[k]); }\n"
+    )
+    ffi.cdef(f"void naive_many({x} *, {total} *, int);")
+    sources = [*folder.glob("*_many.c"), *(folder / f"{plan.name}.c" for plan in plans)]
+    compile_shared(sources, folder / "all.so", FLAGS, [folder])
+    return ffi, ffi.dlopen(str(folder / "all.so"))
+
+
+def costs(library, plan) -> np.ndarray:
+    """Cycles of every step, once round the ring."""
+    from focgen.targets.steps import step_costs
+
+    return step_costs(library, plan, ON_CORE[plan.length > 64]).cycles
 
 
 def on_cores() -> list[str]:
     """Cycles a tap by the timing model: the slope from L = 64, and the whole sum at L = 1024."""
     from focgen.targets.cores import core
     from focgen.targets.run import TargetLibrary
-    from focgen.targets.steps import step_costs
     from focgen.targets.toolchains import toolchains
 
     one_tap = TransferFunction([(1.0, 0.0)])
@@ -140,7 +165,7 @@ def on_cores() -> list[str]:
                 write_files(scratch, folder_files(plan, b"", kernels=Kernels(name)))
             for chain in toolchains(core(name)):
                 library = TargetLibrary(core(name), chain, plans, [Path(scratch)] * 3)
-                short, long, none = (step_costs(library, plan, STEPS_ON_CORE).cycles for plan in plans)
+                short, long, none = (costs(library, plan) for plan in plans)
                 slope = (long.mean() - short.mean()) / (LENGTH - 64)
                 whole = (long.mean() - none.mean()) / (LENGTH + 1)
                 lines.append(f"  {name:<14}{arithmetic:<8}{chain.name:<19}{slope:>7.2f}{whole:>7.2f}"
