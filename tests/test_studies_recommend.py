@@ -1,5 +1,7 @@
 """Fronts, the shortest length that serves, and the sentence that says so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -113,6 +115,8 @@ def test_the_sentence():
         "(in q31 at 0.01 s), "
         "at 720 B and 181 multiplies; the exponential form does it in 48 B (10 states, 21 multiplies)."
     )
+    counted = sentence(controller, wish, replace(short, cycles=3108.4), exponential, both, 5000)
+    assert "720 B and 181 multiplies, 3108 cycles; the" in counted
     assert sentence(controller, wish, None, exponential, both, 5000).startswith(
         "No length up to L = 5000 keeps the"
     )

@@ -78,7 +78,9 @@ def fronts(study: Study) -> bytes:
     with figure(1, 2, size=(7.6, 3.9), sharey=True) as (fig, axes):
         for axis, cost in zip(axes, (first, "ram_bytes")):
             _front(axis, study, cost)
-            axis.set_xlabel(_SHARES[cost])
+            axis.set_xlabel(
+                _SHARES[cost] + (f" on {_target(study)}" if cost in ("cycles", "instructions") else "")
+            )
         axes[0].set_ylabel("error / largest output")
         axes[0].set_title("What accuracy costs")
         for name, marker in (("short memory", "o"), ("exponential memory", "D")):
@@ -88,6 +90,11 @@ def fronts(study: Study) -> bytes:
         axes[1].plot([], [], color=GREY, lw=0.9, label="nothing is better")
         axes[1].legend(loc="best")
         return png(fig)
+
+
+def _target(study: Study) -> str:
+    """The core that was counted on."""
+    return next(row.compiled_for for row in study.rows if row.instructions is not None).partition(",")[0]
 
 
 def _front(axis, study: Study, cost: str) -> None:
@@ -149,9 +156,9 @@ def frequency(study: Study) -> bytes:
                 for axis in (top, bottom):
                     axis.axvline(place, color=GREY, lw=0.8, ls=":")
         if study.band.crossover_high is not None:
-            top.annotate(
+            bottom.annotate(
                 "crossovers",
-                (study.band.crossover_high, 0.04),
+                (study.band.crossover_high, 0.92),
                 xycoords=("data", "axes fraction"),
                 xytext=(4, 0),
                 textcoords="offset points",

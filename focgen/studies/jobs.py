@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from focgen.errors import PlanError
 from focgen.plan.build import build_plan
 from focgen.plan.canonical import memory_bias, realise
 from focgen.plan.model import Plan
+from focgen.resources import shipped
 from focgen.rig.files import rig_text
 from focgen.studies.closed import Steps, ideal_loop, running_loop
 from focgen.studies.costs import costs
@@ -40,7 +43,7 @@ class Job:
         setup = self.setup
         content = {
             "format": _FORMAT,
-            "version": focgen.__version__,
+            "code": _code(),
             "kind": self.kind,
             "variant": asdict(self.variant),
             "controller": controller_text(setup.controller),
@@ -51,6 +54,16 @@ class Job:
             "target": setup.target,
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()
+
+
+@cache
+def _code() -> str:
+    """A hash of this program: another state of it may answer otherwise."""
+    digest, package = hashlib.sha256(), Path(focgen.__file__).parent
+    for folder in (package, shipped("templates"), shipped("c_runtime")):
+        for path in sorted(p for p in folder.rglob("*") if p.suffix in (".py", ".jinja", ".h", ".c")):
+            digest.update(path.relative_to(folder).as_posix().encode("utf-8") + b"\0" + path.read_bytes())
+    return digest.hexdigest()
 
 
 def answer(job: Job) -> dict[str, Any]:

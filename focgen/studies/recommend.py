@@ -106,21 +106,22 @@ def sentence(
 ) -> str:
     """The recommendation."""
     able = {"short": short, "exponential": exponential}
-    other = (
-        ""
-        if exponential is None
-        else (
-            f"the exponential form does it in {exponential.ram_bytes} B ({exponential.states} states, "
-            f"{exponential.multiplies} multiplies)"
-        )
-    )
+    other = ""
+    if exponential is not None:
+        price = f"{exponential.ram_bytes} B ({exponential.states} states, {_work(exponential)})"
+        other = f"the exponential form does it in {price}"
     where = f"in {controller.arithmetic} at {controller.sample_time:g} s"
     if short is not None:
-        price = f"{short.ram_bytes} B and {short.multiplies} multiplies"
-        first = f"L = {short.length} keeps {wish} ({where}), at {price}"
+        first = f"L = {short.length} keeps {wish} ({where}), at {short.ram_bytes} B and {_work(short)}"
         return f"{first}; {other}." if other else f"{first}."
     if "short" in asked and other:
         return f"No length up to L = {longest} keeps {wish} ({where}); {other}."
     if other:
         return f"To keep {wish} ({where}), {other}."
     return f"None of the {' and '.join(sorted(asked & set(able)))} memories looked at keeps {wish} ({where})."
+
+
+def _work(row: Row) -> str:
+    """Multiplications, and cycles where they are known."""
+    cycles = "" if row.cycles is None else f", {row.cycles:.0f} cycles"
+    return f"{row.multiplies} multiplies{cycles}"
