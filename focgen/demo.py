@@ -20,11 +20,14 @@ from focgen.report.control import design_pictures, simulation_pictures
 from focgen.report.demo_page import demo_page
 from focgen.report.identification import identification_pictures
 from focgen.resources import shipped
+from focgen.studies.model import Study
+from focgen.studies.study import study
 from focgen.trials.make import make
 from focgen.trials.sealing import unseal
 from focgen.verification.verify import Verification, verify
 
 _LOADED = 40.0  # s: the steps up to their release, as in the paper
+_MEMORIES = {"lengths": (50, 200, 1000), "tolerances": (0.1, 0.03, 1e-3, 1e-5), "arithmetics": ("q31",)}
 _SEED = 5  # of the sealed case
 
 
@@ -32,7 +35,8 @@ _SEED = 5  # of the sealed case
 class Demo:
     """Everything the demo found, and the ``folder`` and ``report`` where it stands.
 
-    ``diagnosis`` is of a rig whose effects were sealed; ``sealed`` are their names, opened afterwards.
+    ``memory`` is the study of a few lengths. ``diagnosis`` is of a rig whose effects were sealed; ``sealed`` are
+    their names, opened afterwards.
     """
 
     folder: Path
@@ -40,6 +44,7 @@ class Demo:
     identification: Identification
     design: Design
     simulation: Simulation
+    memory: Study
     generated: dict[str, Generated]
     verified: dict[str, Verification]
     diagnosis: Diagnosis
@@ -65,27 +70,30 @@ def demo(out: str | Path) -> Demo:
         (scratch / "pictures").mkdir()
         for name, content in _pictures(made).items():
             (scratch / "pictures" / name).write_bytes(content)
-        page = demo_page(made.identification, made.design, made.simulation, made.generated, made.verified,
-                         made.diagnosis, made.sealed)
+        page = demo_page(made.identification, made.design, made.simulation, made.memory, made.generated,
+                         made.verified, made.diagnosis, made.sealed)
         (scratch / "report.html").write_text(page.html(), encoding="utf-8")
     return replace(made, folder=Path(out), report=Path(out) / "report.html")
 
 
 def _chain(folder: Path) -> Demo:
     rig, controller = folder / "identified.toml", folder / "controller.toml"
-    say("1/6  identify: a fractional model from six steps of pressure, and six integer-order ones beside it")
+    say("1/7  identify: a fractional model from six steps of pressure, and six integer-order ones beside it")
     found = identify([folder / "logs/steps.csv"], folder / "rig.toml", rig, last=_LOADED, unseen=[folder / "logs/sines.csv"])
-    say("2/6  design: the model inverted, and a gain schedule as quick as the loop allows")
+    say("2/7  design: the model inverted, and a gain schedule as quick as the loop allows")
     designed = design(rig, controller)
-    say("3/6  simulate: the closed loop at seven set points, bit for bit as it will run")
+    say("3/7  simulate: the closed loop at seven set points, bit for bit as it will run")
     simulated = simulate(rig, controller)
-    say(f"4/6  generate: C in {', '.join(ARITHMETICS)}")
+    say("4/7  study memory: a few lengths of it, and the exponential form")
+    own = (designed.controller.sample_time,)
+    memory = study("memory", controller, folder / "memory", sample_times=own, **_MEMORIES)
+    say(f"5/7  generate: C in {', '.join(ARITHMETICS)}")
     generated = {a: generate(controller, folder / "firmware" / a, a) for a in ARITHMETICS}
-    say("5/6  verify: the C against the Python reference, sample for sample")
+    say("6/7  verify: the C against the Python reference, sample for sample")
     verified = {a: verify(folder / "firmware" / a) for a in ARITHMETICS}
-    say("6/6  diagnose: another rig, whose logs hold an effect that its model lacks, under seal")
+    say("7/7  diagnose: another rig, whose logs hold an effect that its model lacks, under seal")
     diagnosis, sealed = _blind(folder / "diagnosis")
-    return Demo(folder, folder / "report.html", found, designed, simulated, generated, verified, diagnosis, sealed)
+    return Demo(folder, folder / "report.html", found, designed, simulated, memory, generated, verified, diagnosis, sealed)
 
 
 def _blind(folder: Path) -> tuple[Diagnosis, tuple[str, ...]]:

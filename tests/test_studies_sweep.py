@@ -29,6 +29,14 @@ SMALL = dict(
     sample_times=(0.02,),
     setpoints=(0.004, 0.01),
 )
+SCRIPT = """
+import focgen
+from focgen.studies import write
+from tests.test_studies_sweep import SMALL
+
+write._shown = lambda study: {}
+focgen.study("memory", "controller.toml", "out", jobs=1, **SMALL)
+"""
 CONTROLLER = paper_controller(sample_time=0.02, length=80, arithmetic="q15")
 
 
@@ -182,8 +190,9 @@ def test_an_interrupted_and_a_killed_study_go_on(alone, tmp_path):
         found = {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/rows/[!.]*.json")}
         assert len(found) >= len(rows) + 2 and rows.items() <= found.items()
         rows = found
-    # the rest by one process: it finds what two have found
-    focgen.study("memory", tmp_path / "controller.toml", tmp_path / "out", jobs=1, **SMALL)
+    # the rest by one process, called from a plain script: it finds what two have found
+    (tmp_path / "plain.py").write_text(SCRIPT)
+    subprocess.run([sys.executable, "plain.py"], cwd=tmp_path, check=True)
     assert all(p.stat().st_mtime_ns == when for p, when in rows.items())
     assert (tmp_path / "out" / "study.json").read_text() == alone
 

@@ -35,6 +35,7 @@ def _payload(made: Demo) -> dict:
                      "gof": {model: values["mean"] for model, values in found.gof.items()}},
         "design": {"settling_s": designed.settling_s, "overshoot_pct": designed.overshoot_pct, "holds": designed.holds},
         "simulate": {"settling_s": [s.settling_s for s in made.simulation.setpoints], "holds": made.simulation.holds},
+        "study": {"recommendation": made.memory.recommendation},
         "verify": {a: v.targets for a, v in made.verified.items()},
         "diagnose": {"verdict": made.diagnosis.verdict, "sealed": made.sealed,
                      "found": [[c.effect for c in cause.candidates] for cause in made.diagnosis.causes]},
@@ -45,5 +46,5 @@ def _payload(made: Demo) -> dict:
 def _text(made: Demo) -> str:
     lead = demo_lead(made.identification, made.design, made.verified)
     return (f"\n{lead}\n\n{text_table(firmware_table(made.generated, made.verified))}\n\n"
-            f"{diagnosis_sentence(made.diagnosis, made.sealed)}\n\nlook at  {made.report}\n"
+            f"{made.memory.recommendation}\n\n{diagnosis_sentence(made.diagnosis, made.sealed)}\n\nlook at  {made.report}\n"
             f"         {made.folder / 'pictures'}\nread     {made.folder / 'firmware' / 'q31'}")

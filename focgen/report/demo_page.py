@@ -10,14 +10,16 @@ from focgen.loop.simulate import Simulation
 from focgen.report.control_summary import margins_table, points_table, setpoints_table
 from focgen.report.identification_summary import gain_text, parameter_table, quality_table
 from focgen.report.page import Page, Picture, Section, TableOf
+from focgen.report.study_summary import rows_table
+from focgen.studies.model import Study
 from focgen.verification.verify import Verification
 
 
-def demo_page(identification: Identification, design: Design, simulation: Simulation,
+def demo_page(identification: Identification, design: Design, simulation: Simulation, memory: Study,
               generated: dict[str, Generated], verified: dict[str, Verification], diagnosis: Diagnosis,
               sealed: tuple[str, ...]) -> Page:
     """The page; its pictures are in ``pictures/``, the C in ``firmware/``, the sealed case in ``diagnosis/``."""
-    sections = (_model(identification), _controller(design), _loop(simulation), _firmware(generated, verified),
+    sections = (_model(identification), _controller(design), _loop(simulation), _memory(memory), _firmware(generated, verified),
                 _diagnosis(diagnosis, sealed))
     return Page("From step tests to a verified fractional-order controller",
                 demo_lead(identification, design, verified), sections)
@@ -56,6 +58,13 @@ def _controller(design: Design) -> Section:
 def _loop(simulation: Simulation) -> Section:
     caption = "Output and command at seven set points, from rest, bit for bit as the C will run (as Fig. 10)"
     return Section("Closed loop", simulation.notes, (setpoints_table(simulation),), (Picture("pictures/setpoints.png", caption),))
+
+
+def _memory(study: Study) -> Section:
+    pictures = (Picture("memory/pareto.png", "Short and exponential memory: error against multiplications, and bytes"),
+                Picture("memory/loops.png", "A step of the closed loop by memory, and how far it is from infinite memory's"))
+    return Section("Memory", (study.recommendation,), (rows_table(study, study.controller.sample_time),), pictures,
+                   ("memory/report.html", "memory/study.json"))
 
 
 def _firmware(generated: dict[str, Generated], verified: dict[str, Verification]) -> Section:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -86,8 +87,22 @@ def _end_with(parent) -> None:
     os._exit(1)
 
 
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """New processes do not import the script that called: they need none of it, and it would run again."""
+    script = sys.modules["__main__"]
+    before = {name: getattr(script, name) for name in ("__file__", "__spec__") if hasattr(script, name)}
+    try:
+        script.__spec__ = None
+        vars(script).pop("__file__", None)
+        yield
+    finally:
+        vars(script).update(before)
+
+
 def _from_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job]) -> Iterator[tuple[int, dict[str, Any]]]:
-    places = {pool.submit(answer, job): place for place, job in enumerate(jobs)}
+    with _no_script():  # processes start as jobs are handed over
+        places = {pool.submit(answer, job): place for place, job in enumerate(jobs)}
     for done in as_completed(places):
         yield places[done], done.result()
 
