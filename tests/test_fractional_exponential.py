@@ -15,7 +15,9 @@ from focgen.fractional.exponential import (
 )
 from focgen.fractional.exponential_certificate import certify
 from focgen.fractional.exponential_fit import ladder
+from focgen.fractional.exponential_rounded import fit_rounded
 from focgen.fractional.weights import gl_weights
+from focgen.plan.memory import ROUNDED
 from tests.bench.memory import errors, exact_output
 
 ORDERS = [0.6, 0.1, 0.9, 0.003, 0.9997, 1.2, 1.75, -0.4, -0.93]
@@ -256,3 +258,48 @@ def test_states_that_do_not_exist_are_refused():
         certify(0.4, 1, 1000, [1.0], [0.3])
     with pytest.raises(ValueError):
         ExponentialMemory(0.6, 1000, 0.1, 1, (0.5,), (-0.3,)).certificate
+
+
+@pytest.mark.parametrize("arithmetic", ["f32", "q31", "q15"])
+@pytest.mark.parametrize("order", [0.03, 0.1, 0.3, 0.6, 0.9, 1.2, 1.8, -0.4])
+def test_poles_as_an_arithmetic_holds_them(order, arithmetic):
+    """Each lag up to the horizon with the rounded poles; at most one state more than free poles need."""
+    tolerance, horizon = 1e-4, 10**5
+    memory = fit_rounded(order, horizon, tolerance, ROUNDED[arithmetic])
+    found = truths(memory.beta, memory.differences, horizon, memory.poles, memory.weights)
+    for bound, truth in zip(bounds(memory.certificate), found):
+        assert truth <= bound <= 1.02 * truth + 1e-11
+    assert found[0] <= memory.tolerance <= tolerance
+    assert memory.states <= fit_exponential(order, horizon, tolerance).states + 1
+    rates = 1.0 - np.array(memory.poles)
+    np.testing.assert_array_equal(ROUNDED[arithmetic](rates), rates)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])
+@pytest.mark.parametrize("order", np.round(np.arange(-0.95, 2.0, 0.1), 2).tolist())
+def test_every_lag_to_a_million_for_many_orders(order, arithmetic):
+    memory = fit_rounded(order, 10**6, 1e-5, ROUNDED[arithmetic])
+    found = truths(memory.beta, memory.differences, 10**6, memory.poles, memory.weights)
+    for bound, truth in zip(bounds(memory.certificate), found):
+        assert truth <= bound <= 1.02 * truth + 1e-11
+    assert found[0] <= memory.tolerance <= 1e-5
+
+
+@pytest.mark.parametrize("arithmetic", ["f32", "q31", "q15"])
+def test_rounded_poles_reach_the_longest_horizon(arithmetic):
+    memory = fit_rounded(0.6, 10**8, 1e-4, ROUNDED[arithmetic])
+    assert memory.states <= theoretical_states(10**8, 1e-4) + 2
+    assert memory.certificate.kernel <= 1e-4
+
+
+def test_rates_too_coarse_are_refused():
+    with pytest.raises(ValueError, match="as they are held"):
+        fit_rounded(0.6, 10**5, 1e-6, coarse)
+    with pytest.raises(ValueError, match="tolerance"):
+        fit_rounded(0.6, 10**5, 1.0, coarse)
+
+
+def coarse(rates):
+    """Powers of four."""
+    return 4.0 ** np.round(np.log(rates) / np.log(4.0))

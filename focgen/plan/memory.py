@@ -77,7 +77,8 @@ def _rounded(arithmetic: str):
     return held
 
 
-_ROUNDED = {arithmetic: _rounded(arithmetic) for arithmetic in SPEEDS}
+ROUNDED = {arithmetic: _rounded(arithmetic) for arithmetic in SPEEDS}
+"""By arithmetic, what takes rates, falling, to those it holds."""
 
 
 def memories_of(
@@ -102,7 +103,7 @@ def _fitted(
     controller: Controller, order: float, arithmetic: str, tolerance: float, horizon: int
 ) -> ExponentialMemory:
     try:
-        return fit_rounded(order, horizon, tolerance, _ROUNDED[arithmetic])
+        return fit_rounded(order, horizon, tolerance, ROUNDED[arithmetic])
     except ValueError as reason:
         remedy = "allow a larger tolerance, a shorter horizon, or choose another arithmetic"
         raise PlanError(controller.name, f"order {order:g} has no exponential memory: {reason}", remedy) from None
