@@ -1,4 +1,5 @@
-"""Plans with an exponential memory: bounds, proofs and responses against truths that know nothing of the plan."""
+"""Plans with an exponential memory: bounds, proofs and responses against truths that know nothing of the
+plan."""
 
 from dataclasses import replace
 
@@ -91,7 +92,8 @@ def test_after_a_reset_nothing_moves(controller, arithmetic):
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("controller", [SUM, RECURSION], ids=["sum", "recursion"])
 def test_the_running_response_is_that_of_the_impulse_response(controller, arithmetic):
-    """The transform of what a reference with these poles answers to a unit sample; and near the designed one."""
+    """The transform of what a reference with these poles answers to a unit sample; and near the designed
+    one."""
     plan = build_plan(controller, arithmetic, **ASKED)
     unit = np.zeros((1, 4096))
     unit[0, 0] = 1.0
@@ -99,7 +101,8 @@ def test_the_running_response_is_that_of_the_impulse_response(controller, arithm
     answer = answer - answer[-1] * (np.arange(4096) > 0)  # the slow modes' last, which a window would cut
     omega = np.array([3.0, 30.0, 200.0])
     expected = np.exp(-1j * np.outer(omega, np.arange(4096)) * plan.sample_time) @ answer
-    np.testing.assert_allclose(running_response(plan, omega), expected, rtol=2e-2 if arithmetic == "q15" else 2e-3)
+    near = 2e-2 if arithmetic == "q15" else 2e-3
+    np.testing.assert_allclose(running_response(plan, omega), expected, rtol=near)
     slow = np.array([0.05, 0.5])
     np.testing.assert_allclose(running_response(plan, slow), designed_response(controller, slow), rtol=2e-2)
 

@@ -1,7 +1,7 @@
 """Exponential memory over 10^7 samples, in compiled C: the error never leaves the manifest's bound.
 
-The truth is the operator with the memory's own poles and weights, in long double and in another form: each mode sums
-up differences, S_k = p S_{k-1} + v_k, instead of keeping a mean.
+The truth is the operator with the memory's own poles and weights, in long double and in another form: each
+mode sums up differences, S_k = p S_{k-1} + v_k, instead of keeping a mean.
 """
 
 import numpy as np

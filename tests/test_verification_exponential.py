@@ -1,4 +1,4 @@
-"""Exponential memory in every arithmetic: the C and the reference agree in every bit, errors keep their bounds."""
+"""Exponential memory in every arithmetic: C and reference agree in every bit, errors keep their bounds."""
 
 from dataclasses import replace
 

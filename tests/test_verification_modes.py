@@ -23,18 +23,38 @@ FAULTS = (
     Fault("the present sample in place of the past one", "@.c", r"(past = .*), 1\)\];", r"\1, 0)];"),
     Fault("a mode left out", "@.c", r"(numerator_means, )(\d+), past", r"\1\2 - 1, past"),
     Fault("slow modes left out", "@.c", r"sum \+= (foc_\w+\()+.*numerator_slow_modes[^;]*;", "", SLOW),
-    Fault("reset forgets the means", "@.c", r"s->numerator_means\[i\] = [^;]*;", "s->numerator_means[i] = 0;"),
+    Fault(
+        "reset forgets the means", "@.c",
+        r"s->numerator_means\[i\] = [^;]*;",
+        "s->numerator_means[i] = 0;",
+    ),
     Fault("reset keeps the slow means", "@.c", r"s->numerator_slow_means\[i\] = [^;]*;", "(void)e;"),
     Fault("reset keeps the rests", "@.c", r"s->numerator_slow_rests\[i\] = [^;]*;", "", ("f32",)),
     Fault("a mean with a bit less", "@.c", r"(numerator_means, \d+, past,\s+)(\d+), ", r"\1\2 - 1, ", FIXED),
     Fault("a drive with a bit less", "@.c", r"(means, \d+, past,\s+\d+,\s+)(\d+)", r"\1\2 + 1", FIXED),
-    Fault("slow rates as the fast ones", "@.c", r"(slow_means, \d+,\s+past,\s+\d+,\s+\d+,\s+)18\)", r"\g<1>17)", ("q31",)),
+    Fault(
+        "slow rates as the fast ones", "@.c",
+        r"(slow_means, \d+,\s+past,\s+\d+,\s+\d+,\s+)18\)",
+        r"\g<1>17)", ("q31",),
+    ),
     Fault("a bank's scale", "@.c", r"(means, \d+,\s+past[^;]*\), )(\d+)\);", r"\1\2 + 1);", FIXED),
     Fault("means stand still", "foc_memory.h", r"means\[i\] (\+)?= [^;]*;", ""),
-    Fault("drive truncated", "foc_memory.h", r"foc_shift(\d\d)\(now - means\[i\], to_drive\)", "((now - means[i]) >> to_drive)", FIXED),
-    Fault("drive after the update", "foc_memory.h", r"(sum \+= modes\[i\]\.weight) \* drive", r"\1 * (u - means[i])", ("f32",)),
+    Fault(
+        "drive truncated", "foc_memory.h",
+        r"foc_shift(\d\d)\(now - means\[i\], to_drive\)",
+        "((now - means[i]) >> to_drive)", FIXED,
+    ),
+    Fault(
+        "drive after the update", "foc_memory.h",
+        r"(sum \+= modes\[i\]\.weight) \* drive",
+        r"\1 * (u - means[i])", ("f32",),
+    ),
     Fault("rests not taken up", "foc_memory.h", r"rests\[i\] = step - [^;]*;", "rests[i] = 0.0f;", ("f32",)),
-    Fault("compensation the other way", "foc_memory.h", r"step - \(mean - means\[i\]\)", "(mean - means[i]) - step", ("f32",)),
+    Fault(
+        "compensation the other way", "foc_memory.h",
+        r"step - \(mean - means\[i\]\)",
+        "(mean - means[i]) - step", ("f32",),
+    ),
     Fault("weights in double", "foc_memory.h", r"float sum = 0\.0f;", "double sum = 0.0;", ("f32",)),
 )
 
@@ -42,7 +62,11 @@ BOTH = (
     Fault("change is the sample", "@.c", r"(change = [^-;]*) - [^;]*;", r"\1;"),
     Fault("change over two samples", "@.c", r"(change = .*), 2\)\];", r"\1, 1)];"),
     Fault("denominator's modes left out", "@.c", r"sum \+= (foc_\w+\()+.*denominator_modes_1[^;]*;", ""),
-    Fault("rest of the filtered error", "@.c", r"s->denominator_means_2\[i\] = [^;]*;", "s->denominator_means_2[i] = 0;"),
+    Fault(
+        "rest of the filtered error", "@.c",
+        r"s->denominator_means_2\[i\] = [^;]*;",
+        "s->denominator_means_2[i] = 0;",
+    ),
     Fault("means of the error in the denominator", "@.c", r"past = s->filtered\[", "past = s->error["),
 )
 
@@ -89,7 +113,8 @@ def tenth_more(number: str) -> str:
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("mode, which", [(0, 1), (-1, 2), (-1, 1)])
 def test_one_rate_or_weight_wrong(sound, tmp_path, arithmetic, mode, which):
-    """The fastest mode by its last digit, and the slowest, which hardly moves in so few samples, by a tenth."""
+    """The fastest mode by its last digit, and the slowest, which hardly moves in so few samples, by a
+    tenth."""
     folder = shutil.copytree(sound / f"spba_{arithmetic}", tmp_path / "broken")
     path = folder / "spba.c"
     text = path.read_text()
@@ -108,7 +133,9 @@ def test_the_memory_of_another_version_is_not_the_one_that_was_proved(sound, tmp
     assert found.targets["host"].mismatches == 0 and found.differences and not found.holds
 
 
-@pytest.mark.parametrize("key, value", [("tolerance", 1e-2), ("horizon", 10**5), ("memory", "short"), ("states", 3)])
+@pytest.mark.parametrize(
+    "key, value", [("tolerance", 1e-2), ("horizon", 10**5), ("memory", "short"), ("states", 3)]
+)
 def test_a_manifest_that_tells_of_another_memory(sound, tmp_path, key, value):
     import json
 

@@ -15,10 +15,11 @@ NAMES = {"direct": "numerator", "rest": "integrand", "feedback": "denominator"}
 
 @dataclass(frozen=True)
 class BankText:
-    """One bank: its table (``kind``, ``name``, ``rows`` under ``about``), its state, and the code that uses them.
+    """One bank: its table (``kind``, ``name``, ``rows`` under ``about``), its state, and the code that uses
+    them.
 
-    ``settled`` is what every mean is set to for a history that has been constant for ever; ``compensated`` has
-    rests beside the means.
+    ``settled`` is what every mean is set to for a history that has been constant for ever; ``compensated``
+    has rests beside the means.
     """
 
     name: str
@@ -40,8 +41,8 @@ def bank_texts(plan: Plan, table: Sum) -> list[BankText]:
 
 
 def label(table: Sum, index: int, what: str = "modes") -> str:
-    """The bank's name within the controller's: its sum, whether it is the slower one of its term, and the number of
-    the term where there are several.
+    """The bank's name within the controller's: its sum, whether it is the slower one of its term, and the
+    number of the term where there are several.
     """
     orders = list(dict.fromkeys(bank.order for bank in table.banks))
     number = f"_{orders.index(table.banks[index].order) + 1}" if len(orders) > 1 else ""
@@ -126,7 +127,8 @@ def _past(plan: Plan, table: Sum, lag: int) -> str:
 
 
 def inputs(plan: Plan, table: Sum) -> list[str]:
-    """Declarations of what drives the banks of a sum: the sample before, and for orders above 1 its change."""
+    """Declarations of what drives the banks of a sum: the sample before, and for orders above 1 its
+    change."""
     ctype, needed = plan.error.ctype, {bank.differences for bank in table.banks}
     lines = [f"const {ctype} past = {_past(plan, table, 1)};"] if needed else []
     if 2 in needed:
@@ -138,11 +140,10 @@ def inputs(plan: Plan, table: Sum) -> list[str]:
 def _call(plan: Plan, table: Sum, bank: Bank, index: int, name: str) -> str:
     slow = "slow_" if _slow(plan, bank) else ""
     states = f"s->{means(table, index)}" + (f", s->{rests(table, index)}" if bank.compensated else "")
-    shifts = {"q31": f", {bank.up}, {bank.to_drive}, {bank.rate_shift}", "q15": f", {bank.up}, {bank.to_drive}"}
-    call = (
-        f"foc_{slow}modes_{plan.arithmetic}({name}, {states}, {bank.modes}, {'past' if bank.differences == 1 else 'change'}"
-        f"{shifts.get(plan.arithmetic, '')})"
-    )
+    both = f", {bank.up}, {bank.to_drive}"
+    shifts = {"q31": f"{both}, {bank.rate_shift}", "q15": both}.get(plan.arithmetic, "")
+    u = "past" if bank.differences == 1 else "change"
+    call = f"foc_{slow}modes_{plan.arithmetic}({name}, {states}, {bank.modes}, {u}{shifts})"
     return shifted(call, bank.sum.ctype, bank.align)
 
 

@@ -146,12 +146,12 @@ def _memory_section(plan: Plan) -> str:
         f"s^{m.order:g} to {m.tolerance:.2g} with {m.states} modes" for m in plan.memories
     )
     words = (
-        f"The memory is a sum of exponentials. Every fractional power of s keeps a few means of its history, each over a"
-        f" time of its own ({_times(plan)}); the weights that the past has through them follow the exact ones for"
-        f" {plan.horizon} samples: {orders} (relative error, proved for every lag). Nothing is cut off, so a constant is"
-        " remembered without an error, and a step costs the same however far the memory reaches. Means cannot leave the"
-        " range of what they average: the bounds above hold for any number of samples."
-        f"{_SLOW[plan.arithmetic] * _has_slow(plan)}"
+        "The memory is a sum of exponentials. Every fractional power of s keeps a few means of its history,"
+        f" each over a time of its own ({_times(plan)}); the weights that the past has through them follow"
+        f" the exact ones for {plan.horizon} samples: {orders} (relative error, proved for every lag). Nothing"
+        " is cut off, so a constant is remembered without an error, and a step costs the same however far the"
+        " memory reaches. Means cannot leave the range of what they average: the bounds above hold for any"
+        f" number of samples.{_SLOW[plan.arithmetic] * _has_slow(plan)}"
     )
     return "\n".join(wrapped(words.split(" "), 116))
 

@@ -76,4 +76,5 @@ def memory_about(plan: Plan) -> list[str]:
         return []
     head = f"Memory: exponential, {plan.states} modes with a mean each. The weights of every s^b are within"
     proved = max((memory.tolerance for memory in plan.memories), default=0.0)
-    return [head, f"{proved:.2g} of the exact ones up to {plan.horizon} samples back, and the gain at rest is exact."]
+    rest = f"{proved:.2g} of the exact ones up to {plan.horizon} samples back, and the gain at rest is exact."
+    return [head, rest]

@@ -54,11 +54,10 @@ def generate(
     """Write C for a controller into the folder ``out``, whole or not at all.
 
     ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15),
-    ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one, ``tolerance`` (1e-8 … 0.1) and
-    ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier) default to the controller's own.
-    ``selftest`` adds NAME_selftest.c and .h.
-    ``target`` names a core whose own instructions the history sums shall use; without it they take their
-    portable form. The bits are the same.
+    ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one, ``tolerance`` (1e-8 … 0.1)
+    and ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier) default to the
+    controller's own. ``selftest`` adds NAME_selftest.c and .h. ``target`` names a core whose own instructions
+    the history sums shall use; without it they take their portable form. The bits are the same.
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be
@@ -85,7 +84,8 @@ def folder_files(
     """
     title, digest = plan.controller.name, sha256(controller_toml)
     runtime = {
-        name: (shipped("c_runtime") / name).read_text(encoding="utf-8") for name in runtime_files(plan, kernels)
+        name: (shipped("c_runtime") / name).read_text(encoding="utf-8")
+        for name in runtime_files(plan, kernels)
     }
     inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
     manifest = manifest_of(plan, inputs, selftest, kernels)

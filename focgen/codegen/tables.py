@@ -48,8 +48,8 @@ class SumText:
     """A history sum: its tables, and the function that computes it.
 
     Where it looks ahead: ``ahead`` is the call of each step, ``rest`` that of a reset, ``near`` what is left
-    to its own step; else they are empty, and ``near`` None. ``banks`` remember what is beyond the taps, driven by
-    what ``inputs`` declare.
+    to its own step; else they are empty, and ``near`` None. ``banks`` remember what is beyond the taps,
+    driven by what ``inputs`` declare.
     """
 
     tables: list[TableText]

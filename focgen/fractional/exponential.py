@@ -167,7 +167,7 @@ def _memory(order: float, horizon: int, tolerance: float, fit: Alternation) -> E
 
 
 def memory_of(order: float, horizon: int, poles, weights) -> ExponentialMemory:
-    """Return the memory with these ``poles`` and ``weights``; its tolerance is what its certificate proves."""
+    """Return the memory with these ``poles`` and ``weights``, and the tolerance its certificate proves."""
     differences = math.ceil(order)
     tolerance = certify(differences - order, differences, horizon, poles, weights).kernel
     return ExponentialMemory(order, horizon, tolerance, differences, tuple(map(float, poles)),

@@ -1,4 +1,5 @@
-"""Exponential memories as a machine holds them: their poles rounded, with weights and a certificate of their own."""
+"""Exponential memories as a machine holds them: their poles rounded, with weights and a certificate of their
+own."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def fit_rounded(order: float, horizon: int, tolerance: float, rounded: Rounding)
             memory = _held(order, horizon, candidate, rounded)
             if memory is not None and memory.tolerance <= tolerance:
                 return memory
-    raise ValueError(f"poles as they are held miss the tolerance {tolerance:g} at the horizon {horizon}; allow more")
+    what = f"poles as they are held miss the tolerance {tolerance:g} at the horizon {horizon}"
+    raise ValueError(f"{what}; allow more")
 
 
 def _held(order: float, horizon: int, fit: Alternation, rounded: Rounding) -> ExponentialMemory | None:

@@ -1,8 +1,8 @@
 """Modes as integers, and as floating numbers: the banks of an exponential memory.
 
-u is the history's value (m = 1) or its latest difference (m = 2). L = u·2^up lies within the range of u, widened
-by what rounding can add to it for ever: D·2^to_drive is within half of it of u·2^up − L, and the shift of a·D, if
-there is one, adds half a count of L a sample, which the rate takes away again.
+u is the history's value (m = 1) or its latest difference (m = 2). L = u·2^up lies within the range of u,
+widened by what rounding can add to it for ever: D·2^to_drive is within half of it of u·2^up − L, and the
+shift of a·D, if there is one, adds half a count of L a sample, which the rate takes away again.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _ARITHMETIC = {16: "q15", 32: "q31"}
 
 @dataclass(frozen=True)
 class BankDraft:
-    """A bank before its sum is aligned: real weights as multiples of 2^``exponent``, D in counts of 2^``guard``
-    of the history's.
+    """A bank before its sum is aligned: real weights as multiples of 2^``exponent``, D in counts of
+    2^``guard`` of the history's.
     """
 
     order: float
@@ -80,7 +80,8 @@ def _span(counts) -> Interval:
 
 
 def driven_by(each: Interval, differences: int) -> Interval:
-    """The range of u for a history whose counts lie in ``each`` (0 included: the rest before the first sample)."""
+    """The range of u for a history whose counts lie in ``each`` (0 included: the rest before the first
+    sample)."""
     each = each.hull(0)
     return each if differences == 1 else each - each
 
@@ -124,8 +125,8 @@ def _draft(modes: Modes, speed: Speed, each: Interval, word: Word) -> BankDraft:
 def drive_error(made: Sum) -> float:
     """What the rounding of every D can add to a sum, in counts of its total, in any one sample.
 
-    D is off by its own rounding and by the mean of those before, at most a count in all; and by what the shift of
-    a·D adds to L.
+    D is off by its own rounding and by the mean of those before, at most a count in all; and by what the
+    shift of a·D adds to L.
     """
     return sum(_each_error(bank) for bank in made.banks) / made.total.lsb
 

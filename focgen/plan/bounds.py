@@ -231,10 +231,10 @@ def plan_reach(plan: Plan) -> float:
 def _drive_error(rates: np.ndarray, m: float, u: float, tiny: float, compensated: bool) -> np.ndarray:
     """How far a mode's D can be off for |u| ≤ m, shape of ``rates``.
 
-    u_{k−1} itself is rounded where m = 2: u m, once, and as much in L. Each sample adds to L's error η ≤ q (2 u
-    |D|) + u |L|, and the rate takes η / q of it; D is rounded once more. Compensated, with r ≤ u |L| and t = r +
-    q D: D is rounded twice, t once, and r loses at most 3 u |t| more where |t| > |L| (Dekker 1971 is exact
-    otherwise): η ≤ q (4 u |D|) + 4 u |t|.
+    u_{k−1} itself is rounded where m = 2: u m, once, and as much in L. Each sample adds to L's error η ≤ q (2
+    u |D|) + u |L|, and the rate takes η / q of it; D is rounded once more. Compensated, with r ≤ u |L| and t
+    = r + q D: D is rounded twice, t once, and r loses at most 3 u |t| more where |t| > |L| (Dekker 1971 is
+    exact otherwise): η ≤ q (4 u |D|) + 4 u |t|.
     """
     far = 2.0 * m
     twice = 2.0 * u * m * (m > 1.0)

@@ -30,16 +30,17 @@ def build_plan(
     tolerance: float | None = None,
     horizon: int | None = None,
 ) -> Plan:
-    """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with ``memory`` "short", of ``length`` past samples,
-    or "exponential", within ``tolerance`` up to ``horizon`` samples; all default to the controller's.
+    """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with ``memory`` "short", of ``length`` past
+    samples, or "exponential", within ``tolerance`` up to ``horizon`` samples; all default to the
+    controller's.
 
-    ``tolerance``: 1e-8 … 0.1, the largest relative error of the exact memory's weights up to the horizon, 100 …
-    1e8 samples (:class:`focgen.fractional.exponential.ExponentialMemory`).
+    ``tolerance``: 1e-8 … 0.1, the largest relative error of the exact memory's weights up to the horizon, 100
+    … 1e8 samples (:class:`focgen.fractional.exponential.ExponentialMemory`).
 
     Raises PlanError where the transfer function cannot be realised, its truncated recursion is not stable, a
     range cannot be represented, or a node cannot be proved; the remedy says what would work.
     """
-    given = {"arithmetic": arithmetic, "length": length, "memory": memory, "tolerance": tolerance, "horizon": horizon}
+    given = dict(arithmetic=arithmetic, length=length, memory=memory, tolerance=tolerance, horizon=horizon)
     wanted = replace(controller, **{key: value for key, value in given.items() if value is not None})
     _check(wanted)
     folded, memories = _tables(wanted)
@@ -79,10 +80,12 @@ def _check(controller: Controller) -> None:
     if not isinstance(length, int) or not 1 <= length <= _LONGEST:
         raise PlanError(where, f"the memory length is {length!r}", f"give 1 to {_LONGEST} past samples")
     if controller.memory not in MEMORIES:
-        raise PlanError(where, f"the memory form {controller.memory!r} is unknown", f"choose {' or '.join(MEMORIES)}")
+        choices = " or ".join(MEMORIES)
+        raise PlanError(where, f"the memory form {controller.memory!r} is unknown", f"choose {choices}")
     if not isinstance(controller.tolerance, float) or not isinstance(controller.horizon, int):
         remedy = "give a number, and a whole number of samples"
-        raise PlanError(where, f"tolerance {controller.tolerance!r} and horizon {controller.horizon!r}", remedy)
+        what = f"has the tolerance {controller.tolerance!r} and the horizon {controller.horizon!r}"
+        raise PlanError(where, what, remedy)
     if not all(map(math.isfinite, _numbers(controller))) or controller.sample_time <= 0.0:
         raise PlanError(
             where, "has a number that is not finite, or a sample_time that is not positive", "correct it"

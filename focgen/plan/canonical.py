@@ -69,7 +69,8 @@ class Realisation:
 class Table:
     """Weights by lag from 0 on. ``size`` is Σ|terms| of each: the weight is known to 1e-13 of it.
 
-    With an exponential memory they are the taps alone; ``modes`` has the rest, and ``whole`` the response of all.
+    With an exponential memory they are the taps alone; ``modes`` has the rest, and ``whole`` the response of
+    all.
     """
 
     weights: np.ndarray

@@ -14,7 +14,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_LOW, FLAG_SCHEDULE, Bank, Format, Plan, Schedule, Sum
+from focgen.plan.model import (
+    FLAG_HIGH,
+    FLAG_INPUT,
+    FLAG_LOW,
+    FLAG_SCHEDULE,
+    Bank,
+    Format,
+    Plan,
+    Schedule,
+    Sum,
+)
 from focgen.plan.scenario import Reset, Scenario, Trace
 from focgen.plan.usable import holding, invalid_samples, usable
 

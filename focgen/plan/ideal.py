@@ -33,8 +33,8 @@ def ideal(
 ) -> Trace:
     """Run a controller on physical inputs; returns physical u and d (ahead of the integrator), no flags.
 
-    ``length``: the memory length L; None for infinite memory, all that has been. ``memories``: exponential ones that
-    stand for the orders they are of, instead; with them ``length`` only has to cover whole orders.
+    ``length``: the memory length L; None for infinite memory, all that has been. ``memories``: exponential
+    ones that stand for the orders they are of, instead; with them ``length`` only has to cover whole orders.
     Raises PlanError where the transfer function cannot be realised.
     """
     count = scenario.samples if length is None else length
@@ -60,8 +60,8 @@ def _weights(order: float, count: int) -> np.ndarray:
 
 
 class _Sum:
-    """Σ c h^−β w_j^(β), eq. (10)–(14): taps, without the zeros that whole orders end in, and modes where a memory
-    stands for an order: c h^−β ∇^m (1 + Σ_i w_i / (z − p_i)).
+    """Σ c h^−β w_j^(β), eq. (10)–(14): taps, without the zeros that whole orders end in, and modes where a
+    memory stands for an order: c h^−β ∇^m (1 + Σ_i w_i / (z − p_i)).
     """
 
     def __init__(self, terms: Polynomial, step: float, count: int, memories: dict[float, ExponentialMemory]):
@@ -84,7 +84,8 @@ class _Sum:
         """Applied to a signal that starts from zero."""
         total = _convolved(self.taps, signal)
         for pole, weight, m in self.modes:
-            total = total + lfilter(np.concatenate([[0.0], weight * _weights(float(m), m)]), [1.0, -pole], signal)
+            rise = np.concatenate([[0.0], weight * _weights(float(m), m)])
+            total = total + lfilter(rise, [1.0, -pole], signal)
         return total
 
     def solved(self, forced: np.ndarray) -> np.ndarray:

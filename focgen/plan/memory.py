@@ -1,8 +1,8 @@
 """Exponential memories for a controller's fractional terms, as an arithmetic can hold them.
 
-Fixed point: a rate q = 1 − p is an integer count a of 2^−bits, and only rates that are such counts are used, so
-the poles are exact; their weights and certificates are found for them. Slow modes, whose rates would lose digits,
-stand in a bank of their own with more bits. Floating point: rates are numbers of the type.
+Fixed point: a rate q = 1 − p is an integer count a of 2^−bits, and only rates that are such counts are used,
+so the poles are exact; their weights and certificates are found for them. Slow modes, whose rates would lose
+digits, stand in a bank of their own with more bits. Floating point: rates are numbers of the type.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ def by_speed(arithmetic: str, rates: np.ndarray) -> list[tuple[Speed, np.ndarray
 
 
 def _rounded(arithmetic: str):
-    """The function that takes rates to those the arithmetic holds; one object for each, so that fits are kept."""
+    """The function that takes rates to those the arithmetic holds; one object for each, so that fits are
+    kept."""
     kind = {"f64": np.float64, "f32": np.float32}.get(arithmetic)
 
     def held(rates: np.ndarray) -> np.ndarray:
@@ -106,7 +107,8 @@ def _fitted(
         return fit_rounded(order, horizon, tolerance, ROUNDED[arithmetic])
     except ValueError as reason:
         remedy = "allow a larger tolerance, a shorter horizon, or choose another arithmetic"
-        raise PlanError(controller.name, f"order {order:g} has no exponential memory: {reason}", remedy) from None
+        what = f"order {order:g} has no exponential memory: {reason}"
+        raise PlanError(controller.name, what, remedy) from None
 
 
 def exponential_tables(controller: Controller, memories: tuple[ExponentialMemory, ...]) -> Tables:

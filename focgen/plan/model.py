@@ -61,13 +61,12 @@ proof in ``proofs`` says for each of these nodes that it cannot overflow, so the
 narrowing (v, u) saturates to the ends of its type all the same; the proofs say that in range it never has to.
 Additions to an integral (z, I) are made in the type of its state, r and d widened to it.
 
-Exponential memory
-------------------
-With ``memory`` "exponential" a sum's taps are short, and ``Sum.banks`` remember the rest. A term c s^β, m − 1 <
-β < m, is c h^−β ∇^m (x_k + Σ_{j≥1} Σ_i w_i p_i^(j−1) x_{k−j}) (:mod:`focgen.fractional.exponential`), ∇ the
-backward difference; its lag 0 and every whole order are taps. A mode's part, ∇^m Σ_{j≥1} p^(j−1) x_{k−j}, is
-how far the history's past is from its own mean, weighted by p^j. So a mode keeps that mean, L: it never leaves
-the range of what it averages, and a constant is remembered without any error.
+Exponential memory ------------------ With ``memory`` "exponential" a sum's taps are short, and ``Sum.banks``
+remember the rest. A term c s^β, m − 1 < β < m, is c h^−β ∇^m (x_k + Σ_{j≥1} Σ_i w_i p_i^(j−1) x_{k−j})
+(:mod:`focgen.fractional.exponential`), ∇ the backward difference; its lag 0 and every whole order are taps. A
+mode's part, ∇^m Σ_{j≥1} p^(j−1) x_{k−j}, is how far the history's past is from its own mean, weighted by p^j.
+So a mode keeps that mean, L: it never leaves the range of what it averages, and a constant is remembered
+without any error.
 
 With u_k = ∇^(m−1) x_k (x itself for m = 1), at sample k, before L_i knows of it:
 
@@ -76,15 +75,17 @@ With u_k = ∇^(m−1) x_k (x itself for m = 1), at sample k, before L_i knows o
 in the order of the bank. The sum's total is that of its blocks plus M of each bank. Every fractional term has
 modes of its own; those too slow to be held like the rest are in a second bank.
 
-* Fixed: D_i = shift(u_{k−1}·2^up − L_i, to_drive), M = Σ c_i D_i, L_i ← L_i + shift(a_i D_i, rate_shift), where
-  a_i counts 2^−(to_drive + rate_shift). M starts at 0, is exact, and enters as shift(M, align). L has ``up``
-  bits more than x, and D_i is the only thing that is rounded (where rate_shift is 0): to at most half a count of
-  D, whatever q is, and for ever, since L only ever moves towards u.
-* Floating: as written, M = 0, M ← M + c_i D_i. In a ``compensated`` bank L_i is the sum of two numbers, L_i and
-  r_i: D_i = (u_{k−1} − L_i) − r_i, t = r_i + q_i D_i, L' = L_i + t, r_i ← t − (L' − L_i), L_i ← L'. That is so for
-  f32 and slow modes: L_i alone would stand still as soon as q_i D_i is less than half its last digit.
+* Fixed: D_i = shift(u_{k−1}·2^up − L_i, to_drive), M = Σ c_i D_i, L_i ← L_i + shift(a_i D_i, rate_shift),
+  where a_i counts 2^−(to_drive + rate_shift). M starts at 0, is exact, and enters as shift(M, align). L has
+  ``up`` bits more than x, and D_i is the only thing that is rounded (where rate_shift is 0): to at most half
+  a count of D, whatever q is, and for ever, since L only ever moves towards u.
+* Floating: as written, M = 0, M ← M + c_i D_i. In a ``compensated`` bank L_i is the sum of two numbers, L_i
+  and r_i: D_i = (u_{k−1} − L_i) − r_i, t = r_i + q_i D_i, L' = L_i + t, r_i ← t − (L' − L_i), L_i ← L'. That
+  is so for f32 and slow modes: L_i alone would stand still as soon as q_i D_i is less than half its last
+  digit.
 
-``reset`` and ``init`` set L_i to u of the constant past: x (m = 1) or 0 (m = 2), and r_i = 0. ``track`` leaves them.
+``reset`` and ``init`` set L_i to u of the constant past: x (m = 1) or 0 (m = 2), and r_i = 0. ``track``
+leaves them.
 
 =================  ========================  ========================  ================
 mode               q15, q ≥ 2^−8             q15, slower               q31
@@ -122,139 +123,29 @@ from dataclasses import dataclass
 
 from focgen.control.controller import Controller
 from focgen.fractional.exponential import ExponentialMemory
+from focgen.plan.sums import Bank, Block, Count, Format, Sum
 
-Count = int | float
+__all__ = [
+    "Bank",
+    "Block",
+    "Count",
+    "ErrorBound",
+    "FLAG_HIGH",
+    "FLAG_INPUT",
+    "FLAG_INVALID",
+    "FLAG_LOW",
+    "FLAG_SCHEDULE",
+    "Feedback",
+    "Format",
+    "InnerIntegrator",
+    "Integrator",
+    "Plan",
+    "Proof",
+    "Schedule",
+    "Sum",
+]
 
 FLAG_HIGH, FLAG_LOW, FLAG_SCHEDULE, FLAG_INPUT, FLAG_INVALID = 1, 2, 4, 8, 16
-
-
-@dataclass(frozen=True)
-class Format:
-    """How one node is held.
-
-    ``ctype`` is a C type; ``lsb`` the physical value of one count (1.0 floating); ``low`` and ``high`` its
-    proven range in counts; ``unit`` for comments.
-    """
-
-    ctype: str
-    lsb: float
-    low: Count
-    high: Count
-    unit: str = ""
-
-    @property
-    def floating(self) -> bool:
-        """Whether this is ``float`` or ``double``."""
-        return self.ctype in ("float", "double")
-
-    @property
-    def bits(self) -> int:
-        """Width of the type."""
-        return {"float": 32, "double": 64}.get(self.ctype) or int(self.ctype.strip("u_int"))
-
-
-@dataclass(frozen=True)
-class Block:
-    """Taps ``first`` … ``last`` (lags, both included), which share one scale.
-
-    ``weights[i]`` belongs to lag ``first + i``; its real value is ``weights[i] * lsb``. ``sum`` holds the
-    block's own sum; shifted right by ``align``, rounding, it is in counts of the total.
-    """
-
-    first: int
-    last: int
-    weights: tuple[Count, ...]
-    lsb: float
-    sum: Format
-    align: int
-
-
-@dataclass(frozen=True)
-class Bank:
-    """Modes of an exponential memory that are held alike, the fastest first; see the module's description.
-
-    ``rates`` (a_i) and ``weights`` (c_i) are counts of ``rate.lsb`` and ``lsb``. ``state`` is L, ``drive`` D, in
-    units of the history; ``sum`` M, which shifted right by ``align`` is in counts of the total. ``order`` is that
-    of their term s^β.
-    """
-
-    order: float
-    rates: tuple[Count, ...]
-    weights: tuple[Count, ...]
-    rate: Format
-    lsb: float
-    state: Format
-    drive: Format
-    sum: Format
-    up: int = 0
-    to_drive: int = 0
-    rate_shift: int = 0
-    align: int = 0
-    compensated: bool = False
-
-    @property
-    def differences(self) -> int:
-        """m, the order rounded up: 1 or 2."""
-        return math.ceil(self.order)
-
-    @property
-    def modes(self) -> int:
-        """How many there are."""
-        return len(self.rates)
-
-    @property
-    def real_rates(self) -> tuple[float, ...]:
-        """q_i; exact."""
-        return tuple(a * self.rate.lsb for a in self.rates)
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """c_i; exact."""
-        return tuple(c * self.lsb for c in self.weights)
-
-
-@dataclass(frozen=True)
-class Sum:
-    """Σ_j w_j x_{k−j} over ``history`` ("error" or "filtered"); ``blocks`` oldest first, without gaps.
-
-    ``banks`` add what an exponential memory remembers beyond the taps.
-    """
-
-    name: str
-    history: str
-    blocks: tuple[Block, ...]
-    total: Format
-    banks: tuple[Bank, ...] = ()
-
-    @property
-    def taps(self) -> int:
-        """How many weights there are."""
-        return sum(len(block.weights) for block in self.blocks)
-
-    @property
-    def first(self) -> int:
-        """The smallest lag: 0, or 1 for the feedback."""
-        return self.blocks[-1].first
-
-    @property
-    def last(self) -> int:
-        """The largest lag."""
-        return self.blocks[0].last
-
-    @property
-    def weights(self) -> tuple[Count, ...]:
-        """All weights by rising lag, from lag ``first`` on, each in counts of its own block."""
-        return tuple(w for block in reversed(self.blocks) for w in block.weights)
-
-    @property
-    def modes(self) -> int:
-        """How many modes its banks have."""
-        return sum(bank.modes for bank in self.banks)
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """The taps' real values by rising lag; exact."""
-        return tuple(w * block.lsb for block in reversed(self.blocks) for w in block.weights)
 
 
 @dataclass(frozen=True)
@@ -351,9 +242,9 @@ class Plan:
     ``product`` g·v before its shift. ``constant_gain`` (counts of ``gain``) is used where there is no
     schedule. ``increment`` holds d. ``output`` carries the output limits as its low and high.
 
-    ``memory`` is "short", with ``length`` past samples, or "exponential": then ``memories`` has the operator of
-    each fractional order, with the poles as the arithmetic holds them, ``horizon`` (samples) and ``tolerance``
-    are what was asked for, and ``length`` counts the past samples that the taps need.
+    ``memory`` is "short", with ``length`` past samples, or "exponential": then ``memories`` has the operator
+    of each fractional order, with the poles as the arithmetic holds them, ``horizon`` (samples) and
+    ``tolerance`` are what was asked for, and ``length`` counts the past samples that the taps need.
     """
 
     controller: Controller

@@ -1,7 +1,7 @@
 """The impulse responses of sums that remember by modes.
 
-A mode with rate q = 1 − p and m differences answers a unit sample by ∇^(m−1) of (0, 1, −q, −q p, −q p², …). They
-go on for ever; what follows after ``LAGS`` samples is bounded by its sum of magnitudes.
+A mode with rate q = 1 − p and m differences answers a unit sample by ∇^(m−1) of (0, 1, −q, −q p, −q p², …).
+They go on for ever; what follows after ``LAGS`` samples is bounded by its sum of magnitudes.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ class Response:
 def response_of(
     taps: Sequence[float] | np.ndarray, first: int, modes: Sequence[Modes], lags: int = LAGS
 ) -> Response:
-    """What taps from lag ``first`` on and modes answer to a unit sample, up to ``lags`` where there are modes."""
+    """What taps from lag ``first`` on and modes answer to a unit sample, up to ``lags`` where there are
+    modes."""
     taps = np.concatenate([np.zeros(first), np.asarray(taps, dtype=float)])
     if not modes:
         return Response(taps)

@@ -72,8 +72,8 @@ class _Ledger:
         return self.add(f"{name} sum", weighted(bank.weights, drive), bank.sum.ctype, "l1 norm", half)
 
     def sum(self, table: Sum, each: Interval, past: Interval | None = None) -> Interval:
-        """Every block and every partial total of a history sum; ``past`` is what modes are driven by, if not by
-        ``each``.
+        """Every block and every partial total of a history sum; ``past`` is what modes are driven by, if not
+        by ``each``.
         """
         total = Interval(0, 0)
         for block in table.blocks:

@@ -44,7 +44,8 @@ class Inverse:
     norm: float
 
     def norm_after(self, numerator: np.ndarray, left_out: float = 0.0) -> float:
-        """Bound on ‖B/A‖₁ for the numerator's weights, shape (taps,), and ``left_out``, Σ|weights| of more."""
+        """Bound on ‖B/A‖₁ for the numerator's weights, shape (taps,), and ``left_out``, Σ|weights| of
+        more."""
         own = float(np.abs(fftconvolve(numerator, self.response)).sum())
         rest = float(np.abs(numerator).sum()) * self.residual + left_out
         return (own + rest * self.norm) * _SLACK

@@ -1,7 +1,7 @@
 """What a memory leaves out, against an infinite one.
 
-Short memory leaves out its tail. An exponential one is wrong by what its certificate bounds, once up to its horizon
-and once for ever: Σ |∇^m (h_j − g_j)| for each term.
+Short memory leaves out its tail. An exponential one is wrong by what its certificate bounds, once up to its
+horizon and once for ever: Σ |∇^m (h_j − g_j)| for each term.
 """
 
 from __future__ import annotations

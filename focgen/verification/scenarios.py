@@ -86,13 +86,18 @@ def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:
 def worst_cases(plan: Plan) -> Scenario:
     """Raw inputs that take each node to its proved worst case, two lanes a node, up and down.
 
-    They stand in the order of the proofs, those that are alike once. The floating forms have no proofs; theirs take the filtered error
-    to its largest.
+    They stand in the order of the proofs, those that are alike once. The floating forms have no proofs;
+    theirs take the filtered error to its largest.
     """
     nodes = ["v"] if plan.floating else [proof.node for proof in plan.proofs]
     made = [worst_case_input(plan, node) for node in nodes]
-    distinct = {(s.ref.tobytes(), s.meas.tobytes(), s.resets, s.sched is not None and s.sched.tobytes()): s for s in made}
-    return side_by_side(list(distinct.values()))
+    return side_by_side(list({_content(scenario): scenario for scenario in made}.values()))
+
+
+def _content(scenario: Scenario) -> tuple:
+    """What tells scenarios apart."""
+    signals = scenario.ref, scenario.meas, scenario.sched
+    return *(None if x is None else x.tobytes() for x in signals), scenario.resets, scenario.tracks
 
 
 def side_by_side(scenarios: list[Scenario]) -> Scenario:
