@@ -8,7 +8,7 @@ EFFECT = Effect(
     stage="sensor",
     meaning="the reading depends on the direction of the strain",
     reveals="slow cycles with the curvature logged beside the reading",
-    confused_with=("hysteresis", "valve_stiction", "sensor_relaxation"),
+    confused_with=("hysteresis", "valve_stiction", "sensor_relaxation", "sensor_nonlinearity"),
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
     forms=_loops.forms("strain"),
 )

@@ -24,7 +24,7 @@ EFFECT = Effect(
     stage="regulator",
     meaning="small command changes or reversals do nothing until a band is crossed",
     reveals="slow ramps with reversals and small steps about an offset, with the pressure logged",
-    confused_with=("hysteresis", "dead_zone", "sensor_quantization"),
+    confused_with=("hysteresis", "dead_zone", "valve_asymmetry", "sensor_quantization"),
     needs=lambda e: None if e.reversals else "the input never turns round above zero",
     forms=[
         Form("play", "command", (_BAND,), _play),
