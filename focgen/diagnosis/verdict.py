@@ -121,7 +121,7 @@ def _moved(e: Explanation) -> bool:
 
 def _found(e: Explanation, cause: Cause, rigs: compose.Rigs, logs, squares, floor: float) -> Found:
     kept = tied(cause.rivals)
-    sure = confidences(cause.rivals)[: len(kept)]
+    sure = confidences(cause.rivals, cause.share)[: len(kept)]
     name = cause.rivals[0].effect
     others = tuple(p for p in rigs.placed if not (p.effect == name and p.stage == cause.rivals[0].stage))
     share = _share_lost(e, cause, rigs, others, logs, squares, floor)
