@@ -21,7 +21,7 @@ _FUNCTIONS = {
     "trial": "focgen.trials.trial",
     "replay": "focgen.rig.replay",
     "study": "focgen.studies.study",
-    "demo": "focgen.demo",
+    "demo": "focgen.demonstration",
     "read_logs": "focgen.logs.read",
     "read_rig": "focgen.rig.files",
     "read_controller": "focgen.control.files",

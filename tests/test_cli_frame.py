@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+import focgen
 from focgen.cli.main import commands, main, parser
 from focgen.cli.outcome import to_json
 from focgen.errors import InputError
@@ -28,6 +29,12 @@ def test_every_command_shows_a_worked_example(capsys):
         with pytest.raises(SystemExit):
             parser().parse_args([name, "--help"])
         assert f"focgen {name}" in capsys.readouterr().out.split("\n\n", 1)[1]
+
+
+def test_every_command_is_a_function_of_its_name():
+    parser()  # loads them all: no file of the package may stand in a function's place
+    for name in commands():
+        assert callable(getattr(focgen, name)), name
 
 
 def test_a_closed_pipe_is_no_error():

@@ -63,7 +63,7 @@ def test_nothing_else_names_an_effect():
     root = Path(focgen.__file__).parent
     for path in root.rglob("*.py"):
         inside = path.relative_to(root).parts
-        if inside[:2] == ("rig", "effects") or inside[0] in ("trials", "demo.py"):
+        if inside[:2] == ("rig", "effects") or inside[0] in ("trials", "demonstration.py"):
             continue
         found = {n for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
                  if isinstance(node, ast.Constant) and isinstance(n := node.value, str)} & set(NAMES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from focgen.cli.outcome import Outcome
-from focgen.demo import Demo, demo
+from focgen.demonstration import Demo, demo
 from focgen.report.demo_page import demo_lead, diagnosis_sentence, firmware_table
 from focgen.report.page import text_table
 
