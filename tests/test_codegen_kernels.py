@@ -97,7 +97,7 @@ def test_the_work_is_shared_evenly(arithmetic):
 # --------------------------------------------------------------------------------------------- same bits
 
 
-LENGTHS = [40, *range(46, 53), *range(61, 69), 95, 99, 100, *range(126, 131), 200, 257]
+LENGTHS = [*range(22, 26), 40, *range(46, 53), *range(61, 69), 95, 99, 100, *range(126, 131), 200, 257]
 
 
 def test_random_controllers_agree_in_every_bit(tmp_path):

@@ -19,7 +19,7 @@ from focgen.plan.model import Block, Count, Sum
 
 AHEAD = 4
 NEAR, NEAR_FLOATING = 16, 8  # lags summed in their own step; 8 at least, as the others are not known before
-SHORTEST = 32  # far lags below which looking ahead does not pay
+SHORTEST = 8  # far lags below which looking ahead does not pay
 _LONGEST = 65_000  # the runs count weights in 16 bits
 _WIDEST = 31  # bits that a block may be shifted by
 _RUN = 4  # what a run costs beside its tiles, in tiles: calls, the ring's end, rounding
