@@ -53,7 +53,7 @@ def written(controllers, folder, arithmetics=ARITHMETICS, memory="short"):
 
 
 def agree(name: str, chain, plans, folder, samples: int, host: Library, worst: int | None) -> Counter:
-    """Every sample of every plan, and the state's bytes after every run; how many there were by arithmetic."""
+    """Every sample of every plan, and the state's bytes after every run; how many by arithmetic."""
     counted = Counter()
     library = TargetLibrary(core(name), chain, plans, [folder] * len(plans))
     assert library.illegal() == ()

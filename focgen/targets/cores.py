@@ -66,7 +66,7 @@ CORES = (
     Core(
         "rv32imac", "RV32IMAC",
         ("-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m+a+c"),
-        ("-march=rv32imac", "-mabi=ilp32"), "UC_CPU_RISCV32_ANY",
+        ("-march=rv32imac", "-mabi=ilp32", "-ffreestanding"), "UC_CPU_RISCV32_ANY",
     ),
 )  # fmt: skip
 """Those that an emulator of the ``targets`` extra runs."""

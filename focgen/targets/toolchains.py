@@ -21,6 +21,11 @@ EXACT = ("-O2", "-std=c99", "-ffp-contract=off")
 
 _ZIG = ("-ffreestanding", "-fno-sanitize=undefined", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
 _GCC = ("-fno-tree-loop-distribute-patterns", "-nostdlib")
+_GCC_OF = {
+    True: ("arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
+    False: ("riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf"),
+}
+"""Command and package of GCC, for ARM and for RISC-V."""
 _SLOW = 300.0  # s; Zig's first build also builds its runtime
 
 
@@ -51,8 +56,9 @@ def absent(core: Core) -> tuple[str, ...]:
     lines = []
     if _zig() is None:
         lines.append("zig: not installed (pip install 'focgen[targets]')")
-    if _gcc(core) is None and core.arm:
-        lines.append("arm-none-eabi-gcc: not installed (apt-get install gcc-arm-none-eabi)")
+    if _gcc(core) is None:
+        name, package = _GCC_OF[core.arm]
+        lines.append(f"{name}: not installed (apt-get install {package})")
     return tuple(lines)
 
 
@@ -65,7 +71,7 @@ def _zig() -> Toolchain | None:
 
 
 def _gcc(core: Core) -> Toolchain | None:
-    return _gcc_of("arm-none-eabi-gcc") if core.arm else _gcc_of("riscv64-unknown-elf-gcc")
+    return _gcc_of(_GCC_OF[core.arm][0])
 
 
 @cache

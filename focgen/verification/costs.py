@@ -14,7 +14,7 @@ from focgen.output import write_file
 from focgen.targets.cores import EMULATED, core
 from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr, entry_of
 from focgen.targets.emulator import emulator_title
-from focgen.targets.toolchains import Toolchain, toolchains
+from focgen.targets.toolchains import Toolchain, absent, toolchains
 from focgen.verification.folder import GeneratedFolder, read_folder
 
 TARGETS = (*EMULATED, "avr")
@@ -102,8 +102,7 @@ def _on(name: str, read: GeneratedFolder, compiler: str) -> Cost:
     except MissingExtra as missing:
         return Cost(skipped=f"{missing.what} ({missing.remedy})")
     if chain is None:
-        return Cost(skipped="needs arm-none-eabi-gcc (apt-get install gcc-arm-none-eabi)" if one.arm else
-                    "needs riscv64-unknown-elf-gcc (apt-get install gcc-riscv64-unknown-elf)")  # fmt: skip
+        return Cost(skipped=next(line for line in absent(one) if ("zig" in line) == (compiler == "zig")))
     return cost_on(one, chain, read.plan, read.path)
 
 
