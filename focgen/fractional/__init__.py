@@ -13,6 +13,7 @@ _NAMES = {
     "UnprovenStability": "discrete",
     "UnstableRecursion": "discrete",
     "fit_exponential": "exponential",
+    "fit_rounded": "exponential_rounded",
     "fit_states": "exponential",
     "from_control": "convert",
     "from_scipy": "convert",

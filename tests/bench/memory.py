@@ -81,6 +81,7 @@ def _against_rival() -> list[str]:
         return ["fracmem is not installed: pip install 'focgen[bench]'"]
     lines = [f"Beside fracmem, order 0.6, horizon {HORIZON}: the fewest states whose largest error of the",
              "four is no larger, then the fewest that are as good with each input by itself.", _head()]
+    ratios: dict[str, list[float]] = {"largest": [], "each": []}
     for taps, modes in RIVALS:
         goal = errors(0.6, HORIZON, _rival(0.6, HORIZON, taps, modes))
         cost = taps + 2 * modes
@@ -90,10 +91,16 @@ def _against_rival() -> list[str]:
             (lambda found: all(found[key] <= goal[key] for key in goal), "each"),
         ):
             memory, found = _cheapest(0.6, HORIZON, good_enough)
+            ratios[what].append(cost / memory.multiplies)
             ratio = f"{cost / memory.multiplies:.1f} times fewer multiplies ({what})"
             name = f"  exponential n{memory.states}"
             lines.append(_row(name, memory.multiplies, memory.words, found, ratio))
-    return lines
+    spans = {what: f"{min(found):.1f} to {max(found):.1f}" for what, found in ratios.items()}
+    return [
+        *lines,
+        f"  {spans['largest']} times fewer multiplies where the largest of the four errors is no larger,",
+        f"  {spans['each']} where each of them is no larger.",
+    ]
 
 
 def _head() -> str:
