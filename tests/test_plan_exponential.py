@@ -9,6 +9,7 @@ import pytest
 from focgen.control.controller import ControllerRanges
 from focgen.errors import PlanError
 from focgen.fractional.transfer import TransferFunction
+from focgen.plan.banks import drive_error
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.plan.formats import span
@@ -205,3 +206,33 @@ def test_to_physical_and_back_is_what_the_reference_sees():
     reference = ideal(SUM, to_physical(plan, raw), plan.length, plan.memories)
     inputs = dict(plan.error_bound.parts)["inputs"]
     assert np.abs(trace.d - reference.d).max() <= plan.error_bound.operator - inputs
+
+
+@pytest.mark.parametrize("arithmetic", ["q31", "q15"])
+@pytest.mark.parametrize("horizon", [200, 10**7])
+def test_rounding_of_the_drives_costs_what_is_said_and_no_more(arithmetic, horizon):
+    """Each bank's integers against the same rates and weights without rounding; an adversary comes near."""
+    plan = build_plan(SUM, arithmetic, **{**ASKED, "horizon": horizon})
+    rng = np.random.default_rng(4)
+    for bank in plan.direct.banks:
+        alone = replace(plan.direct, banks=(bank,))
+        allowed = drive_error(alone) * alone.total.lsb / plan.error.lsb  # in counts of e
+        assert 0.25 * allowed < adversary(bank, plan.error, rng) <= allowed
+
+
+def adversary(bank, form, rng) -> float:
+    """The largest error that greedy search finds: each sample the one of several that adds most to it."""
+    rates, weights = np.array(bank.real_rates), np.array(bank.values)
+    whole, real, worst = np.zeros(bank.modes, np.int64), np.zeros(bank.modes), 0.0
+    rate = np.array(bank.rates)
+    for _ in range(3000):
+        choices = rng.integers(int(form.low) // 2, int(form.high) // 2, 64)
+        drives = ((choices[:, None] << bank.up) - whole + (1 << bank.to_drive >> 1)) >> bank.to_drive
+        exact = choices[:, None] - real
+        errors = (drives * 2.0 ** (bank.to_drive - bank.up) - exact) @ weights
+        best = int(np.argmax(errors))
+        worst = max(worst, float(errors[best]))
+        low = int(np.argmin(errors))  # what lowers the error now raises it later
+        whole = whole + ((rate * drives[low] + (1 << bank.rate_shift >> 1)) >> bank.rate_shift)
+        real = real + rates * exact[low]
+    return worst
