@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.diagnosis.explain import Explanation
+from focgen.diagnosis.segments import session
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.model import Rig
 from focgen.rig.replay import effect_tables, simulate_session
-from focgen.diagnosis.segments import session
 
 
 @dataclass(frozen=True, eq=False)

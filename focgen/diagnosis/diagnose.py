@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from focgen.control.files import read_controller
 from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.explain import Explanation, clues_for, explain
@@ -14,7 +15,6 @@ from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
 from focgen.diagnosis.segments import cuts, make
 from focgen.diagnosis.smooth import freed
-from focgen.control.files import read_controller
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.progress import say

@@ -9,7 +9,6 @@ import numpy as np
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.model import Actuator, LinearActuator, Rig
 
-
 _USUAL = 0.2  # relative deviation of own parameters from those given that surprises nobody
 
 

@@ -12,7 +12,6 @@ from scipy.signal import savgol_filter
 
 from focgen.diagnosis.segments import Segment
 
-
 _RIGHT = 0.03  # of the residual foretold by inputs: below it the simulation is the better measurement
 WRONG = 0.05  # of the residual foretold by inputs: beyond it the simulation is not to be relied on
 

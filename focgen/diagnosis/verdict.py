@@ -11,7 +11,7 @@ from focgen.diagnosis.confidence import confidences, tied
 from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.explain import Cause, Explanation, problem_residual, weighed
 from focgen.diagnosis.fit import Weighing, fit
-from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit, Where
+from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit
 from focgen.diagnosis.next_experiment import propose
 from focgen.diagnosis.running import Running
 from focgen.diagnosis.search import evidence as nats

@@ -1,6 +1,7 @@
 """A smooth static curve of any shape, shared by the families that bend."""
 
 import numpy as np
+
 from focgen.rig.effects._effect import Form, Parameter
 
 _BEYOND = 1.2  # of the largest level seen: the bend grows no further there

@@ -1,6 +1,7 @@
 """Stiffer beyond a curvature: an obstacle, a wall, the finger's own other side."""
 
 import numpy as np
+
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 _PLACE = Parameter("curvature", level=1, lower=0.1, upper=1.3, starts=(0.8, 0.5), zero=1.3)

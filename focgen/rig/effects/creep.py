@@ -1,6 +1,7 @@
 """A slow further deformation under constant load."""
 
 import numpy as np
+
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter
 from focgen.rig.effects._lags import lag_response

@@ -1,6 +1,7 @@
 """Nothing moves below a threshold: slack, a seal, static friction overcome only once."""
 
 import numpy as np
+
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 _LEVEL = Parameter("threshold", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.25), zero=0.0)

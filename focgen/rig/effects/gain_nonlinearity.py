@@ -1,6 +1,7 @@
 """A static gain that departs smoothly from the line K(p): stiffening, ballooning."""
 
 import numpy as np
+
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import Effect, Form, Parameter
 

@@ -1,6 +1,7 @@
 """A bent calibration curve."""
 
 import numpy as np
+
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import Effect, Form, Parameter
 

@@ -1,6 +1,7 @@
 """A reading in coarse steps."""
 
 import numpy as np
+
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 _COARSE = 0.006  # of the range: finer steps are the resolution of any converter

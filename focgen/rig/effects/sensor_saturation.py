@@ -1,6 +1,7 @@
 """A reading that stops at a limit."""
 
 import numpy as np
+
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 _LIMIT = Parameter("limit", level=1, lower=0.1, upper=1.3, starts=(0.9, 0.6), zero=1.3)

@@ -1,6 +1,7 @@
 """A gain that grows with the largest load seen, or with the work done (Mullins)."""
 
 import numpy as np
+
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 _GROWTH = Parameter("growth", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)

@@ -1,0 +1,80 @@
+"""The parts of a diagnosis, each against what is known of it."""
+
+import numpy as np
+
+from focgen.diagnosis.disturbance import disturbance
+from focgen.diagnosis.explain import problem_of
+from focgen.diagnosis.fit import Weighing, fit
+from focgen.diagnosis.segments import make
+from focgen.diagnosis.shrink import predict
+from focgen.diagnosis.smooth import freed
+from focgen.rig import kernels
+from tests.diagnosis_rig import RIG, H, _noise, session
+
+
+def actuator(**case):
+    """The actuator's problem of a session."""
+    logs = session(4, **case)
+    return problem_of(RIG, make(logs, "pressure", "curvature"), logs)
+
+
+def test_a_tone_in_the_noise_is_heard_and_noise_is_none():
+    rng = np.random.default_rng(0)
+    noise = [_noise(rng, 1500) for _ in range(4)]
+    tone = [p + 1.2 * np.sin(2 * np.pi * 3.1 * H * np.arange(len(p)) + i) for i, p in enumerate(noise)]
+    assert not disturbance(noise, H, 1.0).hums and disturbance(tone, H, 1.0).hums
+
+
+def test_a_slow_swing_is_seen():
+    rng = np.random.default_rng(1)
+    noise = [_noise(rng, 3000) for _ in range(4)]
+    swing = [p + 3.0 * np.sin(2 * np.pi * H * np.arange(len(p)) / 60.0) for p in noise]
+    assert not disturbance(noise, H, 1.0).swings and disturbance(swing, H, 1.0).swings
+
+
+def test_innovations_are_those_of_the_formula():
+    rng = np.random.default_rng(2)
+    y, made, weight = rng.normal(size=(3, 50))
+    rest = np.zeros(50, np.uint8)
+    rest[[0, 23]] = 1
+    ar = np.array([1.0, -0.5, 0.2])
+    expected = []
+    for part in ((y - made) * weight)[:22].reshape(-1, 2), ((y - made) * weight)[23:49].reshape(-1, 2):
+        expected.append(np.convolve(part.mean(axis=1), ar)[: len(part)])
+    assert np.allclose(kernels.innovations(y, made, weight, rest, 2, ar), np.concatenate(expected), atol=1e-12)
+
+
+def test_products_are_those_of_the_matrix():
+    rows = np.random.default_rng(3).normal(size=(5, 700))
+    assert np.allclose(kernels.products(rows), rows @ rows.T)
+
+
+def test_thinned_samples_fit_the_same_parameters():
+    problem = actuator(T=1.6)
+    whole = fit(problem, problem.nominal(), Weighing(np.ones(1)))
+    thin = fit(problem.thinned(3), problem.nominal(), Weighing(np.ones(1)))
+    assert abs(np.exp(whole.vector[0]) - 1.6) < 0.03
+    assert np.allclose(thin.vector[:2], whole.vector[:2], atol=0.01)
+
+
+def test_parameters_far_from_those_given_are_doubted_but_not_without_end():
+    own = actuator().own
+    near, far, absurd = (own.start() + np.r_[shift, np.zeros(len(own.start()) - 1)] for shift in (0.1, 0.7, 7.0))
+    assert own.doubt(own.start()) == 0 < own.doubt(near) < 0.5 < 2 < own.doubt(far) < own.doubt(absurd) < 8
+
+
+def test_a_signal_is_freed_of_its_noise_where_its_model_holds():
+    problem, clean = actuator(), actuator(noise=0.0).segment.y
+    found = fit(problem, problem.nominal(), Weighing(np.ones(1)))
+    made = found.problem.simulate(found.vector)
+    noisy = np.sqrt(np.mean((problem.segment.y - clean) ** 2))
+    for left, noise, part in ((0.0, True, 0.5), (0.0, False, 0.8), (0.2, True, 1.0)):
+        got = freed(problem.segment, made, 1.0, left, noise)
+        assert np.sqrt(np.mean((got - clean) ** 2)) < part * noisy
+
+
+def test_the_promise_is_less_sure_where_the_gap_is_little_more_than_noise():
+    loud, quiet = (predict(np.full(5, gap), np.full(5, 1.05), 1.0) for gap in (1.5, 50.0))
+    width = [p.interval[1] - p.interval[0] for p in (loud, quiet)]
+    assert width[0] > 2 * width[1]
+    assert predict(np.ones(5), np.ones(5), 1.0) is None
