@@ -17,8 +17,12 @@ def made(tmp_path_factory):
     (folder / "rig.toml").write_text(tomlkit.dumps(rig_table(RIG)))
     logs = []
     for log in session(4, vent=0.8):
-        rows = np.column_stack([log.start + log.time, *(log[r] for r in ("command", "pressure", "curvature", "output"))])
-        np.savetxt(folder / f"{log.name}.csv", rows, delimiter=",", header="t_s,u,p,k,y", comments="", fmt="%.9g")
+        rows = np.column_stack(
+            [log.start + log.time, *(log[r] for r in ("command", "pressure", "curvature", "output"))]
+        )
+        np.savetxt(
+            folder / f"{log.name}.csv", rows, delimiter=",", header="t_s,u,p,k,y", comments="", fmt="%.9g"
+        )
         logs.append(str(folder / f"{log.name}.csv"))
     return folder, logs
 
@@ -46,16 +50,21 @@ def test_diagnose_writes_what_it_says(made, capsys):
     assert main(["replay", str(out / "refitted.toml"), logs[0], "--json"]) == 0
     without = json.loads(capsys.readouterr().out)["logs"]
     name = next(iter(without))
-    assert with_effects[name]["rmse_by_signal"]["pressure"] < 0.5 * without[name]["rmse_by_signal"]["pressure"]
+    assert (
+        with_effects[name]["rmse_by_signal"]["pressure"] < 0.5 * without[name]["rmse_by_signal"]["pressure"]
+    )
 
 
-@pytest.mark.parametrize("arguments, told", [
-    (["diagnose", "RIG"], "no log"),
-    (["diagnose", "RIG", "LOG"], "--out"),
-    (["diagnose", "RIG", "nowhere.csv", "--out", "OUT"], "nowhere.csv"),
-    (["diagnose", "RIG", "LOG", "--out", "OUT", "--from", "1e6"], ""),
-    (["replay", "nowhere.toml", "LOG"], "nowhere.toml"),
-])
+@pytest.mark.parametrize(
+    "arguments, told",
+    [
+        (["diagnose", "RIG"], "no log"),
+        (["diagnose", "RIG", "LOG"], "--out"),
+        (["diagnose", "RIG", "nowhere.csv", "--out", "OUT"], "nowhere.csv"),
+        (["diagnose", "RIG", "LOG", "--out", "OUT", "--from", "1e6"], ""),
+        (["replay", "nowhere.toml", "LOG"], "nowhere.toml"),
+    ],
+)
 def test_bad_input_is_one_line_and_leaves_nothing(made, capsys, arguments, told):
     folder, logs = made
     place = {"RIG": str(folder / "rig.toml"), "LOG": logs[0], "OUT": str(folder / "never")}

@@ -41,7 +41,9 @@ def test_innovations_are_those_of_the_formula():
     expected = []
     for part in ((y - made) * weight)[:22].reshape(-1, 2), ((y - made) * weight)[23:49].reshape(-1, 2):
         expected.append(np.convolve(part.mean(axis=1), ar)[: len(part)])
-    assert np.allclose(kernels.innovations(y, made, weight, rest, 2, ar), np.concatenate(expected), atol=1e-12)
+    assert np.allclose(
+        kernels.innovations(y, made, weight, rest, 2, ar), np.concatenate(expected), atol=1e-12
+    )
 
 
 def test_products_are_those_of_the_matrix():
@@ -59,7 +61,9 @@ def test_thinned_samples_fit_the_same_parameters():
 
 def test_parameters_far_from_those_given_are_doubted_but_not_without_end():
     own = actuator().own
-    near, far, absurd = (own.start() + np.r_[shift, np.zeros(len(own.start()) - 1)] for shift in (0.1, 0.7, 7.0))
+    near, far, absurd = (
+        own.start() + np.r_[shift, np.zeros(len(own.start()) - 1)] for shift in (0.1, 0.7, 7.0)
+    )
     assert own.doubt(own.start()) == 0 < own.doubt(near) < 0.5 < 2 < own.doubt(far) < own.doubt(absurd) < 8
 
 

@@ -120,7 +120,8 @@ def test_friction_damper_has_hysteresis(tmp_path):
 
 
 def test_coupled_drives_fold_the_speed_or_are_unknown(tmp_path):
-    """The pulse counter cannot see the sign of the speed. That it is the sensor no log of one stage can tell."""
+    """The pulse counter cannot see the sign of the speed. That it is the sensor no log of one stage can
+    tell."""
     found = diagnosed("drives", tmp_path)
     assert found.verdict == "unknown" or "sensor_nonlinearity" in set().union(*names(found))
     assert found.where.inferred and "sensor" not in [cause.stage for cause in found.causes]

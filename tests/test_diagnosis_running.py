@@ -14,8 +14,15 @@ from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
 from focgen.plan.scenario import Scenario, physical_trace, to_raw
 
-CONTROLLER = Controller("foc", 0.02, TransferFunction([(1.3, 0.6), (1.0, 0.0)]), 40.0, True,
-                        ControllerRanges((0.0, 0.02), (0.0, 0.02), (0.0, 10.0)), length=1000)
+CONTROLLER = Controller(
+    "foc",
+    0.02,
+    TransferFunction([(1.3, 0.6), (1.0, 0.0)]),
+    40.0,
+    True,
+    ControllerRanges((0.0, 0.02), (0.0, 0.02), (0.0, 10.0)),
+    length=1000,
+)
 N = 1500
 
 
@@ -66,7 +73,9 @@ def test_lost_and_late_samples_from_raw_time():
     u, ref, meas = command()
     even = np.arange(N) * 0.02
     keep = np.random.default_rng(1).random(N) > 0.05
-    assert [c.effect for c in running(CONTROLLER, [log_of(u, ref, meas, even[keep])]).causes] == ["missed_samples"]
+    assert [c.effect for c in running(CONTROLLER, [log_of(u, ref, meas, even[keep])]).causes] == [
+        "missed_samples"
+    ]
     late = even + np.random.default_rng(2).normal(0, 0.002, N)
     assert [c.effect for c in running(CONTROLLER, [log_of(u, ref, meas, late)]).causes] == ["sample_jitter"]
     assert not running(CONTROLLER, [log_of(u, ref, meas, even)]).causes

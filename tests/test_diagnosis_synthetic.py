@@ -30,14 +30,17 @@ def test_parameters_only(seed):
     assert found.gap.refitted < 0.6 * found.gap.as_given
 
 
-@pytest.mark.parametrize("effect, stage, case", [
-    ("transport_delay", "regulator", {"delay": 4}),
-    ("valve_asymmetry", "regulator", {"vent": 0.8}),
-    ("dead_zone", "actuator", {"zone": 0.045}),
-    ("hysteresis", "actuator", {"slip": 0.35}),
-    ("gain_drift", "actuator", {"drift": 6e-4}),
-    ("sensor_nonlinearity", "sensor", {"bend": 20.0}),
-])
+@pytest.mark.parametrize(
+    "effect, stage, case",
+    [
+        ("transport_delay", "regulator", {"delay": 4}),
+        ("valve_asymmetry", "regulator", {"vent": 0.8}),
+        ("dead_zone", "actuator", {"zone": 0.045}),
+        ("hysteresis", "actuator", {"slip": 0.35}),
+        ("gain_drift", "actuator", {"drift": 6e-4}),
+        ("sensor_nonlinearity", "sensor", {"bend": 20.0}),
+    ],
+)
 def test_one_effect_is_named_in_its_stage(effect, stage, case):
     found = diagnose(RIG, session(11, **case))
     assert found.verdict == "named" and named(found) == [[effect]]
@@ -51,8 +54,10 @@ def test_the_promise_holds_on_new_experiments(tmp_path):
     unseen = session(3, slip=0.35)[4:]
     floor = session(3, slip=0.35, noise=0.0)[4:]
     noise = np.mean((unseen[0]["output"] - floor[0]["output"]) ** 2)
-    squares = [next(iter(replay(tmp_path / "out" / name, unseen).logs.values())).rmse ** 2
-               for name in (found.refitted_rig, found.augmented_rig)]
+    squares = [
+        next(iter(replay(tmp_path / "out" / name, unseen).logs.values())).rmse ** 2
+        for name in (found.refitted_rig, found.augmented_rig)
+    ]
     achieved = (squares[0] - squares[1]) / (squares[0] - noise)
     assert abs(achieved - found.shrink) < 0.1
     assert found.shrink_interval[0] <= achieved <= found.shrink_interval[1] + 0.02
@@ -85,9 +90,15 @@ def test_units_do_not_matter():
 
     from focgen.rig.model import Actuator
 
-    rig = replace(RIG, actuator=Actuator(1.3, 0.6, (2e-5, 3.4e-5)),
-                  regulator=type(RIG.regulator)([(10.0, 0.0)], RIG.regulator.den))  # p in mbar·10, curvature as before
-    scaled = [replace(log, signals={r: s * {"pressure": 100.0}.get(r, 1.0) for r, s in log.signals.items()}) for log in logs]
+    rig = replace(
+        RIG,
+        actuator=Actuator(1.3, 0.6, (2e-5, 3.4e-5)),
+        regulator=type(RIG.regulator)([(10.0, 0.0)], RIG.regulator.den),
+    )  # p in mbar·10, curvature as before
+    scaled = [
+        replace(log, signals={r: s * {"pressure": 100.0}.get(r, 1.0) for r, s in log.signals.items()})
+        for log in logs
+    ]
     assert named(diagnose(rig, scaled)) == [["dead_zone"]]
 
 

@@ -1,4 +1,5 @@
-"""How much evidence noise alone gathers: sessions of the nominal rig simulated with noise of the colour found, and diagnosed."""
+"""How much evidence noise alone gathers: sessions of the nominal rig simulated with noise of the colour
+found, and diagnosed."""
 
 from __future__ import annotations
 
@@ -17,16 +18,18 @@ _RARE = 0.02  # of the sessions without any effect may pass the threshold
 
 
 def threshold(e: Explanation, clues: Sequence[Clue], draws: int, least: float) -> float:
-    """The nats of evidence over the whole library that noise exceeds in one of fifty sessions like this segment's.
+    """The nats of evidence over the whole library that noise exceeds in one of fifty sessions like this
+    segment's.
 
-    ``draws``: how many sessions are simulated; Gumbel's law of largest values is fitted to what they give, by moments
-    (E. J. Gumbel, Statistics of Extremes, 1958). ``least``: nats that are asked for in any case.
+    ``draws``: how many sessions are simulated; Gumbel's law of largest values is fitted to what they give,
+    by moments (E. J. Gumbel, Statistics of Extremes, 1958). ``least``: nats that are asked for in any case.
     """
     rng = np.random.default_rng(0)
     gains = np.array([_largest(e, clues, rng) for _ in range(draws)])
     scale = max(float(np.std(gains, ddof=1)) * np.sqrt(6.0) / np.pi, 0.5)
     found = float(gains.mean()) - 0.5772 * scale - scale * np.log(-np.log1p(-_RARE))
-    say(f"{e.segment.entry} to {e.segment.exit}: noise alone gathers {gains.max():.1f} nats in {draws} sessions")
+    place = f"{e.segment.entry} to {e.segment.exit}"
+    say(f"{place}: noise alone gathers {gains.max():.1f} nats in {draws} sessions")
     return max(found, least)
 
 

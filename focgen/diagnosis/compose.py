@@ -1,4 +1,5 @@
-"""The segments' findings put together into rigs: the refitted one, the augmented one, and their sessions simulated."""
+"""The segments' findings put together into rigs: the refitted one, the augmented one, and their sessions
+simulated."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from focgen.rig.replay import effect_tables, simulate_session
 
 @dataclass(frozen=True, eq=False)
 class Rigs:
-    """``refitted``: own parameters only; ``fitted`` with ``placed``: own parameters together with the effects."""
+    """``refitted``: own parameters only; ``fitted`` with ``placed``: own parameters together with the
+    effects."""
 
     refitted: Rig
     fitted: Rig
@@ -35,8 +37,9 @@ class Rigs:
 
 
 def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> Rigs:
-    """Own parameters from the segment that has them, effects from all. Where that refit brings the output no closer,
-    because the gap lies in a stage that is not refitted, the refitted rig keeps the parameters given."""
+    """Own parameters from the segment that has them, effects from all. Where that refit brings the output no
+    closer, because the gap lies in a stage that is not refitted, the refitted rig keeps the parameters
+    given."""
     refitted = fitted = rig
     placed: list[Placed] = []
     for e in explanations:

@@ -6,25 +6,31 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.explain import Rival
+from focgen.diagnosis.rivals import Rival
 
 SET_WITHIN = 2.0  # separations below this leave a rival in the set
 CLOSE = 0.5  # and it must reach this part of the best one's evidence,
 NEAR = 8.0  # or fall short of it by no more than these nats
 TEMPER = 1.0  # weight of a rival: exp(-TEMPER · max(z, 0)^POWER)
 POWER = 1.0
-ELSEWHERE = (0.03, 0.12)  # probability that the cause is none of the candidates; of a lesser cause, beside a larger one
+ELSEWHERE = (
+    0.03,
+    0.12,
+)  # probability that the cause is none of the candidates; of a lesser cause, beside a larger one
 LESSER = 0.3  # of what the segment's causes explain: below it a cause is a lesser one
 
 
 def tied(rivals: Sequence[Rival]) -> tuple[Rival, ...]:
     """The rivals that the data cannot tell from the best, the best first."""
     best = rivals[0].gain
-    return tuple(r for r in rivals if r.separation < SET_WITHIN and (r.gain > CLOSE * best or best - r.gain < NEAR))
+    return tuple(
+        r for r in rivals if r.separation < SET_WITHIN and (r.gain > CLOSE * best or best - r.gain < NEAR)
+    )
 
 
 def confidences(rivals: Sequence[Rival], share: float = 1.0) -> np.ndarray:
-    """The probability of every rival; they sum to less than 1. ``share``: what the cause explains of its segment's gap."""
+    """The probability of every rival; they sum to less than 1. ``share``: what the cause explains of its
+    segment's gap."""
     z = np.array([max(r.separation, 0.0) for r in rivals])
     weight = np.exp(-TEMPER * z**POWER)
     return (1.0 - ELSEWHERE[share < LESSER]) * weight / weight.sum()

@@ -28,25 +28,36 @@ EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
 
-def diagnose(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], out: str | Path | None = None,
-             controller: str | Path | None = None, first: float | None = None, last: float | None = None,
-             bootstrap: int = 0, only: Sequence[str] | None = None, pictures: bool = True) -> Diagnosis:
+def diagnose(
+    rig: Rig | str | Path,
+    logs: Sequence[Experiment | str | Path],
+    out: str | Path | None = None,
+    controller: str | Path | None = None,
+    first: float | None = None,
+    last: float | None = None,
+    bootstrap: int = 0,
+    only: Sequence[str] | None = None,
+    pictures: bool = True,
+) -> Diagnosis:
     """Diagnose the gap between the nominal rig and its logs, one session of one rig.
 
-    ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures; ``controller``: of
-    closed-loop logs, whose own departures are then looked for too; ``first``, ``last``: s within each experiment;
-    ``bootstrap``: sessions simulated from the nominal rig to set the threshold of evidence by, at least 2
-    (0: the built-in one).
-    ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how strong it is.
-    ``pictures``: whether to draw them.
-    Raises RigError, LogError, ControllerError for files that cannot be used, FocgenError for an unknown effect.
+    ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures;
+    ``controller``: of closed-loop logs, whose own departures are then looked for too; ``first``, ``last``: s
+    within each experiment; ``bootstrap``: sessions simulated from the nominal rig to set the threshold of
+    evidence by, at least 2 (0: the built-in one).
+    ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how
+    strong it is. ``pictures``: whether to draw them.
+    Raises RigError, LogError, ControllerError for files that cannot be used, FocgenError for an unknown
+    effect.
     """
     _check(only)
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
     logs = _usable(experiments(rig, logs, first, last))
     ran = running(read_controller(controller), logs) if controller is not None else None
     explanations = explain_all(rig, logs, THRESHOLD, only, bootstrap)
-    rigs, diagnosis, evidence = verdict.reach(rig, logs, compose.compose(rig, explanations, logs), explanations, ran)
+    rigs, diagnosis, evidence = verdict.reach(
+        rig, logs, compose.compose(rig, explanations, logs), explanations, ran
+    )
     if out is not None:
         from focgen.diagnosis.write import write
 
@@ -59,7 +70,9 @@ def _usable(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
         if "output" not in log:
             raise LogError(log.name, "has no output", "name its column in [signals]")
         if not any(role in log for role in ("command", "pressure")):
-            raise LogError(log.name, "has neither command nor pressure", "name the column of the input in [signals]")
+            raise LogError(
+                log.name, "has neither command nor pressure", "name the column of the input in [signals]"
+            )
         bad = [role for role, values in log.signals.items() if not np.all(np.isfinite(values))]
         if bad and bad[0] != "reference":
             raise LogError(log.name, f"has gaps in {bad[0]}", "cut them out with --from and --to")
@@ -74,10 +87,12 @@ def _check(only: Sequence[str] | None) -> None:
             raise FocgenError(name, "is no effect of the library", f"known: {', '.join(sorted(EFFECTS))}")
 
 
-def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float,
-                only: Sequence[str] | None = None, draws: int = 0) -> tuple[Explanation, ...]:
-    """Explain segment after segment, each on what the one before it gives freed of noise. ``draws``: sessions simulated
-    for the threshold of each; where it comes out higher than ``threshold``, the segment is explained anew."""
+def explain_all(
+    rig: Rig, logs: Sequence[Experiment], threshold: float, only: Sequence[str] | None = None, draws: int = 0
+) -> tuple[Explanation, ...]:
+    """Explain segment after segment, each on what the one before it gives freed of noise. ``draws``:
+    sessions simulated for the threshold of each; where it comes out higher than ``threshold``, the segment
+    is explained anew."""
     roles, x, found, trusted = cuts(logs), None, [], True
     for entry, exit in zip(roles, roles[1:]):
         segment = make(logs, entry, exit, x)
@@ -92,6 +107,11 @@ def explain_all(rig: Rig, logs: Sequence[Experiment], threshold: float,
         best = found[-1].best
         response = best.problem.references.clocks["response"]
         trusted = found[-1].left.share < UNTRUSTED
-        x = freed(segment, best.problem.simulate(best.vector), response, found[-1].left.share,
-                  not verdict.is_unknown(found[-1]))
+        x = freed(
+            segment,
+            best.problem.simulate(best.vector),
+            response,
+            found[-1].left.share,
+            not verdict.is_unknown(found[-1]),
+        )
     return tuple(found)

@@ -1,7 +1,7 @@
 """Whether what is left is more than noise although nothing that was done to the rig foretells it.
 
-Noise of sensors is steady and forgets within a response of the rig. A loose plug comes in bursts, a room's temperature in
-slow swings: neither depends on the input, and both are there.
+Noise of sensors is steady and forgets within a response of the rig. A loose plug comes in bursts, a room's
+temperature in slow swings: neither depends on the input, and both are there.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ SWINGS = 20.0  # power at periods beyond eight responses over that between one a
 
 @dataclass(frozen=True)
 class Disturbance:
-    """``kurtosis`` and ``loudest`` of the innovations, ``slow``: the ratio of slow power to that about the response;
-    ``line``: the part of the power in the strongest line, in the median of the long experiments."""
+    """``kurtosis`` and ``loudest`` of the innovations, ``slow``: the ratio of slow power to that about the
+    response; ``line``: the part of the power in the strongest line, in the median of the long experiments."""
 
     kurtosis: float
     loudest: float
@@ -51,29 +51,32 @@ def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturban
     parts = [p for p in parts if len(p) > 20] or parts
     r = autocovariance(parts, 2)
     ar = np.r_[1.0, -solve_toeplitz(r[:2], r[1:3])] if r[0] > 0 and min(map(len, parts)) > 20 else np.ones(1)
-    quiet = [whiten(p, ar)[len(ar):] for p in parts]
+    quiet = [whiten(p, ar)[len(ar) :] for p in parts]
     joined = np.concatenate(quiet)
     variance = max(float(np.mean(joined**2)), 1e-300)
     count = max(10, int(response / h))
     local = np.array([np.mean(s**2) for p in quiet for s in np.array_split(p, max(1, len(p) // count))])
     loudest = float(np.max(local) / max(np.median(local), 1e-300))
-    return Disturbance(float(np.mean(joined**4) / variance**2), loudest, _slow(parts, h, response),
-                       _line(parts))
+    return Disturbance(
+        float(np.mean(joined**4) / variance**2), loudest, _slow(parts, h, response), _line(parts)
+    )
 
 
 def _line(parts: list[np.ndarray]) -> float:
-    """The part of the power within two bins of the strongest line, slow ones left out; the median over experiments."""
+    """The part of the power within two bins of the strongest line, slow ones left out; the median over
+    experiments."""
     shares = []
     for p in parts:
         if len(p) >= _LONG:
             power = np.abs(np.fft.rfft((p - p.mean()) * np.hanning(len(p)))) ** 2
             near = np.convolve(power, np.ones(5), "same")
-            shares.append(float(near[len(power) // 50:].max() / max(power.sum(), 1e-300)))
+            shares.append(float(near[len(power) // 50 :].max() / max(power.sum(), 1e-300)))
     return float(np.median(shares)) if shares else 0.0
 
 
 def _slow(parts: list[np.ndarray], h: float, response: float) -> float:
-    """Mean power density at periods beyond eight responses over that at one to four; 1 where there is too little."""
+    """Mean power density at periods beyond eight responses over that at one to four; 1 where there is too
+    little."""
     low, low_count, near, near_count = 0.0, 0, 0.0, 0
     for p in parts:
         power = np.abs(np.fft.rfft((p - p.mean()) * np.hanning(len(p)))) ** 2 / len(p)

@@ -10,7 +10,8 @@ from focgen.rig.effects import Excitation
 
 
 def excitation(parts: Sequence[np.ndarray], h: float, response: float) -> Excitation:
-    """Summary of input signals (experiments in order), sampled every ``h`` s, of a rig that responds in ``response`` s."""
+    """Summary of input signals (experiments in order), sampled every ``h`` s, of a rig that responds in
+    ``response`` s."""
     top = max(float(np.max(np.abs(p))) for p in parts) or 1.0
     coarse = [np.round(np.abs(p) / top * 10).astype(int) for p in parts]
     changes = [c[np.flatnonzero(np.diff(c, prepend=c[0] - 1))] for c in coarse]

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.diagnosis.excitation import excitation
-from focgen.diagnosis.fit import Fit, Weighing, fit
+from focgen.diagnosis.fit import Fit, Weighing, fit, weighed
 from focgen.diagnosis.leftover import Leftover, foretold, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
+from focgen.diagnosis.rivals import Cause, Rival, doubted, left_out
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.segments import Segment, is_single, owner
-from focgen.diagnosis.separation import separation
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
 from focgen.rig.engine import fits_in, slot_in
@@ -26,40 +25,27 @@ _MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of o
 _MENDING = 0.6  # of the best further family's evidence: a form of a family found already then goes first
 _WHOLE = 0.5  # of what inputs foretell of a residual: a further family has to explain as much
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
-_SHARE = (0.06, 0.15)  # of the gap that a further family has to close, and one that is easily confused with those found,
+_SHARE = (
+    0.06,
+    0.15,
+)  # of the gap that a further family has to close, and one that is easily confused with those found,
 _MERGED = (0.15, 0.25)  # where the stages are merged
 _ASTRAY = 1.1  # of the sum of squares without a rounding: beyond it the rounding is left to the end
-_SWAPS = 3
-_MENDED = 3  # rivals that get a second form where the best has one
-_VISIBLE = (0.015, 0.05)  # of the remaining mean square, the first effect and any further: below, one is of no use
+_VISIBLE = (
+    0.015,
+    0.05,
+)  # of the remaining mean square, the first effect and any further: below, one is of no use
 _KNOWN = 0.12  # of what an effect takes from a residual has to be foretold by inputs
-_NOISY = (0.15, 0.03)  # the same where the input is measured, its noise still in it or not: that looks like a small effect
-
-
-@dataclass(frozen=True)
-class Rival:
-    """A family that may be the cause instead: ``separation`` from the best in standard deviations, ``gain`` in nats."""
-
-    effect: str
-    stage: str
-    separation: float
-    gain: float
-    fit: Fit
-
-
-@dataclass(frozen=True, eq=False)
-class Cause:
-    """One effect of a segment: ``rivals``, the best first; ``share``: of the refitted gap's explained mean square."""
-
-    rivals: tuple[Rival, ...]
-    gain: float
-    share: float
+_NOISY = (
+    0.15,
+    0.03,
+)  # the same where the input is measured, its noise still in it or not: that looks like a small effect
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A segment explained. ``nominal``: its own parameters refitted; ``best``: with the effects; ``errors``: by family,
-    the root-mean-square residual with that effect alone, as a share of the refitted nominal's."""
+    """A segment explained. ``nominal``: its own parameters refitted; ``best``: with the effects; ``errors``:
+    by family, the root-mean-square residual with that effect alone, as a share of the refitted nominal's."""
 
     segment: Segment
     given: np.ndarray
@@ -78,11 +64,16 @@ class Explanation:
 
 
 def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
-    """Every form that may act in this segment. In a rig of one stage every family may, but of those that share a formula
-    only the one at home there."""
+    """Every form that may act in this segment. In a rig of one stage every family may, but of those that
+    share a formula only the one at home there."""
     if not is_single(rig):
-        return [Clue(e.name, form, e.stage) for e in library().values() if e.stage in segment.stages
-                for form in e.forms if fits_in(form, e.stage, rig)]
+        return [
+            Clue(e.name, form, e.stage)
+            for e in library().values()
+            if e.stage in segment.stages
+            for form in e.forms
+            if fits_in(form, e.stage, rig)
+        ]
     stage, found = owner(rig), {}
     for effect in sorted(library().values(), key=lambda e: e.stage != stage):
         for form in effect.forms:
@@ -92,11 +83,18 @@ def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
 
 
 def guests_in(segment: Segment, rig: Rig) -> list[Clue]:
-    """Forms that are at home in another stage and may sit in this one: tried where those at home leave much."""
+    """Forms that are at home in another stage and may sit in this one: tried where those at home leave
+    much."""
     if is_single(rig):
         return []
-    return [Clue(e.name, form, stage) for e in library().values() for stage in e.also if stage in segment.stages
-            and e.stage not in segment.stages for form in e.forms if fits_in(form, stage, rig)]
+    return [
+        Clue(e.name, form, stage)
+        for e in library().values()
+        for stage in e.also
+        if stage in segment.stages and e.stage not in segment.stages
+        for form in e.forms
+        if fits_in(form, stage, rig)
+    ]
 
 
 def _much_left(base: Fit) -> bool:
@@ -112,12 +110,18 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     return Problem(segment, Own(rig, stage, load, response), scales)
 
 
-def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: float,
-            only: Sequence[str] | None = None, trusted: bool = True) -> Explanation:
+def explain(
+    rig: Rig,
+    segment: Segment,
+    logs: Sequence[Experiment],
+    threshold: float,
+    only: Sequence[str] | None = None,
+    trusted: bool = True,
+) -> Explanation:
     """Find the segment's effects; ``threshold``: nats of evidence that noise alone does not reach.
 
-    ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``: whether the input
-    could be freed of its noise.
+    ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``:
+    whether the input could be freed of its noise.
     """
     problem, clues, guests = _held(rig, segment, logs), clues_for(segment, rig), guests_in(segment, rig)
     if only is not None:
@@ -127,7 +131,7 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     base, vector = _seen(problem, given, clues)
     seen = base if len(base.clues) and _misled(problem, base, vector) else None
     if seen is not None:
-        values, base, vector = vector[len(given):], problem, given
+        values, base, vector = vector[len(given) :], problem, given
     while len(rankings) < _DEPTH:
         untried = [c for c in clues if c not in base.clues and not c.form.seen]
         rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
@@ -141,13 +145,21 @@ def explain(rig: Rig, segment: Segment, logs: Sequence[Experiment], threshold: f
     weighing = Weighing(rankings[-1].ar)
     best = _dropped(rankings[-1].base, weighing, threshold)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
-    best, causes = _doubted(best, nominal, rankings, clues, weighing)
+    best, causes = doubted(best, nominal, rankings, clues, weighing)
     if seen is not None:
         best, causes = _beside(best, seen.clues, values, causes, weighing)
     response = problem.references.clocks["response"]
-    return Explanation(segment, given, nominal, best, weighing.ar, causes,
-                       leftover(segment, weighed(best), response),
-                       leftover(segment, weighed(nominal), response), rankings[0].errors)
+    return Explanation(
+        segment,
+        given,
+        nominal,
+        best,
+        weighing.ar,
+        causes,
+        leftover(segment, weighed(best), response),
+        leftover(segment, weighed(nominal), response),
+        rankings[0].errors,
+    )
 
 
 def _seen(problem: Problem, given: np.ndarray, clues: Sequence[Clue]) -> tuple[Problem, np.ndarray]:
@@ -163,15 +175,17 @@ def _seen(problem: Problem, given: np.ndarray, clues: Sequence[Clue]) -> tuple[P
 
 
 def _misled(problem: Problem, seen: Problem, vector: np.ndarray) -> bool:
-    """Whether a fit with a rounding goes astray, as where the rest of the model is far off: its steps have no slope."""
+    """Whether a fit with a rounding goes astray, as where the rest of the model is far off: its steps have
+    no slope."""
     plain = fit(problem, problem.nominal(), Weighing(np.ones(1)), 6)
     return fit(seen, vector, Weighing(np.ones(1)), 6).sse > _ASTRAY * plain.sse
 
 
-def _beside(best: Fit, clues: Sequence[Clue], values: np.ndarray, causes: tuple[Cause, ...],
-            weighing: Weighing) -> tuple[Fit, tuple[Cause, ...]]:
-    """With what was seen in the output itself put to what was found without it: a cause, and where it brings the model
-    closer a part of it."""
+def _beside(
+    best: Fit, clues: Sequence[Clue], values: np.ndarray, causes: tuple[Cause, ...], weighing: Weighing
+) -> tuple[Fit, tuple[Cause, ...]]:
+    """With what was seen in the output itself put to what was found without it: a cause, and where it brings
+    the model closer a part of it."""
     problem = best.problem.with_clues([*best.problem.clues, *clues])
     both = fit(problem, np.r_[best.vector, values], weighing, 0)
     added = tuple(Cause((Rival(c.effect, c.stage, 0.0, 0.0, both),), 0.0, 0.0) for c in clues)
@@ -186,16 +200,6 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     return min(fits, key=lambda f: f.sse).problem
 
 
-def problem_residual(of: Fit) -> np.ndarray:
-    """Measured less simulated (n,)."""
-    return of.problem.residual(of.vector)
-
-
-def weighed(of: Fit) -> np.ndarray:
-    """The residual (n,) by trust, as a share of the output's level."""
-    return of.problem.weighed(of.vector)
-
-
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
     """All clues where inputs foretell something of the residual, else none."""
     ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
@@ -204,16 +208,22 @@ def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[
 
 
 def _chosen(rankings: Sequence[Ranking], threshold: float, trusted: bool) -> Fit | None:
-    """The winner where it is beyond chance and of use. Another form of what was found already goes before a further
-    family, unless that explains clearly more: no form is quite what the rig does, and others mend what it lacks."""
+    """The winner where it is beyond chance and of use. Another form of what was found already goes before a
+    further family, unless that explains clearly more: no form is quite what the rig does, and others mend
+    what it lacks."""
     ranking = rankings[-1]
     if ranking.winner is None or ranking.gain[ranking.winner] < threshold:
         return None
     winner, already = ranking.best[ranking.winner], {c.effect for c in ranking.base.problem.clues}
     known = [ranking.best[name] for name in already if name in ranking.best]
     again = max(known, key=lambda f: evidence(f, ranking.base), default=None)
-    mended = again if again is not None and evidence(again, ranking.base) > threshold and _mends(
-        ranking.base, again, _VISIBLE[1], 0.0) else None
+    mended = (
+        again
+        if again is not None
+        and evidence(again, ranking.base) > threshold
+        and _mends(ranking.base, again, _VISIBLE[1], 0.0)
+        else None
+    )
     if again is not None and evidence(again, ranking.base) > _MENDING * ranking.gain[ranking.winner]:
         return mended
     further = bool(already)
@@ -224,9 +234,11 @@ def _chosen(rankings: Sequence[Ranking], threshold: float, trusted: bool) -> Fit
 
 
 def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
-    """Whether a further family closes only a small part of the gap: what the first one's form lacks looks like that,
-    the more so to a family that is easily confused with it."""
-    first, now, then = (float(np.mean(weighed(f) ** 2)) for f in (rankings[0].base, rankings[-1].base, winner))
+    """Whether a further family closes only a small part of the gap: what the first one's form lacks looks
+    like that, the more so to a family that is easily confused with it."""
+    first, now, then = (
+        float(np.mean(weighed(f) ** 2)) for f in (rankings[0].base, rankings[-1].base, winner)
+    )
     response = winner.problem.references.clocks["response"]
     noise = now * (1.0 - foretold(winner.problem.segment, weighed(rankings[-1].base), response))
     name, *others = (c.effect for c in reversed(winner.problem.clues))
@@ -236,8 +248,8 @@ def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
 
 
 def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:
-    """Whether the residual falls visibly, by the part ``whole`` of what inputs foretell of it, and mostly so: what is not
-    foretold is noise, and what takes that away no effect."""
+    """Whether the residual falls visibly, by the part ``whole`` of what inputs foretell of it, and mostly
+    so: what is not foretold is noise, and what takes that away no effect."""
     before, after = (weighed(f) for f in (base, better))
     old, new = np.mean(before**2), np.mean(after**2)
     if old - new < visible * new:
@@ -254,7 +266,7 @@ def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
         for i, clue in enumerate(best.problem.clues):
             if clue.form.seen:
                 continue
-            without = _without(best, [best.problem.clues[i]], weighing)
+            without = left_out(best, [best.problem.clues[i]], weighing)
             found.append((evidence(best, without), without))
         if not found:
             break
@@ -263,86 +275,3 @@ def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
             break
         best = without
     return fit(best.problem, best.vector, weighing, 6)
-
-
-def _without(of: Fit, clues: Sequence[Clue], weighing: Weighing) -> Fit:
-    problem, head = of.problem, of.problem.head
-    kept, vector, place = [], [of.vector[:head]], head
-    for clue in problem.clues:
-        count = len(clue.form.parameters)
-        if clue not in clues:
-            kept.append(clue)
-            vector.append(of.vector[place:place + count])
-        place += count
-    return fit(problem.with_clues(kept), np.concatenate(vector), weighing, 8)
-
-
-def _doubted(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Fit, tuple[Cause, ...]]:
-    """Every effect held against its rivals beside the others; where one of them does better, it takes the place."""
-    for _ in range(_SWAPS):
-        causes = _causes(best, nominal, rankings, clues, weighing)
-        usurper = min((r for c in causes for r in c.rivals), key=lambda r: r.separation, default=None)
-        if usurper is None or usurper.separation >= 0:
-            return best, causes
-        best = usurper.fit
-    return best, _causes(best, nominal, rankings, clues, weighing)
-
-
-def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Cause, ...]:
-    found = []
-    for name in dict.fromkeys(c.effect for c in best.problem.clues):
-        own = [c for c in best.problem.clues if c.effect == name]
-        without = _without(best, own, weighing)
-        rivals = [Rival(name, own[0].stage, 0.0, evidence(best, without), best)]
-        if not own[0].form.seen:  # what is read off the signal itself has no rival: nothing else makes such steps
-            others = [c for c in clues if c.effect != name and c.form.seen is None]
-            ranking = (next((r for r in rankings if r.base.problem.clues == without.problem.clues), None)
-                       or rank(without.problem, without.vector, others))
-            rivals += _rivals(best, without, ranking, clues, weighing, len(own) > 1)
-        before, after = (np.mean(weighed(f) ** 2) for f in (nominal, best))
-        lost = np.mean(weighed(without) ** 2) - after
-        share = float(np.clip(lost / max(before - after, 1e-300), 0, 1))
-        rivals.sort(key=lambda r: r.separation)
-        found.append(Cause(tuple(rivals), evidence(best, without), share))
-    return tuple(sorted(found, key=lambda c: -c.share))
-
-
-def _rivals(best: Fit, without: Fit, ranking: Ranking, clues, weighing: Weighing, mended: bool) -> list[Rival]:
-    """The families of ``ranking`` in the place of one of ``best``; ``mended``: that one has two forms, so the foremost
-    of the others may have, too."""
-    found, open_ = [], _indistinct(best, ranking)
-    for other, candidate in ranking.best.items():
-        if other in {c.effect for c in best.problem.clues}:
-            continue
-        again = fit(candidate.problem, candidate.vector, weighing, 6)
-        if mended and len(found) < _MENDED:
-            again = _second_form(again, clues, weighing)
-        apart = separation(best, again, without, other in open_)
-        found.append(Rival(other, again.problem.clues[-1].stage, apart,
-                           evidence(again, without), again))
-    return found
-
-
-def _indistinct(best: Fit, ranking: Ranking) -> set[str]:
-    """The families that these experiments are not made to tell from those of ``best``: easily confused with one of them, and
-    one of the two lacking what would show it."""
-    segment, response = best.problem.segment, best.problem.references.clocks["response"]
-    seen = excitation(segment.parts(segment.x), segment.run.h, response)
-    found = set()
-    for a in (library()[c.effect] for c in best.problem.clues):
-        for b in (library()[name] for name in ranking.best):
-            alike = a.name in b.confused_with or b.name in a.confused_with
-            if alike and (a.needs(seen) or b.needs(seen)):
-                found.add(b.name)
-    return found
-
-
-def _second_form(of: Fit, clues, weighing: Weighing) -> Fit:
-    """With the form of the same family beside it that helps most, where one does."""
-    last = of.problem.clues[-1]
-    forms = [c for c in clues if c.effect == last.effect and c.stage == last.stage and c != last]
-    ranking = rank(of.problem, of.vector, forms)
-    if ranking.winner is None:
-        return of
-    better = fit(ranking.best[ranking.winner].problem, ranking.best[ranking.winner].vector, weighing, 6)
-    return better if evidence(better, of) > 0 else of

@@ -17,8 +17,8 @@ _STALE = 2  # iterations that rows of the Jacobian are kept for
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted hypothesis: ``vector``, ``innovations`` (all experiments, one after the other), their ``sse``, and the
-    normal matrix ``information`` (J^T J of the innovations)."""
+    """A fitted hypothesis: ``vector``, ``innovations`` (all experiments, one after the other), their
+    ``sse``, and the normal matrix ``information`` (J^T J of the innovations)."""
 
     problem: Problem
     vector: np.ndarray
@@ -30,7 +30,7 @@ class Fit:
     def size(self) -> int:
         """How many parameters the clues have that are free."""
         low, high = self.problem.bounds()
-        return int(np.sum(high[self.problem.head:] - low[self.problem.head:] > 1e-6))
+        return int(np.sum(high[self.problem.head :] - low[self.problem.head :] > 1e-6))
 
     @cached_property
     def doubt(self) -> float:
@@ -38,7 +38,8 @@ class Fit:
         return self.problem.own.doubt(self.vector)
 
     def residual(self) -> list[np.ndarray]:
-        """Measured less simulated, by experiment, as a share of the output's level, each sample by its trust."""
+        """Measured less simulated, by experiment, as a share of the output's level, each sample by its
+        trust."""
         return self.problem.segment.parts(self.problem.weighed(self.vector))
 
 
@@ -59,16 +60,25 @@ def means(part: np.ndarray, coarse: int) -> np.ndarray:
 def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing) -> np.ndarray:
     """The weighed residual, as a share of the output's level."""
     segment = problem.segment
-    return innovated(segment.y, problem.simulate(vector), segment.weight, segment.run.rest, weighing.coarse, weighing.ar)
+    return innovated(
+        segment.y, problem.simulate(vector), segment.weight, segment.run.rest, weighing.coarse, weighing.ar
+    )
 
 
-def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int = 12, tolerance: float = 1e-3,
-        known: np.ndarray | None = None) -> Fit:
-    """Least squares from ``start`` within the problem's bounds; stops when the gain is below ``tolerance`` nats.
+def fit(
+    problem: Problem,
+    start: np.ndarray,
+    weighing: Weighing,
+    iterations: int = 12,
+    tolerance: float = 1e-3,
+    known: np.ndarray | None = None,
+) -> Fit:
+    """Least squares from ``start`` within the problem's bounds; stops when the gain is below ``tolerance``
+    nats.
 
-    ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a little off.
-    Otherwise the rows ahead of the clues' own are made anew only every third time, for they change little, and the fit
-    does not end on old ones.
+    ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a
+    little off. Otherwise the rows ahead of the clues' own are made anew only every third time, for they
+    change little, and the fit does not end on old ones.
     """
     low, high = problem.bounds()
     vector = np.clip(start, low, high)
@@ -96,8 +106,15 @@ def fit(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int
     return Fit(problem, vector, now, sse, normal)
 
 
-def jacobian(problem: Problem, vector: np.ndarray, now: np.ndarray, weighing: Weighing, low, high,
-             known: np.ndarray | None = None) -> np.ndarray:
+def jacobian(
+    problem: Problem,
+    vector: np.ndarray,
+    now: np.ndarray,
+    weighing: Weighing,
+    low,
+    high,
+    known: np.ndarray | None = None,
+) -> np.ndarray:
     """Rows (k, n): the innovations' derivatives, by differences."""
     rows = [] if known is None else list(known)
     for i in range(len(rows), len(vector)):
@@ -115,6 +132,18 @@ def _step(normal, slope, damping, vector, low, high) -> np.ndarray:
     step = np.zeros_like(vector)
     if free.any():
         scale = np.diag(normal)[free]
-        matrix = normal[np.ix_(free, free)] + damping * np.diag(scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12)
+        matrix = normal[np.ix_(free, free)] + damping * np.diag(
+            scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12
+        )
         step[free] = np.linalg.lstsq(matrix, slope[free], rcond=1e-12)[0]
     return np.clip(step, -1.0, 1.0)
+
+
+def problem_residual(of: Fit) -> np.ndarray:
+    """Measured less simulated (n,)."""
+    return of.problem.residual(of.vector)
+
+
+def weighed(of: Fit) -> np.ndarray:
+    """The residual (n,) by trust, as a share of the output's level."""
+    return of.problem.weighed(of.vector)

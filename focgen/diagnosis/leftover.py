@@ -1,7 +1,7 @@
 """Whether what a model leaves depends on what was done to the rig, and on what of it.
 
-Noise cannot be foretold from the input. A flexible regression on level, rate, direction, history and time, fitted on some
-stretches and scored on others, can foretell only what a model should have explained.
+Noise cannot be foretold from the input. A flexible regression on level, rate, direction, history and time,
+fitted on some stretches and scored on others, can foretell only what a model should have explained.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ _FOLDS = 8
 
 @dataclass(frozen=True)
 class Leftover:
-    """``share``: the part of the residual's mean square that inputs foretell, 0 … 1; ``depends``: that part by the group
-    of regressors (level, rate, direction, history, time)."""
+    """``share``: the part of the residual's mean square that inputs foretell, 0 … 1; ``depends``: that part
+    by the group of regressors (level, rate, direction, history, time)."""
 
     share: float
     depends: dict[str, float]
@@ -29,7 +29,9 @@ class Leftover:
 def _groups(segment: Segment, response: float) -> dict[str, np.ndarray]:
     """Regressors (n, k) by what they stand for, of order one."""
     x, run = segment.x / segment.level_in, segment.run
-    lags = [kernels.lag(x, run.rest, run.h, tau, tau) for tau in response * np.array([0.05, 0.2, 1.0, 4.0, 16.0])]
+    lags = [
+        kernels.lag(x, run.rest, run.h, tau, tau) for tau in response * np.array([0.05, 0.2, 1.0, 4.0, 16.0])
+    ]
     slow, quick = lags[2], lags[0]
     rate = (x - lags[1]) * 3
     direction = np.tanh(20 * (lags[0] - lags[1]))
@@ -81,7 +83,8 @@ def _thinned(values: np.ndarray, thin: int) -> np.ndarray:
 
 
 def _foretold(matrix: np.ndarray, target: np.ndarray) -> float:
-    """1 − (error on stretches not fitted)/(mean square), stretches interleaved so that each fold sees the whole session."""
+    """1 − (error on stretches not fitted)/(mean square), stretches interleaved so that each fold sees the
+    whole session."""
     stretch = max(8, len(target) // (12 * _FOLDS))
     fold = (np.arange(len(target)) // stretch) % _FOLDS
     scale = np.sqrt(np.mean(matrix**2, axis=0)) + 1e-12

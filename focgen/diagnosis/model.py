@@ -20,7 +20,8 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that may be the cause. ``confidence``: probability; ``separation``: standard deviations behind the best."""
+    """An effect that may be the cause. ``confidence``: probability; ``separation``: standard deviations
+    behind the best."""
 
     effect: str
     confidence: float
@@ -31,7 +32,8 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Found:
-    """One effect found, in ``stage``: its candidates, likeliest first; ``shrink``: the share lost when it is left out."""
+    """One effect found, in ``stage``: its candidates, likeliest first; ``shrink``: the share lost when it is
+    left out."""
 
     stage: str
     candidates: tuple[Candidate, ...]
@@ -41,7 +43,8 @@ class Found:
 
 @dataclass(frozen=True)
 class Gap:
-    """Root-mean-square errors of the output, experiments counted alike, in ``unit``; ``gof`` the same as eq. (4)."""
+    """Root-mean-square errors of the output, experiments counted alike, in ``unit``; ``gof`` the same as eq.
+    (4)."""
 
     as_given: float
     refitted: float
@@ -53,7 +56,8 @@ class Gap:
 
 @dataclass(frozen=True)
 class Where:
-    """``stage``: the one that carries the gap, or None; ``inferred``: without its own signals; ``share`` by stage."""
+    """``stage``: the one that carries the gap, or None; ``inferred``: without its own signals; ``share`` by
+    stage."""
 
     stage: str | None
     inferred: bool
@@ -63,8 +67,8 @@ class Where:
 
 @dataclass(frozen=True)
 class PlainFit:
-    """What one effect alone does for its segment of the chain: ``error`` is the root-mean-square residual with its best
-    form, as a share of the refitted nominal's. A plain fit says nothing about certainty."""
+    """What one effect alone does for its segment of the chain: ``error`` is the root-mean-square residual
+    with its best form, as a share of the refitted nominal's. A plain fit says nothing about certainty."""
 
     effect: str
     error: float
@@ -101,7 +105,8 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What the pictures are drawn from: signals by experiment (as given, refitted, explained), explanations by segment."""
+    """What the pictures are drawn from: signals by experiment (as given, refitted, explained), explanations
+    by segment."""
 
     simulated: dict[str, list[dict[str, np.ndarray]]]
     explanations: tuple

@@ -1,8 +1,8 @@
 """The experiment that best tells the rivals apart, per second of rig time.
 
-For rivals A and B the expected separation is the distance of their outputs in units of the noise, as far as B cannot
-take it up by moving its parameters (T-optimality, A. C. Atkinson and V. V. Fedorov, Biometrika 62, 1975), with what the
-logs have already told about them.
+For rivals A and B the expected separation is the distance of their outputs in units of the noise, as far as
+B cannot take it up by moving its parameters (T-optimality, A. C. Atkinson and V. V. Fedorov, Biometrika 62,
+1975), with what the logs have already told about them.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.explain import Explanation, Rival
+from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.menu import Choice, menu
 from focgen.diagnosis.model import Found, NextExperiment
 from focgen.diagnosis.noise import whiten
+from focgen.diagnosis.rivals import Rival
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import Chain
@@ -25,8 +26,9 @@ _MOST = 99.0
 _ROLES = {"regulator": "pressure", "actuator": "curvature"}
 
 
-def propose(rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation],
-            found: Sequence[Found]) -> NextExperiment | None:
+def propose(
+    rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation], found: Sequence[Found]
+) -> NextExperiment | None:
     """For the least certain cause with rivals; None where nothing is tied."""
     for e in explanations:
         for cause in e.causes:
@@ -47,14 +49,17 @@ def _between(rig: Rig, logs, e: Explanation, a: Rival, b: Rival) -> NextExperime
     good = [o for o in options if o[0] >= _ENOUGH] or [max(options, key=lambda o: o[0])]
     value, choice, stage = max(good, key=lambda o: o[0] / np.sqrt(o[1].seconds))
     logged = f", with the {_ROLES[stage]} logged" if stage else ""
-    return NextExperiment(f"telling {a.effect} from {b.effect}",
-                          f"{choice.what}, on the {entry} from 0 to {e.segment.level_in:.4g}, {choice.seconds:.0f} s{logged}",
-                          float(min(value, _MOST)),
-                          {"seconds": choice.seconds, "also_log": _ROLES.get(stage), "rivals": [a.effect, b.effect]})
+    return NextExperiment(
+        f"telling {a.effect} from {b.effect}",
+        f"{choice.what}, on the {entry} from 0 to {e.segment.level_in:.4g}, {choice.seconds:.0f} s{logged}",
+        float(min(value, _MOST)),
+        {"seconds": choice.seconds, "also_log": _ROLES.get(stage), "rivals": [a.effect, b.effect]},
+    )
 
 
 def _separation(e: Explanation, a: Rival, b: Rival, choice: Choice, stage: str | None) -> float:
-    """Expected standard deviations between the two on the choice, seen at the output or at what leaves ``stage``."""
+    """Expected standard deviations between the two on the choice, seen at the output or at what leaves
+    ``stage``."""
     run = Run.of([len(choice.command)], [float(e.segment.run.clock[-1])], choice.h)
     last = stage or e.segment.stages[-1]
 

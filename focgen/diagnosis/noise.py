@@ -34,8 +34,8 @@ def fit_ar(parts: Sequence[np.ndarray]) -> np.ndarray:
     r[0] *= 1 + 1e-9
     best, chosen = np.inf, np.ones(1)
     for order in (p for p in _ORDERS if p <= most):
-        a = -solve_toeplitz(r[:order], r[1: order + 1]) if order else np.zeros(0)
-        variance = r[0] + a @ r[1: order + 1]
+        a = -solve_toeplitz(r[:order], r[1 : order + 1]) if order else np.zeros(0)
+        variance = r[0] + a @ r[1 : order + 1]
         if variance <= 0:
             continue
         score = count * np.log(variance) + order * np.log(count)

@@ -14,7 +14,8 @@ _USUAL = 0.2  # relative deviation of own parameters from those given that surpr
 
 @dataclass(frozen=True)
 class Own:
-    """Turns the own parameters of ``stage`` into a vector and back; levels are the segment's largest magnitudes."""
+    """Turns the own parameters of ``stage`` into a vector and back; levels are the segment's largest
+    magnitudes."""
 
     rig: Rig
     stage: str | None
@@ -38,7 +39,8 @@ class Own:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds of the vector.
 
-        A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead zone.
+        A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead
+        zone.
         """
         start = self.start()
         low, high = start - 50.0, start + 50.0
@@ -53,8 +55,9 @@ class Own:
         return low, high
 
     def doubt(self, vector: np.ndarray) -> float:
-        """Nats against own parameters this far from those given. The owner identified them once: a tenth off is usual, a
-        factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a guess; an offset is free."""
+        """Nats against own parameters this far from those given. The owner identified them once: a tenth off
+        is usual, a factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a
+        guess; an offset is free."""
         start = self.start()
         if not len(start):
             return 0.0
@@ -76,7 +79,9 @@ class Own:
         a, v = self.rig.actuator, [float(value) for value in vector]
         if isinstance(a, Actuator):
             gains = tuple(g * self.level_out / self.level_in ** (i + 1) for i, g in enumerate(v[2:-1]))
-            return replace(self.rig, actuator=Actuator(float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out))
+            return replace(
+                self.rig, actuator=Actuator(float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out)
+            )
         dynamics = self._to_transfer(a.dynamics, vector[:-1])
         return replace(self.rig, actuator=LinearActuator(dynamics, v[-1] * self.level_out))
 

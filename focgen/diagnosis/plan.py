@@ -1,7 +1,7 @@
 """Before any data: which effects a set of experiments can and cannot tell apart.
 
-Each effect is switched on a little in the nominal chain; what of its trace in the output survives a refit of the nominal
-parameters, and how alike the survivors are, is known without a rig.
+Each effect is switched on a little in the nominal chain; what of its trace in the output survives a refit of
+the nominal parameters, and how alike the survivors are, is known without a rig.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ _ROLES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 
 @dataclass(frozen=True)
 class Survival:
-    """An effect under the plan: the share of its trace that a refit leaves, what it is tied with, what is lacking."""
+    """An effect under the plan: the share of its trace that a refit leaves, what it is tied with, what is
+    lacking."""
 
     effect: str
     stage: str
@@ -42,7 +43,8 @@ class Survival:
 
 @dataclass(frozen=True)
 class Plan:
-    """What the experiments can tell: ``effects`` by segment of the chain, and the ``experiments`` they were asked of."""
+    """What the experiments can tell: ``effects`` by segment of the chain, and the ``experiments`` they were
+    asked of."""
 
     experiments: tuple[str, ...]
     effects: tuple[Survival, ...]

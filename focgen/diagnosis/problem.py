@@ -44,8 +44,9 @@ class References:
 class Problem:
     """Residuals of a segment under the rig with ``clues``.
 
-    The vector: the rig's own parameters, the nuisances (the alignment of input and output, at most ``slack`` samples, and
-    where nothing of the segment has an offset of its own, one), then every clue's parameters, all of order one.
+    The vector: the rig's own parameters, the nuisances (the alignment of input and output, at most ``slack``
+    samples, and where nothing of the segment has an offset of its own, one), then every clue's parameters,
+    all of order one.
     """
 
     segment: Segment
@@ -66,7 +67,9 @@ class Problem:
 
     def thinned(self, factor: int) -> Problem:
         """The same on means of ``factor`` samples at a time."""
-        return Problem(self.segment.thinned(factor), self.own, self.references, self.clues, slack=self.slack / factor)
+        return Problem(
+            self.segment.thinned(factor), self.own, self.references, self.clues, slack=self.slack / factor
+        )
 
     def stretched(self, vector: np.ndarray, factor: float) -> np.ndarray:
         """``vector`` with its alignment, which is in samples, times ``factor``."""
@@ -97,7 +100,11 @@ class Problem:
 
     def _least(self, p) -> float:
         """The lower bound: a time constant of less than two samples is nothing that samples could show."""
-        return max(p.lower, 2.0 * self.segment.run.h / self.references.clocks[p.clock]) if p.time == 1 else p.lower
+        return (
+            max(p.lower, 2.0 * self.segment.run.h / self.references.clocks[p.clock])
+            if p.time == 1
+            else p.lower
+        )
 
     def starts(self, clue: Clue) -> list[np.ndarray]:
         """Start values of one clue's entries."""

@@ -1,8 +1,8 @@
 """The controller's stage: how the running one departs from the ideal one, from closed-loop logs.
 
-The controller is replayed on the logged reference and measurement. What it should have commanded is compared with the
-logged command, sample by sample in steps (an integrator would keep every small error for ever). Lost and late samples are
-read off the raw time stamps, which no resampling has touched.
+The controller is replayed on the logged reference and measurement. What it should have commanded is compared
+with the logged command, sample by sample in steps (an integrator would keep every small error for ever).
+Lost and late samples are read off the raw time stamps, which no resampling has touched.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class Departure:
 
 @dataclass(frozen=True)
 class Running:
-    """``departure``: root-mean-square of logged less ideal command, per sample, in its unit; ``causes`` best first."""
+    """``departure``: root-mean-square of logged less ideal command, per sample, in its unit; ``causes`` best
+    first."""
 
     departure: float
     resolved: bool
@@ -56,7 +57,9 @@ def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
     """
     logged = [log for log in logs if "reference" in log and "command" in log]
     if not logged:
-        raise ControllerError(controller.name, "the logs lack reference or command", "name both columns in [signals]")
+        raise ControllerError(
+            controller.name, "the logs lack reference or command", "name both columns in [signals]"
+        )
     command = [np.asarray(log["command"], float) for log in logged]
     best = _commands(logged, lambda s: ideal(controller, s).u, controller)
     before = _departure(command, best)
@@ -79,7 +82,9 @@ def _scenario(controller: Controller, log: Experiment) -> Scenario:
     if controller.scheduled:
         role = "pressure" if "pressure" in log else None
         if role is None:
-            raise ControllerError(controller.name, "is scheduled, and the logs lack the pressure", "log the pressure")
+            raise ControllerError(
+                controller.name, "is scheduled, and the logs lack the pressure", "log the pressure"
+            )
         sched = np.asarray(log[role], float)[None]
     return Scenario(np.asarray(log["reference"], float)[None], np.asarray(log["output"], float)[None], sched)
 
@@ -101,7 +106,9 @@ def _rivals(controller: Controller, logs, command, best) -> Iterator[tuple[Depar
     for arithmetic in ("q31", "q15"):
         try:
             plan = build_plan(controller, arithmetic)
-            made = _commands(logs, lambda s, p=plan: physical_trace(p, execute(p, to_raw(p, s))).u, controller)
+            made = _commands(
+                logs, lambda s, p=plan: physical_trace(p, execute(p, to_raw(p, s))).u, controller
+            )
         except PlanError:
             continue
         yield Departure("fixed_point", 0.0, "bits", float(arithmetic[1:]) + 1, "bit"), made
@@ -123,7 +130,11 @@ def _limits(controller: Controller, logs, command) -> Iterator[tuple[Departure, 
 
 def _stamps(logs: Sequence[Experiment]) -> Iterator[Departure]:
     """What the raw time stamps show: samples left out, and samples early or late."""
-    steps = [np.diff(log.raw_time) / log.sample_time for log in logs if log.raw_time is not None and len(log.raw_time) > 2]
+    steps = [
+        np.diff(log.raw_time) / log.sample_time
+        for log in logs
+        if log.raw_time is not None and len(log.raw_time) > 2
+    ]
     if not steps:
         return
     joined = np.concatenate(steps)

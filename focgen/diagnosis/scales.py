@@ -30,8 +30,16 @@ def _levels(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> dict[str,
     entry, supply = segment.level_in, made.get("regulator", segment.level_in)
     response = made.get("actuator", segment.level_in)
     drive = _largest([rig.actuator.drive(np.linspace(0, supply, 50))]) if rig.actuator else supply
-    return {"command": entry, "supply": supply, "load": supply, "drive": drive, "dynamics": 1.0,
-            "response": response, "strain": response, "reading": made.get("sensor", segment.level_out)}
+    return {
+        "command": entry,
+        "supply": supply,
+        "load": supply,
+        "drive": drive,
+        "dynamics": 1.0,
+        "response": response,
+        "strain": response,
+        "reading": made.get("sensor", segment.level_out),
+    }
 
 
 def _largest(parts) -> float:
@@ -40,7 +48,8 @@ def _largest(parts) -> float:
 
 
 def clocks(rig: Rig, logs: Sequence[Experiment]) -> dict[str, float]:
-    """``response``: 63 % of the nominal chain's step; ``record``: the longest experiment; ``session``: all; ``sample``."""
+    """``response``: 63 % of the nominal chain's step; ``record``: the longest experiment; ``session``: all;
+    ``sample``."""
     h = min(log.sample_time for log in logs)
     record = max(len(log) * log.sample_time for log in logs)
     begin = min(log.start for log in logs)

@@ -1,4 +1,5 @@
-"""Which effects a segment needs: every form of every family fitted on top of what was found, the best one kept."""
+"""Which effects a segment needs: every form of every family fitted on top of what was found, the best one
+kept."""
 
 from __future__ import annotations
 
@@ -23,10 +24,12 @@ _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is drop
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """``base`` and what each family adds to it, all under the same noise model ``ar``; ``best`` by family, likeliest first.
+    """``base`` and what each family adds to it, all under the same noise model ``ar``; ``best`` by family,
+    likeliest first.
 
-    ``errors``: by family, the root-mean-square residual with its best form, over that of ``base`` (a quick fit's where no
-    more was worth while). ``gain`` are nats of evidence over ``base``: half the log-likelihood ratio's worth less half k ln n.
+    ``errors``: by family, the root-mean-square residual with its best form, over that of ``base`` (a quick
+    fit's where no more was worth while). ``gain`` are nats of evidence over ``base``: half the
+    log-likelihood ratio's worth less half k ln n.
     """
 
     base: Fit
@@ -42,16 +45,16 @@ class Ranking:
 
 
 def evidence(of: Fit, against: Fit) -> float:
-    """Nats of evidence of one fit over another on the same innovations (Schwarz's approximation), own parameters close
-    to those given preferred."""
+    """Nats of evidence of one fit over another on the same innovations (Schwarz's approximation), own
+    parameters close to those given preferred."""
     n = len(of.innovations)
     gain = 0.5 * n * np.log(max(against.sse, 1e-300) / max(of.sse, 1e-300))
     return float(gain - 0.5 * (of.size - against.size) * np.log(n) + against.doubt - of.doubt)
 
 
 def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
-    """Fit every clue on top of ``base`` (a vector of ``problem``), first on means of neighbouring samples, then on every
-    sample and with the colour of the noise."""
+    """Fit every clue on top of ``base`` (a vector of ``problem``), first on means of neighbouring samples,
+    then on every sample and with the colour of the noise."""
     shortest = min(last - first for first, last in problem.segment.run.spans)
     factor = max(1, min(len(problem.segment.y) // _COARSE, shortest // 20))
     thin, rough = problem.thinned(factor), Weighing(np.ones(1))
@@ -62,9 +65,15 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
     tried = _promising(tried, ground)
     rough = Weighing(_colour(min([ground, *tried], key=lambda t: t.sse)))
     ground = fit(thin, ground.vector, rough, 6)
-    tried = sorted((fit(t.problem, t.vector, rough, 10, 0.05) for t in tried), key=lambda t: -evidence(t, ground))
+    tried = sorted(
+        (fit(t.problem, t.vector, rough, 10, 0.05) for t in tried), key=lambda t: -evidence(t, ground)
+    )
     top = evidence(tried[0], ground) if tried else 0.0
-    kept = tried[:2] if top < _NOTHING else [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR]
+    kept = (
+        tried[:2]
+        if top < _NOTHING
+        else [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR]
+    )
     full = [_on_all(t, problem, factor) for t in (ground, *kept)]
     return finish(full[0], full[1:], errors)
 
@@ -96,8 +105,8 @@ def _chosen(tried: Sequence[Fit]) -> list[Fit]:
 
 
 def _colour(leader: Fit) -> np.ndarray:
-    """The whitening filter of what the best fit leaves. Where inputs foretell much of that it is no noise yet, and a filter
-    that takes out its colour would hide what is missing: then there is none."""
+    """The whitening filter of what the best fit leaves. Where inputs foretell much of that it is no noise
+    yet, and a filter that takes out its colour would hide what is missing: then there is none."""
     problem = leader.problem
     share = foretold(problem.segment, problem.weighed(leader.vector), problem.references.clocks["response"])
     return np.ones(1) if share > _MISFIT else fit_ar(leader.residual())
@@ -137,8 +146,9 @@ def family(of: Fit) -> str:
     return of.problem.clues[-1].effect
 
 
-def best_start(problem: Problem, base: np.ndarray, clue: Clue, weighing: Weighing,
-               known: np.ndarray) -> Fit | None:
+def best_start(
+    problem: Problem, base: np.ndarray, clue: Clue, weighing: Weighing, known: np.ndarray
+) -> Fit | None:
     """The best of the fits from the clue's start values, a few iterations each."""
     extended = problem.with_clues([*problem.clues, clue])
     fits = []

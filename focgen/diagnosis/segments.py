@@ -20,9 +20,10 @@ _ORDER = ("command", "pressure", "curvature", "output")
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """The stages between two logged signals: input ``x`` and output ``y`` (n,), experiments one after the other as in
-    ``run``. ``held``: the input is a staircase (a command). ``names`` of the experiments. ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off
-    makes a difference beyond the noise."""
+    """The stages between two logged signals: input ``x`` and output ``y`` (n,), experiments one after the
+    other as in ``run``. ``held``: the input is a staircase (a command). ``names`` of the experiments.
+    ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a difference
+    beyond the noise."""
 
     entry: str
     exit: str
@@ -56,20 +57,25 @@ class Segment:
 
     @cached_property
     def bent(self) -> np.ndarray:
-        """The input (n,), where it was measured with its bends sharpened: straight lines between samples of a smooth signal
-        pass below its crests, by (2πfh)²/12 of them, which the second difference mends."""
+        """The input (n,), where it was measured with its bends sharpened: straight lines between samples of
+        a smooth signal pass below its crests, by (2πfh)²/12 of them, which the second difference mends."""
         if self.entry == "command":
             return self.x
         before, after = _neighbours(self.x, self.run.rest)
         return self.x - (before - 2 * self.x + after) / 12.0
 
     def thinned(self, factor: int) -> Segment:
-        """The same in means of ``factor`` samples at a time; what does not fill the last of an experiment is left out."""
+        """The same in means of ``factor`` samples at a time; what does not fill the last of an experiment is
+        left out."""
         if factor == 1:
             return self
         counts = [(last - first) // factor for first, last in self.run.spans]
-        kept = np.concatenate([first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)])
-        x, y, trust, clock = (v[kept].reshape(-1, factor).mean(axis=1) for v in (self.x, self.y, self.trust, self.run.clock))
+        kept = np.concatenate(
+            [first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)]
+        )
+        x, y, trust, clock = (
+            v[kept].reshape(-1, factor).mean(axis=1) for v in (self.x, self.y, self.trust, self.run.clock)
+        )
         rest = np.zeros(len(x), np.uint8)
         rest[np.cumsum([0, *counts[:-1]])] = 1
         run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
@@ -88,7 +94,11 @@ def _neighbours(x: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def stages_of(rig: Rig) -> tuple[str, ...]:
     """The stages that the rig file gives; the others are 1."""
-    given = {"regulator": rig.regulator != UNITY, "actuator": rig.actuator is not None, "sensor": rig.sensor != UNITY}
+    given = {
+        "regulator": rig.regulator != UNITY,
+        "actuator": rig.actuator is not None,
+        "sensor": rig.sensor != UNITY,
+    }
     return tuple(stage for stage, there in given.items() if there)
 
 
@@ -100,7 +110,7 @@ def cuts(logs: Sequence[Experiment]) -> tuple[str, ...]:
 def between(entry: str, exit: str) -> tuple[str, ...]:
     """The stages between two signals."""
     order = ("regulator", "actuator", "sensor")
-    return order[order.index(_ENTERS[entry]): order.index(_LEAVES[exit]) + 1]
+    return order[order.index(_ENTERS[entry]) : order.index(_LEAVES[exit]) + 1]
 
 
 def session(logs: Sequence[Experiment]) -> Run:
@@ -118,8 +128,17 @@ def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None
     x = joined(logs, entry) if x is None else x
     names = tuple(log.name for log in logs)
     trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
-    return Segment(entry, exit, between(entry, exit), x, joined(logs, exit), session(logs), entry == "command", names,
-                   trust)
+    return Segment(
+        entry,
+        exit,
+        between(entry, exit),
+        x,
+        joined(logs, exit),
+        session(logs),
+        entry == "command",
+        names,
+        trust,
+    )
 
 
 def _unsteadiness(log: Experiment) -> float:
@@ -150,5 +169,3 @@ def owner(rig: Rig) -> str | None:
     """The stage whose parameters are the rig's own."""
     given = stages_of(rig)
     return "actuator" if "actuator" in given or not given else given[0] if len(given) == 1 else None
-
-

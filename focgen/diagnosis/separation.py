@@ -1,7 +1,8 @@
 """How well the data tell two fitted explanations apart: Vuong's test on blocks of innovations.
 
-Q. H. Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 57 (1989). Differences of
-the log-likelihood are summed over blocks, for neighbours are alike where a form is a little wrong.
+Q. H. Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 57 (1989).
+Differences of the log-likelihood are summed over blocks, for neighbours are alike where a form is a little
+wrong.
 """
 
 from __future__ import annotations
@@ -11,7 +12,10 @@ import numpy as np
 from focgen.diagnosis.fit import Fit
 
 _BLOCKS = 80
-_FORM = (0.004, 0.01)  # of the gain: what a form a little wrong may cost, in one stage, and where stages are merged
+_FORM = (
+    0.004,
+    0.01,
+)  # of the gain: what a form a little wrong may cost, in one stage, and where stages are merged
 _UNTOLD = 0.05
 _ROUGH = 2.0  # nats: what is held against own parameters far from those given is known no better
 
@@ -20,8 +24,8 @@ def separation(better: Fit, other: Fit, nominal: Fit, indistinct: bool = False) 
     """Standard deviations by which ``better`` beats ``other``, complexity paid for, own parameters close to
     those given preferred; innovations of the same weighing.
 
-    To the spread belongs that no form is quite what the rig does: a part of the gain over ``nominal``, a larger one
-    where the experiments are not made to tell the two apart (``indistinct``).
+    To the spread belongs that no form is quite what the rig does: a part of the gain over ``nominal``, a
+    larger one where the experiments are not made to tell the two apart (``indistinct``).
     """
     a, b = better.innovations, other.innovations
     n = min(len(a), len(b))

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 _DRAWS = 400
-_FORM, _LOUD = 0.02, 0.12  # share that a form a little wrong may lose on new experiments, and what the noise adds to it
+_FORM, _LOUD = (
+    0.02,
+    0.12,
+)  # share that a form a little wrong may lose on new experiments, and what the noise adds to it
 _REST = 0.3  # of what is left unexplained that may come or go
 _MOST = 1.02  # measured on few experiments, noise may make it more than all
 
@@ -23,8 +26,8 @@ class Shrink:
 def predict(refitted: np.ndarray, explained: np.ndarray, floor: float) -> Shrink | None:
     """From mean squares by experiment (m,) and the floor's mean square; None where nothing can shrink.
 
-    The interval is at least as wide as the errors of the promise were on simulated rigs of foreign forms: a few
-    hundredths, more where the gap is little more than the noise or part of it is unexplained.
+    The interval is at least as wide as the errors of the promise were on simulated rigs of foreign forms: a
+    few hundredths, more where the gap is little more than the noise or part of it is unexplained.
     """
     if not np.mean(refitted) > floor * 1.0001:
         return None
@@ -40,4 +43,6 @@ def predict(refitted: np.ndarray, explained: np.ndarray, floor: float) -> Shrink
 
 def _share(refitted, explained, floor: float) -> float:
     could = np.mean(refitted) - floor
-    return float(np.clip((np.mean(refitted) - np.mean(explained)) / could, -1.0, 1.0)) if could > 0 else np.nan
+    return (
+        float(np.clip((np.mean(refitted) - np.mean(explained)) / could, -1.0, 1.0)) if could > 0 else np.nan
+    )

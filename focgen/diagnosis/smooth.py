@@ -1,7 +1,7 @@
 """A measured signal freed of its noise, to be the next stage's input.
 
-Noise in an input looks like a lag of the stage behind it. What the stage before is simulated to give is free of noise; what
-it lacks is added back, smoothed by the colour of the noise.
+Noise in an input looks like a lag of the stage behind it. What the stage before is simulated to give is free
+of noise; what it lacks is added back, smoothed by the colour of the noise.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ WRONG = 0.05  # of the residual foretold by inputs: beyond it the simulation is 
 def freed(segment: Segment, simulated: np.ndarray, response: float, left: float, noise: bool) -> np.ndarray:
     """The segment's output: as simulated, plus the residual below the pace of the rig; ``response`` in s.
 
-    ``left``: the share of the residual that inputs foretell; where there is one, little is smoothed away, and where
-    there is none and the residual is but ``noise``, all of it is.
+    ``left``: the share of the residual that inputs foretell; where there is one, little is smoothed away,
+    and where there is none and the residual is but ``noise``, all of it is.
     """
     if noise and left < _RIGHT:
         return simulated

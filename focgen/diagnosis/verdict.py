@@ -9,10 +9,11 @@ import numpy as np
 from focgen.diagnosis import compose
 from focgen.diagnosis.confidence import confidences, tied
 from focgen.diagnosis.disturbance import Disturbance, disturbance
-from focgen.diagnosis.explain import Cause, Explanation, problem_residual, weighed
-from focgen.diagnosis.fit import Weighing, fit
+from focgen.diagnosis.explain import Explanation
+from focgen.diagnosis.fit import Weighing, fit, problem_residual, weighed
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit
 from focgen.diagnosis.next_experiment import propose
+from focgen.diagnosis.rivals import Cause
 from focgen.diagnosis.running import Running
 from focgen.diagnosis.search import evidence as nats
 from focgen.diagnosis.shrink import Shrink, predict
@@ -27,16 +28,24 @@ LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it somethi
 _PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
 
 
-def reach(rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations: Sequence[Explanation],
-          controller: Running | None = None) -> tuple[compose.Rigs, Diagnosis, Evidence]:
+def reach(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    rigs: compose.Rigs,
+    explanations: Sequence[Explanation],
+    controller: Running | None = None,
+) -> tuple[compose.Rigs, Diagnosis, Evidence]:
     """The rigs that the verdict stands for, the diagnosis, and what its pictures need."""
     causes = [(e, c) for e in explanations for c in e.causes]
     unknown = [e for e in explanations if is_unknown(e)]
     if unknown:
         rigs = _without(rigs, causes, unknown)
         causes = [(e, c) for e, c in causes if e not in unknown]
-    made = {"as given": compose.simulated(rig, (), logs), "refitted": compose.simulated(rigs.refitted, (), logs),
-            "explained": compose.simulated(rigs.fitted, rigs.placed, logs)}
+    made = {
+        "as given": compose.simulated(rig, (), logs),
+        "refitted": compose.simulated(rigs.refitted, (), logs),
+        "explained": compose.simulated(rigs.fitted, rigs.placed, logs),
+    }
     floor = _floor(explanations[-1])
     squares = {name: compose.squares(logs, m) for name, m in made.items()}
     floor = min(floor, float(np.mean(squares["explained"])))
@@ -46,11 +55,20 @@ def reach(rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations
     word = _word(found, unknown, explanations)
     shares = stage_shares(found, unknown, explanations)
     diagnosis = Diagnosis(
-        word, locate(explanations, shares, found, unknown, word), found, _gap(rig, logs, made, squares, floor),
-        total.value if total else None, total.interval if total else None, "refitted.toml", "augmented.toml",
+        word,
+        locate(explanations, shares, found, unknown, word),
+        found,
+        _gap(rig, logs, made, squares, floor),
+        total.value if total else None,
+        total.interval if total else None,
+        "refitted.toml",
+        "augmented.toml",
         propose(rig, logs, explanations, found),
-        _description(unknown), (), tuple(note for log in logs for note in log.notes),
-        _plain_fits(explanations))
+        _description(unknown),
+        (),
+        tuple(note for log in logs for note in log.notes),
+        _plain_fits(explanations),
+    )
     return rigs, diagnosis, Evidence(made, tuple(explanations))
 
 
@@ -65,14 +83,20 @@ def _departures(controller: Running | None) -> tuple[Found, ...]:
     found = []
     for d in controller.causes if controller else ():
         parameters = {d.parameter: Estimate(d.value, (d.value, d.value), d.unit)}
-        found.append(Found("controller", (Candidate(d.effect, 0.9, "running", parameters, 0.0),), d.share,
-                           (max(d.share - 0.1, 0.0), min(d.share + 0.1, 1.0))))
+        found.append(
+            Found(
+                "controller",
+                (Candidate(d.effect, 0.9, "running", parameters, 0.0),),
+                d.share,
+                (max(d.share - 0.1, 0.0), min(d.share + 0.1, 1.0)),
+            )
+        )
     return tuple(found)
 
 
 def is_unknown(e: Explanation) -> bool:
-    """Whether most of what inputs foretell of the nominal residual is still there after the effects, or without any the
-    residual is not just noise."""
+    """Whether most of what inputs foretell of the nominal residual is still there after the effects, or
+    without any the residual is not just noise."""
     if not e.causes and (disturbed(e).bursts or disturbed(e).swings or disturbed(e).hums):
         return True
     if e.left.share < LEFT:
@@ -137,13 +161,17 @@ def _share_lost(e, cause, rigs, others, logs, squares, floor) -> Shrink:
     without = compose.squares(logs, compose.simulated(rigs.fitted, others, logs))
     lost = predict(np.maximum(squares["refitted"], 0), np.maximum(squares["explained"], 0), floor)
     could = max(float(np.mean(squares["refitted"])) - floor, 1e-300)
-    value = float(np.clip((np.mean(np.minimum(without, squares["refitted"])) - np.mean(squares["explained"])) / could, 0, 1))
+    value = float(
+        np.clip(
+            (np.mean(np.minimum(without, squares["refitted"])) - np.mean(squares["explained"])) / could, 0, 1
+        )
+    )
     wide = (lost.interval[1] - lost.interval[0]) / 2 if lost else 0.1
     return Shrink(value, (max(value - wide, -1.0), min(value + wide, 1.0)))
 
 
 def _candidate(rival, confidence: float) -> Candidate:
-    problem, clue = rival.fit.problem, rival.fit.problem.clues
+    clue = rival.fit.problem.clues
     places = [i for i, c in enumerate(clue) if c.effect == rival.effect]
     parameters = {}
     for i in places:
@@ -162,15 +190,25 @@ def estimates(of, which: int) -> dict[str, Estimate]:
     for i, parameter in enumerate(clue.form.parameters):
         v, s = of.vector[place + i], 1.96 * spread[place + i]
         scale = problem.references.scale(parameter, slot_in(clue.form, clue.stage))
-        ends = [float(scale * (np.exp(np.clip(e, -60, 60)) if parameter.log else e)) for e in (v - s, v, v + s)]
-        found[parameter.name] = Estimate(ends[1], (ends[0], ends[2]), _unit(parameter, slot_in(clue.form, clue.stage)))
+        ends = [
+            float(scale * (np.exp(np.clip(e, -60, 60)) if parameter.log else e)) for e in (v - s, v, v + s)
+        ]
+        found[parameter.name] = Estimate(
+            ends[1], (ends[0], ends[2]), _unit(parameter, slot_in(clue.form, clue.stage))
+        )
     return found
 
 
 def _unit(parameter, slot: str) -> str:
-    level = {"command": "command", "supply": "pressure", "load": "pressure", "reading": "output"}.get(slot, "curvature")
-    words = [f"{level} unit^{parameter.level:g}" if parameter.level not in (0, 1) else f"{level} unit" * parameter.level,
-             f"s^{parameter.time:g}" if parameter.time not in (0, 1) else "s" * parameter.time]
+    level = {"command": "command", "supply": "pressure", "load": "pressure", "reading": "output"}.get(
+        slot, "curvature"
+    )
+    words = [
+        f"{level} unit^{parameter.level:g}"
+        if parameter.level not in (0, 1)
+        else f"{level} unit" * parameter.level,
+        f"s^{parameter.time:g}" if parameter.time not in (0, 1) else "s" * parameter.time,
+    ]
     return " ".join(w for w in words if w)
 
 
@@ -180,11 +218,15 @@ def _ordered(found: Sequence[Found]) -> tuple[Found, ...]:
 
 def _gap(rig: Rig, logs, made, squares, floor: float) -> Gap:
     rms = {name: float(np.sqrt(np.mean(v))) for name, v in squares.items()}
-    gof = {name: float(np.mean([goodness(log["output"], m["output"]) for log, m in zip(logs, parts)]))
-           for name, parts in made.items()}
+    gof = {
+        name: float(np.mean([goodness(log["output"], m["output"]) for log, m in zip(logs, parts)]))
+        for name, parts in made.items()
+    }
     spread = [np.std(log["output"]) for log in logs]
     gof["possible"] = float(np.mean([1 - np.sqrt(floor) / s for s in spread if s > 0] or [0.0]))
-    return Gap(rms["as given"], rms["refitted"], rms["explained"], float(np.sqrt(floor)), rig.signals.output, gof)
+    return Gap(
+        rms["as given"], rms["refitted"], rms["explained"], float(np.sqrt(floor)), rig.signals.output, gof
+    )
 
 
 def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
@@ -193,7 +235,10 @@ def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
     for e in unknown:
         parts, noise = {k: v for k, v in e.left_nominal.depends.items() if v > 0.02}, disturbed(e)
         found[f"{e.segment.entry} to {e.segment.exit}"] = {
-            "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"], "share": e.left_nominal.share,
-            "bursts": noise.bursts, "slow_swings": noise.swings,
-            "hums": noise.hums}
+            "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"],
+            "share": e.left_nominal.share,
+            "bursts": noise.bursts,
+            "slow_swings": noise.swings,
+            "hums": noise.hums,
+        }
     return found

@@ -6,16 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.explain import Explanation, problem_residual, weighed
+from focgen.diagnosis.explain import Explanation
+from focgen.diagnosis.fit import problem_residual, weighed
 from focgen.diagnosis.model import Found, Where
 
 STAGES = ("regulator", "actuator", "sensor", "controller")
 
 
-def stage_shares(found: Sequence[Found], unknown: Sequence[Explanation],
-                 explanations: Sequence[Explanation]) -> dict[str, float]:
-    """The part of the gap that each stage's causes carry; they sum to 1 where there is one. A segment that no effect
-    explains carries its part of what inputs foretell of all residuals."""
+def stage_shares(
+    found: Sequence[Found], unknown: Sequence[Explanation], explanations: Sequence[Explanation]
+) -> dict[str, float]:
+    """The part of the gap that each stage's causes carry; they sum to 1 where there is one. A segment that
+    no effect explains carries its part of what inputs foretell of all residuals."""
     weight = dict.fromkeys(STAGES, 0.0)
     for f in found:
         weight[f.stage] += max(f.shrink, 0.01)
@@ -55,9 +57,14 @@ def regimes(e: Explanation) -> dict[str, object]:
     third = np.digitize(np.arange(len(x)), np.array([1, 2]) * len(x) / 3)
     return {
         "level": {f"{edges[i]:.3g} to {edges[i + 1]:.3g}": float(square[level == i].sum()) for i in range(3)},
-        "direction": {"rising": float(square[moving & (slope > 0)].sum()),
-                      "falling": float(square[moving & (slope < 0)].sum()), "held": float(square[~moving].sum())},
-        "time": {name: float(square[third == i].sum()) for i, name in enumerate(("first third", "second", "last"))},
+        "direction": {
+            "rising": float(square[moving & (slope > 0)].sum()),
+            "falling": float(square[moving & (slope < 0)].sum()),
+            "held": float(square[~moving].sum()),
+        },
+        "time": {
+            name: float(square[third == i].sum()) for i, name in enumerate(("first third", "second", "last"))
+        },
         "frequency": _bands(e, residual),
         "depends_on": e.left_nominal.depends,
     }

@@ -15,8 +15,14 @@ from focgen.output import write_files
 from focgen.rig.files import rig_table
 
 
-def write(out: str | Path, diagnosis: Diagnosis, evidence: Evidence, rigs: Rigs, logs: Sequence[Experiment],
-          drawn: bool = True) -> None:
+def write(
+    out: str | Path,
+    diagnosis: Diagnosis,
+    evidence: Evidence,
+    rigs: Rigs,
+    logs: Sequence[Experiment],
+    drawn: bool = True,
+) -> None:
     """Write all files into ``out``, or none; pictures where they are to be ``drawn``."""
     from focgen.cli.outcome import to_json
 

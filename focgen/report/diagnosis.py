@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from focgen.diagnosis.explain import Explanation, problem_residual
+from focgen.diagnosis.explain import Explanation
+from focgen.diagnosis.fit import problem_residual
 from focgen.diagnosis.model import Diagnosis, Evidence
 from focgen.logs.experiment import Experiment
 from focgen.report.style import COLOURS, figure, png

@@ -31,12 +31,16 @@ class Placed:
 
 
 def slot_in(form: Form, stage: str) -> str:
-    """The slot of ``form`` in ``stage``: its own, or where it is not at home the one before or after the dynamics."""
+    """The slot of ``form`` in ``stage``: its own, or where it is not at home the one before or after the
+    dynamics."""
     if form.slot in SLOTS[stage]:
         return form.slot
     before = form.slot in ("command", "load", "drive", "strain")
-    return {"regulator": "command" if before else "supply", "actuator": "drive" if before else "response",
-            "sensor": "strain" if before else "reading"}[stage]
+    return {
+        "regulator": "command" if before else "supply",
+        "actuator": "drive" if before else "response",
+        "sensor": "strain" if before else "reading",
+    }[stage]
 
 
 Step = tuple[tuple, Callable[[np.ndarray, Run], np.ndarray], Placed | None]
@@ -46,22 +50,31 @@ Step = tuple[tuple, Callable[[np.ndarray, Run], np.ndarray], Placed | None]
 class Chain:
     """A rig with effects, made to be run again and again with few things changed.
 
-    What a step did last is remembered by its input and parameters, so that only what comes after a changed one is run.
+    What a step did last is remembered by its input and parameters, so that only what comes after a changed
+    one is run.
     """
 
     rig: Rig
     placed: tuple[Placed, ...] = ()
     remember: dict | None = None
 
-    def run(self, x: np.ndarray, first: str, last: str, run: Run, held: bool = False,
-            tap: dict[str, np.ndarray] | None = None, left: dict[str, dict] | None = None) -> np.ndarray:
+    def run(
+        self,
+        x: np.ndarray,
+        first: str,
+        last: str,
+        run: Run,
+        held: bool = False,
+        tap: dict[str, np.ndarray] | None = None,
+        left: dict[str, dict] | None = None,
+    ) -> np.ndarray:
         """What leaves stage ``last`` when ``x`` (n,) enters stage ``first``.
 
-        ``held``: the input is a staircase. ``tap`` receives what leaves each stage, ``left`` what outlives the session,
-        by effect.
+        ``held``: the input is a staircase. ``tap`` receives what leaves each stage, ``left`` what outlives
+        the session, by effect.
         """
         begin, end = STAGES.index(first), STAGES.index(last)
-        for stage in STAGES[begin:end + 1]:
+        for stage in STAGES[begin : end + 1]:
             for number, (key, act, placed) in enumerate(self.steps(stage, held and stage == first)):
                 if left is not None and placed is not None and placed.form.leaves:
                     left[placed.effect] = placed.form.leaves(x, placed.values, run)
@@ -102,13 +115,19 @@ class Chain:
 
 
 def _effect(placed: Placed) -> Step:
-    return ((placed.effect, placed.form.name, placed.values),
-            lambda x, run: placed.form.act(x, placed.values, run), placed)
+    return (
+        (placed.effect, placed.form.name, placed.values),
+        lambda x, run: placed.form.act(x, placed.values, run),
+        placed,
+    )
 
 
 def _transfer(transfer, held: bool) -> Step:
-    return ((transfer, held),
-            lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, held), None)
+    return (
+        (transfer, held),
+        lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, held),
+        None,
+    )
 
 
 def _actuator(actuator, here: Sequence[Placed], held: bool) -> list[Step]:
@@ -122,8 +141,11 @@ def _actuator(actuator, here: Sequence[Placed], held: bool) -> list[Step]:
     if isinstance(actuator, LinearActuator):
         return [*drive, *_linear(actuator, speed, held)]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
-    lag = ((actuator.T, actuator.alpha, speed), lambda x, run: respond(
-        x, run.rest, run.h, actuator.T, actuator.alpha, run.duration, speed), None)
+    lag = (
+        (actuator.T, actuator.alpha, speed),
+        lambda x, run: respond(x, run.rest, run.h, actuator.T, actuator.alpha, run.duration, speed),
+        None,
+    )
     return [line, *drive, lag]
 
 
@@ -131,8 +153,13 @@ def _linear(actuator: LinearActuator, speed: float, held: bool) -> list[Step]:
     if speed == 1.0:
         return [_transfer(actuator.dynamics, held)]
     gain, T, alpha = linear.single_lag(actuator.dynamics)
-    return [((actuator.dynamics, speed), lambda x, run: respond(
-        gain * x, run.rest, run.h, T, alpha, run.duration, speed), None)]
+    return [
+        (
+            (actuator.dynamics, speed),
+            lambda x, run: respond(gain * x, run.rest, run.h, T, alpha, run.duration, speed),
+            None,
+        )
+    ]
 
 
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:

@@ -76,7 +76,9 @@ def _proper(table: Table) -> TransferFunction:
 def _alpha(table: Table) -> float:
     alpha = table.number("alpha", above=0.0)
     if alpha >= 2.0:
-        raise table.fail("alpha", f"is {alpha:g}", "give an order in (0, 2); beyond it 1/(T s^alpha + 1) is unstable")
+        raise table.fail(
+            "alpha", f"is {alpha:g}", "give an order in (0, 2); beyond it 1/(T s^alpha + 1) is unstable"
+        )
     return alpha
 
 

@@ -1,8 +1,8 @@
 """The compiled loops of the chain simulator (``kernels.c``), as functions of arrays.
 
-The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left behind.
-Every function takes a session's signal, shape (n,), and ``rest`` (n,), true where an experiment begins and the loop
-starts at rest; it returns a new array of shape (n,).
+The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
+behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), true where an experiment
+begins and the loop starts at rest; it returns a new array of shape (n,).
 """
 
 from __future__ import annotations
@@ -18,18 +18,24 @@ from focgen.errors import BuildError
 
 _SOURCE = Path(__file__).with_name("kernels.c")
 _DECLARATIONS = """
-void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0, const double *b1,
-                  const double *pair, double through, int switching, double *z);
-void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const double *down);
-void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau, double vent, double scale, int sub);
-void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, double h, double rate, double tau, int soft, int sub);
-void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double start);
-void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double left);
-void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width, double power, double beta);
-void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *a,
-                   double *w);
-int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double *made, const double *weight,
-                       int coarse, int order, const double *ar, double *mean);
+void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
+    const double *b0, const double *b1, const double *pair, double through, int switching, double *z);
+void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const
+    double *down);
+void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
+    double vent, double scale, int sub);
+void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, double h, double rate,
+    double tau, int soft, int sub);
+void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double
+    start);
+void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double
+    left);
+void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width, double
+    power, double beta);
+void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
+    const double *a, double *w);
+int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double
+    *made, const double *weight, int coarse, int order, const double *ar, double *mean);
 void focgen_products(int n, int k, const double *r, double *m);
 """
 _FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
@@ -54,19 +60,33 @@ def _call(name: str, x: np.ndarray, rest: np.ndarray, *others) -> np.ndarray:
     ffi, library = _library()
     x = np.ascontiguousarray(x, float)
     y = np.empty_like(x)
-    getattr(library, name)(len(x), ffi.from_buffer("double[]", x), ffi.from_buffer("double[]", y),
-                           ffi.from_buffer("unsigned char[]", rest), *others)
+    getattr(library, name)(
+        len(x),
+        ffi.from_buffer("double[]", x),
+        ffi.from_buffer("double[]", y),
+        ffi.from_buffer("unsigned char[]", rest),
+        *others,
+    )
     return y
 
 
 def modes(x, rest, a, b0, b1, pair, through: float, switching: bool) -> np.ndarray:
-    """Sum of first-order modes; ``a``, ``b0``, ``b1`` (2, m) and ``pair`` (2, 6), rows loading and unloading."""
+    """Sum of first-order modes; ``a``, ``b0``, ``b1`` (2, m) and ``pair`` (2, 6), rows loading and
+    unloading."""
     ffi, _ = _library()
     tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
     scratch = np.empty(tables[0].shape[1])
     pointers = [ffi.from_buffer("double[]", t) for t in tables]
-    return _call("focgen_modes", x, rest, len(scratch), *pointers, float(through), int(switching),
-                 ffi.from_buffer("double[]", scratch))
+    return _call(
+        "focgen_modes",
+        x,
+        rest,
+        len(scratch),
+        *pointers,
+        float(through),
+        int(switching),
+        ffi.from_buffer("double[]", scratch),
+    )
 
 
 def lag(x, rest, h: float, up: float, down: float) -> np.ndarray:
@@ -105,7 +125,8 @@ def stick(x, rest, band: float, left: float) -> np.ndarray:
 
 
 def bouc_wen(x, rest, width: float, power: float = 1.0, beta: float = 0.5) -> np.ndarray:
-    """Bouc–Wen's hysteretic variable in [−1, 1]; ``width`` is the input's travel to reverse it, units of x."""
+    """Bouc–Wen's hysteretic variable in [−1, 1]; ``width`` is the input's travel to reverse it, units of
+    x."""
     return _call("focgen_bouc_wen", x, rest, float(width), float(power), float(beta))
 
 
@@ -115,24 +136,40 @@ def rational(x, rest, b, a) -> np.ndarray:
     order = max(len(a), len(b)) - 1
     tables = [np.ascontiguousarray(np.pad(t, (0, order + 1 - len(t))), float) for t in (b, a)]
     scratch = np.zeros(order + 1)
-    return _call("focgen_filter", x, rest, order, *(ffi.from_buffer("double[]", t) for t in (*tables, scratch)))
+    return _call(
+        "focgen_filter", x, rest, order, *(ffi.from_buffer("double[]", t) for t in (*tables, scratch))
+    )
 
 
 def products(rows: np.ndarray) -> np.ndarray:
-    """Every row's product with every other, (k, k), of ``rows`` (k, n); unlike ``rows @ rows.T`` in one thread."""
+    """Every row's product with every other, (k, k), of ``rows`` (k, n); unlike ``rows @ rows.T`` in one
+    thread."""
     ffi, library = _library()
     rows = np.ascontiguousarray(rows, float)
     found = np.empty((len(rows), len(rows)))
-    library.focgen_products(rows.shape[1], len(rows), ffi.from_buffer("double[]", rows), ffi.from_buffer("double[]", found))
+    library.focgen_products(
+        rows.shape[1], len(rows), ffi.from_buffer("double[]", rows), ffi.from_buffer("double[]", found)
+    )
     return found
 
 
 def innovations(y, made, weight, rest, coarse: int, ar) -> np.ndarray:
-    """(y − made) · weight of every experiment in means of ``coarse`` samples, whitened by ``ar``; all (n,) but ``ar``."""
+    """(y − made) · weight of every experiment in means of ``coarse`` samples, whitened by ``ar``; all (n,)
+    but ``ar``."""
     ffi, library = _library()
     arrays = [np.ascontiguousarray(a, float) for a in (y, made, weight, ar)]
     found, scratch = np.empty(len(y)), np.empty(len(y))
     pointers = [ffi.from_buffer("double[]", a) for a in (*arrays, found, scratch)]
-    count = library.focgen_innovations(len(y), pointers[0], pointers[4], ffi.from_buffer("unsigned char[]", rest),
-                                       pointers[1], pointers[2], coarse, len(ar) - 1, pointers[3], pointers[5])
+    count = library.focgen_innovations(
+        len(y),
+        pointers[0],
+        pointers[4],
+        ffi.from_buffer("unsigned char[]", rest),
+        pointers[1],
+        pointers[2],
+        coarse,
+        len(ar) - 1,
+        pointers[3],
+        pointers[5],
+    )
     return found[:count]

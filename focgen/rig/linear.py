@@ -13,9 +13,11 @@ from focgen.rig.modes import hold, respond
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
 
 
-def run(transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: float, duration: float,
-        held: bool = False) -> np.ndarray:
-    """The response to ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is true, every ``duration`` s or sooner.
+def run(
+    transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: float, duration: float, held: bool = False
+) -> np.ndarray:
+    """The response to ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is true, every
+    ``duration`` s or sooner.
 
     ``held``: the input is a staircase, not linear between samples.
     """
@@ -32,7 +34,8 @@ def run(transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: float, d
 
 
 def oscillator(x: np.ndarray, rest: np.ndarray, h: float, period: float, damping: float) -> np.ndarray:
-    """The response of w²/(s² + 2 d w s + w²), w = 2π/``period`` (s), ``damping`` d < 1, input linear between samples."""
+    """The response of w²/(s² + 2 d w s + w²), w = 2π/``period`` (s), ``damping`` d < 1, input linear between
+    samples."""
     w = 2.0 * np.pi / period
     pole = w * complex(-damping, np.sqrt(1.0 - damping**2))
     scale = -2.0 * (w * w / (2j * pole.imag)) / pole
@@ -55,7 +58,8 @@ def single_lag(transfer: TransferFunction) -> tuple[float, float, float] | None:
 
 @lru_cache(maxsize=512)
 def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Numerator and denominator in powers of z^-1, exact at the samples: the modes one by one, put together again."""
+    """Numerator and denominator in powers of z^-1, exact at the samples: the modes one by one, put together
+    again."""
     num, den = _coefficients(transfer.num), _coefficients(transfer.den)
     if len(den) == 1:
         return num / den[0], np.ones(1)
@@ -63,7 +67,9 @@ def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndar
     poles = np.roots(den).astype(complex)
     if _coincide(poles):
         return _by_exponential(num, den, h, held)
-    residues = np.polyval(num, poles) / (den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)]))
+    residues = np.polyval(num, poles) / (
+        den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)])
+    )
     a = np.exp(poles * h)
     gain = np.where(poles == 0, h, (a - 1) / np.where(poles == 0, 1, poles))  # of a step over one sample
     past = residues * gain if held else residues * h * _ramp(poles * h, a)
@@ -73,7 +79,7 @@ def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndar
     for i in range(len(poles)):
         rest = np.atleast_1d(np.poly(np.delete(a, i)))
         b[: len(rest)] += now[i] * rest
-        b[1: len(rest) + 1] += past[i] * rest
+        b[1 : len(rest) + 1] += past[i] * rest
     return b.real, whole.real
 
 
@@ -96,7 +102,7 @@ def _by_exponential(num: np.ndarray, den: np.ndarray, h: float, held: bool) -> t
 
     scale = abs(den[-1] / den[0]) ** (1 / (len(den) - 1)) or 1.0  # time in units of 1/scale: well conditioned
     powers = scale ** np.arange(len(den) - 1, -1, -1.0)
-    num, den = num * powers[-len(num):], den * powers
+    num, den = num * powers[-len(num) :], den * powers
     b, a, _ = cont2discrete((num / den[0], den / den[0]), h * scale, "zoh" if held else "foh")
     return np.atleast_2d(b)[0], a
 
@@ -110,7 +116,8 @@ def _coefficients(terms) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _fractional(transfer: TransferFunction, h: float, duration: float):
-    """Mode tables: the branch cut by the trapezoidal rule in ln ξ, the poles of the principal sheet by residues."""
+    """Mode tables: the branch cut by the trapezoidal rule in ln ξ, the poles of the principal sheet by
+    residues."""
     x = np.arange(np.log(1e-3 / duration), np.log(30.0 / h), _SPACING)
     xi = np.exp(x)
     cut = transfer(xi * np.exp(1j * np.pi))
@@ -135,7 +142,9 @@ def _fractional(transfer: TransferFunction, h: float, duration: float):
         else:
             q = pole * h
             m, scale = (np.exp(q) - 1) / q, -2 * residue / pole
-            pair = np.array([[c.real, c.imag] for c in (np.exp(q), scale * (m - np.exp(q)), scale * (1 - m))]).ravel()
+            pair = np.array(
+                [[c.real, c.imag] for c in (np.exp(q), scale * (m - np.exp(q)), scale * (1 - m))]
+            ).ravel()
     return *(np.stack([row, row]) for row in rows), np.stack([pair, pair]), through
 
 
@@ -146,7 +155,8 @@ def _residue(transfer: TransferFunction, pole: complex) -> complex:
 
 
 def _poles(transfer: TransferFunction, low: float, high: float) -> list[complex]:
-    """Zeros of the denominator on the principal sheet, upper half plane and negative-free axis, by Newton's rule."""
+    """Zeros of the denominator on the principal sheet, upper half plane and negative-free axis, by Newton's
+    rule."""
     radius, angle = np.meshgrid(np.geomspace(low, high, 60), np.linspace(0.0, 0.999 * np.pi, 24))
     s = (radius * np.exp(1j * angle)).ravel()
     with np.errstate(all="ignore"):

@@ -1,10 +1,10 @@
 """1/(T s^α + 1) as a sum of first-order modes: one pass over the samples, no memory to cut off.
 
-For 0 < α < 2 the impulse response is ∫ μ(ξ) e^{−ξt} dξ, μ(ξ) = T ξ^α sin(απ)/(π (1 + 2 T ξ^α cos(απ) + T² ξ^{2α})),
-plus, for α > 1, the pole pair at T^{−1/α} e^{±iπ/α} (diffusive representation; G. Montseny, ESAIM Proc. 5, 1998).
-The trapezoidal rule in ln ξ converges geometrically but for that pole, whose share is known in closed form:
-its residue times 1/(exp(2πd/Δ) + 1), d = π(1 − α)/α, with nodes half a spacing Δ either side of it. One formula
-then holds for all α, α = 1 included, where the pole alone remains.
+For 0 < α < 2 the impulse response is ∫ μ(ξ) e^{−ξt} dξ, μ(ξ) = T ξ^α sin(απ)/(π (1 + 2 T ξ^α cos(απ) + T²
+ξ^{2α})), plus, for α > 1, the pole pair at T^{−1/α} e^{±iπ/α} (diffusive representation; G. Montseny, ESAIM
+Proc. 5, 1998). The trapezoidal rule in ln ξ converges geometrically but for that pole, whose share is known
+in closed form: its residue times 1/(exp(2πd/Δ) + 1), d = π(1 − α)/α, with nodes half a spacing Δ either side
+of it. One formula then holds for all α, α = 1 included, where the pole alone remains.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e
 
 @dataclass(frozen=True)
 class Modes:
-    """Rates (m,) in 1/s, weights (m,) in 1/s, the pair's pole and residue (1/s), and the instantaneous share."""
+    """Rates (m,) in 1/s, weights (m,) in 1/s, the pair's pole and residue (1/s), and the instantaneous
+    share."""
 
     rates: np.ndarray
     weights: np.ndarray
@@ -50,14 +51,17 @@ def fractional_lag(T: float, alpha: float, h: float, duration: float) -> Modes:
     residue = -2 * pole / alpha * share  # both of the pair: twice the real part of one
     if distance > np.pi / 2:  # its share is below 1e-5 there, and the mode would grow
         pole, residue = -np.exp(centre) + 0j, 0j
-    return Modes(xi[seen], weights[seen], complex(pole), complex(residue), float(np.sum(weights[~seen] / xi[~seen])))
+    return Modes(
+        xi[seen], weights[seen], complex(pole), complex(residue), float(np.sum(weights[~seen] / xi[~seen]))
+    )
 
 
-def respond(x: np.ndarray, rest: np.ndarray, h: float, T: float, alpha: float, duration: float,
-            unloading: float = 1.0) -> np.ndarray:
-    """The response of 1/(T s^alpha + 1) to ``x`` (n,), linear between samples of ``h`` s; ``rest`` (n,) is true where an
-    experiment begins, none longer than ``duration`` s. ``unloading`` multiplies every rate while the load falls short
-    of the response.
+def respond(
+    x: np.ndarray, rest: np.ndarray, h: float, T: float, alpha: float, duration: float, unloading: float = 1.0
+) -> np.ndarray:
+    """The response of 1/(T s^alpha + 1) to ``x`` (n,), linear between samples of ``h`` s; ``rest`` (n,) is
+    true where an experiment begins, none longer than ``duration`` s. ``unloading`` multiplies every rate
+    while the load falls short of the response.
     """
     a, b0, b1, pair, through = tables(T, alpha, h, 2.0 ** np.ceil(np.log2(duration)), unloading)
     return kernels.modes(x, rest, a, b0, b1, pair, through, unloading != 1.0)
@@ -81,7 +85,8 @@ def _tables(modes: Modes, h: float, speed: float):
 
 
 def hold(q):
-    """Coefficients of z' = λ(z − x), λh = q, for x linear over the sample: a, of the past and of the present x."""
+    """Coefficients of z' = λ(z − x), λh = q, for x linear over the sample: a, of the past and of the present
+    x."""
     a = np.exp(q)
     mean = np.where(np.abs(q) < 1e-4, 1 + q / 2 + q * q / 6, (a - 1) / np.where(q == 0, 1, q))
     return a, mean - a, 1 - mean

@@ -22,8 +22,8 @@ _BESIDES = ("name", "form", "stage", "clock", "carried")
 
 @dataclass(frozen=True)
 class Replayed:
-    """One experiment: ``gof`` of the output, eq. (4) of the paper; ``rmse`` of the output and of every signal simulated
-    and logged, in their units."""
+    """One experiment: ``gof`` of the output, eq. (4) of the paper; ``rmse`` of the output and of every
+    signal simulated and logged, in their units."""
 
     gof: float
     rmse: float
@@ -38,12 +38,16 @@ class Replay:
     simulated: dict[str, dict[str, np.ndarray]]
 
 
-def replay(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], first: float | None = None,
-           last: float | None = None) -> Replay:
+def replay(
+    rig: Rig | str | Path,
+    logs: Sequence[Experiment | str | Path],
+    first: float | None = None,
+    last: float | None = None,
+) -> Replay:
     """Run the rig on each experiment's ``command`` where it is logged, else on its ``pressure``.
 
-    The experiments are one session and follow the one the rig's effects were found in. ``first``, ``last``: s within
-    each experiment. Raises RigError for effects unknown, LogError for logs that cannot be used.
+    The experiments are one session and follow the one the rig's effects were found in. ``first``, ``last``:
+    s within each experiment. Raises RigError for effects unknown, LogError for logs that cannot be used.
     """
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
     logs = experiments(rig, logs, first, last)
@@ -52,28 +56,40 @@ def replay(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path], first
     return Replay(results, {log.name: made for log, made in zip(logs, simulated)})
 
 
-def experiments(rig: Rig, logs: Sequence[Experiment | str | Path], first=None, last=None) -> tuple[Experiment, ...]:
+def experiments(
+    rig: Rig, logs: Sequence[Experiment | str | Path], first=None, last=None
+) -> tuple[Experiment, ...]:
     """The logs read, and cut to ``first`` … ``last`` s."""
     if logs and all(isinstance(log, Experiment) for log in logs):
         return tuple(log.between(first, last) for log in logs)
     return read_logs(logs, rig.signals, rig.sample_time, first, last)
 
 
-def simulate_session(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] | None = None,
-                     continues: bool = True) -> list[dict[str, np.ndarray]]:
-    """The signals that each experiment should show, by role; ``continues``: after the session the rig's effects left."""
+def simulate_session(
+    rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] | None = None, continues: bool = True
+) -> list[dict[str, np.ndarray]]:
+    """The signals that each experiment should show, by role; ``continues``: after the session the rig's
+    effects left."""
     entry = "command" if all("command" in log for log in logs) else "pressure"
     if not all(entry in log for log in logs):
-        raise LogError(logs[0].name, "has neither command nor pressure throughout", "name an input in [signals]")
+        raise LogError(
+            logs[0].name, "has neither command nor pressure throughout", "name an input in [signals]"
+        )
     clock = _clock(rig) if continues else 0.0
     begin = min(log.start for log in logs)
     ahead = clock if begin < clock else 0.0
-    run = Run.of([len(log) for log in logs], [log.start + ahead for log in logs], logs[0].sample_time,
-                 _carried(rig) if continues else {})
+    run = Run.of(
+        [len(log) for log in logs],
+        [log.start + ahead for log in logs],
+        logs[0].sample_time,
+        _carried(rig) if continues else {},
+    )
     tap: dict[str, np.ndarray] = {}
     x = np.concatenate([np.asarray(log[entry], float) for log in logs])
     first = "regulator" if entry == "command" else "actuator"
-    Chain(rig, tuple(placed_in(rig) if placed is None else placed)).run(x, first, "sensor", run, entry == "command", tap)
+    Chain(rig, tuple(placed_in(rig) if placed is None else placed)).run(
+        x, first, "sensor", run, entry == "command", tap
+    )
     return [{_LEAVES[stage]: y[a:b] for stage, y in tap.items()} for a, b in run.spans]
 
 
@@ -85,17 +101,34 @@ def placed_in(rig: Rig) -> tuple[Placed, ...]:
 def _placed(rig: Rig, table) -> Placed:
     effect = library().get(table["name"])
     if effect is None:
-        raise RigError(f"{rig.name} [[effects]]", f"names the unknown effect {table['name']!r}",
-                       f"known: {', '.join(library())}")
-    form = next((f for f in effect.forms if f.name == table.get("form", f.name)
-                 and all(p.name in table for p in f.parameters)), None)
+        raise RigError(
+            f"{rig.name} [[effects]]",
+            f"names the unknown effect {table['name']!r}",
+            f"known: {', '.join(library())}",
+        )
+    form = next(
+        (
+            f
+            for f in effect.forms
+            if f.name == table.get("form", f.name) and all(p.name in table for p in f.parameters)
+        ),
+        None,
+    )
     if form is None:
         known = "; ".join(f"{f.name}: {', '.join(p.name for p in f.parameters)}" for f in effect.forms)
-        raise RigError(f"{rig.name} [[effects]] {effect.name}", "has no form with these parameters", f"give one of {known}")
+        raise RigError(
+            f"{rig.name} [[effects]] {effect.name}",
+            "has no form with these parameters",
+            f"give one of {known}",
+        )
     stage = table.get("stage", effect.stage)
     strange = set(table) - {p.name for p in form.parameters} - set(_BESIDES)
     if stage not in STAGES or strange:
-        what = f"has the stage {stage!r}" if stage not in STAGES else f"has the unknown key {sorted(strange)[0]!r}"
+        what = (
+            f"has the stage {stage!r}"
+            if stage not in STAGES
+            else f"has the unknown key {sorted(strange)[0]!r}"
+        )
         raise RigError(f"{rig.name} [[effects]] {effect.name}", what, f"stages are {', '.join(STAGES)}")
     return Placed(effect.name, form, stage, tuple(float(table[p.name]) for p in form.parameters))
 
@@ -109,16 +142,23 @@ def _carried(rig: Rig) -> dict[str, float]:
 
 
 def session_state(rig: Rig) -> tuple[float, dict[str, float]]:
-    """Where the session that the rig's effects were found in ended: its clock, s, and what outlives a rest."""
+    """Where the session that the rig's effects were found in ended: its clock, s, and what outlives a
+    rest."""
     return _clock(rig), _carried(rig)
 
 
 def effect_tables(placed: Sequence[Placed], left: dict[str, dict], clock: float) -> tuple[dict, ...]:
-    """Effects as ``[[effects]]`` tables, with what outlives the session: ``left`` by effect, its ``clock`` in s."""
+    """Effects as ``[[effects]]`` tables, with what outlives the session: ``left`` by effect, its ``clock``
+    in s."""
     tables = []
     for p in placed:
-        table = {"name": p.effect, "form": p.form.name, "stage": p.stage,
-                 **{q.name: float(v) for q, v in zip(p.form.parameters, p.values)}, "clock": float(clock)}
+        table = {
+            "name": p.effect,
+            "form": p.form.name,
+            "stage": p.stage,
+            **{q.name: float(v) for q, v in zip(p.form.parameters, p.values)},
+            "clock": float(clock),
+        }
         tables.append(table | ({"carried": left[p.effect]} if left.get(p.effect) else {}))
     return tuple(tables)
 

@@ -15,6 +15,8 @@ def _quartic(x, values, run):
 
 def quartic(slot):
     """x (1 + a q + b q² + c q³), q = |x| over the largest level."""
-    sizes = (Parameter(n, lower=-2.0, upper=2.0, starts=(0.02,), zero=0.0) for n in ("first", "second", "third"))
+    sizes = (
+        Parameter(n, lower=-2.0, upper=2.0, starts=(0.02,), zero=0.0) for n in ("first", "second", "third")
+    )
     scale = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
     return Form("quartic", slot, (*sizes, scale), _quartic)

@@ -9,6 +9,6 @@ def delayed(x, delay, run):
     whole, part = int(back), back % 1.0
     nearer, further = np.zeros_like(x), np.zeros_like(x)
     for first, last in run.spans:
-        nearer[first + whole:last] = x[first:max(last - whole, first)]
-        further[first + whole + 1:last] = x[first:max(last - whole - 1, first)]
+        nearer[first + whole : last] = x[first : max(last - whole, first)]
+        further[first + whole + 1 : last] = x[first : max(last - whole - 1, first)]
     return (1.0 - part) * nearer + part * further

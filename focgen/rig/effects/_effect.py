@@ -1,6 +1,7 @@
 """What an effect is: a family of forms, each nested in the nominal chain.
 
-A file of this package that defines ``EFFECT`` adds a family to the library; nothing else needs to know its name.
+A file of this package that defines ``EFFECT`` adds a family to the library; nothing else needs to know its
+name.
 """
 
 from __future__ import annotations
@@ -17,19 +18,20 @@ SLOTS = {
     "actuator": ("load", "drive", "dynamics", "response"),
     "sensor": ("strain", "reading"),
 }
-"""Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the pressure
-entering the actuator; ``drive``: K(p) p; ``dynamics``: the rates of the actuator; ``response``: what leaves it; ``strain``:
-into the sensor; ``reading``: what leaves it."""
+"""Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the
+pressure entering the actuator; ``drive``: K(p) p; ``dynamics``: the rates of the actuator; ``response``:
+what leaves it; ``strain``: into the sensor; ``reading``: what leaves it."""
 
 
 @dataclass(frozen=True)
 class Parameter:
     """One parameter of a form.
 
-    Its unit is level^``level`` · time^``time``; ``lower``, ``upper`` and ``starts`` are in multiples of references taken
-    from the data: the largest magnitude at the slot, and the time ``clock``: the rig's "response" time, the
-    "sample" time or the "record" (one experiment; "session": all). ``zero`` is the value that gives the nominal chain,
-    None where another parameter's zero does. ``log``: searched on a logarithmic scale.
+    Its unit is level^``level`` · time^``time``; ``lower``, ``upper`` and ``starts`` are in multiples of
+    references taken from the data: the largest magnitude at the slot, and the time ``clock``: the rig's
+    "response" time, the "sample" time or the "record" (one experiment; "session": all). ``zero`` is the
+    value that gives the nominal chain, None where another parameter's zero does. ``log``: searched on a
+    logarithmic scale.
     """
 
     name: str
@@ -47,8 +49,9 @@ class Parameter:
 class Run:
     """A session being simulated, its experiments one after the other in every array of shape (n,).
 
-    ``h`` in s; ``rest`` (n,) is true at each experiment's first sample; ``clock`` (n,) is the session's time in s;
-    ``duration`` of the longest experiment in s; ``carried``: what outlived the rests before this session.
+    ``h`` in s; ``rest`` (n,) is true at each experiment's first sample; ``clock`` (n,) is the session's time
+    in s; ``duration`` of the longest experiment in s; ``carried``: what outlived the rests before this
+    session.
     """
 
     h: float
@@ -64,7 +67,13 @@ class Run:
         return list(zip(firsts, [*firsts[1:], len(self.rest)]))
 
     @classmethod
-    def of(cls, lengths: Sequence[int], starts: Sequence[float], h: float, carried: Mapping[str, float] | None = None):
+    def of(
+        cls,
+        lengths: Sequence[int],
+        starts: Sequence[float],
+        h: float,
+        carried: Mapping[str, float] | None = None,
+    ):
         """The run of experiments of ``lengths`` samples beginning at ``starts`` s on the session's clock."""
         rest = np.zeros(sum(lengths), np.uint8)
         rest[np.cumsum([0, *lengths[:-1]])] = 1
@@ -80,9 +89,10 @@ class Form:
     """One formula: ``act(x, values, run)`` maps what passes its ``slot``, shape (n,), to what leaves it.
 
     In the slot ``dynamics`` it returns the factor by which all rates are multiplied when unloading.
-    ``seen(y)`` reads the values off what was measured, (n,), where that can be done at sight; None where it is not there.
-    ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of a later session.
-    ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is linear, None where not.
+    ``seen(y)`` reads the values off what was measured, (n,), where that can be done at sight; None where it
+    is not there. ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of
+    a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is
+    linear, None where not.
     """
 
     name: str
@@ -98,11 +108,11 @@ class Form:
 class Excitation:
     """What a set of experiments does to the rig, as an identifiability check sees it.
 
-    ``levels``: how many distinct levels (a tenth of the range apart) were held or passed; ``lowest`` of the range visited
-    above zero; ``unloads``, ``reversals``: how often the input falls by a tenth of the range, turns round above zero;
-    ``hold``: the longest constant input in response times; ``fastest``: the fastest tenth-of-range change in response
-    times; ``experiments``; ``repeats``: of a level after a higher one; ``duration`` in response times; ``samples`` per
-    response time.
+    ``levels``: how many distinct levels (a tenth of the range apart) were held or passed; ``lowest`` of the
+    range visited above zero; ``unloads``, ``reversals``: how often the input falls by a tenth of the range,
+    turns round above zero; ``hold``: the longest constant input in response times; ``fastest``: the fastest
+    tenth-of-range change in response times; ``experiments``; ``repeats``: of a level after a higher one;
+    ``duration`` in response times; ``samples`` per response time.
     """
 
     levels: int
@@ -122,7 +132,8 @@ Check = Callable[[Excitation], str | None]
 
 @dataclass(frozen=True)
 class Effect:
-    """A family. ``stage`` is the usual one, ``also`` others it may sit in. ``single``: nature has one form only.
+    """A family. ``stage`` is the usual one, ``also`` others it may sit in. ``single``: nature has one form
+    only.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
     ``noiselike``: what it does cannot be foretold from the input, as rounding.

@@ -49,8 +49,8 @@ def forms(slot):
 
 
 def deep_forms(slot):
-    """Besides, a lag of a part of the signal only, and one with its times spread (Cole and Cole, J. Chem. Phys. 9,
-    1941), as where something has to soak in."""
+    """Besides, a lag of a part of the signal only, and one with its times spread (Cole and Cole, J. Chem.
+    Phys. 9, 1941), as where something has to soak in."""
     share = Parameter("share", lower=0.0, upper=1.0, starts=(0.3, 0.5), zero=0.0)
     tau = Parameter("lag", time=1, lower=0.02, upper=20.0, starts=(0.2, 1.5), log=True)
     order = Parameter("order", lower=0.4, upper=1.0, starts=(0.8,))

@@ -26,7 +26,11 @@ def _bouc_wen(x, values, run):
 
 def _wide(x, values, run):
     narrow, broad, width = values
-    return x + narrow * (kernels.play(x, run.rest, width) - x) + broad * (kernels.play(x, run.rest, 4.0 * width) - x)
+    return (
+        x
+        + narrow * (kernels.play(x, run.rest, width) - x)
+        + broad * (kernels.play(x, run.rest, 4.0 * width) - x)
+    )
 
 
 def _widening(x, values, run):
@@ -40,17 +44,40 @@ def forms(slot):
     """The forms of a hysteresis at ``slot``."""
     return [
         Form("prandtl_ishlinskii", slot, (_SHARE, _WIDTH), _prandtl_ishlinskii),
-        Form("play", slot, (Parameter("width", level=1, lower=0.0, upper=0.6, starts=(0.02, 0.1), zero=0.0),), _play),
-        Form("bouc_wen", slot, (
-            Parameter("size", level=1, lower=-1.0, upper=1.0, starts=(0.05, 0.05), zero=0.0), _WIDTH,
-        ), _bouc_wen),
-        Form("two_plays", slot, (
-            Parameter("narrow", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0),
-            Parameter("broad", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0), _WIDTH,
-        ), _wide),
-        Form("widening", slot, (
-            Parameter("even", lower=0.0, upper=0.7, starts=(0.1, 0.1), zero=0.0),
-            Parameter("growing", lower=-0.5, upper=0.7, starts=(0.1, 0.1), zero=0.0), _WIDTH,
-            Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
-        ), _widening),
+        Form(
+            "play",
+            slot,
+            (Parameter("width", level=1, lower=0.0, upper=0.6, starts=(0.02, 0.1), zero=0.0),),
+            _play,
+        ),
+        Form(
+            "bouc_wen",
+            slot,
+            (
+                Parameter("size", level=1, lower=-1.0, upper=1.0, starts=(0.05, 0.05), zero=0.0),
+                _WIDTH,
+            ),
+            _bouc_wen,
+        ),
+        Form(
+            "two_plays",
+            slot,
+            (
+                Parameter("narrow", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0),
+                Parameter("broad", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0),
+                _WIDTH,
+            ),
+            _wide,
+        ),
+        Form(
+            "widening",
+            slot,
+            (
+                Parameter("even", lower=0.0, upper=0.7, starts=(0.1, 0.1), zero=0.0),
+                Parameter("growing", lower=-0.5, upper=0.7, starts=(0.1, 0.1), zero=0.0),
+                _WIDTH,
+                Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
+            ),
+            _widening,
+        ),
     ]

@@ -28,23 +28,42 @@ def _wandering(x, values, run):
 
 
 def forms(slot, level, onto):
-    """The forms of a trend; ``onto(x, trend)`` applies it, ``level`` is the power of the level in its unit."""
+    """The forms of a trend; ``onto(x, trend)`` applies it, ``level`` is the power of the level in its
+    unit."""
+
     def act(trend):
         return lambda x, values, run: onto(x, trend(x, values, run))
 
     size = dict(level=level, lower=-2.0, upper=2.0, zero=0.0, clock="session")
     return [
         Form("linear", slot, (Parameter("rate", time=-1, starts=(0.1,), **size),), act(_linear)),
-        Form("settling", slot, (
-            Parameter("size", starts=(0.1, 0.1), **size),
-            Parameter("time", time=1, clock="session", lower=0.08, upper=5.0, starts=(0.1, 0.5), log=True),
-        ), act(_settling)),
-        Form("bending", slot, (
-            Parameter("rate", time=-1, starts=(0.1,), **size),
-            Parameter("acceleration", time=-2, starts=(0.05,), **size),
-        ), act(_bending)),
-        Form("wandering", slot, (  # a spline through values at equal times, the last one kept
-            *(Parameter(name, starts=(0.01,), **size) for name in ("first", "second", "third", "fourth")),
-            Parameter("spacing", time=1, clock="session", lower=0.2, upper=0.5, starts=(0.25,), log=True),
-        ), act(_wandering)),
+        Form(
+            "settling",
+            slot,
+            (
+                Parameter("size", starts=(0.1, 0.1), **size),
+                Parameter(
+                    "time", time=1, clock="session", lower=0.08, upper=5.0, starts=(0.1, 0.5), log=True
+                ),
+            ),
+            act(_settling),
+        ),
+        Form(
+            "bending",
+            slot,
+            (
+                Parameter("rate", time=-1, starts=(0.1,), **size),
+                Parameter("acceleration", time=-2, starts=(0.05,), **size),
+            ),
+            act(_bending),
+        ),
+        Form(
+            "wandering",
+            slot,
+            (  # a spline through values at equal times, the last one kept
+                *(Parameter(name, starts=(0.01,), **size) for name in ("first", "second", "third", "fourth")),
+                Parameter("spacing", time=1, clock="session", lower=0.2, upper=0.5, starts=(0.25,), log=True),
+            ),
+            act(_wandering),
+        ),
     ]

@@ -40,16 +40,34 @@ EFFECT = Effect(
     confused_with=("gain_nonlinearity", "sensor_saturation", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
     forms=[
-        Form("knee", "response", (
-            _PLACE, Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
-        ), _knee),
-        Form("soft_knee", "response", (
-            _PLACE, Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
-            Parameter("width", level=1, lower=3e-3, upper=0.2, starts=(0.02, 0.05), log=True),
-        ), _soft),
-        Form("early_knee", "drive", (
-            _PLACE, Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
-        ), _knee),
+        Form(
+            "knee",
+            "response",
+            (
+                _PLACE,
+                Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
+            ),
+            _knee,
+        ),
+        Form(
+            "soft_knee",
+            "response",
+            (
+                _PLACE,
+                Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
+                Parameter("width", level=1, lower=3e-3, upper=0.2, starts=(0.02, 0.05), log=True),
+            ),
+            _soft,
+        ),
+        Form(
+            "early_knee",
+            "drive",
+            (
+                _PLACE,
+                Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
+            ),
+            _knee,
+        ),
         Form("gradual", "response", (_PLACE, _STIFFNESS), _gradual),
         Form("hertz", "response", (_PLACE, _STIFFNESS), _hertz),
     ],

@@ -27,7 +27,11 @@ def _logarithmic(x, values, run):
 
 def _two(x, values, run):
     quick, slow, tau = values
-    return x + quick * kernels.lag(x, run.rest, run.h, tau / 5, tau / 5) + slow * kernels.lag(x, run.rest, run.h, tau, tau)
+    return (
+        x
+        + quick * kernels.lag(x, run.rest, run.h, tau / 5, tau / 5)
+        + slow * kernels.lag(x, run.rest, run.h, tau, tau)
+    )
 
 
 def _pole_response(values, s):
@@ -54,11 +58,23 @@ EFFECT = Effect(
     needs=lambda e: None if e.hold > 8 else "no hold is long beside the rig's response: hold a level longer",
     forms=[
         Form("pole", "response", (_SHARE, _tau(6.0, 12.0, 60.0)), _pole, response=_pole_response),
-        Form("logarithmic", "response", (_SHARE, _tau(15.0, 30.0, 150.0)), _logarithmic,
-             response=_logarithmic_response),
-        Form("two_poles", "response", (
-            Parameter("quick", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0),
-            Parameter("slow", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0), _tau(20.0, 30.0, 80.0),
-        ), _two, response=_two_response),
+        Form(
+            "logarithmic",
+            "response",
+            (_SHARE, _tau(15.0, 30.0, 150.0)),
+            _logarithmic,
+            response=_logarithmic_response,
+        ),
+        Form(
+            "two_poles",
+            "response",
+            (
+                Parameter("quick", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0),
+                Parameter("slow", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0),
+                _tau(20.0, 30.0, 80.0),
+            ),
+            _two,
+            response=_two_response,
+        ),
     ],
 )

@@ -13,7 +13,9 @@ def _hard(x, values, run):
 
 def _soft(x, values, run):
     threshold, width = values
-    size = width * (np.logaddexp(0.0, (np.abs(x) - threshold) / width) - np.logaddexp(0.0, -threshold / width))
+    size = width * (
+        np.logaddexp(0.0, (np.abs(x) - threshold) / width) - np.logaddexp(0.0, -threshold / width)
+    )
     return np.sign(x) * size
 
 
@@ -27,8 +29,14 @@ EFFECT = Effect(
     also=("regulator",),
     forms=[
         Form("hard", "load", (_LEVEL,), _hard),
-        Form("soft", "load", (
-            _LEVEL, Parameter("width", level=1, lower=3e-3, upper=0.2, starts=(0.02, 0.05), log=True),
-        ), _soft),
+        Form(
+            "soft",
+            "load",
+            (
+                _LEVEL,
+                Parameter("width", level=1, lower=3e-3, upper=0.2, starts=(0.02, 0.05), log=True),
+            ),
+            _soft,
+        ),
     ],
 )

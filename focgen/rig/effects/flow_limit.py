@@ -3,7 +3,9 @@
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
-_RATE = Parameter("rate", level=1, time=-1, lower=1e-3, upper=1e3, starts=(10.0, 2.0, 0.5), zero=1e3, log=True)
+_RATE = Parameter(
+    "rate", level=1, time=-1, lower=1e-3, upper=1e3, starts=(10.0, 2.0, 0.5), zero=1e3, log=True
+)
 
 
 def _hard(x, values, run):
@@ -23,8 +25,14 @@ EFFECT = Effect(
     needs=lambda e: None if e.levels >= 3 and e.fastest < 1.0 else "needs fast steps of several sizes",
     forms=[
         Form("hard", "supply", (_RATE,), _hard),
-        Form("saturating", "supply", (
-            _RATE, Parameter("lag", time=1, lower=0.0, upper=5.0, starts=(0.05, 0.05, 0.1), zero=0.0),
-        ), _soft),
+        Form(
+            "saturating",
+            "supply",
+            (
+                _RATE,
+                Parameter("lag", time=1, lower=0.0, upper=5.0, starts=(0.05, 0.05, 0.1), zero=0.0),
+            ),
+            _soft,
+        ),
     ],
 )

@@ -33,13 +33,24 @@ EFFECT = Effect(
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
     also=("regulator",),
     forms=[
-        Form("cubic", "drive", (Parameter("size", lower=-0.9, upper=5.0, starts=(0.1, -0.1), zero=0.0), _ONE), _cubic),
-        Form("exponential", "drive", (
-            Parameter("bend", level=-1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0),
-        ), _exponential),
-        Form("locking", "drive", (
-            Parameter("bend", level=-1, lower=-0.97, upper=3.0, starts=(0.3, -0.3), zero=0.0),
-        ), _gent),
+        Form(
+            "cubic",
+            "drive",
+            (Parameter("size", lower=-0.9, upper=5.0, starts=(0.1, -0.1), zero=0.0), _ONE),
+            _cubic,
+        ),
+        Form(
+            "exponential",
+            "drive",
+            (Parameter("bend", level=-1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0),),
+            _exponential,
+        ),
+        Form(
+            "locking",
+            "drive",
+            (Parameter("bend", level=-1, lower=-0.97, upper=3.0, starts=(0.3, -0.3), zero=0.0),),
+            _gent,
+        ),
         _curves.quartic("drive"),
     ],
 )

@@ -23,16 +23,35 @@ EFFECT = Effect(
     stage="regulator",
     meaning="chamber pressure stays below the regulated one by an amount that grows with it",
     reveals="holds at several levels, with the pressure logged",
-    confused_with=("supply_saturation", "gain_nonlinearity", "gain_drift", "slow_regulator", "valve_asymmetry"),
+    confused_with=(
+        "supply_saturation",
+        "gain_nonlinearity",
+        "gain_drift",
+        "slow_regulator",
+        "valve_asymmetry",
+    ),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
     forms=[
-        Form("laminar", "supply", (Parameter("share", lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),), _laminar),
-        Form("turbulent", "supply", (
-            Parameter("loss", level=0.5, lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),
-        ), _turbulent),
-        Form("growing", "supply", (
-            Parameter("share", lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),
-            Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
-        ), _growing),
+        Form(
+            "laminar",
+            "supply",
+            (Parameter("share", lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),),
+            _laminar,
+        ),
+        Form(
+            "turbulent",
+            "supply",
+            (Parameter("loss", level=0.5, lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),),
+            _turbulent,
+        ),
+        Form(
+            "growing",
+            "supply",
+            (
+                Parameter("share", lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),
+                Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
+            ),
+            _growing,
+        ),
     ],
 )

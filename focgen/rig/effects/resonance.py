@@ -40,9 +40,23 @@ EFFECT = Effect(
     confused_with=("sensor_lag", "transport_delay"),
     needs=lambda e: None if e.fastest < 1.0 else "no change of the input is fast beside the rig's response",
     forms=[
-        Form("series", "response", (_PERIOD, _DAMPING), _series, response=lambda values, s: _mode_response(*values, s)),
-        Form("parallel", "response", (
-            Parameter("share", lower=-1.0, upper=1.0, starts=(0.1, 0.1, 0.1), zero=0.0), _PERIOD, _DAMPING,
-        ), _parallel, response=_parallel_response),
+        Form(
+            "series",
+            "response",
+            (_PERIOD, _DAMPING),
+            _series,
+            response=lambda values, s: _mode_response(*values, s),
+        ),
+        Form(
+            "parallel",
+            "response",
+            (
+                Parameter("share", lower=-1.0, upper=1.0, starts=(0.1, 0.1, 0.1), zero=0.0),
+                _PERIOD,
+                _DAMPING,
+            ),
+            _parallel,
+            response=_parallel_response,
+        ),
     ],
 )

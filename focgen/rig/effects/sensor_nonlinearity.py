@@ -21,7 +21,8 @@ def _cubic(x, values, run):
 
 
 def _folded(x, values, run):
-    """Turned over below ``centre``, and zero at rest: a bridge that crosses its balance, read without its sign."""
+    """Turned over below ``centre``, and zero at rest: a bridge that crosses its balance, read without its
+    sign."""
     share, centre = values
     return x + 2.0 * share * (np.maximum(centre - x, 0.0) - max(centre, 0.0))
 
@@ -42,9 +43,14 @@ EFFECT = Effect(
         Form("exponential", "strain", (_bend("bend", -1, 0.1, -0.3),), _exponential),
         Form("cubic", "strain", (_bend("bend", -1, 0.1), _bend("twist", -2, 0.05)), _cubic),
         _curves.quartic("strain"),
-        Form("folded", "strain", (
-            Parameter("share", lower=0.0, upper=1.0, starts=(0.5, 0.7, 0.7), zero=0.0),
-            Parameter("centre", level=1, lower=-0.5, upper=1.0, starts=(0.0, 0.3, 0.6)),
-        ), _folded),
+        Form(
+            "folded",
+            "strain",
+            (
+                Parameter("share", lower=0.0, upper=1.0, starts=(0.5, 0.7, 0.7), zero=0.0),
+                Parameter("centre", level=1, lower=-0.5, upper=1.0, starts=(0.0, 0.3, 0.6)),
+            ),
+            _folded,
+        ),
     ],
 )

@@ -38,8 +38,18 @@ EFFECT = Effect(
     needs=lambda e: None,
     single=True,
     noiselike=True,
-    forms=[Form("rounding", "reading", (
-        Parameter("step", level=1, lower=0.0, upper=0.9, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0),
-        Parameter("phase", level=1, lower=-0.5, upper=0.5, starts=(0.0,)),
-    ), _round, seen=_seen)],
+    forms=[
+        Form(
+            "rounding",
+            "reading",
+            (
+                Parameter(
+                    "step", level=1, lower=0.0, upper=0.9, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0
+                ),
+                Parameter("phase", level=1, lower=-0.5, upper=0.5, starts=(0.0,)),
+            ),
+            _round,
+            seen=_seen,
+        )
+    ],
 )

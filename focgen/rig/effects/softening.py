@@ -56,8 +56,13 @@ EFFECT = Effect(
     confused_with=("gain_nonlinearity", "gain_drift", "creep"),
     needs=lambda e: None if e.repeats else "no level is repeated after a higher one",
     forms=[
-        Form("largest", "drive", (_GROWTH, Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))),
-             _largest, leaves=_leaves_peak),
+        Form(
+            "largest",
+            "drive",
+            (_GROWTH, Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))),
+            _largest,
+            leaves=_leaves_peak,
+        ),
         Form("saturating", "drive", (_GROWTH, _scale(0.3, 1.0)), _saturating, leaves=_leaves_peak),
         Form("reloading", "drive", (_GROWTH, _scale(0.1, 0.5)), _reloading, leaves=_leaves_peak),
         Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),

@@ -25,8 +25,14 @@ EFFECT = Effect(
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
     forms=[
         Form("hard", "supply", (_CEILING,), _hard),
-        Form("soft", "supply", (
-            _CEILING, Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.03, 0.05), log=True),
-        ), _soft),
+        Form(
+            "soft",
+            "supply",
+            (
+                _CEILING,
+                Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.03, 0.05), log=True),
+            ),
+            _soft,
+        ),
     ],
 )

@@ -18,7 +18,13 @@ EFFECT = Effect(
     confused_with=("slow_regulator", "sensor_lag", "valve_asymmetry"),
     needs=lambda e: None if e.fastest < 0.25 else "no change of the input is fast beside the rig's response",
     single=True,
-    forms=[Form("delay", "supply", (
-        Parameter("delay", time=1, lower=0.0, upper=5.0, starts=(0.01, 0.05, 0.3), zero=0.0),
-    ), _shift, response=lambda values, s: np.exp(-values[0] * s))],
+    forms=[
+        Form(
+            "delay",
+            "supply",
+            (Parameter("delay", time=1, lower=0.0, upper=5.0, starts=(0.01, 0.05, 0.3), zero=0.0),),
+            _shift,
+            response=lambda values, s: np.exp(-values[0] * s),
+        )
+    ],
 )

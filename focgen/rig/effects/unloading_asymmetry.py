@@ -21,11 +21,17 @@ EFFECT = Effect(
     confused_with=("valve_asymmetry", "hysteresis", "gain_nonlinearity"),
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
-        Form("speed", "dynamics", (
-            Parameter("unloading_speed", lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True),
-        ), _speed),
-        Form("lag", "response", (
-            Parameter("lag", time=1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0),
-        ), _lag),
+        Form(
+            "speed",
+            "dynamics",
+            (Parameter("unloading_speed", lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True),),
+            _speed,
+        ),
+        Form(
+            "lag",
+            "response",
+            (Parameter("lag", time=1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0),),
+            _lag,
+        ),
     ],
 )

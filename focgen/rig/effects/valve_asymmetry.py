@@ -26,9 +26,15 @@ EFFECT = Effect(
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
         Form("two_lags", "supply", (_time("fill", 0.02, 0.02), _time("vent", 0.2, 1.0)), _lags),
-        Form("orifice", "supply", (
-            _time("fill", 0.02, 0.1), _time("vent", 0.2, 0.5),
-            Parameter("scale", level=1, lower=0.02, upper=50.0, starts=(1.0, 0.5), log=True),
-        ), _orifice),
+        Form(
+            "orifice",
+            "supply",
+            (
+                _time("fill", 0.02, 0.1),
+                _time("vent", 0.2, 0.5),
+                Parameter("scale", level=1, lower=0.02, upper=50.0, starts=(1.0, 0.5), log=True),
+            ),
+            _orifice,
+        ),
     ],
 )

@@ -29,8 +29,14 @@ EFFECT = Effect(
     forms=[
         Form("play", "command", (_BAND,), _play),
         Form("stick", "command", (_BAND,), _stick),
-        Form("stick_slip", "command", (
-            _BAND, Parameter("left", lower=0.0, upper=0.95, starts=(0.5, 0.5, 0.5)),
-        ), _slip),
+        Form(
+            "stick_slip",
+            "command",
+            (
+                _BAND,
+                Parameter("left", lower=0.0, upper=0.95, starts=(0.5, 0.5, 0.5)),
+            ),
+            _slip,
+        ),
     ],
 )

@@ -1,0 +1,128 @@
+"""Every effect found held against its rivals, each in its place beside the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.diagnosis.excitation import excitation
+from focgen.diagnosis.fit import Fit, Weighing, fit, weighed
+from focgen.diagnosis.problem import Clue
+from focgen.diagnosis.search import Ranking, evidence, rank
+from focgen.diagnosis.separation import separation
+from focgen.rig.effects import library
+
+_SWAPS = 3
+_MENDED = 3  # rivals that get a second form where the best has one
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A family that may be the cause instead: ``separation`` from the best in standard deviations, ``gain``
+    in nats."""
+
+    effect: str
+    stage: str
+    separation: float
+    gain: float
+    fit: Fit
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """One effect of a segment: ``rivals``, the best first; ``share``: of the refitted gap's explained mean
+    square."""
+
+    rivals: tuple[Rival, ...]
+    gain: float
+    share: float
+
+
+def doubted(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Fit, tuple[Cause, ...]]:
+    """Every effect held against its rivals beside the others; where one of them does better, it takes the
+    place."""
+    for _ in range(_SWAPS):
+        causes = _causes(best, nominal, rankings, clues, weighing)
+        usurper = min((r for c in causes for r in c.rivals), key=lambda r: r.separation, default=None)
+        if usurper is None or usurper.separation >= 0:
+            return best, causes
+        best = usurper.fit
+    return best, _causes(best, nominal, rankings, clues, weighing)
+
+
+def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Cause, ...]:
+    found = []
+    for name in dict.fromkeys(c.effect for c in best.problem.clues):
+        own = [c for c in best.problem.clues if c.effect == name]
+        without = left_out(best, own, weighing)
+        rivals = [Rival(name, own[0].stage, 0.0, evidence(best, without), best)]
+        # what is read off the signal itself has no rival: nothing else makes such steps
+        if not own[0].form.seen:
+            others = [c for c in clues if c.effect != name and c.form.seen is None]
+            ranking = next(
+                (r for r in rankings if r.base.problem.clues == without.problem.clues), None
+            ) or rank(without.problem, without.vector, others)
+            rivals += _rivals(best, without, ranking, clues, weighing, len(own) > 1)
+        before, after = (np.mean(weighed(f) ** 2) for f in (nominal, best))
+        lost = np.mean(weighed(without) ** 2) - after
+        share = float(np.clip(lost / max(before - after, 1e-300), 0, 1))
+        rivals.sort(key=lambda r: r.separation)
+        found.append(Cause(tuple(rivals), evidence(best, without), share))
+    return tuple(sorted(found, key=lambda c: -c.share))
+
+
+def _rivals(
+    best: Fit, without: Fit, ranking: Ranking, clues, weighing: Weighing, mended: bool
+) -> list[Rival]:
+    """The families of ``ranking`` in the place of one of ``best``; ``mended``: that one has two forms, so
+    the foremost of the others may have, too."""
+    found, open_ = [], _indistinct(best, ranking)
+    for other, candidate in ranking.best.items():
+        if other in {c.effect for c in best.problem.clues}:
+            continue
+        again = fit(candidate.problem, candidate.vector, weighing, 6)
+        if mended and len(found) < _MENDED:
+            again = _second_form(again, clues, weighing)
+        apart = separation(best, again, without, other in open_)
+        found.append(Rival(other, again.problem.clues[-1].stage, apart, evidence(again, without), again))
+    return found
+
+
+def _indistinct(best: Fit, ranking: Ranking) -> set[str]:
+    """The families that these experiments are not made to tell from those of ``best``: easily confused with
+    one of them, and one of the two lacking what would show it."""
+    segment, response = best.problem.segment, best.problem.references.clocks["response"]
+    seen = excitation(segment.parts(segment.x), segment.run.h, response)
+    found = set()
+    for a in (library()[c.effect] for c in best.problem.clues):
+        for b in (library()[name] for name in ranking.best):
+            alike = a.name in b.confused_with or b.name in a.confused_with
+            if alike and (a.needs(seen) or b.needs(seen)):
+                found.add(b.name)
+    return found
+
+
+def _second_form(of: Fit, clues, weighing: Weighing) -> Fit:
+    """With the form of the same family beside it that helps most, where one does."""
+    last = of.problem.clues[-1]
+    forms = [c for c in clues if c.effect == last.effect and c.stage == last.stage and c != last]
+    ranking = rank(of.problem, of.vector, forms)
+    if ranking.winner is None:
+        return of
+    better = fit(ranking.best[ranking.winner].problem, ranking.best[ranking.winner].vector, weighing, 6)
+    return better if evidence(better, of) > 0 else of
+
+
+def left_out(of: Fit, clues: Sequence[Clue], weighing: Weighing) -> Fit:
+    """``of`` without ``clues``, fitted again."""
+    problem, head = of.problem, of.problem.head
+    kept, vector, place = [], [of.vector[:head]], head
+    for clue in problem.clues:
+        count = len(clue.form.parameters)
+        if clue not in clues:
+            kept.append(clue)
+            vector.append(of.vector[place : place + count])
+        place += count
+    return fit(problem.with_clues(kept), np.concatenate(vector), weighing, 8)
