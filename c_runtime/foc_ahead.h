@@ -40,11 +40,12 @@ static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, c
                                  unsigned tiles)
 {
     int32_t s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
-    int32_t a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
+    int32_t a = weights[1], b = weights[2], c = weights[3]; /* the next sample meets them */
 
     weights += 4;
     for (; tiles > 0u; tiles--) {
-        d = weights[0];
+        const int32_t d = weights[0];
+
         s0 += d * x[0];
         s1 += c * x[0];
         s2 += b * x[0];
@@ -76,12 +77,11 @@ static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, c
 
 /* One run: ahead[8 ... 11] are the sums of its block, ahead[4 ... 7] of the blocks complete. */
 static inline void foc_run_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *run,
-                               const int16_t *ring, uint16_t size, uint16_t now)
+                               const int16_t *ring, unsigned size, unsigned now)
 {
     const unsigned start = foc_run_start(run->back, size, now);
     const unsigned tiles = run->tiles;
     const unsigned straight = size / 4u - start;
-    unsigned i;
 
     weights += run->weights;
     ring += 4u * start;
@@ -92,6 +92,8 @@ static inline void foc_run_q15(int32_t *ahead, const FOC_ROM int16_t *weights, c
         foc_tiles_q15(&ahead[8], &weights[4u * straight], ring - 4u * start, tiles - straight);
     }
     if (run->ends != 0u) {
+        unsigned i;
+
         for (i = 0; i < 4u; i++) {
             ahead[4u + i] += foc_shift32(ahead[8u + i], run->shift);
             ahead[8u + i] = 0;
@@ -101,7 +103,7 @@ static inline void foc_run_q15(int32_t *ahead, const FOC_ROM int16_t *weights, c
 
 /* Runs from ... to - 1, one after another. */
 static inline void foc_runs_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *runs,
-                                unsigned from, unsigned to, const int16_t *ring, uint16_t size, uint16_t now)
+                                unsigned from, unsigned to, const int16_t *ring, unsigned size, unsigned now)
 {
 #ifdef FOC_HAS_WORK_Q15
     if (from < to) {
@@ -119,13 +121,14 @@ static inline void foc_runs_q15(int32_t *ahead, const FOC_ROM int16_t *weights, 
 /* A step's share: runs[slices[p]] up to runs[slices[p + 1]] in step p of a group. ahead[0 ... 3] are the far
    sums of the present group's steps, of which step p adds ahead[p] to its near lags. */
 static inline void foc_ahead_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *runs,
-                                 const FOC_ROM uint8_t *slices, const int16_t *ring, uint16_t size,
-                                 uint16_t now)
+                                 const FOC_ROM uint8_t *slices, const int16_t *ring, unsigned size,
+                                 unsigned now)
 {
     const unsigned step = now & 3u;
-    unsigned i;
 
     if (step == 0u) {
+        unsigned i;
+
         for (i = 0; i < 4u; i++) {
             ahead[i] = ahead[4u + i];
             ahead[4u + i] = 0;
@@ -136,14 +139,14 @@ static inline void foc_ahead_q15(int32_t *ahead, const FOC_ROM int16_t *weights,
 
 /* After every sample of the ring has been set to the same value and `now` to its last slot. */
 static inline void foc_rest_q15(int32_t *ahead, const FOC_ROM int16_t *weights, const FOC_ROM foc_run *runs,
-                                const FOC_ROM uint8_t *slices, const int16_t *ring, uint16_t size)
+                                const FOC_ROM uint8_t *slices, const int16_t *ring, unsigned size)
 {
     unsigned i;
 
     for (i = 4; i < 12u; i++) {
         ahead[i] = 0;
     }
-    foc_runs_q15(ahead, weights, runs, 0, slices[4], ring, size, (uint16_t)(size - 1u));
+    foc_runs_q15(ahead, weights, runs, 0, slices[4], ring, size, size - 1u);
     for (i = 0; i < 4u; i++) {
         ahead[i] = ahead[4u + i];
     }
@@ -173,11 +176,12 @@ static inline void foc_tiles_q31(int64_t *sum, const FOC_ROM int32_t *weights, c
                                  unsigned tiles)
 {
     int64_t s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
-    int32_t a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
+    int32_t a = weights[1], b = weights[2], c = weights[3]; /* the next sample meets them */
 
     weights += 4;
     for (; tiles > 0u; tiles--) {
-        d = weights[0];
+        const int32_t d = weights[0];
+
         s0 += (int64_t)d * x[0];
         s1 += (int64_t)c * x[0];
         s2 += (int64_t)b * x[0];
@@ -208,12 +212,11 @@ static inline void foc_tiles_q31(int64_t *sum, const FOC_ROM int32_t *weights, c
 #endif
 
 static inline void foc_run_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *run,
-                               const int32_t *ring, uint16_t size, uint16_t now)
+                               const int32_t *ring, unsigned size, unsigned now)
 {
     const unsigned start = foc_run_start(run->back, size, now);
     const unsigned tiles = run->tiles;
     const unsigned straight = size / 4u - start;
-    unsigned i;
 
     weights += run->weights;
     ring += 4u * start;
@@ -224,6 +227,8 @@ static inline void foc_run_q31(int64_t *ahead, const FOC_ROM int32_t *weights, c
         foc_tiles_q31(&ahead[8], &weights[4u * straight], ring - 4u * start, tiles - straight);
     }
     if (run->ends != 0u) {
+        unsigned i;
+
         for (i = 0; i < 4u; i++) {
             ahead[4u + i] += foc_shift64(ahead[8u + i], run->shift);
             ahead[8u + i] = 0;
@@ -233,7 +238,7 @@ static inline void foc_run_q31(int64_t *ahead, const FOC_ROM int32_t *weights, c
 
 /* Runs from ... to - 1, one after another. */
 static inline void foc_runs_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *runs,
-                                unsigned from, unsigned to, const int32_t *ring, uint16_t size, uint16_t now)
+                                unsigned from, unsigned to, const int32_t *ring, unsigned size, unsigned now)
 {
 #ifdef FOC_HAS_WORK_Q31
     if (from < to) {
@@ -249,13 +254,14 @@ static inline void foc_runs_q31(int64_t *ahead, const FOC_ROM int32_t *weights, 
 }
 
 static inline void foc_ahead_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *runs,
-                                 const FOC_ROM uint8_t *slices, const int32_t *ring, uint16_t size,
-                                 uint16_t now)
+                                 const FOC_ROM uint8_t *slices, const int32_t *ring, unsigned size,
+                                 unsigned now)
 {
     const unsigned step = now & 3u;
-    unsigned i;
 
     if (step == 0u) {
+        unsigned i;
+
         for (i = 0; i < 4u; i++) {
             ahead[i] = ahead[4u + i];
             ahead[4u + i] = 0;
@@ -265,14 +271,14 @@ static inline void foc_ahead_q31(int64_t *ahead, const FOC_ROM int32_t *weights,
 }
 
 static inline void foc_rest_q31(int64_t *ahead, const FOC_ROM int32_t *weights, const FOC_ROM foc_run *runs,
-                                const FOC_ROM uint8_t *slices, const int32_t *ring, uint16_t size)
+                                const FOC_ROM uint8_t *slices, const int32_t *ring, unsigned size)
 {
     unsigned i;
 
     for (i = 4; i < 12u; i++) {
         ahead[i] = 0;
     }
-    foc_runs_q31(ahead, weights, runs, 0, slices[4], ring, size, (uint16_t)(size - 1u));
+    foc_runs_q31(ahead, weights, runs, 0, slices[4], ring, size, size - 1u);
     for (i = 0; i < 4u; i++) {
         ahead[i] = ahead[4u + i];
     }
@@ -300,11 +306,12 @@ static inline const int32_t *foc_latest_q31(int32_t *copy, uint16_t count, const
 static inline void foc_tiles_f32(float *sum, const FOC_ROM float *weights, const float *x, unsigned tiles)
 {
     float s0 = sum[0], s1 = sum[1], s2 = sum[2], s3 = sum[3];
-    float a = weights[1], b = weights[2], c = weights[3], d; /* the weights that the next sample meets */
+    float a = weights[1], b = weights[2], c = weights[3]; /* the next sample meets them */
 
     weights += 4;
     for (; tiles > 0u; tiles--) {
-        d = weights[0];
+        const float d = weights[0];
+
         s0 += d * x[0];
         s1 += c * x[0];
         s2 += b * x[0];
@@ -335,7 +342,7 @@ static inline void foc_tiles_f32(float *sum, const FOC_ROM float *weights, const
 #endif
 
 static inline void foc_run_f32(float *ahead, const FOC_ROM float *weights, const FOC_ROM foc_run *run,
-                               const float *ring, uint16_t size, uint16_t now)
+                               const float *ring, unsigned size, unsigned now)
 {
     const unsigned start = foc_run_start(run->back, size, now);
     const unsigned tiles = run->tiles;
@@ -352,8 +359,8 @@ static inline void foc_run_f32(float *ahead, const FOC_ROM float *weights, const
 }
 
 static inline void foc_ahead_f32(float *ahead, const FOC_ROM float *weights, const FOC_ROM foc_run *runs,
-                                 const FOC_ROM uint8_t *slices, const float *ring, uint16_t size,
-                                 uint16_t now)
+                                 const FOC_ROM uint8_t *slices, const float *ring, unsigned size,
+                                 unsigned now)
 {
     const unsigned step = now & 3u;
     unsigned i;
@@ -370,7 +377,7 @@ static inline void foc_ahead_f32(float *ahead, const FOC_ROM float *weights, con
 }
 
 static inline void foc_rest_f32(float *ahead, const FOC_ROM float *weights, const FOC_ROM foc_run *runs,
-                                const FOC_ROM uint8_t *slices, const float *ring, uint16_t size)
+                                const FOC_ROM uint8_t *slices, const float *ring, unsigned size)
 {
     unsigned i;
 
@@ -378,7 +385,7 @@ static inline void foc_rest_f32(float *ahead, const FOC_ROM float *weights, cons
         ahead[i] = 0.0f;
     }
     for (i = 0; i < slices[4]; i++) {
-        foc_run_f32(ahead, weights, &runs[i], ring, size, (uint16_t)(size - 1u));
+        foc_run_f32(ahead, weights, &runs[i], ring, size, size - 1u);
     }
     for (i = 0; i < 4u; i++) {
         ahead[i] = ahead[4u + i];

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from focgen.codegen.generate import folder_files
+from focgen.codegen.kernels import Kernels
 from focgen.control.files import controller_text
 from focgen.output import write_files
 from focgen.plan.build import build_plan
@@ -21,6 +22,7 @@ from tests.proofs.spread import controllers
 COMMAND = """cppcheck --std=c99 --enable=all --addon=misra --quiet --template={id}|{file}:{line}
     --suppress=missingIncludeSystem --suppress=unmatchedSuppression""".split()
 CASES = {"all": ("q15", "f64"), "inverse": ("f32",), "filter": ("q31",)}
+KERNELS = {"cortex-m4": ("q15", "f32"), "cortex-m0plus": ("q31",)}  # looking ahead, and by halves
 DEVIATIONS = shipped("c_runtime") / "deviations.md"
 
 
@@ -53,6 +55,11 @@ def found(tmp_path_factory) -> dict[str, list[str]]:
         for arithmetic in arithmetics:
             plan = build_plan(controllers(12)[name], arithmetic, name=f"{name}_{arithmetic}")
             write_files(folder, folder_files(plan, controller_text(plan.controller).encode(), selftest=True))
+    for target, arithmetics in KERNELS.items():
+        for arithmetic in arithmetics:
+            plan = build_plan(controllers(64)["all"], arithmetic, name=f"{arithmetic}_{target[7:]}")
+            kernels = Kernels(target)
+            write_files(folder, folder_files(plan, b"", selftest=True, kernels=kernels))
     return cppcheck(folder, *sorted(path.name for path in folder.glob("*.c")))
 
 
