@@ -1,5 +1,6 @@
 """The open loop of a study: its errors, biases and bounds against sums taken independently."""
 
+import json
 from dataclasses import replace
 
 import mpmath
@@ -14,9 +15,10 @@ from focgen.studies.costs import multiplies
 from focgen.studies.jobs import Job, answer, read_row
 from focgen.studies.model import INPUTS, Setup, Variant
 from focgen.studies.operator import fractional_terms, measure, variant_of
-from focgen.studies.signals import exact_power, inputs
+from focgen.studies.signals import exact_power, inputs, signed
 from focgen.studies.spectrum import band_of, memory_spectrum, omegas
 from tests.conftest import paper_controller
+from tests.controllers import random_controller
 
 SAMPLES = 2000
 
@@ -99,6 +101,34 @@ def test_no_error_exceeds_its_bound(seed, memory):
     found = row(variant, controller, 800)
     assert found.note is None or "compiled" in found.note
     assert 0.0 < found.error <= found.bound
+
+
+@pytest.mark.parametrize("memory", ["short", "exponential"])
+@pytest.mark.parametrize("seed", [1, 4, 19, 31, 35, 44, 51, 59])
+def test_any_controller_can_be_studied(seed, memory):
+    """Integrating ones, leads, lags, second order; ranges that differ, or hold errors of one sign only."""
+    controller = random_controller(seed)
+    arithmetic, h = ("f64", "f32", "q31", "q15")[seed % 4], controller.sample_time
+    variant = Variant("short", arithmetic, h, length=60)
+    if memory == "exponential":
+        variant = Variant(memory, arithmetic, h, tolerance=1e-3, horizon=10_000)
+    found = answer(Job("row", setup(controller, 400), variant))
+    json.dumps(found, allow_nan=False)
+    assert found["row"]["note"] is None and 0.0 <= found["row"]["error"] <= found["row"]["bound"]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_inputs_never_leave_the_ranges(seed):
+    controller = signed(random_controller(seed))
+    given, ranges = inputs(controller, controller.sample_time, 200), controller.ranges
+    for part, (low, high) in (
+        (given.scenario.ref, ranges.reference),
+        (given.scenario.meas, ranges.measurement),
+    ):
+        slack = 1e-12 * (high - low)
+        assert low - slack <= part.min() and part.max() <= high + slack
+    assert given.scenario.ref - given.scenario.meas == pytest.approx(given.error, abs=1e-9 * given.amplitude)
+    assert np.abs(given.error).max() == given.amplitude > 0.0
 
 
 def test_arithmetic_adds_what_it_rounds():

@@ -7,6 +7,7 @@ import pytest
 
 from focgen.studies.model import Band, Ideal, Loop, Row
 from focgen.studies.recommend import Wish, leanest, pareto, sentence, shortest
+from focgen.studies.study import _unsettled
 from tests.conftest import paper_controller
 
 BAND = Band(0.3, 30.0, "")
@@ -122,3 +123,10 @@ def test_the_sentence():
     )
     assert sentence(controller, wish, None, None, both, 5000).startswith("None of the")
     assert sentence(controller, wish, short, None, {"short"}, 5000).endswith("181 multiplies.")
+
+
+def test_an_ideal_loop_that_does_not_settle_is_said():
+    unstable = replace(LOOP, settling_s=None, stable=False)
+    assert "is not stable" in _unsettled(Ideal(0.01, 0.0, 0.0, unstable))[0]
+    assert "does not settle" in _unsettled(Ideal(0.01, 0.0, 0.0, replace(unstable, stable=True)))[0]
+    assert _unsettled(Ideal(0.01, 0.0, 0.0, LOOP)) == _unsettled(Ideal(0.01, 0.0, 0.0, None)) == []

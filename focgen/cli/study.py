@@ -42,13 +42,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of short memory, past samples (default: 10 … 5000 and the controller's)",
     )
     parser.add_argument(
-        "--tolerances", nargs="+", type=float, metavar="E", help="of exponential memory (default: 0.1 … 1e-6)"
+        "--tolerances",
+        nargs="+",
+        type=float,
+        metavar="E",
+        help="of exponential memory (default: 0.1 … 1e-6, and the controller's)",
     )
     parser.add_argument(
         "--horizon",
         type=int,
         metavar="N",
-        help="of exponential memory, samples at the controller's sample time (default: 1000000)",
+        help="of exponential memory, samples at the controller's sample time (default: the controller's)",
     )
     parser.add_argument("--arithmetic", nargs="+", choices=ARITHMETICS, help="default: all four")
     parser.add_argument(

@@ -133,8 +133,8 @@ def _loop(run: LoopRun, bench: Bench, found: list[Margins]) -> Loop:
     iae = float((away.sum(axis=0) * run.sample_time).mean())
     return Loop(
         finite(np.mean([s.settling_s for s in steps])),
-        max(s.overshoot_pct for s in steps),
-        iae,
+        finite(max(s.overshoot_pct for s in steps)),
+        finite(iae),
         finite(min(m.phase_deg for m in found)),
         finite(min(m.gain_db for m in found)),
         finite(min(m.delay_s for m in found)),

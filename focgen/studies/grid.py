@@ -12,7 +12,6 @@ from focgen.studies.model import Variant
 
 LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 TOLERANCES = (0.1, 0.03, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
-HORIZON = 1_000_000  # samples at the controller's own sample time
 _FACTORS = (0.5, 1.0, 2.0)  # of the sample time
 _LONGEST = 65_534
 _HORIZONS = (100, 10**8)
@@ -88,13 +87,18 @@ def grid_of(
     grid = Grid(
         tuple(memories or MEMORIES),
         tuple(sorted(set(lengths or (*LENGTHS, controller.length)))),
-        tuple(sorted(set(tolerances or TOLERANCES), reverse=True)),
-        HORIZON if horizon is None else horizon,
+        tuple(sorted(set(tolerances or (*TOLERANCES, *_own(controller))), reverse=True)),
+        controller.horizon if horizon is None else horizon,
         tuple(arithmetics or ARITHMETICS),
         tuple(dict.fromkeys(sample_times or (own * factor for factor in _FACTORS))),
     )
     _check(grid)
     return grid
+
+
+def _own(controller: Controller) -> tuple[float, ...]:
+    """The tolerance that the controller itself asks for."""
+    return (controller.tolerance,) if controller.memory == "exponential" else ()
 
 
 def _check(grid: Grid) -> None:

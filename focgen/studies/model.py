@@ -75,8 +75,8 @@ class Loop:
     """
 
     settling_s: float | None
-    overshoot_pct: float
-    iae: float
+    overshoot_pct: float | None
+    iae: float | None
     margin_deg: float | None
     gain_margin_db: float | None
     delay_margin_s: float | None

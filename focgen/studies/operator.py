@@ -15,7 +15,7 @@ from focgen.plan.ideal import ideal
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, physical_trace, to_raw
 from focgen.studies.model import INPUTS, Variant
-from focgen.studies.signals import Inputs, exact_power, inputs, relative_errors
+from focgen.studies.signals import Inputs, exact_power, inputs, relative_errors, signed
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class OpenLoop:
 
     errors: dict[str, float]
     bound: float | None
-    error_ahead: float
+    error_ahead: float | None
 
     @property
     def error(self) -> float:
@@ -61,12 +61,14 @@ def measure(controller: Controller, plan: Plan, own: float, samples: int) -> Ope
     ``controller`` is the variant; ``own`` and ``samples`` as :func:`focgen.studies.signals.inputs` has them.
     Raises PlanError where the operator alone has no plan in this arithmetic.
     """
-    given = inputs(controller, own, samples)
+    both = signed(controller)
+    plan = plan if both is controller else build_plan(both)
+    controller, given = both, inputs(both, own, samples)
     each = [_power(controller, term, given) for term in fractional_terms(controller)]
     errors = {name: max(found[name] for found, _ in each) for name in INPUTS}
     bounds = [bound for _, bound in each]
     exact = ideal(controller, given.scenario).d
-    ahead = max(relative_errors(_ahead(plan, given.scenario), exact).values())
+    ahead = max(relative_errors(_ahead(plan, given.scenario), exact).values(), default=None)
     return OpenLoop(errors, None if None in bounds else max(bounds), ahead)
 
 

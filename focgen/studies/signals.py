@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import fftconvolve
@@ -26,10 +26,21 @@ class Inputs:
     scenario: Scenario
 
 
+def signed(controller: Controller) -> Controller:
+    """The controller; where its ranges hold errors of one sign only, with ranges that hold both."""
+    (r0, r1), (m0, m1) = controller.ranges.reference, controller.ranges.measurement
+    if min(r1 - m0, m1 - r0) > 0.0:
+        return controller
+    half = 0.5 * max(r1 - m0, m1 - r0)
+    ranges = replace(controller.ranges, reference=(-half, half), measurement=(-half, half))
+    return replace(controller, ranges=ranges)
+
+
 def inputs(controller: Controller, own: float, samples: int) -> Inputs:
     """The inputs at the controller's sample time: ``samples`` at ``own`` s, as many seconds at another.
 
-    The ramp ends at the amplitude. Set point and measurement share the error so that each stays in its range;
+    The amplitude is the largest error of either sign, and where the ramp ends. ``controller`` is a signed one
+    (:func:`signed`). Set point and measurement share the error so that each stays in its range;
     the schedule, where there is one, stands where the gain is largest.
     """
     count = max(2, round(samples * own / controller.sample_time))
@@ -39,17 +50,14 @@ def inputs(controller: Controller, own: float, samples: int) -> Inputs:
     shape = {"step": np.ones(count), "ramp": k / (count - 1.0), "sine": np.sin(turn), "noise": noise}
     unit = np.array([shape[name] for name in INPUTS])
     (r0, r1), (m0, m1) = controller.ranges.reference, controller.ranges.measurement
-    amplitude = max(min(r1 - m0, m1 - r0), 0.5 * max(r1 - m0, m1 - r0))
+    amplitude = min(r1 - m0, m1 - r0)
     error = amplitude * unit
     return Inputs(controller.sample_time, amplitude, error, _scenario(controller, error))
 
 
 def _scenario(controller: Controller, error: np.ndarray) -> Scenario:
     (r0, r1), (m0, m1) = controller.ranges.reference, controller.ranges.measurement
-    base = min(max(0.5 * (max(r0, m0) + min(r1, m1)), r0), r1)
-    up = (r1 - base) / (r1 - m0) if r1 > m0 else 0.0
-    down = (base - r0) / (m1 - r0) if m1 > r0 else 0.0
-    reference = base + np.where(error > 0.0, up, down) * error
+    reference = np.clip(0.5 * (m0 + m1) + error, r0, r1)  # the measurement takes what is left: in its range
     sched = None
     if controller.scheduled:
         points, gains = controller.gain.breakpoints, np.abs(controller.gain.gains)
@@ -64,6 +72,8 @@ def exact_power(order: float, sample_time: float, x: np.ndarray) -> np.ndarray:
 
 
 def relative_errors(found: np.ndarray, exact: np.ndarray) -> dict[str, float]:
-    """For each input the largest error relative to the largest exact output; both (4, samples)."""
-    worst = np.abs(found - exact).max(axis=1) / np.abs(exact).max(axis=1)
-    return dict(zip(INPUTS, map(float, worst)))
+    """For each input the largest error relative to the largest exact output, both (4, samples); without those
+    whose exact output is 0 throughout.
+    """
+    off, sizes = np.abs(found - exact).max(axis=1), np.abs(exact).max(axis=1)
+    return {name: float(error / size) for name, error, size in zip(INPUTS, off, sizes) if size > 0.0}

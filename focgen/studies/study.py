@@ -16,7 +16,7 @@ from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.studies.grid import Grid, grid_of
 from focgen.studies.jobs import Job, read_ideal, read_plant, read_row
-from focgen.studies.model import Curves, Plant, Row, Setup, Study, Variant
+from focgen.studies.model import Curves, Ideal, Plant, Row, Setup, Study, Variant
 from focgen.studies.operator import fractional_terms
 from focgen.studies.plant import exact_step, plant_of, plant_times
 from focgen.studies.recommend import Wish, leanest, pareto, sentence, shortest
@@ -163,7 +163,13 @@ class _Sweep:
             self._plant(plant, plants) if plant is not None else None,
             pareto(every, self._first()),
             said,
-            tuple([*notes, *_missing(every)]),
+            tuple(
+                [
+                    *notes,
+                    *_unsettled(perfect[self.grid.sample_times.index(self._first())][0]),
+                    *_missing(every),
+                ]
+            ),
             tuple(curves for _, curves in rows),
             tuple(curves for _, curves in perfect),
         )
@@ -200,6 +206,14 @@ class _Sweep:
         times = plant_times(self.own) * self.own
         exact = exact_step(plant, self.own)
         return Plant(str(plant), self.own, tuple(map(float, times)), tuple(map(float, exact)), rows)
+
+
+def _unsettled(ideal: Ideal) -> list[str]:
+    """What has to be said where not even infinite memory settles."""
+    if ideal.loop is None or ideal.loop.settling_s is not None:
+        return []
+    how = "does not settle at every set point" if ideal.loop.stable else "is not stable"
+    return [f"even with infinite memory the loop {how}: the recommendation looks at the phase alone"]
 
 
 def _missing(rows: tuple[Row, ...]) -> list[str]:
