@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV   := .venv
 RUN    := $(VENV)/bin/python
 JOBS   ?= 2
+FUZZ_SECONDS ?= 600
 
-.PHONY: help demo test test-long bench trials trial-cases trial-report clean
+.PHONY: help demo test test-long bench trials trial-cases trial-report prove fuzz clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -57,6 +58,16 @@ trials: trial-cases            ## sealed cases diagnosed blind, then the table o
 
 trial-report: $(VENV)/ready    ## the table of what `make trials` has diagnosed so far
 	$(RUN) -m focgen trial score $(SETS) --partial --oracle --jobs $(JOBS) --out $(TRIALS)/table
+
+$(VENV)/ready-prove: $(VENV)/ready-test
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[prove]'
+	@touch $@
+
+prove: $(VENV)/ready-prove     ## no overflow, no access outside, by the verifiers that are installed
+	$(RUN) -m tests.proofs
+
+fuzz: $(VENV)/ready-test       ## led random calls under the sanitisers, FUZZ_SECONDS=600 (needs clang)
+	$(RUN) -m tests.proofs.fuzz --seconds $(FUZZ_SECONDS)
 
 clean:                         ## remove everything that was built
 	rm -rf $(VENV) build

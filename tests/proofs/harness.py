@@ -54,15 +54,18 @@ def _around(worst: int) -> Interval:
     return Interval(-worst, worst)
 
 
-def harness(plan: Plan, dialect: str, asked: tuple[str, ...] | None = None) -> str:
-    """The C of a harness. ``dialect``: "eva" or "esbmc". It asks about the members ``asked`` afterwards, by
-    default about all that cannot be any value of their type.
+def harness(
+    plan: Plan, dialect: str, asked: tuple[str, ...] | None = None, call: str = "any"
+) -> str:
+    """The C of a harness. ``dialect``: "eva" or "esbmc". It makes one ``call`` ("init", "reset", "track",
+    "step" or any of them) and asks about the members ``asked`` afterwards, by default about all that cannot
+    be any value of their type.
     """
     speak = {"eva": _Eva(), "esbmc": _Esbmc()}[dialect]
     ranges = reachable(plan)
     lines = [f'#include "{plan.name}.c"', speak.head, f"static {plan.name}_state s;", "int main(void)\n{"]
     lines += [line for m in members(plan) for line in _every(m, speak.choose(m, ranges[m.name]))]
-    lines += _calls(plan, speak)
+    lines += _calls(plan, speak, call)
     about = [m for m in members(plan) if ranges[m.name] and (asked is None or m.name in asked)]
     lines += [line for m in about for line in _every(m, speak.ask(m, ranges[m.name]))]
     return "\n".join([*lines, "    return 0;", "}", ""])
@@ -76,18 +79,19 @@ def _every(member: Member, statement: str) -> list[str]:
     return [loop, "        " + statement.replace("$", f"s.{member.name}[i]"), "    }"]
 
 
-def _calls(plan: Plan, speak) -> list[str]:
+def _calls(plan: Plan, speak, call: str) -> list[str]:
     signal, name = plan.output.ctype, plan.name
-    sched = ", c" if plan.schedule else ""
-    return [
-        *(f"    {signal} {argument} = {speak.any(signal)};" for argument in "abc"),
-        f"    switch ({speak.any('uint8_t')} & 3) {{",
-        f"    case 0: {name}_init(&s); break;",
-        f"    case 1: {name}_reset(&s, a, b, c); break;",
-        f"    case 2: {name}_track(&s, a); break;",
-        f"    default: (void){name}_step(&s, a, b{sched});",
-        "    }",
-    ]
+    calls = {
+        "init": f"{name}_init(&s);",
+        "reset": f"{name}_reset(&s, a, b, c);",
+        "track": f"{name}_track(&s, a);",
+        "step": f"(void){name}_step(&s, a, b{', c' if plan.schedule else ''});",
+    }
+    lines = [f"    {signal} {argument} = {speak.any(signal)};" for argument in "abc"]
+    if call != "any":
+        return [*lines, f"    {calls[call]}"]
+    cases = [f"    case {i}: {one} break;" for i, one in enumerate(calls.values())]
+    return [*lines, f"    switch ({speak.any('uint8_t')} & 3) {{", *cases, "    }"]
 
 
 class _Eva:
