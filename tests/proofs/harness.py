@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from focgen.codegen.literals import literal
 from focgen.codegen.state import Member, members
+from focgen.plan.formats import limit
 from focgen.plan.model import Format, Plan
 
 
@@ -37,7 +38,7 @@ def reachable(plan: Plan) -> dict[str, Interval | None]:
         "filtered": None,
         "carry": Interval(-half, half),
         "integral": _hull(plan.integrator.state, zero=False) if plan.integrator else None,
-        "increment": _around(worst["increment"]),
+        "increment": _around(_room(plan)) if plan.integrator else None,
         "resting": None if plan.feedback else _around(worst["v"]),
         "inner": _hull(plan.inner.state) if plan.inner else None,
         "inner_input": _around(worst["rest total"]) if plan.inner else None,
@@ -48,6 +49,13 @@ def reachable(plan: Plan) -> dict[str, Interval | None]:
 def _hull(form: Format, zero: bool = True) -> Interval:
     low, high = int(form.low), int(form.high)
     return Interval(min(low, 0), max(high, 0)) if zero else Interval(low, high)
+
+
+def _room(plan: Plan) -> int:
+    """How large two increments may be, added to an integral at its limit: all that the sum asks of them."""
+    state, own = plan.integrator.state, plan.increment
+    most = max(abs(int(state.low)), abs(int(state.high)))
+    return min((limit(state.bits) - most) // 2, limit(own.bits))
 
 
 def _around(worst: int) -> Interval:
