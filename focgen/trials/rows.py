@@ -96,9 +96,9 @@ def _pair(j: Judged) -> bool:
 
 ROWS = (
     _Measure("top-1 effect", _visible, lambda j: j.top_right, limits=(0.92, 0.80, 0.72), guessed=_hit),
-    _Measure("  … high severity", _severe("high"), lambda j: j.top_right, guessed=_hit),
-    _Measure("  … mid severity", _severe("mid"), lambda j: j.top_right, guessed=_hit),
-    _Measure("  … low severity", _severe("low"), lambda j: j.top_right, guessed=_hit),
+    _Measure("  … high severity", _severe("high"), lambda j: j.top_right),
+    _Measure("  … mid severity", _severe("mid"), lambda j: j.top_right),
+    _Measure("  … low severity", _severe("low"), lambda j: j.top_right),
     _Measure("stage right", _visible, lambda j: j.stage_right, limits=(0.98, 0.92, 0.88), guessed=_staged),
     _Measure(
         "named one effect, wrongly",
