@@ -271,19 +271,9 @@ def test_design_says_what_the_margins_lack():
 )
 def test_linear_parts_are_what_the_simulator_does(effect, form):
     """A sine through the simulated effect comes out as its frequency response says."""
-    values = {
-        "delay": (0.35,),
-        "one_lag": (0.2,),
-        "two_lags": (0.2,),
-        "pole": (0.4, 2.0),
-        "logarithmic": (0.4, 0.5),
-        "two_poles": (0.3, 0.2, 2.0),
-        "one_time": (0.5, 0.7),
-        "spread": (0.5, 0.7),
-        "series": (0.8, 0.2),
-        "parallel": (0.6, 0.8, 0.2),
-    }[form]
+    chosen = {"delay": 0.35, "lag": 0.2, "share": 0.4, "time": 1.2, "quick": 0.3, "slow": 0.2, "period": 0.8}
     shape = form_of(effect, form)
+    values = tuple(chosen.get(p.name, 0.25) for p in shape.parameters)
     table = {"name": effect, "form": form, **dict(zip((p.name for p in shape.parameters), values))}
     response, inside, others = linear_part(bench(table))
     assert inside == (effect,) and others == ()

@@ -45,7 +45,7 @@ def held_response(
     """The response of hold, ``transfer`` and sampling, at ``omega`` ≤ π/h rad/s: all side bands added up.
 
     The sample is taken before the hold moves on, so what passes at once arrives one sample late. ``more``: a
-    factor of the response that is no transfer function, as a delay; beyond 40 bands it is taken to add nothing.
+    factor of the response that is no transfer function, as a delay; beyond 40 bands it adds nothing.
     """
     h, omega = sample_time, np.asarray(omega, dtype=float)
     back = np.exp(-1j * omega * h)
@@ -127,7 +127,7 @@ class Shapes:
 
 
 def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
-    """Sample the four loops, from 1e-5 of the sampling frequency up; linear effects of the rig are in them."""
+    """Sample the four loops, from 1e-5 of the sampling frequency up; the rig's linear effects are in them."""
     h, transfer = controller.sample_time, chain_transfer(rig)
     effects, _, _ = linear_part(rig)
     low, nyquist = _LOW * 2.0 * math.pi / h, math.pi / h

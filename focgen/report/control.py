@@ -58,7 +58,7 @@ def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
 
 
 def _other_loop(axes, simulation: Simulation, index: int, colour) -> None:
-    """What to compare with, dotted: the loop without the rig's effects, or where it has none, the frozen one."""
+    """What to compare with, dotted: the loop without the rig's effects, or without any, the frozen one."""
     time, frozen = simulation.running.time, simulation.frozen[index]
     other = frozen if simulation.nominal is None else simulation.nominal.output[:, index]
     if other is not None:
