@@ -60,9 +60,9 @@ def forms(slot, level, onto):
         Form(
             "wandering",
             slot,
-            (  # a spline through values at equal times, the last one kept
+            (  # a spline through values at equal times; the last, within the session, is kept
                 *(Parameter(name, starts=(0.01,), **size) for name in ("first", "second", "third", "fourth")),
-                Parameter("spacing", time=1, clock="session", lower=0.2, upper=0.5, starts=(0.25,), log=True),
+                Parameter("spacing", time=1, clock="session", lower=0.2, upper=0.25, starts=(0.24,), log=True),
             ),
             act(_wandering),
         ),
