@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -14,17 +15,26 @@ def read(path: Path) -> LogTable:
     """Read a file. Raises LogError where it is damaged or its channels differ in length, MissingExtra without nptdms."""
     try:
         import nptdms
+        from nptdms.log import log_manager
     except ImportError:
         raise MissingExtra.of("nptdms", "tdms", str(path)) from None
+    log_manager.set_level(logging.ERROR)  # what it warns of is refused below, in one line
     path.open("rb").close()
     try:
         groups = nptdms.TdmsFile.read(path).groups()
-        channels = [(group.name, channel.name, np.asarray(channel[:])) for group in groups for channel in group.channels()]
+        channels = [
+            (group.name, channel.name, np.asarray(channel[:]))
+            for group in groups
+            for channel in group.channels()
+        ]
     except Exception:  # nptdms has no error of its own for damaged files
         raise LogError(str(path), "is not a whole TDMS file", "write it again") from None
     names = [channel for _, channel, _ in channels]
-    columns = {channel if names.count(channel) == 1 else f"{group}/{channel}": _seconds(values)
-               for group, channel, values in channels if len(values)}
+    columns = {
+        channel if names.count(channel) == 1 else f"{group}/{channel}": _seconds(values)
+        for group, channel, values in channels
+        if len(values)
+    }
     if len({len(values) for values in columns.values()}) > 1:
         sizes = ", ".join(f"{name} {len(values)}" for name, values in columns.items())
         raise LogError(str(path), f"holds channels of different lengths ({sizes})", "log them at one rate")
