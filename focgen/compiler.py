@@ -22,7 +22,9 @@ def find_compiler() -> list[str]:
     chosen = shlex.split(os.environ.get("CC", ""))
     if chosen:
         if shutil.which(chosen[0]) is None:
-            raise BuildError("the compiler", f"$CC names {chosen[0]!r}, which is not there", "unset CC or correct it")
+            raise BuildError(
+                "the compiler", f"$CC names {chosen[0]!r}, which is not there", "unset CC or correct it"
+            )
         return chosen
     for name in _USUAL:
         if shutil.which(name):
@@ -32,15 +34,32 @@ def find_compiler() -> list[str]:
     raise BuildError("the compiler", "no C compiler was found", _REMEDY)
 
 
-def compile_shared(sources: Sequence[str | Path], target: str | Path, flags: Sequence[str] = (),
-                   include: Sequence[str | Path] = ()) -> None:
+def compile_shared(
+    sources: Sequence[str | Path],
+    target: str | Path,
+    flags: Sequence[str] = (),
+    include: Sequence[str | Path] = (),
+) -> None:
     """Compile C files into the shared library ``target``. Raises BuildError with the compiler's first complaint."""
     folders = [part for folder in include for part in ("-I", str(folder))]
-    command = [*find_compiler(), *flags, "-shared", "-fPIC", *folders, *map(str, sources), "-o", str(target), "-lm"]
+    command = [
+        *find_compiler(),
+        *flags,
+        "-shared",
+        "-fPIC",
+        *folders,
+        *map(str, sources),
+        "-o",
+        str(target),
+        "-lm",
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
-        raise BuildError(str(sources[0]), f"does not compile: {_first_complaint(done.stderr)}",
-                         "generate the folder again, or set CC to another compiler")
+        raise BuildError(
+            str(sources[0]),
+            f"does not compile: {_first_complaint(done.stderr)}",
+            "generate the folder again, or set CC to another compiler",
+        )
 
 
 def _first_complaint(text: str) -> str:

@@ -70,8 +70,16 @@ def demo(out: str | Path) -> Demo:
         (scratch / "pictures").mkdir()
         for name, content in _pictures(made).items():
             (scratch / "pictures" / name).write_bytes(content)
-        page = demo_page(made.identification, made.design, made.simulation, made.memory, made.generated,
-                         made.verified, made.diagnosis, made.sealed)
+        page = demo_page(
+            made.identification,
+            made.design,
+            made.simulation,
+            made.memory,
+            made.generated,
+            made.verified,
+            made.diagnosis,
+            made.sealed,
+        )
         (scratch / "report.html").write_text(page.html(), encoding="utf-8")
     return replace(made, folder=Path(out), report=Path(out) / "report.html")
 
@@ -79,7 +87,13 @@ def demo(out: str | Path) -> Demo:
 def _chain(folder: Path) -> Demo:
     rig, controller = folder / "identified.toml", folder / "controller.toml"
     say("1/7  identify: a fractional model from six steps of pressure, and six integer-order ones beside it")
-    found = identify([folder / "logs/steps.csv"], folder / "rig.toml", rig, last=_LOADED, unseen=[folder / "logs/sines.csv"])
+    found = identify(
+        [folder / "logs/steps.csv"],
+        folder / "rig.toml",
+        rig,
+        last=_LOADED,
+        unseen=[folder / "logs/sines.csv"],
+    )
     say("2/7  design: the model inverted, and a gain schedule as quick as the loop allows")
     designed = design(rig, controller)
     say("3/7  simulate: the closed loop at seven set points, bit for bit as it will run")
@@ -93,7 +107,18 @@ def _chain(folder: Path) -> Demo:
     verified = {a: verify(folder / "firmware" / a) for a in ARITHMETICS}
     say("7/7  diagnose: another rig, whose logs hold an effect that its model lacks, under seal")
     diagnosis, sealed = _blind(folder / "diagnosis")
-    return Demo(folder, folder / "report.html", found, designed, simulated, memory, generated, verified, diagnosis, sealed)
+    return Demo(
+        folder,
+        folder / "report.html",
+        found,
+        designed,
+        simulated,
+        memory,
+        generated,
+        verified,
+        diagnosis,
+        sealed,
+    )
 
 
 def _blind(folder: Path) -> tuple[Diagnosis, tuple[str, ...]]:
@@ -108,5 +133,8 @@ def _blind(folder: Path) -> tuple[Diagnosis, tuple[str, ...]]:
 
 def _pictures(made: Demo) -> dict[str, bytes]:
     """All pictures, by file name."""
-    return {**identification_pictures(made.identification), **design_pictures(made.design, made.identification.rig),
-            **simulation_pictures(made.simulation)}
+    return {
+        **identification_pictures(made.identification),
+        **design_pictures(made.design, made.identification.rig),
+        **simulation_pictures(made.simulation),
+    }

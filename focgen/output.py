@@ -24,7 +24,9 @@ def new_folder(target: str | Path) -> Iterator[Path]:
         target.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(prefix=".focgen-", dir=target))
     except OSError as reason:
-        raise InputError(str(target), f"cannot be written ({reason.strerror})", "choose another --out") from None
+        raise InputError(
+            str(target), f"cannot be written ({reason.strerror})", "choose another --out"
+        ) from None
     try:
         yield scratch
         for source in sorted(p for p in scratch.rglob("*") if p.is_file()):

@@ -23,7 +23,12 @@ def track(items: Iterable[Item], label: str, total: int | None = None) -> Iterat
     shown, begin = sys.stderr.isatty(), time.monotonic()
     for count, item in enumerate(items):
         if shown:
-            print(f"\r\033[K{bar(label, count, total, time.monotonic() - begin)}", end="", file=sys.stderr, flush=True)
+            print(
+                f"\r\033[K{bar(label, count, total, time.monotonic() - begin)}",
+                end="",
+                file=sys.stderr,
+                flush=True,
+            )
         yield item
     if shown:
         print("\r\033[K", end="", file=sys.stderr, flush=True)

@@ -104,8 +104,10 @@ class Table:
 
     def _terms(self, key: str, default: list | None = None) -> list[tuple[float, float]]:
         value = self.required(key) if default is None else self.raw(key, default)
-        right = isinstance(value, list) and value and all(
-            isinstance(t, list) and len(t) == 2 and all(map(_is_number, t)) for t in value
+        right = (
+            isinstance(value, list)
+            and value
+            and all(isinstance(t, list) and len(t) == 2 and all(map(_is_number, t)) for t in value)
         )
         if not right:
             raise self.fail(key, f"is {value!r}", "give a list of [coefficient, order of s] terms")

@@ -8,8 +8,11 @@ from focgen.control.controller import Controller, ControllerRanges, GainSchedule
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.model import Actuator, Ranges, Rig, Signals
 
+
 def pytest_addoption(parser):
-    parser.addoption("--update-golden", action="store_true", help="write tests/golden anew from what is generated")
+    parser.addoption(
+        "--update-golden", action="store_true", help="write tests/golden anew from what is generated"
+    )
 
 
 _OPEN_DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "open"

@@ -7,9 +7,15 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.model import Actuator, Ranges, Rig, Signals
 
 H = 0.05
-RIG = Rig("soft finger", H, Signals("t_s", "y", "u", "p", "k"), Actuator(1.3, 0.6, (0.002, 0.34)),
-          TransferFunction([(0.1, 0.0)], [(0.12, 1.0), (1.0, 0.0)]),
-          TransferFunction([(6.0, 0.0)], [(1.0, 1.0), (6.0, 0.0)]), Ranges((0.0, 2.0), (0.0, 0.2), (0.0, 0.02)))
+RIG = Rig(
+    "soft finger",
+    H,
+    Signals("t_s", "y", "u", "p", "k"),
+    Actuator(1.3, 0.6, (0.002, 0.34)),
+    TransferFunction([(0.1, 0.0)], [(0.12, 1.0), (1.0, 0.0)]),
+    TransferFunction([(6.0, 0.0)], [(1.0, 1.0), (6.0, 0.0)]),
+    Ranges((0.0, 2.0), (0.0, 0.2), (0.0, 0.02)),
+)
 
 
 def commands():
@@ -40,12 +46,24 @@ def _fractional(v, T, alpha):
     w = np.cumprod(np.r_[1.0, 1 - (alpha + 1) / np.arange(1, n)])
     y = np.zeros(n)
     for k in range(1, n):
-        y[k] = (v[k] - T * H**-alpha * (w[1:k + 1] @ y[k - 1::-1][:k])) / (1 + T * H**-alpha)
+        y[k] = (v[k] - T * H**-alpha * (w[1 : k + 1] @ y[k - 1 :: -1][:k])) / (1 + T * H**-alpha)
     return y
 
 
-def session(seed=0, noise=0.006, T=1.3, alpha=0.6, gain=(0.002, 0.34), delay=0, vent=None, zone=0.0, slip=0.0,
-            bend=0.0, drift=0.0, roles=("pressure", "curvature")):
+def session(
+    seed=0,
+    noise=0.006,
+    T=1.3,
+    alpha=0.6,
+    gain=(0.002, 0.34),
+    delay=0,
+    vent=None,
+    zone=0.0,
+    slip=0.0,
+    bend=0.0,
+    drift=0.0,
+    roles=("pressure", "curvature"),
+):
     """Experiments of a rig with one of these effects: ``delay`` samples, ``vent`` slower s, dead ``zone``, ``slip`` (a
     Maxwell element of dry friction, share), a ``bend`` of the sensor, a ``drift`` of the gain a second."""
     rng, logs, start = np.random.default_rng(seed), [], 0.0
@@ -61,7 +79,11 @@ def session(seed=0, noise=0.006, T=1.3, alpha=0.6, gain=(0.002, 0.34), delay=0, 
         signals = {"command": u, "pressure": p, "curvature": kappa, "output": y}
         for role, size in (("pressure", 0.18), ("curvature", 0.011), ("output", 0.011)):
             signals[role] = signals[role] + _noise(rng, len(u)) * noise * size
-        logs.append(Experiment(name, H, {r: s for r, s in signals.items() if r in ("command", "output", *roles)}, start))
+        logs.append(
+            Experiment(
+                name, H, {r: s for r, s in signals.items() if r in ("command", "output", *roles)}, start
+            )
+        )
         start += len(u) * H + 15
     return tuple(logs)
 

@@ -15,7 +15,9 @@ from focgen.output import new_folder, write_file, write_files
 from focgen.progress import bar
 
 
-@pytest.mark.parametrize("argv", [["nonsense"], [], ["design"], ["design", "missing.toml", "--out", "x.toml"]])
+@pytest.mark.parametrize(
+    "argv", [["nonsense"], [], ["design"], ["design", "missing.toml", "--out", "x.toml"]]
+)
 def test_unusable_input_is_one_line_and_status_2(argv, capsys):
     assert main(argv) == 2
     captured = capsys.readouterr()
@@ -66,7 +68,10 @@ def test_files_of_others_stay(tmp_path):
 
 def test_an_unwritable_place_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
-    for write in (lambda: write_files(tmp_path / "file", {"a": "b"}), lambda: write_file(tmp_path / "file" / "x", "b")):
+    for write in (
+        lambda: write_files(tmp_path / "file", {"a": "b"}),
+        lambda: write_file(tmp_path / "file" / "x", "b"),
+    ):
         with pytest.raises(InputError, match="cannot be written"):
             write()
 

@@ -39,10 +39,15 @@ def test_reads_a_hand_written_controller(tmp_path):
 
 
 def test_written_controller_reads_back_equal(tmp_path, paper_controller):
-    for controller in (paper_controller, replace(
-        paper_controller, gain=2.5, ranges=replace(paper_controller.ranges, schedule=None),
-        designed_from=Source("rig.toml", "ab" * 32),
-    )):
+    for controller in (
+        paper_controller,
+        replace(
+            paper_controller,
+            gain=2.5,
+            ranges=replace(paper_controller.ranges, schedule=None),
+            designed_from=Source("rig.toml", "ab" * 32),
+        ),
+    ):
         write_controller(controller, tmp_path / "controller.toml")
         assert read_controller(tmp_path / "controller.toml") == controller
 
@@ -55,7 +60,10 @@ FAULTS = {
     "no transfer": (CONTROLLER.replace("[transfer]", "[transfr]"), "lacks the table [transfer]"),
     "length 0": (CONTROLLER.replace("length = 64", "length = 0"), "at least 1 sample"),
     "length true": (CONTROLLER.replace("length = 64", "length = true"), "at least 1 sample"),
-    "breakpoints fall": (CONTROLLER.replace("breakpoints = [0.0, 1.0]", "breakpoints = [1.0, 0.0]"), "rising strictly"),
+    "breakpoints fall": (
+        CONTROLLER.replace("breakpoints = [0.0, 1.0]", "breakpoints = [1.0, 0.0]"),
+        "rising strictly",
+    ),
     "one gain short": (CONTROLLER.replace("gains = [1.0, 3.0]", "gains = [1.0]"), "one gain for each"),
     "no schedule range": (CONTROLLER.replace("schedule = [0.0, 2.0]\n", ""), "lacks 'schedule'"),
     "NaN": (CONTROLLER.replace("[1.0, 0.5], [2.0", "[nan, 0.5], [2.0"), "list of [coefficient, order of s]"),

@@ -65,8 +65,11 @@ def test_nothing_else_names_an_effect():
         inside = path.relative_to(root).parts
         if inside[:2] == ("rig", "effects") or inside[0] in ("trials", "demonstration.py"):
             continue
-        found = {n for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-                 if isinstance(node, ast.Constant) and isinstance(n := node.value, str)} & set(NAMES)
+        found = {
+            n
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            if isinstance(node, ast.Constant) and isinstance(n := node.value, str)
+        } & set(NAMES)
         assert not found, f"{path} names {found}"
 
 
@@ -100,8 +103,10 @@ def test_a_form_changes_something_and_stays_finite(effect, form):
         return
     x, run = session(1)
     x = np.where(np.arange(len(x)) > 550, -x, x)
-    rows = [tuple(p.starts[min(i, len(p.starts) - 1)] for p in form.parameters)
-            for i in range(max(len(p.starts) for p in form.parameters))]
+    rows = [
+        tuple(p.starts[min(i, len(p.starts) - 1)] for p in form.parameters)
+        for i in range(max(len(p.starts) for p in form.parameters))
+    ]
     found = [form.act(x.copy(), values, run) for values in rows]
     assert all(y.shape == x.shape and np.all(np.isfinite(y)) for y in found)
     assert max(np.max(np.abs(y - x)) for y in found) > 1e-6

@@ -23,7 +23,9 @@ def ramp_response(transfer, t, h):
     return float(mpmath.invertlaplace(f, t, method="talbot", degree=24))
 
 
-@pytest.mark.parametrize("T, alpha", [(1.32, 0.6), (1.0, 0.3), (2.0, 0.9), (2.0, 1.0), (2.0, 1.04), (1.0, 1.6), (50.0, 0.5)])
+@pytest.mark.parametrize(
+    "T, alpha", [(1.32, 0.6), (1.0, 0.3), (2.0, 0.9), (2.0, 1.0), (2.0, 1.04), (1.0, 1.6), (50.0, 0.5)]
+)
 def test_fractional_lag_from_the_first_sample_to_the_last(T, alpha):
     h, n = 0.02, 20_000
     x = np.r_[0.0, np.ones(n)]
@@ -31,7 +33,9 @@ def test_fractional_lag_from_the_first_sample_to_the_last(T, alpha):
     for k in (5, 50, 500, 20_000):
         exact = ramp_response(lambda s: 1 / (T * s**alpha + 1), k * h, h) if k < 500 else None
         if exact is None:  # the rise no longer matters: a step half a sample earlier, to h²
-            exact = float(mpmath.invertlaplace(lambda s: 1 / (s * (T * s**alpha + 1)), (k - 0.5) * h, method="talbot"))
+            exact = float(
+                mpmath.invertlaplace(lambda s: 1 / (s * (T * s**alpha + 1)), (k - 0.5) * h, method="talbot")
+            )
         assert abs(y[k] - exact) < 3e-5
 
 
@@ -42,13 +46,17 @@ def test_initial_rest_leaves_no_trace():
     np.testing.assert_allclose(y[4999:9999], z, atol=1e-12)
 
 
-@pytest.mark.parametrize("num, den", [([3.0], [0.2, 1.0]), ([152.48], [1, 53.39, 1528]), ([1, 2], [1, 2, 1]), ([2, 1, 3], [1, 2, 5])])
+@pytest.mark.parametrize(
+    "num, den",
+    [([3.0], [0.2, 1.0]), ([152.48], [1, 53.39, 1528]), ([1, 2], [1, 2, 1]), ([2, 1, 3], [1, 2, 5])],
+)
 def test_whole_orders_agree_with_scipy(num, den):
     h, n = 0.03, 400
     x = np.random.default_rng(3).normal(size=n)
     x[0] = 0.0
-    transfer = TransferFunction([(c, len(num) - 1 - i) for i, c in enumerate(num)],
-                                [(c, len(den) - 1 - i) for i, c in enumerate(den)])
+    transfer = TransferFunction(
+        [(c, len(num) - 1 - i) for i, c in enumerate(num)], [(c, len(den) - 1 - i) for i, c in enumerate(den)]
+    )
     _, exact, _ = lsim((num, den), x, np.arange(n) * h, interp=True)
     np.testing.assert_allclose(linear.run(transfer, x, rest(n), h, n * h), exact, atol=1e-9)
 
@@ -58,7 +66,11 @@ def test_general_fractional_transfer_function():
     h, n = 0.05, 400
     y = linear.run(transfer, np.r_[0.0, np.ones(n)], rest(n + 1), h, n * h)
     for k in (10, 40, 200, 400):
-        exact = float(mpmath.invertlaplace(lambda s: 1 / (s * (s**1.5 + 0.8 * s**0.7 + 1)), (k - 0.5) * h, method="talbot"))
+        exact = float(
+            mpmath.invertlaplace(
+                lambda s: 1 / (s * (s**1.5 + 0.8 * s**0.7 + 1)), (k - 0.5) * h, method="talbot"
+            )
+        )
         assert abs(y[k] - exact) < 2e-3
 
 

@@ -240,11 +240,23 @@ def test_the_bench_compares_with_the_full_sum():
         np.testing.assert_allclose(exact_output(0.6, x), full, atol=1e-12)
 
 
-@pytest.mark.parametrize("order, horizon, tolerance", [
-    (1.0, 1000, 1e-3), (0.0, 1000, 1e-3), (2.0, 1000, 1e-3), (2.3, 1000, 1e-3), (-1.0, 1000, 1e-3),
-    (1 + 1e-9, 1000, 1e-3), (math.nan, 1000, 1e-3), (0.6, 99, 1e-3), (0.6, 10**9, 1e-3), (0.6, 1000, 1e-12),
-    (0.6, 1000, 0.5), (0.6, 1000, math.nan),
-])
+@pytest.mark.parametrize(
+    "order, horizon, tolerance",
+    [
+        (1.0, 1000, 1e-3),
+        (0.0, 1000, 1e-3),
+        (2.0, 1000, 1e-3),
+        (2.3, 1000, 1e-3),
+        (-1.0, 1000, 1e-3),
+        (1 + 1e-9, 1000, 1e-3),
+        (math.nan, 1000, 1e-3),
+        (0.6, 99, 1e-3),
+        (0.6, 10**9, 1e-3),
+        (0.6, 1000, 1e-12),
+        (0.6, 1000, 0.5),
+        (0.6, 1000, math.nan),
+    ],
+)
 def test_what_cannot_be_fitted_is_refused(order, horizon, tolerance):
     with pytest.raises(ValueError):
         fit_exponential(order, horizon, tolerance)

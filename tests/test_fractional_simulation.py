@@ -26,7 +26,7 @@ def seconds(count):
 def mittag_leffler_step(t, constant, order):
     """1 − E_α(−t^α/T) by its series in many digits: nothing here is shared with the package."""
     with mp.workdps(60):
-        x = -mp.mpf(float(t)) ** mp.mpf(order) / mp.mpf(constant)
+        x = -(mp.mpf(float(t)) ** mp.mpf(order)) / mp.mpf(constant)
         terms = (x ** int(k) * mp.rgamma(mp.mpf(order) * k + 1) for k in range(int(200 / order)))
         return float(1 - mp.fsum(terms))
 

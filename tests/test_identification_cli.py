@@ -19,8 +19,21 @@ MODELS = {"fom", "iom_1p", "iom_2p", "iom_2p1z", "iom_3p", "iom_3p1z", "iom_3p2z
 def loading(tmp_path_factory):
     """The positive steps alone (to 40 s), which the fractional model can describe: (folder, payload)."""
     folder = tmp_path_factory.mktemp("identified")
-    argv = ["identify", str(STEPS), "--rig", str(RIG), "--out", str(folder / "new.toml"), "--to", "40",
-            "--unseen", str(SINES), "--report", str(folder / "pictures"), "--json"]
+    argv = [
+        "identify",
+        str(STEPS),
+        "--rig",
+        str(RIG),
+        "--out",
+        str(folder / "new.toml"),
+        "--to",
+        "40",
+        "--unseen",
+        str(SINES),
+        "--report",
+        str(folder / "pictures"),
+        "--json",
+    ]
     return folder, *run_captured(argv)
 
 
@@ -44,7 +57,11 @@ def test_json_has_the_promised_fields(loading):
         assert set(e["ci95"]) == {"K", "T", "alpha"}
         assert all(low < e[key] < high for key, (low, high) in e["ci95"].items())
     rig = payload["rig"]
-    assert {"T", "alpha", "gain", "gain_r2", "ci95"} <= rig.keys() and set(rig["ci95"]) == {"T", "alpha", "gain"}
+    assert {"T", "alpha", "gain", "gain_r2", "ci95"} <= rig.keys() and set(rig["ci95"]) == {
+        "T",
+        "alpha",
+        "gain",
+    }
     assert len(rig["gain"]) == len(rig["ci95"]["gain"]) == 2
     assert set(payload["gof"]) == MODELS
     for values in payload["gof"].values():
@@ -65,9 +82,15 @@ def test_loading_gives_the_makers_parameters_back(loading):
         assert low <= truth <= high and low <= value <= high
     assert rig["T"] == pytest.approx(1.32, rel=0.02) and rig["alpha"] == pytest.approx(0.6, abs=0.01)
     assert rig["gain"][1] == pytest.approx(0.345, rel=0.02) and rig["gain_r2"] > 0.999
-    hits = [low <= truth <= high for e in loading[1]["experiments"]
-            for truth, (low, high) in [(1.32, e["ci95"]["T"]), (0.6, e["ci95"]["alpha"]),
-                                       (0.0015 + 0.345 * e["level"], e["ci95"]["K"])]]
+    hits = [
+        low <= truth <= high
+        for e in loading[1]["experiments"]
+        for truth, (low, high) in [
+            (1.32, e["ci95"]["T"]),
+            (0.6, e["ci95"]["alpha"]),
+            (0.0015 + 0.345 * e["level"], e["ci95"]["K"]),
+        ]
+    ]
     assert sum(hits) >= 15  # of 18; fewer has a chance of 1 % where 95 % is meant
 
 
@@ -90,7 +113,11 @@ def test_the_rig_written_is_the_rig_reported(loading):
     assert written.actuator.T == payload["rig"]["T"] and written.actuator.alpha == payload["rig"]["alpha"]
     assert list(written.actuator.gain) == payload["rig"]["gain"]
     assert (written.regulator, written.sensor, written.signals, written.ranges) == (
-        nominal.regulator, nominal.sensor, nominal.signals, nominal.ranges)
+        nominal.regulator,
+        nominal.sensor,
+        nominal.signals,
+        nominal.ranges,
+    )
 
 
 def test_pictures_are_written(loading):
@@ -140,7 +167,9 @@ def test_a_degree_that_makes_no_sense_is_refused(tmp_path, capsys, degree):
 def test_missing_files_are_refused(tmp_path, capsys):
     log, rig, absent = str(STEPS), str(RIG), str(EXAMPLES / "absent.csv")
     assert "absent.csv" in refused(["identify", absent, "--rig", rig], tmp_path, capsys)
-    assert "absent.toml" in refused(["identify", log, "--rig", str(EXAMPLES / "absent.toml")], tmp_path, capsys)
+    assert "absent.toml" in refused(
+        ["identify", log, "--rig", str(EXAMPLES / "absent.toml")], tmp_path, capsys
+    )
     assert "absent.csv" in refused(["identify", log, "--rig", rig, "--unseen", absent], tmp_path, capsys)
 
 
@@ -151,15 +180,35 @@ def test_logs_without_a_step_are_refused(tmp_path, capsys):
 
 def test_a_rig_that_cannot_be_written_leaves_no_pictures(tmp_path, capsys):
     (tmp_path / "file").write_text("in the way")
-    argv = ["identify", str(STEPS), "--rig", str(RIG), "--to", "8", "--out", str(tmp_path / "file" / "new.toml"),
-            "--report", str(tmp_path / "pictures")]
+    argv = [
+        "identify",
+        str(STEPS),
+        "--rig",
+        str(RIG),
+        "--to",
+        "8",
+        "--out",
+        str(tmp_path / "file" / "new.toml"),
+        "--report",
+        str(tmp_path / "pictures"),
+    ]
     assert main(argv) == 2 and "file" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
 def test_pictures_that_cannot_be_written_leave_no_rig(tmp_path, capsys):
     (tmp_path / "file").write_text("in the way")
-    argv = ["identify", str(STEPS), "--rig", str(RIG), "--to", "8", "--out", str(tmp_path / "new.toml"),
-            "--report", str(tmp_path / "file" / "pictures")]
+    argv = [
+        "identify",
+        str(STEPS),
+        "--rig",
+        str(RIG),
+        "--to",
+        "8",
+        "--out",
+        str(tmp_path / "new.toml"),
+        "--report",
+        str(tmp_path / "file" / "pictures"),
+    ]
     assert main(argv) == 2 and "file" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["file"]

@@ -30,7 +30,9 @@ def exact_step(step: float, count: int, begin: float, T: float = T, alpha: float
     return answer
 
 
-def step_log(step=0.02, seconds=41.0, release=None, noise=None, level=LEVEL, offset=0.0, **model) -> Experiment:
+def step_log(
+    step=0.02, seconds=41.0, release=None, noise=None, level=LEVEL, offset=0.0, **model
+) -> Experiment:
     """A held step of pressure at 1 s, released at ``release`` s."""
     time = step * np.arange(int(round(seconds / step)))
     pressure = level * (np.arange(len(time)) >= round(1.0 / step))
@@ -39,7 +41,9 @@ def step_log(step=0.02, seconds=41.0, release=None, noise=None, level=LEVEL, off
         pressure = pressure * (np.arange(len(time)) < round(release / step))
         curvature = curvature - K * level * exact_step(step, len(time), release, **model)
     noise = 0.0 if noise is None else noise
-    return Experiment("step", step, {"pressure": pressure, "curvature": curvature + noise, "output": curvature})
+    return Experiment(
+        "step", step, {"pressure": pressure, "curvature": curvature + noise, "output": curvature}
+    )
 
 
 def fitted(log: Experiment):
@@ -107,7 +111,9 @@ def test_an_integer_plant_is_found_exactly():
     moved = np.arange(1500) >= 50
     log = Experiment("plant", 0.02, {"pressure": 1.0 * moved, "curvature": answer * (time > 1.0)})
     fit = {f.name: f for f in fit_integer_models(prepare(log, paper_rig()))}["2p1z"]
-    assert fit.num == pytest.approx([2.0, 1.0], rel=1e-4) and fit.den == pytest.approx([1.0, 3.2, 0.6], rel=1e-4)
+    assert fit.num == pytest.approx([2.0, 1.0], rel=1e-4) and fit.den == pytest.approx(
+        [1.0, 3.2, 0.6], rel=1e-4
+    )
 
 
 def six_levels(**changes) -> list[Experiment]:
@@ -115,8 +121,11 @@ def six_levels(**changes) -> list[Experiment]:
     logs = []
     for i, level in enumerate((0.075, 0.1, 0.125, 0.15, 0.175, 0.2)):
         log = step_log(**changes)
-        signals = {"pressure": log["pressure"] / LEVEL * level, "curvature": log["curvature"] * line(level),
-                   "output": log["output"]}
+        signals = {
+            "pressure": log["pressure"] / LEVEL * level,
+            "curvature": log["curvature"] * line(level),
+            "output": log["output"],
+        }
         logs.append(Experiment(f"{level}", log.sample_time, signals, start=100.0 * i))
     return logs
 
@@ -124,7 +133,9 @@ def six_levels(**changes) -> list[Experiment]:
 def test_pooled_rig_has_the_line():
     found = module.identify(six_levels(), paper_rig())
     assert found.pooled.gain == pytest.approx((0.0015, 0.345), rel=1e-5) and found.pooled.gain_r2 > 1.0 - 1e-9
-    assert found.pooled.T == pytest.approx(T, rel=1e-6) and found.pooled.alpha == pytest.approx(ALPHA, abs=1e-6)
+    assert found.pooled.T == pytest.approx(T, rel=1e-6) and found.pooled.alpha == pytest.approx(
+        ALPHA, abs=1e-6
+    )
     assert found.gof["rig"]["mean"] > 0.9999
     assert any("positive steps only" in w for w in found.warnings)
     assert any("levels rise" in w for w in found.warnings)
@@ -144,9 +155,13 @@ def test_a_degree_that_the_levels_cannot_show_is_lowered_and_said():
 def test_useless_logs_are_refused():
     flat = step_log()
     with pytest.raises(LogError, match="throughout"):
-        module.identify([Experiment("flat", 0.02, {**flat.signals, "curvature": np.ones(len(flat))})], paper_rig())
+        module.identify(
+            [Experiment("flat", 0.02, {**flat.signals, "curvature": np.ones(len(flat))})], paper_rig()
+        )
     with pytest.raises(LogError, match="0 throughout"):
-        module.identify([Experiment("rest", 0.02, {**flat.signals, "pressure": np.zeros(len(flat))})], paper_rig())
+        module.identify(
+            [Experiment("rest", 0.02, {**flat.signals, "pressure": np.zeros(len(flat))})], paper_rig()
+        )
     noise = np.random.default_rng(0).normal(size=len(flat))
     with pytest.raises((FitError, LogError)):
         wandering = {"pressure": noise, "curvature": np.roll(noise, 5)}
@@ -183,4 +198,6 @@ def test_an_offset_that_is_there_is_found_without_a_rest():
     (fit,) = found.experiments
     assert fit.offset == pytest.approx(0.2 * K * LEVEL, rel=0.1)
     assert fit.ci95["alpha"][0] < ALPHA < fit.ci95["alpha"][1]
-    assert all(f.offset != 0.0 for f in fit.integer) and not any("shows no offset" in note for note in found.notes)
+    assert all(f.offset != 0.0 for f in fit.integer) and not any(
+        "shows no offset" in note for note in found.notes
+    )

@@ -12,14 +12,17 @@ def experiment(**signals):
     return Experiment("e", 0.01, {role: np.array(values) for role, values in signals.items()})
 
 
-@pytest.mark.parametrize("seen, span", [
-    ([0.0, 0.2], (0.0, 0.25)),
-    ([0.001, 0.16], (0.0, 0.2)),
-    ([-0.001, 0.161], (0.0, 0.21)),     # noise below zero is no reach; 0.20125 is rounded outwards
-    ([-3.0, 1.0], (-3.8, 1.3)),
-    ([2.0, 812.0], (0.0, 1100.0)),
-    ([-812.0, -5.0], (-1100.0, 0.0)),
-])
+@pytest.mark.parametrize(
+    "seen, span",
+    [
+        ([0.0, 0.2], (0.0, 0.25)),
+        ([0.001, 0.16], (0.0, 0.2)),
+        ([-0.001, 0.161], (0.0, 0.21)),  # noise below zero is no reach; 0.20125 is rounded outwards
+        ([-3.0, 1.0], (-3.8, 1.3)),
+        ([2.0, 812.0], (0.0, 1100.0)),
+        ([-812.0, -5.0], (-1100.0, 0.0)),
+    ],
+)
 def test_a_range_spans_zero_and_what_was_seen_with_room(seen, span):
     ranges, notes = seen_ranges(Ranges(), [experiment(command=[0.0, 1.0], output=seen)])
     assert ranges == Ranges(output=span)
@@ -27,7 +30,10 @@ def test_a_range_spans_zero_and_what_was_seen_with_room(seen, span):
 
 
 def test_what_is_given_stays_and_all_experiments_count():
-    logs = [experiment(pressure=[0.0, 0.1], output=[0.0, 1.0]), experiment(pressure=[0.0, 0.2], output=[0.0, 4.0])]
+    logs = [
+        experiment(pressure=[0.0, 0.1], output=[0.0, 1.0]),
+        experiment(pressure=[0.0, 0.2], output=[0.0, 4.0]),
+    ]
     ranges, notes = seen_ranges(Ranges(output=(0.0, 2.0)), logs)
     assert ranges == Ranges(pressure=(0.0, 0.25), output=(0.0, 2.0))
     assert len(notes) == 1

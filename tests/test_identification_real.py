@@ -2,8 +2,6 @@
 
 import json
 
-import pytest
-
 from focgen.cli.main import main
 
 RIG = """
@@ -20,8 +18,19 @@ output = "angle_deg"
 def test_mean_gof_and_better_than_one_pole(open_data, tmp_path, capsys):
     (tmp_path / "rig.toml").write_text(RIG)
     log = open_data / "spba_pump_two_chamber_steps.csv"
-    argv = ["identify", str(log), "--rig", str(tmp_path / "rig.toml"), "--out", str(tmp_path / "new.toml"),
-            "--from", "1", "--to", "57", "--json"]
+    argv = [
+        "identify",
+        str(log),
+        "--rig",
+        str(tmp_path / "rig.toml"),
+        "--out",
+        str(tmp_path / "new.toml"),
+        "--from",
+        "1",
+        "--to",
+        "57",
+        "--json",
+    ]
     assert main(argv) == 0
     gof = json.loads(capsys.readouterr().out)["gof"]
     runs = [name for name in gof["fom"] if name != "mean"]

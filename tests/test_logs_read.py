@@ -21,14 +21,21 @@ def table(count=COUNT, **changes) -> dict[str, np.ndarray]:
     """Columns of a log: a step of pressure at 0.1 s."""
     time = STEP * np.arange(count)
     up = time >= 0.1
-    columns = {"t_s": time, "u_V": 1.5 * up, "p_bar": 0.15 * up, "kappa_cam_per_mm": 0.008 * up * time,
-               "kappa_per_mm": 0.0079 * up * time}
+    columns = {
+        "t_s": time,
+        "u_V": 1.5 * up,
+        "p_bar": 0.15 * up,
+        "kappa_cam_per_mm": 0.008 * up * time,
+        "kappa_per_mm": 0.0079 * up * time,
+    }
     return {**columns, **changes}
 
 
 def csv_text(columns) -> str:
     rows = zip(*columns.values())
-    cells = (",".join(str(cell) if isinstance(cell, str) else repr(float(cell)) for cell in row) for row in rows)
+    cells = (
+        ",".join(str(cell) if isinstance(cell, str) else repr(float(cell)) for cell in row) for row in rows
+    )
     return "\n".join([",".join(columns), *cells]) + "\n"
 
 
@@ -59,8 +66,14 @@ def write_tdms(path, columns):
         writer.write_segment([nptdms.ChannelObject("log", k, np.asarray(v)) for k, v in columns.items()])
 
 
-WRITERS = {"csv": write_csv, "csv.gz": write_csv_gz, "parquet": write_parquet, "mat": write_mat, "tdms": write_tdms,
-           "CSV": write_csv}
+WRITERS = {
+    "csv": write_csv,
+    "csv.gz": write_csv_gz,
+    "parquet": write_parquet,
+    "mat": write_mat,
+    "tdms": write_tdms,
+    "CSV": write_csv,
+}
 
 
 def read(*paths, signals=SIGNALS, sample_time=STEP, **options):
@@ -212,7 +225,10 @@ MALFORMED = {
     "NaN": (_with("p_bar", 7, np.nan), "pressure is empty or not a number in line 9"),
     "empty cell": (_with("kappa_per_mm", 3, ""), "output is empty or not a number in line 5"),
     "infinite": (_with("p_bar", 3, np.inf), "infinite in line 5"),
-    "no output": (_without("kappa_per_mm", "kappa_permm"), "no column 'kappa_per_mm'.*output = 'kappa_permm'"),
+    "no output": (
+        _without("kappa_per_mm", "kappa_permm"),
+        "no column 'kappa_per_mm'.*output = 'kappa_permm'",
+    ),
     "no time": (_without("t_s", "t_ms"), "no column 't_s'.*time = 't_ms'"),
     "no input": (_only_output, "no column 'u_V'"),
     "one sample": (lambda path: write_csv(path, table(1)), "1 samples"),
@@ -229,12 +245,18 @@ MALFORMED = {
     "semicolons, comma": (_text(lambda text: text.replace(",", ";").replace(".", ",")), "';'"),
     "tabs": (_text(lambda text: text.replace(",", "\t")), "tabs"),
     "decimal comma": (_with("p_bar", 8, '"0,15"'), "'0,15' in line 10.*point"),
-    "cells missing": (_text(lambda text: text[: text.rindex(",")] + "\n"), "line 61 has 4 cells, the header 5"),
+    "cells missing": (
+        _text(lambda text: text[: text.rindex(",")] + "\n"),
+        "line 61 has 4 cells, the header 5",
+    ),
     "empty file": (_text(lambda text: ""), "is empty"),
     "blank lines": (_text(lambda text: "\n\n"), "is empty"),
     "no header": (_text(lambda text: text.partition("\n")[2]), "instead of a header"),
     "a column twice": (_text(lambda text: text.replace("p_bar", "u_V", 1)), "'u_V' twice"),
-    "not UTF-8": (lambda path: path.write_bytes(csv_text(table()).replace("u_V", "µ_V").encode("latin-1")), "UTF-8"),
+    "not UTF-8": (
+        lambda path: path.write_bytes(csv_text(table()).replace("u_V", "µ_V").encode("latin-1")),
+        "UTF-8",
+    ),
     "UTF-16": (lambda path: path.write_bytes(csv_text(table()).encode("utf-16")), "UTF-8"),
     "binary": (lambda path: path.write_bytes(b"t_s,\x00\x00\n" * 9), "log.csv"),
     "in mbar": (_table(p_bar=1e3 * table()["p_bar"]), "pressure reaches 150 .* range is 0 to 0.25"),
@@ -255,7 +277,16 @@ def refusal(log, rig, tmp_path, capsys, *more) -> str:
     """The one line with which ``focgen identify`` refuses a log; nothing may be written."""
     before = set(tmp_path.rglob("*"))
     new = tmp_path / "new"
-    argv = ["identify", str(log), "--rig", str(rig), "--out", str(new / "rig.toml"), "--report", str(new / "pictures")]
+    argv = [
+        "identify",
+        str(log),
+        "--rig",
+        str(rig),
+        "--out",
+        str(new / "rig.toml"),
+        "--report",
+        str(new / "pictures"),
+    ]
     assert main([*argv, *more]) == 2
     printed = capsys.readouterr()
     lines = [line for line in printed.err.splitlines() if line.startswith("focgen: error: ")]
@@ -277,7 +308,9 @@ def test_malformed_logs_are_refused_in_one_line(tmp_path, rig, capsys, fault):
             read(tmp_path / "log.csv", limits=LIMITS)
 
 
-@pytest.mark.parametrize("name", ["log.xlsx", "log", "missing.csv", "missing.parquet", "missing.mat", "missing.tdms"])
+@pytest.mark.parametrize(
+    "name", ["log.xlsx", "log", "missing.csv", "missing.parquet", "missing.mat", "missing.tdms"]
+)
 def test_unknown_and_missing_files_are_refused(tmp_path, rig, capsys, name):
     if not name.startswith("missing"):
         write_csv(tmp_path / name, table())
@@ -290,7 +323,9 @@ def test_damaged_files_are_refused(tmp_path, rig, capsys, name, content):
     path = tmp_path / name
     WRITERS[name.partition(".")[2]](path, table())
     whole = path.read_bytes()
-    path.write_bytes({"empty": b"", "text": csv_text(table()).encode(), "cut": whole[: len(whole) // 2]}[content])
+    path.write_bytes(
+        {"empty": b"", "text": csv_text(table()).encode(), "cut": whole[: len(whole) // 2]}[content]
+    )
     assert name in refusal(path, rig, tmp_path, capsys)
 
 

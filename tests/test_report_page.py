@@ -5,8 +5,11 @@ from html.parser import HTMLParser
 from focgen.report.page import Page, Picture, Section, TableOf, text_table
 
 TABLE = TableOf(("arithmetic", "state"), (("q31", "4 012 B"), ("q15", "2 006 B")), "Size")
-PAGE = Page("Actuator <1>", "It works & is small.",
-            (Section("Model", ("K rises with p.",), (TABLE,), (Picture("fits.png", "Six steps"),), ("rig.toml",)),))
+PAGE = Page(
+    "Actuator <1>",
+    "It works & is small.",
+    (Section("Model", ("K rises with p.",), (TABLE,), (Picture("fits.png", "Six steps"),), ("rig.toml",)),),
+)
 
 
 class _Collector(HTMLParser):
@@ -31,7 +34,14 @@ def test_page_shows_everything_it_is_given():
     page = _Collector()
     page.feed(PAGE.html())
     shown = "".join(page.text)
-    for piece in ("Actuator <1>", "It works & is small.", "K rises with p.", "4 012 B", "Six steps", "rig.toml"):
+    for piece in (
+        "Actuator <1>",
+        "It works & is small.",
+        "K rises with p.",
+        "4 012 B",
+        "Six steps",
+        "rig.toml",
+    ):
         assert piece in shown
     assert page.images == [{"src": "fits.png", "alt": "Six steps", "loading": "lazy"}]
     assert not page.open
@@ -45,4 +55,8 @@ def test_page_fetches_nothing_and_is_reproducible():
 def test_text_table_aligns_columns():
     caption, *lines = text_table(TABLE).splitlines()
     assert caption == "Size"
-    assert len({len(line) for line in lines}) == 1 and lines[2].startswith("q31 ") and lines[2].endswith(" 4 012 B")
+    assert (
+        len({len(line) for line in lines}) == 1
+        and lines[2].startswith("q31 ")
+        and lines[2].endswith(" 4 012 B")
+    )

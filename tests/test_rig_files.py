@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from focgen.errors import RigError
-from focgen.rig import LinearActuator, read_rig, write_rig
 from focgen.fractional.transfer import TransferFunction
+from focgen.rig import LinearActuator, read_rig, write_rig
 
 RIG = """
 name = "spba"

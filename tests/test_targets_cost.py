@@ -142,7 +142,7 @@ def test_the_deepest_path_and_what_cannot_be_told(tmp_path):
     uint32_t (*volatile pointer)(uint32_t) = leaf;
     __attribute__((noinline)) uint32_t through(uint32_t n) { return pointer(n) + 1; }
     """
-    kept = "".join(f"__asm volatile(\"\" :: \"r\"({name}));" for name in ("top", "self", "through"))
+    kept = "".join(f'__asm volatile("" :: "r"({name}));' for name in ("top", "self", "through"))
     deep += f"void spba_keep(void); void spba_keep(void) {{ {kept} }}"
     deep = deep.replace("{ return 0; }", "{ extern void spba_keep(void); spba_keep(); return 0; }", 1)
     for name in ("cortex-m0plus", "cortex-m4", "rv32imac"):

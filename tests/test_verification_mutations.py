@@ -442,7 +442,11 @@ def test_a_target_that_is_not_there_is_skipped_and_says_why(sound, capsys, monke
 def test_c_that_never_returns_is_a_mismatch_that_says_so(sound, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(compare, "PATIENCE", 0.5)
     folder = copied(sound, tmp_path, "spba", "q15")
-    sow(folder, "spba", Fault("hang", "@.c", r"s->error_now = 0;", "s->error_now = 0; for (;;) { s->flags++; }"))
+    sow(
+        folder,
+        "spba",
+        Fault("hang", "@.c", r"s->error_now = 0;", "s->error_now = 0; for (;;) { s->flags++; }"),
+    )
     assert main(["verify", str(folder), "--samples", "500"]) == 1
     assert "did not return within" in capsys.readouterr().out
 

@@ -44,8 +44,10 @@ def steps(rig: Rig) -> list[Experiment]:
     """A second of rest, 40 s at a level, 15 s of release; one experiment a level."""
     time = np.arange(0.0, 56.0, STEP)
     held = (time >= 1.0) & (time < 41.0)
-    return [_experiment(f"{level:.3f}", held * level / rig.regulator.dc_gain, 100.0 * i)
-            for i, level in enumerate(LEVELS)]
+    return [
+        _experiment(f"{level:.3f}", held * level / rig.regulator.dc_gain, 100.0 * i)
+        for i, level in enumerate(LEVELS)
+    ]
 
 
 def sines(rig: Rig) -> list[Experiment]:

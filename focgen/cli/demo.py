@@ -9,7 +9,9 @@ from focgen.demonstration import Demo, demo
 from focgen.report.demo_page import demo_lead, diagnosis_sentence, firmware_table
 from focgen.report.page import text_table
 
-HELP = "all of it on the example logs: model, controller, verified C, and a sealed case diagnosed; with a report"
+HELP = (
+    "all of it on the example logs: model, controller, verified C, and a sealed case diagnosed; with a report"
+)
 EXAMPLE = """example:
   focgen demo --out build/demo
 
@@ -28,23 +30,43 @@ def run(args: Namespace) -> Outcome:
 def _payload(made: Demo) -> dict:
     found, designed = made.identification, made.design
     return {
-        "paths": {"folder": made.folder, "report": made.report, "rig": made.folder / "identified.toml",
-                  "controller": made.folder / "controller.toml",
-                  "firmware": {a: made.folder / "firmware" / a for a in made.generated}},
-        "identify": {"T": found.pooled.T, "alpha": found.pooled.alpha, "gain": found.pooled.gain,
-                     "gof": {model: values["mean"] for model, values in found.gof.items()}},
-        "design": {"settling_s": designed.settling_s, "overshoot_pct": designed.overshoot_pct, "holds": designed.holds},
-        "simulate": {"settling_s": [s.settling_s for s in made.simulation.setpoints], "holds": made.simulation.holds},
+        "paths": {
+            "folder": made.folder,
+            "report": made.report,
+            "rig": made.folder / "identified.toml",
+            "controller": made.folder / "controller.toml",
+            "firmware": {a: made.folder / "firmware" / a for a in made.generated},
+        },
+        "identify": {
+            "T": found.pooled.T,
+            "alpha": found.pooled.alpha,
+            "gain": found.pooled.gain,
+            "gof": {model: values["mean"] for model, values in found.gof.items()},
+        },
+        "design": {
+            "settling_s": designed.settling_s,
+            "overshoot_pct": designed.overshoot_pct,
+            "holds": designed.holds,
+        },
+        "simulate": {
+            "settling_s": [s.settling_s for s in made.simulation.setpoints],
+            "holds": made.simulation.holds,
+        },
         "study": {"recommendation": made.memory.recommendation},
         "verify": {a: v.targets for a, v in made.verified.items()},
-        "diagnose": {"verdict": made.diagnosis.verdict, "sealed": made.sealed,
-                     "found": [[c.effect for c in cause.candidates] for cause in made.diagnosis.causes]},
+        "diagnose": {
+            "verdict": made.diagnosis.verdict,
+            "sealed": made.sealed,
+            "found": [[c.effect for c in cause.candidates] for cause in made.diagnosis.causes],
+        },
         "holds": made.holds,
     }
 
 
 def _text(made: Demo) -> str:
     lead = demo_lead(made.identification, made.design, made.verified)
-    return (f"\n{lead}\n\n{text_table(firmware_table(made.generated, made.verified))}\n\n"
-            f"{made.memory.recommendation}\n\n{diagnosis_sentence(made.diagnosis, made.sealed)}\n\nlook at  {made.report}\n"
-            f"         {made.folder / 'pictures'}\nread     {made.folder / 'firmware' / 'q31'}")
+    return (
+        f"\n{lead}\n\n{text_table(firmware_table(made.generated, made.verified))}\n\n"
+        f"{made.memory.recommendation}\n\n{diagnosis_sentence(made.diagnosis, made.sealed)}\n\nlook at  {made.report}\n"
+        f"         {made.folder / 'pictures'}\nread     {made.folder / 'firmware' / 'q31'}"
+    )

@@ -21,14 +21,29 @@ EXAMPLE = """example:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("rig", metavar="RIG", help="the nominal rig (rig.toml)")
-    parser.add_argument("logs", metavar="LOG", nargs="*", help="one session of the real rig, a file an experiment")
+    parser.add_argument(
+        "logs", metavar="LOG", nargs="*", help="one session of the real rig, a file an experiment"
+    )
     parser.add_argument("--out", metavar="DIR", help="folder for diagnosis.json, the rigs and the pictures")
-    parser.add_argument("--controller", metavar="FILE", help="the controller of closed-loop logs (controller.toml)")
-    parser.add_argument("--plan", action="store_true", help="only say which effects the experiments could tell apart")
-    parser.add_argument("--bootstrap", type=int, default=0, metavar="N",
-                        help="set the threshold by N simulated sessions of the nominal rig (default: built in)")
-    parser.add_argument("--from", dest="first", type=float, metavar="S", help="from S seconds into each experiment")
-    parser.add_argument("--to", dest="last", type=float, metavar="S", help="to S seconds into each experiment")
+    parser.add_argument(
+        "--controller", metavar="FILE", help="the controller of closed-loop logs (controller.toml)"
+    )
+    parser.add_argument(
+        "--plan", action="store_true", help="only say which effects the experiments could tell apart"
+    )
+    parser.add_argument(
+        "--bootstrap",
+        type=int,
+        default=0,
+        metavar="N",
+        help="set the threshold by N simulated sessions of the nominal rig (default: built in)",
+    )
+    parser.add_argument(
+        "--from", dest="first", type=float, metavar="S", help="from S seconds into each experiment"
+    )
+    parser.add_argument(
+        "--to", dest="last", type=float, metavar="S", help="to S seconds into each experiment"
+    )
 
 
 def run(args: argparse.Namespace) -> Outcome:
@@ -48,20 +63,28 @@ def run(args: argparse.Namespace) -> Outcome:
 
 def in_words(found: Diagnosis, out: str) -> str:
     """The diagnosis for people."""
-    lines = [f"verdict: {found.verdict}", f"stage: {found.where.stage or 'cannot be told'}"
-             + (" (inferred)" if found.where.inferred else "")]
+    lines = [
+        f"verdict: {found.verdict}",
+        f"stage: {found.where.stage or 'cannot be told'}" + (" (inferred)" if found.where.inferred else ""),
+    ]
     for cause in found.causes:
         names = ", ".join(f"{c.effect} {100 * c.confidence:.0f} %" for c in cause.candidates)
         lines.append(f"  {cause.stage}: {names}; {100 * cause.shrink:.0f} % of the gap")
     gap = found.gap
-    lines.append(f"gap of {gap.unit}: {gap.as_given:.4g} as given, {gap.refitted:.4g} refitted, "
-                 f"{gap.explained:.4g} explained, {gap.floor:.4g} noise")
-    lines.append(f"GOF: {gap.gof['as given']:.3f} as given, {gap.gof['refitted']:.3f} refitted, "
-                 f"{gap.gof['explained']:.3f} explained, of a possible {gap.gof['possible']:.3f}")
+    lines.append(
+        f"gap of {gap.unit}: {gap.as_given:.4g} as given, {gap.refitted:.4g} refitted, "
+        f"{gap.explained:.4g} explained, {gap.floor:.4g} noise"
+    )
+    lines.append(
+        f"GOF: {gap.gof['as given']:.3f} as given, {gap.gof['refitted']:.3f} refitted, "
+        f"{gap.gof['explained']:.3f} explained, of a possible {gap.gof['possible']:.3f}"
+    )
     if found.shrink is not None:
         low, high = found.shrink_interval
-        lines.append(f"promised for new experiments: {100 * found.shrink:.0f} % of what could be explained "
-                     f"({100 * low:.0f} to {100 * high:.0f} %)")
+        lines.append(
+            f"promised for new experiments: {100 * found.shrink:.0f} % of what could be explained "
+            f"({100 * low:.0f} to {100 * high:.0f} %)"
+        )
     for place, what in found.unexplained.items():
         lines.append(f"unexplained, {place}: depends on {', '.join(what['depends_on'])}")
     if found.next_experiment:

@@ -23,11 +23,21 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("logs", nargs="+", metavar="LOG", help=".csv, .csv.gz, .parquet, .mat or .tdms")
     parser.add_argument("--rig", required=True, metavar="RIG", help="rig.toml: columns, regulator and sensor")
     parser.add_argument("--out", required=True, metavar="NEW_RIG", help="the rig.toml to write")
-    parser.add_argument("--from", dest="first", type=float, metavar="S", help="begin here, s within each experiment")
-    parser.add_argument("--to", dest="last", type=float, metavar="S", help="end here, s within each experiment")
-    parser.add_argument("--gain-degree", type=int, default=1, metavar="N", help="degree of K(p) (default: 1, a line)")
-    parser.add_argument("--unseen", nargs="+", default=(), metavar="LOG", help="logs to show the rig against, not fitted")
-    parser.add_argument("--report", metavar="DIR", help="write pictures there: Table I, fits, parameters, loops")
+    parser.add_argument(
+        "--from", dest="first", type=float, metavar="S", help="begin here, s within each experiment"
+    )
+    parser.add_argument(
+        "--to", dest="last", type=float, metavar="S", help="end here, s within each experiment"
+    )
+    parser.add_argument(
+        "--gain-degree", type=int, default=1, metavar="N", help="degree of K(p) (default: 1, a line)"
+    )
+    parser.add_argument(
+        "--unseen", nargs="+", default=(), metavar="LOG", help="logs to show the rig against, not fitted"
+    )
+    parser.add_argument(
+        "--report", metavar="DIR", help="write pictures there: Table I, fits, parameters, loops"
+    )
 
 
 def run(args: Namespace) -> Outcome:

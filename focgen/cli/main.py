@@ -11,12 +11,23 @@ from pkgutil import iter_modules
 
 import focgen
 import focgen.cli
-from focgen.errors import FocgenError
 from focgen.cli.outcome import to_json
+from focgen.errors import FocgenError
 
 # The order of the help page; a command exists where focgen/cli has its file.
-_COMMANDS = ("identify", "design", "simulate", "generate", "verify", "cost", "study", "diagnose", "replay",
-             "trial", "demo")
+_COMMANDS = (
+    "identify",
+    "design",
+    "simulate",
+    "generate",
+    "verify",
+    "cost",
+    "study",
+    "diagnose",
+    "replay",
+    "trial",
+    "demo",
+)
 
 _PROLOGUE = """From a CSV of step tests to a verified fractional-order controller on a microcontroller.
 
@@ -53,7 +64,9 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
             name, help=module.HELP, description=module.HELP, epilog=module.EXAMPLE, formatter_class=style
         )
         module.add_arguments(one)
-        one.add_argument("--json", action="store_true", help="one JSON object on stdout, everything else on stderr")
+        one.add_argument(
+            "--json", action="store_true", help="one JSON object on stdout, everything else on stderr"
+        )
         one.set_defaults(run=module.run)
     return top
 

@@ -19,8 +19,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("rig", metavar="RIG", help="the rig, with or without [[effects]]")
     parser.add_argument("logs", metavar="LOG", nargs="+", help="experiments of one session, in order")
-    parser.add_argument("--from", dest="first", type=float, metavar="S", help="from S seconds into each experiment")
-    parser.add_argument("--to", dest="last", type=float, metavar="S", help="to S seconds into each experiment")
+    parser.add_argument(
+        "--from", dest="first", type=float, metavar="S", help="from S seconds into each experiment"
+    )
+    parser.add_argument(
+        "--to", dest="last", type=float, metavar="S", help="to S seconds into each experiment"
+    )
 
 
 def run(args: argparse.Namespace) -> Outcome:

@@ -142,9 +142,7 @@ def _memory_section(plan: Plan) -> str:
     """What an exponential memory is and what holds of it, as a paragraph; empty for a short one."""
     if not plan.states:
         return ""
-    orders = ", ".join(
-        f"s^{m.order:g} to {m.tolerance:.2g} with {m.states} modes" for m in plan.memories
-    )
+    orders = ", ".join(f"s^{m.order:g} to {m.tolerance:.2g} with {m.states} modes" for m in plan.memories)
     words = (
         "The memory is a sum of exponentials. Every fractional power of s keeps a few means of its history,"
         f" each over a time of its own ({_times(plan)}); the weights that the past has through them follow"

@@ -108,9 +108,7 @@ class SourceContext:
     output: str
 
 
-def source_context(
-    plan: Plan, title: str, sha256: str, kernels: Kernels = PORTABLE
-) -> SourceContext:
+def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTABLE) -> SourceContext:
     """Prepare NAME.c; ``sha256`` is of the controller's file. Raises PlanError for what C cannot express."""
     signal = plan.output.ctype
     return SourceContext(

@@ -36,9 +36,7 @@ def members(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[Member, ...]:
     """
     found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan, kernels), *_means(plan)]
     found += _bytes(plan)
-    found += [
-        _ahead(table, name) for name, table in named_sums(plan).items() if kernels.ahead(plan, table)
-    ]
+    found += [_ahead(table, name) for name, table in named_sums(plan).items() if kernels.ahead(plan, table)]
     grouped = [h for h in ("error", "filtered") if kernels.grouped(plan, h)]
     by_words = [*(f"{name}_ahead" for name in named_sums(plan)), *grouped] if grouped else []
     late = {m.name for m in found if by_words and m.name not in by_words}

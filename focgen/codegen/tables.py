@@ -134,9 +134,7 @@ def _near(plan: Plan, near: Sum, weights: str, history: str) -> NearText:
     count, at, parts = near.last + 1, 0, []
     for block in near.blocks:
         wide = f"({block.sum.ctype})" if not block.sum.floating else ""
-        products = [
-            f"{wide}w[{at + i}] * x[{near.last - block.last + i}]" for i in range(len(block.weights))
-        ]
+        products = [f"{wide}w[{at + i}] * x[{near.last - block.last + i}]" for i in range(len(block.weights))]
         parts += products if plan.floating else [_shifted_sum(products, block)]
         at += len(block.weights)
     call = f"foc_latest_{plan.arithmetic}(copy, {count}, {history})"
@@ -159,7 +157,9 @@ def _far_tables(plan: Plan, table: Sum, name: str, about: list[str], ahead: Look
     ]
     count = sum(map(len, ahead.weights))
     word, held = size_of(ctype), size_of(ahead.far[0].sum.ctype)
-    costs = f"{ahead.table_bytes(word)} bytes of tables and {ahead.state_bytes(held)} of state beside the ring"
+    costs = (
+        f"{ahead.table_bytes(word)} bytes of tables and {ahead.state_bytes(held)} of state beside the ring"
+    )
     more = "Zeros fill up every block for the four sums that look ahead."
     plain = f"This takes {costs}; the plain form {plain_bytes(plan, table)} and none."
     lines = [f"{_run_text(run):<28} /* step {_step(ahead, i)} */" for i, run in enumerate(ahead.runs)]

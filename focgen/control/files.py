@@ -1,36 +1,36 @@
 """``controller.toml``: reading, checking and writing a controller.
 
-    name = "spba"
-    sample_time = 0.01                       # s
-    integrator = true                        # trapezoidal, clamped to ranges.output
-    length = 1000                            # memory length L, samples
-    memory = "short"                         # or "exponential", with
-    tolerance = 1e-4                         # optional: relative error of its weights, up to
-    horizon = 1000000                        # optional: so many samples
-    arithmetic = "q31"
+name = "spba"
+sample_time = 0.01                       # s
+integrator = true                        # trapezoidal, clamped to ranges.output
+length = 1000                            # memory length L, samples
+memory = "short"                         # or "exponential", with
+tolerance = 1e-4                         # optional: relative error of its weights, up to
+horizon = 1000000                        # optional: so many samples
+arithmetic = "q31"
 
-    [transfer]                               # eq. (8): terms [coefficient, order of s]
-    num = [[1.32, 0.6], [1.0, 0.0]]
-    den = [[1.0, 0.0]]                       # optional
+[transfer]                               # eq. (8): terms [coefficient, order of s]
+num = [[1.32, 0.6], [1.0, 0.0]]
+den = [[1.0, 0.0]]                       # optional
 
-    [gain]                                   # or simply: gain = 2.5
-    breakpoints = [0.0, 0.1, 0.2]            # of the scheduling signal
-    gains = [480.0, 420.0, 350.0]
+[gain]                                   # or simply: gain = 2.5
+breakpoints = [0.0, 0.1, 0.2]            # of the scheduling signal
+gains = [480.0, 420.0, 350.0]
 
-    [ranges]                                 # physical; formats are planned for these
-    reference = [0.0, 0.02]
-    measurement = [0.0, 0.02]
-    output = [0.0, 10.0]                     # the output limits
-    schedule = [0.0, 0.25]                   # with a gain schedule only
+[ranges]                                 # physical; formats are planned for these
+reference = [0.0, 0.02]
+measurement = [0.0, 0.02]
+output = [0.0, 10.0]                     # the output limits
+schedule = [0.0, 0.25]                   # with a gain schedule only
 
-    [units]                                  # optional, for comments
-    measurement = "1/mm"
-    output = "V"
-    schedule = "bar"
+[units]                                  # optional, for comments
+measurement = "1/mm"
+output = "V"
+schedule = "bar"
 
-    [designed_from]                          # optional
-    file = "rig.toml"
-    sha256 = "…"
+[designed_from]                          # optional
+file = "rig.toml"
+sha256 = "…"
 """
 
 from __future__ import annotations
@@ -98,7 +98,9 @@ def _gain(top: Table) -> float | GainSchedule:
     points, gains = table.numbers("breakpoints"), table.numbers("gains")
     table.done()
     if len(points) != len(gains):
-        raise table.fail("gains", f"has {len(gains)} values for {len(points)} breakpoints", "give one gain for each")
+        raise table.fail(
+            "gains", f"has {len(gains)} values for {len(points)} breakpoints", "give one gain for each"
+        )
     if len(points) < 2 or any(b <= a for a, b in zip(points, points[1:])):
         raise table.fail("breakpoints", f"is {list(points)}", "give at least two, rising strictly")
     return GainSchedule(points, gains)

@@ -162,13 +162,15 @@ def _poles_and_weights(fit: Alternation) -> tuple[np.ndarray, np.ndarray]:
 
 def _memory(order: float, horizon: int, tolerance: float, fit: Alternation) -> ExponentialMemory:
     poles, weights = _poles_and_weights(fit)
-    return ExponentialMemory(order, horizon, tolerance, math.ceil(order), tuple(poles.tolist()),
-                             tuple(weights.tolist()))
+    return ExponentialMemory(
+        order, horizon, tolerance, math.ceil(order), tuple(poles.tolist()), tuple(weights.tolist())
+    )
 
 
 def memory_of(order: float, horizon: int, poles, weights) -> ExponentialMemory:
     """Return the memory with these ``poles`` and ``weights``, and the tolerance its certificate proves."""
     differences = math.ceil(order)
     tolerance = certify(differences - order, differences, horizon, poles, weights).kernel
-    return ExponentialMemory(order, horizon, tolerance, differences, tuple(map(float, poles)),
-                             tuple(map(float, weights)))
+    return ExponentialMemory(
+        order, horizon, tolerance, differences, tuple(map(float, poles)), tuple(map(float, weights))
+    )

@@ -87,8 +87,12 @@ class _Error:
     weights: np.ndarray
 
     def __post_init__(self):
-        if not (np.all(self.poles >= 0.0) and np.all(self.poles < 1.0) and np.all(self.weights >= 0.0)
-                and np.all(np.isfinite(self.weights))):
+        if not (
+            np.all(self.poles >= 0.0)
+            and np.all(self.poles < 1.0)
+            and np.all(self.weights >= 0.0)
+            and np.all(np.isfinite(self.weights))
+        ):
             raise ValueError("the poles must lie in [0, 1) and the weights must not be negative")
 
     def exact(self, m: int, lags: np.ndarray) -> np.ndarray:

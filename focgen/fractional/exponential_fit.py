@@ -104,8 +104,12 @@ class Problem:
                 return None
             largest = np.abs(step).max()
             step *= 0.5 / max(largest, 0.5)
-            fit = Alternation(fit.log_rates + step[:n], fit.log_weights + step[n:-1],
-                              fit.error * math.exp(step[-1]), fit.places)
+            fit = Alternation(
+                fit.log_rates + step[:n],
+                fit.log_weights + step[n:-1],
+                fit.error * math.exp(step[-1]),
+                fit.places,
+            )
             if largest < 0.01 * math.sqrt(fit.error):  # what is left is the square of this step
                 return fit if np.all(np.diff(fit.log_rates) > 0) else None
         return None
@@ -193,9 +197,12 @@ def _pair(problem: Problem, single: Alternation) -> Alternation | None:
     """Two modes: the single one carries the last weight, a fast one what the first weight has more."""
     first_weight, last_weight = gl_weights_at(-problem.beta, np.array([1, problem.horizon]))
     goal = problem.log_horizon
-    start = Alternation(np.array([single.log_rates[0], -0.5 * goal]),
-                        np.log([last_weight, first_weight - last_weight]), 0.1 * single.error,
-                        _distinct(goal * np.array([0.0, 0.2, 0.5, 0.8, 1.0]), problem.horizon))
+    start = Alternation(
+        np.array([single.log_rates[0], -0.5 * goal]),
+        np.log([last_weight, first_weight - last_weight]),
+        0.1 * single.error,
+        _distinct(goal * np.array([0.0, 0.2, 0.5, 0.8, 1.0]), problem.horizon),
+    )
     return problem.solve(start, _FINE, _LEVEL)
 
 

@@ -115,8 +115,12 @@ class _Sector:
         grid = radii[:, None] + 1j * angles
         level = np.pad(self.relative(grid), 1, constant_values=np.inf)
         inner = level[1:-1, 1:-1]
-        around = [level[1 + i : level.shape[0] - 1 + i, 1 + j : level.shape[1] - 1 + j]
-                  for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+        around = [
+            level[1 + i : level.shape[0] - 1 + i, 1 + j : level.shape[1] - 1 + j]
+            for i in (-1, 0, 1)
+            for j in (-1, 0, 1)
+            if (i, j) != (0, 0)
+        ]
         return grid[np.all([inner <= other for other in around], axis=0)]
 
     def _newton(self, x: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from scipy import fft, signal
 
 from focgen.fractional.contour import inverse_laplace
 from focgen.fractional.decomposition import StepImage, step_image
-from focgen.fractional.loggrid import DIRECT, log_grid
+from focgen.fractional.loggrid import log_grid
 from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.fractional.weights import gl_weights
 

@@ -19,15 +19,23 @@ def warnings_of(excitations: Sequence[Excitation], fits: Sequence[ExperimentFit]
     """The warnings that apply, most important first."""
     found = []
     if not any(_releases(x) for x in excitations):
-        found.append("positive steps only: whether the actuator unloads as it loads, and its hysteresis, cannot be "
-                     "seen; log the releases too, and a slow sine")
+        found.append(
+            "positive steps only: whether the actuator unloads as it loads, and its hysteresis, cannot be "
+            "seen; log the releases too, and a slow sine"
+        )
     levels = np.array([x.level for x in excitations])
     rising = len(levels) > 2 and bool(np.all(np.diff(levels) > 0.0))
     if rising:
-        found.append("the levels rise from run to run: a gain that grows with the level cannot be told from one that "
-                     "grows with every load; shuffle them, or repeat the first at the end")
-    found += [f"{f.name}: {key} is known to ±{_half(f, key):.0%} only; hold the step longer or lower the noise"
-              for f in fits for key in ("K", "T", "alpha") if _half(f, key) > _WIDE]
+        found.append(
+            "the levels rise from run to run: a gain that grows with the level cannot be told from one that "
+            "grows with every load; shuffle them, or repeat the first at the end"
+        )
+    found += [
+        f"{f.name}: {key} is known to ±{_half(f, key):.0%} only; hold the step longer or lower the noise"
+        for f in fits
+        for key in ("K", "T", "alpha")
+        if _half(f, key) > _WIDE
+    ]
     return tuple(found)
 
 

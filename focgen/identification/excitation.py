@@ -69,7 +69,9 @@ class Excitation:
         """
         n = len(self)
         kernels = (steps if self.hold == "zero" else means)[:, : n - 1]
-        moved = fft.irfft(fft.rfft(kernels, self._size)[:, None, :] * self._changes, self._size)[:, :, : n - 1]
+        moved = fft.irfft(fft.rfft(kernels, self._size)[:, None, :] * self._changes, self._size)[
+            :, :, : n - 1
+        ]
         out = np.zeros((len(kernels), len(self.drives), n))
         out[:, :, 1:] = moved
         if self.jumps:
@@ -92,8 +94,19 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
     if fitted == "output" and rig.sensor != UNITY:
         gain, drives, hold = _through_sensor(rig.sensor, drives, experiment.sample_time, hold)
     return Excitation(
-        experiment.name, experiment.sample_time, pressure, experiment[fitted], drives, hold, level_before,
-        _level(pressure, level_before), role, fitted, gain, experiment.notes, before is None,
+        experiment.name,
+        experiment.sample_time,
+        pressure,
+        experiment[fitted],
+        drives,
+        hold,
+        level_before,
+        _level(pressure, level_before),
+        role,
+        fitted,
+        gain,
+        experiment.notes,
+        before is None,
     )
 
 
@@ -113,10 +126,14 @@ def _check(experiment: Experiment) -> None:
         raise LogError(experiment.name, f"has {len(experiment)} samples", f"give at least {_FEWEST}")
     fitted = experiment["curvature" if "curvature" in experiment else "output"]
     if np.ptp(fitted) == 0.0:
-        raise LogError(experiment.name, f"has an output of {fitted[0]:g} throughout", "check the sensor and the column")
+        raise LogError(
+            experiment.name, f"has an output of {fitted[0]:g} throughout", "check the sensor and the column"
+        )
     role = "pressure" if "pressure" in experiment else "command"
     if not np.any(experiment[role]):
-        raise LogError(experiment.name, f"has a {role} of 0 throughout", "give a log in which the rig is driven")
+        raise LogError(
+            experiment.name, f"has a {role} of 0 throughout", "give a log in which the rig is driven"
+        )
 
 
 def _input(experiment: Experiment, rig: Rig, before: float | None) -> tuple[np.ndarray, float, str, str]:
@@ -140,7 +157,7 @@ def _value_before(values: np.ndarray, before: float | None) -> float:
 
 
 def hold_of(values: np.ndarray) -> str:
-    """"zero" for an input that is held (it changes in few of its samples), else "linear"."""
+    """ "zero" for an input that is held (it changes in few of its samples), else "linear"."""
     return "zero" if np.count_nonzero(np.diff(values)) <= _HELD * len(values) else "linear"
 
 

@@ -77,8 +77,10 @@ class _Problem:
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """Model − measured, scaled, of all experiments in a row."""
-        parts = [(x[2 + 2 * i] * r[0] + x[3 + 2 * i] - e.measured) * w
-                 for i, (e, r, w) in enumerate(zip(self.experiments, self._kept(x), self.weights))]
+        parts = [
+            (x[2 + 2 * i] * r[0] + x[3 + 2 * i] - e.measured) * w
+            for i, (e, r, w) in enumerate(zip(self.experiments, self._kept(x), self.weights))
+        ]
         return np.concatenate(parts)
 
     def cost(self, x: np.ndarray) -> float:
@@ -87,7 +89,9 @@ class _Problem:
 
     def explains(self, x: np.ndarray) -> bool:
         """Whether ``x`` makes sense and leaves little, so that no other start is worth its time."""
-        return _ALPHAS[0] < x[1] < _ALPHAS[1] and self.cost(x) < _DOUBTFUL**2 * sum(map(len, self.experiments))
+        return _ALPHAS[0] < x[1] < _ALPHAS[1] and self.cost(x) < _DOUBTFUL**2 * sum(
+            map(len, self.experiments)
+        )
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Derivatives of :meth:`residual`, (samples, parameters)."""
@@ -113,8 +117,16 @@ def _best(problem: _Problem):
 
 def _fit_from(problem: _Problem, start: np.ndarray):
     try:
-        return least_squares(problem.residual, start, problem.jacobian, method="lm", x_scale="jac",
-                             xtol=1e-10, ftol=1e-12, max_nfev=200)
+        return least_squares(
+            problem.residual,
+            start,
+            problem.jacobian,
+            method="lm",
+            x_scale="jac",
+            xtol=1e-10,
+            ftol=1e-12,
+            max_nfev=200,
+        )
     except (ValueError, FloatingPointError, np.linalg.LinAlgError) as reason:
         name = problem.experiments[0].name
         raise FitError(name, f"the fit does not converge ({reason})", "look at the log") from None
@@ -153,7 +165,9 @@ def _finished(experiments, problem: _Problem, x: np.ndarray) -> FractionalFit:
     try:
         spread = covariance(jacobian, models)
     except np.linalg.LinAlgError:
-        raise FitError(experiments[0].name, "the log does not determine K, T and alpha", "hold the step longer") from None
+        raise FitError(
+            experiments[0].name, "the log does not determine K, T and alpha", "hold the step longer"
+        ) from None
     return _with_intervals(experiments, problem, x, spread, models)
 
 
@@ -165,10 +179,15 @@ def _with_intervals(experiments, problem, x, spread, models) -> FractionalFit:
     effective = sum(m.effective for m in models)
     wide = lambda variance: half_width(variance, effective, len(x))  # noqa: E731
     gains = slice(2, None, 2)
-    half = {"T": float(wide(slope @ spread @ slope)), "alpha": float(wide(spread[1, 1])),
-            "K": wide(np.diag(spread)[gains]), "offset": wide(np.diag(spread)[3::2])}
+    half = {
+        "T": float(wide(slope @ spread @ slope)),
+        "alpha": float(wide(spread[1, 1])),
+        "K": wide(np.diag(spread)[gains]),
+        "offset": wide(np.diag(spread)[3::2]),
+    }
     simulated = [K[i] * r[0] + x[3 + 2 * i] for i, r in enumerate(problem.responses(log_tau, alpha))]
     variance_T = slope @ spread @ slope
     correlation = float(spread[2] @ slope / np.sqrt(variance_T * spread[2, 2]))
-    return FractionalFit(K.copy(), T, float(alpha), x[3::2].copy(), half, spread[gains, gains], models, simulated,
-                         correlation)
+    return FractionalFit(
+        K.copy(), T, float(alpha), x[3::2].copy(), half, spread[gains, gains], models, simulated, correlation
+    )

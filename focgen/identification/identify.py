@@ -52,7 +52,9 @@ def identify(
     Raises LogError, RigError or FitError; nothing is written then.
     """
     if not 0 <= gain_degree <= _STEEPEST:
-        raise FitError("--gain-degree", f"is {gain_degree}", f"give 0 to {_STEEPEST}; 1 is the line of eq. (5)")
+        raise FitError(
+            "--gain-degree", f"is {gain_degree}", f"give 0 to {_STEEPEST}; 1 is the line of eq. (5)"
+        )
     nominal = rig if isinstance(rig, Rig) else read_rig(rig)
     experiments = _read(logs, nominal, first, last)
     others = _read(unseen, nominal, None, None) if unseen else ()
@@ -60,13 +62,19 @@ def identify(
     fits = tuple(_fit(x) for x in track(excitations, "fitting experiment"))
     steps = [x for x, fit in zip(excitations, fits) if fit.step]
     if not steps:
-        raise FitError("logs", "none is a step of the input", "add step logs; K(p), T and alpha come from them")
+        raise FitError(
+            "logs", "none is a step of the input", "add step logs; K(p), T and alpha come from them"
+        )
     pooled, notes = _pooled(steps, gain_degree)
     ranges, told = seen_ranges(nominal.ranges, experiments)
-    found = replace(nominal, actuator=Actuator(pooled.T, pooled.alpha, pooled.gain), ranges=ranges, effects=())
+    found = replace(
+        nominal, actuator=Actuator(pooled.T, pooled.alpha, pooled.gain), ranges=ranges, effects=()
+    )
     pooled = replace(pooled, simulated={x.name: _through_rig(x, found.actuator) for x in excitations})
     shown = _shown(others, found)
-    result = _compared(excitations, fits, pooled, found, notes + _notes(excitations, fits, nominal) + told, shown)
+    result = _compared(
+        excitations, fits, pooled, found, notes + _notes(excitations, fits, nominal) + told, shown
+    )
     if out is not None:
         write_file(out, rig_text(found))
     return result
@@ -92,11 +100,20 @@ def _fit(x: Excitation) -> ExperimentFit:
     half = {"K": float(fit.half["K"][0]), "T": fit.half["T"], "alpha": fit.half["alpha"]}
     found = {"K": float(fit.K[0]), "T": fit.T, "alpha": fit.alpha}
     return ExperimentFit(
-        name=x.name, **found, offset=float(fit.offset[0]), level=x.level,
+        name=x.name,
+        **found,
+        offset=float(fit.offset[0]),
+        level=x.level,
         ci95={key: (found[key] - half[key], found[key] + half[key]) for key in found},
-        gof=gof(x.measured, fit.simulated[0]), fitted=x.fitted_role, driven_by=x.input_role,
-        time=np.arange(len(x)) * x.step, pressure=x.pressure, measured=x.measured, simulated=fit.simulated[0],
-        integer=fit_integer_models(x, _needs_offset(x, fit)), step=is_step(x),
+        gof=gof(x.measured, fit.simulated[0]),
+        fitted=x.fitted_role,
+        driven_by=x.input_role,
+        time=np.arange(len(x)) * x.step,
+        pressure=x.pressure,
+        measured=x.measured,
+        simulated=fit.simulated[0],
+        integer=fit_integer_models(x, _needs_offset(x, fit)),
+        step=is_step(x),
     )
 
 
@@ -122,25 +139,40 @@ def _pooled(steps: list[Excitation], degree: int) -> tuple[Pooled, tuple[str, ..
     degree, notes = _feasible_degree(levels, degree)
     line = fit_line(levels, fit.K, fit.K_covariance, degree)
     span = lambda value, half: (float(value - half), float(value + half))  # noqa: E731
-    ci95 = {"T": span(fit.T, fit.half["T"]), "alpha": span(fit.alpha, fit.half["alpha"]),
-            "gain": tuple(map(span, line.gain, line.half))}
-    return Pooled(fit.T, fit.alpha, line.gain, line.r2, ci95, tuple(fit.K.tolist()),
-                  tuple(map(span, fit.K, fit.half["K"])), {}), notes
+    ci95 = {
+        "T": span(fit.T, fit.half["T"]),
+        "alpha": span(fit.alpha, fit.half["alpha"]),
+        "gain": tuple(map(span, line.gain, line.half)),
+    }
+    return Pooled(
+        fit.T,
+        fit.alpha,
+        line.gain,
+        line.r2,
+        ci95,
+        tuple(fit.K.tolist()),
+        tuple(map(span, fit.K, fit.half["K"])),
+        {},
+    ), notes
 
 
 def _feasible_degree(levels: np.ndarray, degree: int) -> tuple[int, tuple[str, ...]]:
     possible = min(degree, distinct_levels(levels) - 1)
     if possible == degree:
         return degree, ()
-    return possible, (f"{possible + 1} distinct level{'s' * (possible > 0)}: K(p) of degree {possible}, not {degree}",)
+    return possible, (
+        f"{possible + 1} distinct level{'s' * (possible > 0)}: K(p) of degree {possible}, not {degree}",
+    )
 
 
 def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
     """Logs beside what the identified rig makes of their input."""
     made = [_prepared(e, rig, len(rig.actuator.gain)) for e in experiments]
     answers = [_through_rig(x, rig.actuator) for x in made]
-    return tuple(Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
-                 for x, y in zip(made, answers))
+    return tuple(
+        Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
+        for x, y in zip(made, answers)
+    )
 
 
 def _through_rig(x: Excitation, actuator: Actuator) -> np.ndarray:
@@ -160,10 +192,16 @@ def _compared(excitations, fits, pooled: Pooled, rig: Rig, notes, shown) -> Iden
         counts[f"iom_{fit.name}"] = fit.parameters
     models["rig"] = pooled.simulated
     measured = {f.name: f.measured for f in fits}
-    quality = {model: _with_mean({n: gof(measured[n], y) for n, y in runs.items()}) for model, runs in models.items()}
+    quality = {
+        model: _with_mean({n: gof(measured[n], y) for n, y in runs.items()}) for model, runs in models.items()
+    }
     effective = {f.name: effective_samples(f.measured - f.simulated) for f in fits}
-    criterion = {model: _with_mean({n: bic(measured[n], models[model][n], counts[model] + 1, effective[n])
-                                    for n in measured}) for model in counts}
+    criterion = {
+        model: _with_mean(
+            {n: bic(measured[n], models[model][n], counts[model] + 1, effective[n]) for n in measured}
+        )
+        for model in counts
+    }
     return Identification(fits, pooled, rig, quality, criterion, warnings_of(excitations, fits), notes, shown)
 
 
@@ -173,13 +211,22 @@ def _with_mean(values: dict[str, float]) -> dict[str, float]:
 
 def _notes(excitations, fits, nominal: Rig) -> tuple[str, ...]:
     said = [f"{x.name}: {note}" for x in excitations for note in x.notes]
-    said += [f"{f.name}: begins with the step, and shows no offset: integer-order models have none"
-             for x, f in zip(excitations, fits) if not x.rest_shown and not any(m.offset for m in f.integer)]
-    said += [f"{f.name}: not a step; fitted by itself, left out of T, alpha and K(p)" for f in fits if not f.step]
+    said += [
+        f"{f.name}: begins with the step, and shows no offset: integer-order models have none"
+        for x, f in zip(excitations, fits)
+        if not x.rest_shown and not any(m.offset for m in f.integer)
+    ]
+    said += [
+        f"{f.name}: not a step; fitted by itself, left out of T, alpha and K(p)" for f in fits if not f.step
+    ]
     if isinstance(nominal.actuator, LinearActuator):
-        said.append("the rig's actuator was a transfer function; the identified one is K(p) p through 1/(T s^alpha + 1)")
+        said.append(
+            "the rig's actuator was a transfer function; the identified one is K(p) p through 1/(T s^alpha + 1)"
+        )
     sources = {(f.driven_by, f.fitted) for f in fits}
-    said += [f"driven by the {'measured pressure' if driven == 'pressure' else 'command through the regulator'}, fitted "
-             f"to the {'curvature' if fitted == 'curvature' else 'output through the sensor'}"
-             for driven, fitted in sorted(sources)]
+    said += [
+        f"driven by the {'measured pressure' if driven == 'pressure' else 'command through the regulator'}, fitted "
+        f"to the {'curvature' if fitted == 'curvature' else 'output through the sensor'}"
+        for driven, fitted in sorted(sources)
+    ]
     return tuple(said)

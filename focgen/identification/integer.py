@@ -83,8 +83,9 @@ def _best(problem: _Projected, starts: list[np.ndarray]) -> np.ndarray:
 
 def _run(problem: _Projected, start: np.ndarray, rounds: int):
     try:
-        return least_squares(problem.residual, start, method="lm", xtol=1e-6, ftol=1e-8,
-                             max_nfev=rounds * (len(start) + 1))
+        return least_squares(
+            problem.residual, start, method="lm", xtol=1e-6, ftol=1e-8, max_nfev=rounds * (len(start) + 1)
+        )
     except (ValueError, np.linalg.LinAlgError):
         return None
 
@@ -127,8 +128,13 @@ class _Projected:
         self.experiment, self.poles, self.zeros, self.has_offset = experiment, poles, zeros, has_offset
         self.spread = float(np.std(experiment.measured))
         slow, fast = np.log(1.0 / (_SLOWEST * len(experiment))), np.log(_FASTEST)
-        self.edges = np.array({1: [(slow, fast)], 2: [(slow, fast + 1), (2 * slow, 2 * fast)],
-                               3: [(slow, fast + 1), (2 * slow, 2 * fast), (slow, fast)]}[poles]).T
+        self.edges = np.array(
+            {
+                1: [(slow, fast)],
+                2: [(slow, fast + 1), (2 * slow, 2 * fast)],
+                3: [(slow, fast + 1), (2 * slow, 2 * fast), (slow, fast)],
+            }[poles]
+        ).T
 
     def inside(self, x: np.ndarray) -> np.ndarray:
         """``x`` with every coefficient within what the record can tell."""
@@ -140,7 +146,9 @@ class _Projected:
         single = [_respond(p, self.experiment) for p in poles]
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
         weights = poles ** np.arange(self.zeros, -1, -1)[:, None] / np.array(slopes)
-        rows = np.einsum("kp,pn->kn", weights, np.array(single)).real  # too little for BLAS to share among threads
+        rows = np.einsum(
+            "kp,pn->kn", weights, np.array(single)
+        ).real  # too little for BLAS to share among threads
         constant = [np.ones(len(self.experiment))] * self.has_offset
         return np.column_stack([*rows, *constant])
 

@@ -27,7 +27,9 @@ def seen_ranges(given: Ranges, experiments: Sequence[Experiment]) -> tuple[Range
         if getattr(given, role) is None and seen:
             span = _with_room(min(map(np.min, seen)), max(map(np.max, seen)))
             given = replace(given, **{role: span})
-            notes.append(f"[ranges] {role} is not given: {span[0]:g} … {span[1]:g}, from the logs with a quarter of room")
+            notes.append(
+                f"[ranges] {role} is not given: {span[0]:g} … {span[1]:g}, from the logs with a quarter of room"
+            )
     return given, tuple(notes)
 
 

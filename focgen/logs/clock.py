@@ -18,12 +18,16 @@ _LONGEST = 5_000_000  # samples
 def check_increasing(time: np.ndarray, where: str, line) -> None:
     """Raise LogError where a time stamp is missing or not later than the one before it."""
     if np.isnan(time).any():
-        raise LogError(where, f"has no time stamp in {line(int(np.argmax(np.isnan(time))))}", "complete the column")
+        raise LogError(
+            where, f"has no time stamp in {line(int(np.argmax(np.isnan(time))))}", "complete the column"
+        )
     steps = np.diff(time)
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0)) + 1
         what = f"goes from {time[row - 1]:g} to {time[row]:g} s in {line(row)}: time has to increase"
-        raise LogError(where, what, "sort the rows, or name the column that tells the runs apart as run in [signals]")
+        raise LogError(
+            where, what, "sort the rows, or name the column that tells the runs apart as run in [signals]"
+        )
 
 
 def uniform_step(time: np.ndarray) -> float | None:
@@ -39,7 +43,9 @@ def check_unit(time: np.ndarray, sample_time: float, where: str) -> None:
     if 1.0 / _PLAUSIBLE < ratio < _PLAUSIBLE:
         return
     unit = " (milliseconds?)" if 500 < ratio < 2000 else " (microseconds?)" if 5e5 < ratio < 2e6 else ""
-    what = f"has samples {ratio * sample_time:g} s apart{unit} where the rig's sample_time is {sample_time:g} s"
+    what = (
+        f"has samples {ratio * sample_time:g} s apart{unit} where the rig's sample_time is {sample_time:g} s"
+    )
     raise LogError(where, what, "give time in seconds, or correct sample_time")
 
 
@@ -53,19 +59,31 @@ def on_grid(
     """
     step = uniform_step(time)
     if step is not None:
-        same = abs(step / sample_time - 1.0) < max(_SAME_RATE, 2.0 * _JITTER / (len(time) - 1))  # jitter of both ends
+        same = abs(step / sample_time - 1.0) < max(
+            _SAME_RATE, 2.0 * _JITTER / (len(time) - 1)
+        )  # jitter of both ends
         step = sample_time if same else float(f"{step:.6g}")
-        notes = () if same else (f"sampled every {step:g} s and kept so, though the rig runs at {sample_time:g} s",)
+        notes = (
+            ()
+            if same
+            else (f"sampled every {step:g} s and kept so, though the rig runs at {sample_time:g} s",)
+        )
         return step, dict(signals), notes
     count = int((time[-1] - time[0]) / sample_time + 1e-6) + 1
     if count > _LONGEST:
-        raise LogError(where, f"would take {count} samples of {sample_time:g} s", "shorten the log or set sample_time")
+        raise LogError(
+            where, f"would take {count} samples of {sample_time:g} s", "shorten the log or set sample_time"
+        )
     grid = time[0] + sample_time * np.arange(count)
-    resampled = {role: _held(grid, time, values) if role in HELD else np.interp(grid, time, values)
-                 for role, values in signals.items()}
+    resampled = {
+        role: _held(grid, time, values) if role in HELD else np.interp(grid, time, values)
+        for role, values in signals.items()
+    }
     steps = np.diff(time)
-    note = (f"time stamps not uniform ({steps.min():.3g} to {steps.max():.3g} s apart): "
-            f"resampled every {sample_time:g} s")
+    note = (
+        f"time stamps not uniform ({steps.min():.3g} to {steps.max():.3g} s apart): "
+        f"resampled every {sample_time:g} s"
+    )
     return sample_time, resampled, (note,)
 
 

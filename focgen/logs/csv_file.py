@@ -27,7 +27,9 @@ def read(path: Path) -> LogTable:
     for number, row in zip(numbers[1:], body):
         if len(row) != len(header):
             what = f"line {number} has {len(row)} cells, the header {len(header)}"
-            raise LogError(str(path), what, "separate columns by ',', write decimals with '.', and complete the line")
+            raise LogError(
+                str(path), what, "separate columns by ',', write decimals with '.', and complete the line"
+            )
     columns = {name: [cell.strip() for cell in column] for name, column in zip(header, zip(*body))}
     return LogTable(str(path), columns, lambda row: f"line {numbers[1 + row]}")
 
@@ -50,9 +52,13 @@ def _header(path: Path, row: list[str]) -> list[str]:
     names = [name.strip() for name in row]
     for mark, word in ((";", "';'"), ("\t", "tabs")):
         if any(mark in name for name in names):
-            raise LogError(str(path), f"separates its columns by {word}", "use ',' and write decimals with '.'")
+            raise LogError(
+                str(path), f"separates its columns by {word}", "use ',' and write decimals with '.'"
+            )
     if all(_looks_like_number(name) for name in names):
-        raise LogError(str(path), "starts with numbers instead of a header", "put the columns' names in line 1")
+        raise LogError(
+            str(path), "starts with numbers instead of a header", "put the columns' names in line 1"
+        )
     doubled = next((name for name in names if names.count(name) > 1), None)
     if doubled is not None:
         raise LogError(str(path), f"has the column {doubled!r} twice", "give each column a name of its own")

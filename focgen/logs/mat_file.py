@@ -29,7 +29,9 @@ def read(path: Path) -> LogTable:
         raise LogError(str(path), "holds no vectors", _REMEDY)
     if len(lengths) > 1:
         sizes = ", ".join(f"{name} {len(column)}" for name, column in columns.items())
-        raise LogError(str(path), f"holds vectors of different lengths ({sizes})", "save one experiment a file")
+        raise LogError(
+            str(path), f"holds vectors of different lengths ({sizes})", "save one experiment a file"
+        )
     return LogTable(str(path), columns)
 
 

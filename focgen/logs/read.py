@@ -89,7 +89,9 @@ def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, np.ndarray]]:
     names, firsts, codes = np.unique(labels, return_index=True, return_inverse=True)
     for code in np.argsort(firsts):
         if not names[code]:
-            raise LogError(f"{table.path} [{run}]", f"is empty in {table.line(int(firsts[code]))}", "name the run")
+            raise LogError(
+                f"{table.path} [{run}]", f"is empty in {table.line(int(firsts[code]))}", "name the run"
+            )
         yield str(names[code]), np.flatnonzero(codes == code)
 
 
@@ -113,7 +115,9 @@ def _windowed(time: np.ndarray, window: tuple[float | None, float | None], where
     kept = (since >= first - 1e-9) & (since <= last + 1e-9)
     if kept.sum() < _FEWEST:
         span = f"from {max(first, 0):g} to {min(last, since[-1]):g} s"
-        raise LogError(where, f"has {kept.sum()} samples {span}", f"it lasts {since[-1]:g} s: widen --from and --to")
+        raise LogError(
+            where, f"has {kept.sum()} samples {span}", f"it lasts {since[-1]:g} s: widen --from and --to"
+        )
     return kept
 
 
@@ -123,7 +127,11 @@ def _complete(table: LogTable, columns, rows: np.ndarray, where: str) -> dict[st
     for role, column in columns.items():
         part = column[rows]
         gaps = np.isnan(part)
-        if gaps.all() and role != "output" and (role not in ("command", "pressure") or _other(columns, role, rows)):
+        if (
+            gaps.all()
+            and role != "output"
+            and (role not in ("command", "pressure") or _other(columns, role, rows))
+        ):
             continue
         if gaps.any():
             row = table.line(int(rows[np.argmax(gaps)]))
@@ -147,7 +155,9 @@ def _check_limits(found: list[tuple[str, Experiment]], limits: Limits) -> None:
             continue
         peak, path, experiment = max(peaks, key=lambda entry: entry[0])
         if peak > _TOO_LARGE * largest or 0.0 < peak < _TOO_SMALL * largest:
-            what = f"{role} reaches {peak:.3g} in {experiment.name} where the rig's range is {low:g} to {high:g}"
+            what = (
+                f"{role} reaches {peak:.3g} in {experiment.name} where the rig's range is {low:g} to {high:g}"
+            )
             raise LogError(path, what, "log it in the rig's unit, or correct [ranges]")
 
 

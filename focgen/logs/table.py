@@ -47,8 +47,14 @@ class LogTable:
         """The error for a column that is needed and not there; those ``taken`` have another role."""
         near = self.closest(name, taken)
         there = ", ".join(self.columns)
-        hint = f"write {role} = {near!r} in the rig's [signals]" if near else f"set {role} in the rig's [signals]"
-        return LogError(self.path, f"has no column {name!r} ({role}); there are: {there}".replace(";", ","), hint)
+        hint = (
+            f"write {role} = {near!r} in the rig's [signals]"
+            if near
+            else f"set {role} in the rig's [signals]"
+        )
+        return LogError(
+            self.path, f"has no column {name!r} ({role}); there are: {there}".replace(";", ","), hint
+        )
 
     def texts(self, name: str) -> list[str]:
         """A column as text, numbers in their shortest form."""
@@ -58,19 +64,27 @@ class LogTable:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no number."""
         column = self.columns[name]
         try:
-            values = column if isinstance(column, np.ndarray) and column.dtype.kind in "fiu" else _parsed(column)
+            values = (
+                column if isinstance(column, np.ndarray) and column.dtype.kind in "fiu" else _parsed(column)
+            )
         except (ValueError, TypeError):
             raise self._not_a_number(name) from None
         values = np.asarray(values, dtype=float)
         if np.isinf(values).any():
             row = int(np.argmax(np.isinf(values)))
-            raise LogError(f"{self.path} [{name}]", f"is infinite in {self.line(row)}", "remove or correct it")
+            raise LogError(
+                f"{self.path} [{name}]", f"is infinite in {self.line(row)}", "remove or correct it"
+            )
         return values
 
     def _not_a_number(self, name: str) -> LogError:
         row, cell = next((i, c) for i, c in enumerate(_plain(self.columns[name])) if not _is_number(c))
-        remedy = "write decimals with a point" if "," in str(cell) else "leave the cell empty or give a number"
-        return LogError(f"{self.path} [{name}]", f"holds {cell!r} in {self.line(row)}, which is no number", remedy)
+        remedy = (
+            "write decimals with a point" if "," in str(cell) else "leave the cell empty or give a number"
+        )
+        return LogError(
+            f"{self.path} [{name}]", f"holds {cell!r} in {self.line(row)}, which is no number", remedy
+        )
 
 
 def read_table(path: str | Path) -> LogTable:
@@ -78,7 +92,9 @@ def read_table(path: str | Path) -> LogTable:
     name = Path(path).name.lower()
     kind = next((ending for ending in sorted(_READERS, key=len, reverse=True) if name.endswith(ending)), None)
     if kind is None:
-        raise LogError(str(path), "is not a kind of log that can be read", f"give one of {', '.join(_READERS)}")
+        raise LogError(
+            str(path), "is not a kind of log that can be read", f"give one of {', '.join(_READERS)}"
+        )
     try:
         table = import_module(_READERS[kind]).read(Path(path))
     except OSError as reason:

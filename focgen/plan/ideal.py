@@ -165,11 +165,7 @@ class _Operator:
 
     def integral(self, part: np.ndarray, constant: float, endless: bool) -> np.ndarray:
         """The clamped trapezoid, from 0."""
-        still = (
-            sum(t.coefficient for t in self.form.rest if t.order == 0.0)
-            if endless
-            else self.rest.still
-        )
+        still = sum(t.coefficient for t in self.form.rest if t.order == 0.0) if endless else self.rest.still
         r = np.concatenate([[0.0], self.rest(part)]) + still * constant
         low, high = self.limits
         out, z = [], 0.0

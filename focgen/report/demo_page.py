@@ -15,14 +15,30 @@ from focgen.studies.model import Study
 from focgen.verification.verify import Verification
 
 
-def demo_page(identification: Identification, design: Design, simulation: Simulation, memory: Study,
-              generated: dict[str, Generated], verified: dict[str, Verification], diagnosis: Diagnosis,
-              sealed: tuple[str, ...]) -> Page:
+def demo_page(
+    identification: Identification,
+    design: Design,
+    simulation: Simulation,
+    memory: Study,
+    generated: dict[str, Generated],
+    verified: dict[str, Verification],
+    diagnosis: Diagnosis,
+    sealed: tuple[str, ...],
+) -> Page:
     """The page; its pictures are in ``pictures/``, the C in ``firmware/``, the sealed case in ``diagnosis/``."""
-    sections = (_model(identification), _controller(design), _loop(simulation), _memory(memory), _firmware(generated, verified),
-                _diagnosis(diagnosis, sealed))
-    return Page("From step tests to a verified fractional-order controller",
-                demo_lead(identification, design, verified), sections)
+    sections = (
+        _model(identification),
+        _controller(design),
+        _loop(simulation),
+        _memory(memory),
+        _firmware(generated, verified),
+        _diagnosis(diagnosis, sealed),
+    )
+    return Page(
+        "From step tests to a verified fractional-order controller",
+        demo_lead(identification, design, verified),
+        sections,
+    )
 
 
 def demo_lead(identification: Identification, design: Design, verified: dict[str, Verification]) -> str:
@@ -40,59 +56,111 @@ def demo_lead(identification: Identification, design: Design, verified: dict[str
 
 
 def _model(found: Identification) -> Section:
-    pictures = [Picture("pictures/fits.png", "Six steps, and the fractional model of each (as Fig. 5)"),
-                Picture("pictures/gof.png", "Goodness of fit of the fractional and the integer-order models (Table I)"),
-                Picture("pictures/models.png", "One step, four models, and what each leaves (as Fig. 6)"),
-                Picture("pictures/parameters.png", "The parameters over the level, with 95 % intervals (as Fig. 7)"),
-                Picture("pictures/loops.png", "Sines that the model was not fitted to: where it fails (as Fig. 8)")]
-    return Section("Model", (gain_text(found), *found.warnings), (quality_table(found), parameter_table(found)),
-                   tuple(pictures), ("identified.toml", "rig.toml", "logs/steps.csv", "logs/sines.csv"))
+    pictures = [
+        Picture("pictures/fits.png", "Six steps, and the fractional model of each (as Fig. 5)"),
+        Picture(
+            "pictures/gof.png", "Goodness of fit of the fractional and the integer-order models (Table I)"
+        ),
+        Picture("pictures/models.png", "One step, four models, and what each leaves (as Fig. 6)"),
+        Picture("pictures/parameters.png", "The parameters over the level, with 95 % intervals (as Fig. 7)"),
+        Picture("pictures/loops.png", "Sines that the model was not fitted to: where it fails (as Fig. 8)"),
+    ]
+    return Section(
+        "Model",
+        (gain_text(found), *found.warnings),
+        (quality_table(found), parameter_table(found)),
+        tuple(pictures),
+        ("identified.toml", "rig.toml", "logs/steps.csv", "logs/sines.csv"),
+    )
 
 
 def _controller(design: Design) -> Section:
-    pictures = (Picture("pictures/schedule.png", "The gain schedule, and the formula it stands for"),
-                Picture("pictures/margins.png", "The open loop, ideal and as it will run"))
-    return Section("Controller", design.notes, (points_table(design), margins_table(design)), pictures, ("controller.toml",))
+    pictures = (
+        Picture("pictures/schedule.png", "The gain schedule, and the formula it stands for"),
+        Picture("pictures/margins.png", "The open loop, ideal and as it will run"),
+    )
+    return Section(
+        "Controller",
+        design.notes,
+        (points_table(design), margins_table(design)),
+        pictures,
+        ("controller.toml",),
+    )
 
 
 def _loop(simulation: Simulation) -> Section:
     caption = "Output and command at seven set points, from rest, bit for bit as the C will run (as Fig. 10)"
-    return Section("Closed loop", simulation.notes, (setpoints_table(simulation),), (Picture("pictures/setpoints.png", caption),))
+    return Section(
+        "Closed loop",
+        simulation.notes,
+        (setpoints_table(simulation),),
+        (Picture("pictures/setpoints.png", caption),),
+    )
 
 
 def _memory(study: Study) -> Section:
-    pictures = (Picture("memory/pareto.png", "Short and exponential memory: error against multiplications, and bytes"),
-                Picture("memory/loops.png", "A step of the closed loop by memory, and how far it is from infinite memory's"))
-    return Section("Memory", (study.recommendation,), (rows_table(study, study.controller.sample_time),), pictures,
-                   ("memory/report.html", "memory/study.json"))
+    pictures = (
+        Picture(
+            "memory/pareto.png", "Short and exponential memory: error against multiplications, and bytes"
+        ),
+        Picture(
+            "memory/loops.png",
+            "A step of the closed loop by memory, and how far it is from infinite memory's",
+        ),
+    )
+    return Section(
+        "Memory",
+        (study.recommendation,),
+        (rows_table(study, study.controller.sample_time),),
+        pictures,
+        ("memory/report.html", "memory/study.json"),
+    )
 
 
 def _firmware(generated: dict[str, Generated], verified: dict[str, Verification]) -> Section:
     table = firmware_table(generated, verified)
     files = tuple(f"firmware/{a}/{made.plan.name}.c" for a, made in generated.items())
-    return Section("C", ("Every sample of the C is compared with a reference that shares no code with it: output, "
-                         "increment and flags, in every bit. The error is against the same controller in float64.",),
-                   (table,), (), files)
+    return Section(
+        "C",
+        (
+            "Every sample of the C is compared with a reference that shares no code with it: output, "
+            "increment and flags, in every bit. The error is against the same controller in float64.",
+        ),
+        (table,),
+        (),
+        files,
+    )
 
 
 def _diagnosis(found: Diagnosis, sealed: tuple[str, ...]) -> Section:
-    shown = {"ladder.png": "Where the gap is: measured signals put in place of simulated ones, stage by stage",
-             "residual.png": "What the refitted model leaves, against level, rate, direction and time, and with the effect",
-             "loops.png": "Output against input, measured and simulated, before and after",
-             "candidates.png": "Which effect: the candidates, and how far each is behind the best",
-             "waterfall.png": "How far: what parameters, effect and noise account for"}
+    shown = {
+        "ladder.png": "Where the gap is: measured signals put in place of simulated ones, stage by stage",
+        "residual.png": "What the refitted model leaves, against level, rate, direction and time, and with the effect",
+        "loops.png": "Output against input, measured and simulated, before and after",
+        "candidates.png": "Which effect: the candidates, and how far each is behind the best",
+        "waterfall.png": "How far: what parameters, effect and noise account for",
+    }
     pictures = tuple(Picture(f"diagnosis/found/{name}", caption) for name, caption in shown.items())
-    return Section("A diagnosis, blind", (diagnosis_sentence(found, sealed),), (), pictures,
-                   ("diagnosis/found/diagnosis.json", "diagnosis/found/augmented.toml"))
+    return Section(
+        "A diagnosis, blind",
+        (diagnosis_sentence(found, sealed),),
+        (),
+        pictures,
+        ("diagnosis/found/diagnosis.json", "diagnosis/found/augmented.toml"),
+    )
 
 
 def diagnosis_sentence(found: Diagnosis, sealed: tuple[str, ...]) -> str:
     """What the diagnosis says of the sealed rig, and what the seal says."""
-    causes = [" or ".join(f"{c.effect} ({c.confidence:.0%})" for c in cause.candidates) for cause in found.causes]
+    causes = [
+        " or ".join(f"{c.effect} ({c.confidence:.0%})" for c in cause.candidates) for cause in found.causes
+    ]
     gof = found.gap.gof
-    return (f"A rig with a sealed effect: the diagnosis says {' and '.join(causes) or found.verdict}, and takes the "
-            f"goodness of fit from {gof['refitted']:.3f} to {gof['explained']:.3f} of a possible {gof['possible']:.3f}. "
-            f"The seal says {', '.join(sealed) or 'nothing'}.")
+    return (
+        f"A rig with a sealed effect: the diagnosis says {' and '.join(causes) or found.verdict}, and takes the "
+        f"goodness of fit from {gof['refitted']:.3f} to {gof['explained']:.3f} of a possible {gof['possible']:.3f}. "
+        f"The seal says {', '.join(sealed) or 'nothing'}."
+    )
 
 
 def firmware_table(generated: dict[str, Generated], verified: dict[str, Verification]) -> TableOf:
@@ -100,8 +168,16 @@ def firmware_table(generated: dict[str, Generated], verified: dict[str, Verifica
     rows = []
     for arithmetic, made in generated.items():
         result, sizes = verified[arithmetic].targets["host"], made.manifest["sizes"]
-        rows.append((arithmetic, f"{sizes['state_bytes']} B", f"{sizes['table_bytes']} B",
-                     f"{result.samples - result.mismatches} of {result.samples}", f"{result.max_error.operator:.2g}",
-                     f"{result.error_bound['operator']:.2g}", "yes" if verified[arithmetic].holds else "NO"))
+        rows.append(
+            (
+                arithmetic,
+                f"{sizes['state_bytes']} B",
+                f"{sizes['table_bytes']} B",
+                f"{result.samples - result.mismatches} of {result.samples}",
+                f"{result.max_error.operator:.2g}",
+                f"{result.error_bound['operator']:.2g}",
+                "yes" if verified[arithmetic].holds else "NO",
+            )
+        )
     heads = ("arithmetic", "state", "tables", "samples equal", "largest error", "proven bound", "verified")
     return TableOf(heads, tuple(rows), "The C, ahead of the integrator, in output units per second")

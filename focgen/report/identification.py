@@ -14,8 +14,12 @@ _LAST = 0.5  # of a swinging log: the part drawn as loops, when the start has di
 
 def identification_pictures(found: Identification) -> dict[str, bytes]:
     """Return PNG pictures by file name; ``loops.png`` only where a log swings."""
-    pictures = {"gof.png": _gof(found), "fits.png": _fits(found), "models.png": _models(found),
-                "parameters.png": _parameters(found)}
+    pictures = {
+        "gof.png": _gof(found),
+        "fits.png": _fits(found),
+        "models.png": _models(found),
+        "parameters.png": _parameters(found),
+    }
     if any(log.swings for log in found.unseen) or any(not fit.step for fit in found.experiments):
         pictures["loops.png"] = _loops(found)
     return pictures
@@ -28,8 +32,13 @@ def _gof(found: Identification) -> bytes:
         width = 0.8 / len(models)
         for i, model in enumerate(models):
             places = np.arange(len(names)) + (i - 0.5 * (len(models) - 1)) * width
-            axes.bar(places, [max(found.gof[model][n], 0.0) for n in names], width, label=model_label(model),
-                     color=CYCLE[i % len(CYCLE)])
+            axes.bar(
+                places,
+                [max(found.gof[model][n], 0.0) for n in names],
+                width,
+                label=model_label(model),
+                color=CYCLE[i % len(CYCLE)],
+            )
         axes.set_xticks(range(len(names)), names)
         axes.set_ylabel("goodness of fit")
         lowest = min(found.gof[model][n] for model in models for n in names)
@@ -82,13 +91,30 @@ def _parameters(found: Identification) -> bytes:
         for ax, key in zip(axes, ("K", "T", "alpha")):
             values = np.array([getattr(fit, key) for fit in steps])
             half = np.array([(fit.ci95[key][1] - fit.ci95[key][0]) / 2.0 for fit in steps])
-            ax.errorbar(levels, values, half, fmt="o", color=COLOURS["model"], capsize=3, label="each experiment, 95 %")
+            ax.errorbar(
+                levels,
+                values,
+                half,
+                fmt="o",
+                color=COLOURS["model"],
+                capsize=3,
+                label="each experiment, 95 %",
+            )
         reach = np.linspace(levels.min(), levels.max(), 50)
-        axes[0].plot(reach, np.polynomial.polynomial.polyval(reach, pooled.gain), color=COLOURS["ideal"],
-                     label=f"K(p), R² = {pooled.gain_r2:.4f}")
+        axes[0].plot(
+            reach,
+            np.polynomial.polynomial.polyval(reach, pooled.gain),
+            color=COLOURS["ideal"],
+            label=f"K(p), R² = {pooled.gain_r2:.4f}",
+        )
         for ax, key in zip(axes[1:], ("T", "alpha")):
             ax.axhspan(*pooled.ci95[key], color=COLOURS["band"])
-            ax.axhline(getattr(pooled, key), color=COLOURS["ideal"], label=f"pooled {getattr(pooled, key):.4g}, 95 %", zorder=1)
+            ax.axhline(
+                getattr(pooled, key),
+                color=COLOURS["ideal"],
+                label=f"pooled {getattr(pooled, key):.4g}, 95 %",
+                zorder=1,
+            )
         for ax, label in zip(axes, ("K", r"T ($\mathrm{s}^\alpha$)", "α")):
             low, high = ax.get_ylim()
             ax.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
@@ -102,12 +128,16 @@ def _parameters(found: Identification) -> bytes:
 def _loops(found: Identification) -> bytes:
     """Fig. 8: output over input, logged and as the identified rig has it."""
     swings = [(u.name, u.pressure, u.measured, u.simulated) for u in found.unseen if u.swings]
-    swings += [(f.name, f.pressure, f.measured, found.pooled.simulated[f.name])
-               for f in found.experiments if not f.step]
+    swings += [
+        (f.name, f.pressure, f.measured, found.pooled.simulated[f.name])
+        for f in found.experiments
+        if not f.step
+    ]
     columns = min(4, len(swings))
     rows = -(-len(swings) // columns)
-    with figure(rows, columns, size=(2.4 * columns + 1.0, 2.6 * rows + 0.5), sharex=True, sharey=True,
-                squeeze=False) as (fig, axes):
+    with figure(
+        rows, columns, size=(2.4 * columns + 1.0, 2.6 * rows + 0.5), sharex=True, sharey=True, squeeze=False
+    ) as (fig, axes):
         for ax, (name, pressure, measured, simulated) in zip(axes.flat, swings):
             late = slice(int(len(pressure) * (1.0 - _LAST)), None)
             ax.plot(pressure[late], measured[late], color=GREY, lw=0.7, label="log")

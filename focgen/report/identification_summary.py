@@ -12,8 +12,13 @@ def identification_payload(found: Identification) -> dict:
     return {
         "name": found.rig.name,
         "experiments": [_experiment(fit) for fit in found.experiments],
-        "rig": {"T": pooled.T, "alpha": pooled.alpha, "gain": list(pooled.gain), "gain_r2": pooled.gain_r2,
-                "ci95": pooled.ci95},
+        "rig": {
+            "T": pooled.T,
+            "alpha": pooled.alpha,
+            "gain": list(pooled.gain),
+            "gain_r2": pooled.gain_r2,
+            "ci95": pooled.ci95,
+        },
         "gof": found.gof,
         "bic": found.bic,
         "unseen": {log.name: log.gof for log in found.unseen},
@@ -40,17 +45,32 @@ def quality_table(found: Identification) -> TableOf:
     heads = ("experiment", *map(model_label, found.gof))
     rows = [(name, *(f"{values[name]:.4f}" for values in found.gof.values())) for name in [*names, "mean"]]
     fom = found.bic["fom"]["mean"]
-    criterion = ["BIC − FOM's", *(f"{found.bic[m]['mean'] - fom:+.1f}" if m in found.bic else "–" for m in found.gof)]
-    return TableOf(heads, (*rows, tuple(criterion)), "Goodness of fit, eq. (4); BIC with the effective sample size")
+    criterion = [
+        "BIC − FOM's",
+        *(f"{found.bic[m]['mean'] - fom:+.1f}" if m in found.bic else "–" for m in found.gof),
+    ]
+    return TableOf(
+        heads, (*rows, tuple(criterion)), "Goodness of fit, eq. (4); BIC with the effective sample size"
+    )
 
 
 def parameter_table(found: Identification) -> TableOf:
     """K, T and alpha of each experiment, with 95 % intervals, and the pooled ones."""
-    rows = [(fit.name, f"{fit.level:.4g}", _pm(fit.K, fit.ci95["K"]), _pm(fit.T, fit.ci95["T"]),
-             _pm(fit.alpha, fit.ci95["alpha"])) for fit in found.experiments]
+    rows = [
+        (
+            fit.name,
+            f"{fit.level:.4g}",
+            _pm(fit.K, fit.ci95["K"]),
+            _pm(fit.T, fit.ci95["T"]),
+            _pm(fit.alpha, fit.ci95["alpha"]),
+        )
+        for fit in found.experiments
+    ]
     pooled = found.pooled
     rows.append(("pooled", "", "", _pm(pooled.T, pooled.ci95["T"]), _pm(pooled.alpha, pooled.ci95["alpha"])))
-    return TableOf(("experiment", "level", "K", "T (s^alpha)", "alpha"), tuple(rows), "K / (T s^alpha + 1), ± 95 %")
+    return TableOf(
+        ("experiment", "level", "K", "T (s^alpha)", "alpha"), tuple(rows), "K / (T s^alpha + 1), ± 95 %"
+    )
 
 
 def _pm(value: float, span: tuple[float, float]) -> str:
@@ -60,8 +80,10 @@ def _pm(value: float, span: tuple[float, float]) -> str:
 def gain_text(found: Identification) -> str:
     """K(p) with its intervals and R²."""
     powers = ("", " p", *(f" p^{i}" for i in range(2, len(found.pooled.gain))))
-    terms = " + ".join(f"({_pm(g, span)}){power}" for g, span, power in
-                       zip(found.pooled.gain, found.pooled.ci95["gain"], powers))
+    terms = " + ".join(
+        f"({_pm(g, span)}){power}"
+        for g, span, power in zip(found.pooled.gain, found.pooled.ci95["gain"], powers)
+    )
     return f"K(p) = {terms},  R² = {found.pooled.gain_r2:.4f}"
 
 
@@ -69,6 +91,8 @@ def identification_text(found: Identification) -> str:
     """The identification for people."""
     parts = [text_table(quality_table(found)), text_table(parameter_table(found)), gain_text(found)]
     if found.unseen:
-        parts.append("not fitted, only shown: " + ", ".join(f"{u.name} GOF {u.gof:.3f}" for u in found.unseen))
+        parts.append(
+            "not fitted, only shown: " + ", ".join(f"{u.name} GOF {u.gof:.3f}" for u in found.unseen)
+        )
     parts.append("\n".join([f"warning: {w}" for w in found.warnings] + [f"note: {n}" for n in found.notes]))
     return "\n\n".join(part for part in parts if part)

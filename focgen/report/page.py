@@ -49,8 +49,12 @@ class Page:
     def html(self) -> str:
         """The page as text; equal pages give equal bytes."""
         environment = Environment(
-            loader=FileSystemLoader(shipped("templates")), autoescape=True, undefined=StrictUndefined,
-            trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+            loader=FileSystemLoader(shipped("templates")),
+            autoescape=True,
+            undefined=StrictUndefined,
+            trim_blocks=True,
+            lstrip_blocks=True,
+            keep_trailing_newline=True,
         )
         return environment.get_template("report.html").render(page=self, version=focgen.__version__)
 
@@ -59,8 +63,10 @@ def text_table(table: TableOf) -> str:
     """The same table for a terminal: columns aligned, the first to the left, the others to the right."""
     grid = [table.heads, *table.rows]
     widths = [max(len(row[i]) for row in grid) for i in range(len(table.heads))]
-    lines = ["  ".join(_padded(cell, width, i) for i, (cell, width) in enumerate(zip(row, widths))).rstrip()
-             for row in grid]
+    lines = [
+        "  ".join(_padded(cell, width, i) for i, (cell, width) in enumerate(zip(row, widths))).rstrip()
+        for row in grid
+    ]
     lines.insert(1, "  ".join("-" * width for width in widths))
     return "\n".join(([table.caption] if table.caption else []) + lines)
 

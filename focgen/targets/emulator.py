@@ -245,8 +245,13 @@ class Machine:
 def _registers(uc, core: Core) -> dict[str, int]:
     if core.arm:
         a = uc.arm_const
-        return {"sp": a.UC_ARM_REG_SP, "lr": a.UC_ARM_REG_LR, "pc": a.UC_ARM_REG_PC,
-                "flags": a.UC_ARM_REG_CPSR, "first": a.UC_ARM_REG_R0}
+        return {
+            "sp": a.UC_ARM_REG_SP,
+            "lr": a.UC_ARM_REG_LR,
+            "pc": a.UC_ARM_REG_PC,
+            "flags": a.UC_ARM_REG_CPSR,
+            "first": a.UC_ARM_REG_R0,
+        }
     r = uc.riscv_const
     return {"sp": r.UC_RISCV_REG_SP, "lr": r.UC_RISCV_REG_RA, "pc": r.UC_RISCV_REG_PC, "flags": 0,
             "first": r.UC_RISCV_REG_A0}  # fmt: skip

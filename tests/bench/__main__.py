@@ -10,7 +10,9 @@ import tests.bench
 def main() -> None:
     names = sorted(m.name for m in pkgutil.iter_modules(tests.bench.__path__) if not m.name.startswith("_"))
     parser = argparse.ArgumentParser(prog="python -m tests.bench", description=tests.bench.__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="all of them by default: " + ", ".join(names))
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="all of them by default: " + ", ".join(names)
+    )
     wanted = parser.parse_args().names or names
     unknown = sorted(set(wanted) - set(names))
     if unknown:

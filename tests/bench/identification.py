@@ -69,10 +69,13 @@ def run() -> str:
         times["plain"].append(_seconds(lambda: plain_fit(x, start)))
         times["ours"].append(_seconds(lambda: our_fit(x)))
     plain, ours = (float(np.median(times[name])) for name in ("plain", "ours"))
-    lines = [f"A fit of K, T and α to {COUNT} samples with 2 % noise, median of {ROUNDS}, same data and start.",
-             f"least_squares(lm) around lfilter, eq. (10)  {1e3 * plain:8.1f} ms",
-             f"fit_fractional, offset and intervals too    {1e3 * ours:8.1f} ms    {plain / ours:.1f} times as fast", "",
-             "Error without noise, plain | ours, and the ratio of the errors in α."]
+    lines = [
+        f"A fit of K, T and α to {COUNT} samples with 2 % noise, median of {ROUNDS}, same data and start.",
+        f"least_squares(lm) around lfilter, eq. (10)  {1e3 * plain:8.1f} ms",
+        f"fit_fractional, offset and intervals too    {1e3 * ours:8.1f} ms    {plain / ours:.1f} times as fast",
+        "",
+        "Error without noise, plain | ours, and the ratio of the errors in α.",
+    ]
     lines.append(f"{'α':>5}{'K':>22}{'T':>22}{'α':>22}{'ratio':>11}")
     return "\n".join(lines + [_bias_row(alpha) for alpha in (0.3, 0.6, 0.9)])
 

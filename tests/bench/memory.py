@@ -79,8 +79,11 @@ def _against_rival() -> list[str]:
         import fracmem  # noqa: F401
     except ImportError:
         return ["fracmem is not installed: pip install 'focgen[bench]'"]
-    lines = [f"Beside fracmem, order 0.6, horizon {HORIZON}: the fewest states whose largest error of the",
-             "four is no larger, then the fewest that are as good with each input by itself.", _head()]
+    lines = [
+        f"Beside fracmem, order 0.6, horizon {HORIZON}: the fewest states whose largest error of the",
+        "four is no larger, then the fewest that are as good with each input by itself.",
+        _head(),
+    ]
     ratios: dict[str, list[float]] = {"largest": [], "each": []}
     for taps, modes in RIVALS:
         goal = errors(0.6, HORIZON, _rival(0.6, HORIZON, taps, modes))

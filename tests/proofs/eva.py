@@ -36,9 +36,7 @@ def check(plan: Plan, folder: Path, seconds: float = 600.0) -> Verdict:
     began = time.perf_counter()
     try:
         command, where = [program(), *_OPTIONS, "eva.c"], {**os.environ, "PWD": str(folder)}
-        done = subprocess.run(
-            command, cwd=folder, env=where, capture_output=True, text=True, timeout=seconds
-        )
+        done = subprocess.run(command, cwd=folder, env=where, capture_output=True, text=True, timeout=seconds)
         found = objections(plan, folder, done.stdout + done.stderr)
     except subprocess.TimeoutExpired:
         found = (f"no answer in {seconds:.0f} s",)

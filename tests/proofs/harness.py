@@ -62,9 +62,7 @@ def _around(worst: int) -> Interval:
     return Interval(-worst, worst)
 
 
-def harness(
-    plan: Plan, dialect: str, asked: tuple[str, ...] | None = None, call: str = "any"
-) -> str:
+def harness(plan: Plan, dialect: str, asked: tuple[str, ...] | None = None, call: str = "any") -> str:
     """The C of a harness. ``dialect``: "eva" or "esbmc". It makes one ``call`` ("init", "reset", "track",
     "step" or any of them) and asks about the members ``asked`` afterwards, by default about all that cannot
     be any value of their type.
@@ -128,10 +126,13 @@ class _Eva:
 class _Esbmc:
     """A bounded model checker; the loops of a step have known bounds."""
 
-    head = "\n".join(
-        f"{ctype} nondet_{ctype}(void);"
-        for ctype in ("uint8_t", "uint16_t", "int16_t", "int32_t", "int64_t", "float", "double")
-    ) + "\nvoid __ESBMC_assume(_Bool);\nvoid __ESBMC_assert(_Bool, const char *);"
+    head = (
+        "\n".join(
+            f"{ctype} nondet_{ctype}(void);"
+            for ctype in ("uint8_t", "uint16_t", "int16_t", "int32_t", "int64_t", "float", "double")
+        )
+        + "\nvoid __ESBMC_assume(_Bool);\nvoid __ESBMC_assert(_Bool, const char *);"
+    )
 
     def any(self, ctype: str) -> str:
         return f"nondet_{ctype}()"

@@ -36,9 +36,7 @@ def controllers(length: int) -> dict[str, Controller]:
     wide = ControllerRanges((-1.0, 1.0), (-1.0, 1.0), (-3.0, 3.0))
     return {
         "inverse": inverse,
-        "filter": replace(
-            inverse, name="filter", transfer=plain, gain=2.5, integrator=False, ranges=wide
-        ),
+        "filter": replace(inverse, name="filter", transfer=plain, gain=2.5, integrator=False, ranges=wide),
         "all": replace(inverse, name="all", transfer=both),
     }
 

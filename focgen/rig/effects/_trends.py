@@ -62,7 +62,9 @@ def forms(slot, level, onto):
             slot,
             (  # a spline through values at equal times; the last, within the session, is kept
                 *(Parameter(name, starts=(0.01,), **size) for name in ("first", "second", "third", "fourth")),
-                Parameter("spacing", time=1, clock="session", lower=0.2, upper=0.25, starts=(0.24,), log=True),
+                Parameter(
+                    "spacing", time=1, clock="session", lower=0.2, upper=0.25, starts=(0.24,), log=True
+                ),
             ),
             act(_wandering),
         ),
