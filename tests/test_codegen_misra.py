@@ -17,12 +17,13 @@ from focgen.control.files import controller_text
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.resources import shipped
-from tests.proofs.spread import controllers
+from tests.proofs.spread import controllers, remembering
 
 COMMAND = """cppcheck --std=c99 --enable=all --addon=misra --quiet --template={id}|{file}:{line}
     --suppress=missingIncludeSystem --suppress=unmatchedSuppression""".split()
 CASES = {"all": ("q15", "f64"), "inverse": ("f32",), "filter": ("q31",)}
 KERNELS = {"cortex-m4": ("q15", "f32"), "cortex-m0plus": ("q31",)}  # looking ahead, and by halves
+MODES = ("q31", "f32")  # an exponential memory
 DEVIATIONS = shipped("c_runtime") / "deviations.md"
 
 
@@ -55,6 +56,9 @@ def found(tmp_path_factory) -> dict[str, list[str]]:
         for arithmetic in arithmetics:
             plan = build_plan(controllers(12)[name], arithmetic, name=f"{name}_{arithmetic}")
             write_files(folder, folder_files(plan, controller_text(plan.controller).encode(), selftest=True))
+    for arithmetic in MODES:
+        plan = build_plan(remembering()["inverse_modes"], arithmetic, name=f"modes_{arithmetic}")
+        write_files(folder, folder_files(plan, b"", selftest=True))
     for target, arithmetics in KERNELS.items():
         for arithmetic in arithmetics:
             plan = build_plan(controllers(64)["all"], arithmetic, name=f"{arithmetic}_{target[7:]}")

@@ -19,12 +19,12 @@ from focgen.plan.scenario import Scenario
 from focgen.targets.driver import DTYPES, driver, lane_of
 from focgen.verification.scenarios import raw_scenarios
 from tests.c_code import compiler, run
-from tests.proofs.spread import ARITHMETICS, controllers, generated
+from tests.proofs.spread import ARITHMETICS, controllers, generated, remembering
 
 SANITISERS = """-std=c99 -O1 -g -ffp-contract=off
     -fsanitize=address,undefined -fno-sanitize-recover=all""".split()
 LENGTH = 24
-CASES = [(name, arithmetic) for name in controllers(LENGTH) for arithmetic in ARITHMETICS]
+CASES = [(name, a) for name in (*controllers(LENGTH), *remembering()) for a in ARITHMETICS]
 
 _MAIN = """#include <stdio.h>
 #include <stdlib.h>

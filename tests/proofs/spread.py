@@ -41,9 +41,20 @@ def controllers(length: int) -> dict[str, Controller]:
     }
 
 
+def remembering() -> dict[str, Controller]:
+    """The same with an exponential memory: in the numerator alone, and in everything."""
+    found = controllers(24)
+    return {
+        f"{name}_modes": replace(
+            found[name], name=f"{name}_modes", memory="exponential", tolerance=1e-2, horizon=2000
+        )
+        for name in ("inverse", "all")
+    }
+
+
 def generated(folder: Path, name: str, arithmetic: str, length: int) -> Plan:
     """Write one of them into a folder, under its own name, and return its plan."""
-    controller = controllers(length)[name]
+    controller = {**controllers(length), **remembering()}[name]
     plan = build_plan(controller, arithmetic, name=name)
     write_files(folder, folder_files(plan, controller_text(controller).encode()))
     return plan
