@@ -14,6 +14,8 @@
 The command line prints ``focgen: error: WHERE: WHAT; REMEDY`` and exits with status 2.
 """
 
+from collections.abc import Iterable
+
 
 class FocgenError(Exception):
     """Input that cannot be used.
@@ -68,3 +70,12 @@ class MissingExtra(FocgenError):
     @classmethod
     def of(cls, library: str, extra: str, purpose: str) -> "MissingExtra":
         return cls(purpose, f"needs {library}, which is not installed", f"pip install 'focgen[{extra}]'")
+
+
+def check_choice(
+    where: str, value: str, choices: Iterable[str], error: type[FocgenError] = InputError
+) -> None:
+    """Raise ``error`` where ``value`` is none of ``choices``."""
+    names = tuple(choices)
+    if value not in names:
+        raise error(where, f"is {value!r}", f"choose one of {', '.join(names)}")

@@ -6,9 +6,11 @@ from argparse import ArgumentParser, Namespace
 from typing import Any
 
 from focgen.cli.outcome import Outcome
+from focgen.codegen.kernels import TARGETS
 from focgen.report.page import TableOf, text_table
-from focgen.targets.cost import COUNTED, Cost, PerStep, entry_of
-from focgen.verification.costs import COMPILERS, TARGETS, ControllerCost, cost
+from focgen.targets.asked import entry_of
+from focgen.targets.cost import COUNTED, Cost, PerStep
+from focgen.verification.costs import COMPILERS, ControllerCost, cost
 
 HELP = "what one step of generated C costs on microcontrollers: instructions, cycles, flash, RAM, stack"
 EXAMPLE = """example:

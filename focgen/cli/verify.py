@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from typing import Any
 
-from focgen.cli.outcome import Outcome, plain
+from focgen.cli.outcome import Outcome
+from focgen.targets.asked import entry_of
 from focgen.verification.compare import TargetResult
 from focgen.verification.verify import TARGETS, Verification, verify
 
@@ -40,20 +40,11 @@ def run(args: Namespace) -> Outcome:
     payload = {
         "name": found.name,
         "arithmetic": found.arithmetic,
-        "targets": {name: _entry(result) for name, result in found.targets.items()},
+        "targets": {name: entry_of(result) for name, result in found.targets.items()},
         "differences": list(found.differences),
         "holds": found.holds,
     }
     return Outcome(payload, verification_text(found), found.holds)
-
-
-def _entry(result: TargetResult) -> dict[str, Any]:
-    """A target in JSON: why it was skipped and nothing else, or what was seen there."""
-    if result.skipped is not None:
-        return {"skipped": result.skipped}
-    entry = plain(result)
-    del entry["skipped"]
-    return entry
 
 
 def verification_text(found: Verification) -> str:

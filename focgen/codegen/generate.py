@@ -17,7 +17,7 @@ from focgen.codegen.selftest import selftest_files
 from focgen.codegen.source import source_context
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.control.files import controller_text, read_controller
-from focgen.errors import InputError
+from focgen.errors import InputError, check_choice
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
 from focgen.output import write_files
 from focgen.plan.build import build_plan
@@ -110,10 +110,10 @@ def _source(controller: Controller | str | Path) -> tuple[bytes, Controller, str
 
 
 def _check(arithmetic: str | None, memory: str | None, length: int) -> None:
-    if arithmetic is not None and arithmetic not in ARITHMETICS:
-        raise InputError("--arithmetic", f"is {arithmetic!r}", f"choose one of {', '.join(ARITHMETICS)}")
-    if memory is not None and memory not in MEMORIES:
-        raise InputError("--memory", f"is {memory!r}", f"choose one of {', '.join(MEMORIES)}")
+    if arithmetic is not None:
+        check_choice("--arithmetic", arithmetic, ARITHMETICS)
+    if memory is not None:
+        check_choice("--memory", memory, MEMORIES)
     if not isinstance(length, int) or isinstance(length, bool) or length < 1:
         raise InputError("--length", f"is {length!r}", "give a memory length of at least 1 sample")
     if length > _LONGEST:
@@ -123,8 +123,8 @@ def _check(arithmetic: str | None, memory: str | None, length: int) -> None:
 
 
 def _kernels(target: str | None) -> Kernels:
-    if target is not None and target not in TARGETS:
-        raise InputError("--target", f"is {target!r}", f"choose one of {', '.join(TARGETS)}")
+    if target is not None:
+        check_choice("--target", target, TARGETS)
     return Kernels(target)
 
 
@@ -143,8 +143,7 @@ def _check_form(memory: str, length: int | None, tolerance: float | None, horizo
 
 def _refuse_what_is_missing(package) -> None:
     """Options of the command that this version does not have are refused, never ignored."""
-    if package not in PACKAGES:
-        raise InputError("--for", f"is {package!r}", f"choose one of {', '.join(PACKAGES)}")
+    check_choice("--for", package, PACKAGES)
     if package != "plain":
         raise InputError(
             "--for", f"{package} is not available in this version", "use --for plain and add the three files"

@@ -17,7 +17,7 @@ from focgen.control.inversion import Inversion
 from focgen.control.measures import StepMeasures
 from focgen.control.schedule import TOLERANCE, Table, gain_table
 from focgen.control.units import units_of
-from focgen.errors import DesignError
+from focgen.errors import DesignError, check_choice
 from focgen.loop.bench import Bench, prepare
 from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
@@ -150,8 +150,7 @@ def _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance) -> 
         raise DesignError("--settling", f"is {settling:g}", "give a time above 0 s")
     if overshoot is not None and not (math.isfinite(overshoot) and overshoot >= 0.0):
         raise DesignError("--overshoot", f"is {overshoot:g}", "give percent, 0 or more")
-    if arithmetic not in ARITHMETICS:
-        raise DesignError("--arithmetic", f"is {arithmetic!r}", f"choose one of {', '.join(ARITHMETICS)}")
+    check_choice("--arithmetic", arithmetic, ARITHMETICS, DesignError)
     if length is not None and length < 1:
         raise DesignError("--length", f"is {length}", "give at least 1 past sample")
     if delay not in (0, 1):

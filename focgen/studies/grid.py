@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
-from focgen.errors import InputError
+from focgen.errors import InputError, check_choice
 from focgen.studies.model import Variant
 
 LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
@@ -102,10 +102,10 @@ def _own(controller: Controller) -> tuple[float, ...]:
 
 
 def _check(grid: Grid) -> None:
-    _each("--memory", grid.memories, lambda m: m in MEMORIES, f"choose among {', '.join(MEMORIES)}")
-    _each(
-        "--arithmetic", grid.arithmetics, lambda a: a in ARITHMETICS, f"choose among {', '.join(ARITHMETICS)}"
-    )
+    for memory in grid.memories:
+        check_choice("--memory", memory, MEMORIES)
+    for arithmetic in grid.arithmetics:
+        check_choice("--arithmetic", arithmetic, ARITHMETICS)
     _each(
         "--lengths",
         grid.lengths,

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from focgen.codegen.kernels import TARGETS
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding, rest
 from focgen.control.files import read_controller
 from focgen.control.setpoints import default_setpoints
-from focgen.errors import ControllerError, DesignError, InputError
+from focgen.errors import ControllerError, DesignError, InputError, check_choice
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.studies.grid import Grid, grid_of
@@ -24,7 +25,6 @@ from focgen.studies.spectrum import band_of
 from focgen.studies.store import Store
 from focgen.studies.sweep import Workers, sweep
 from focgen.studies.write import write
-from focgen.verification.costs import TARGETS
 
 SUBJECTS = ("memory",)
 SAMPLES = 10_000  # of the open-loop inputs
@@ -75,8 +75,8 @@ def study_memory(
             "has no fractional power of s, so no memory",
             "study a controller of fractional order",
         )
-    if target is not None and target not in TARGETS:
-        raise InputError("--target", f"is {target!r}", f"choose one of {', '.join(TARGETS)}")
+    if target is not None:
+        check_choice("--target", target, TARGETS)
     grid = grid_of(which, memories, lengths, tolerances, horizon, arithmetics, sample_times)
     model, notes = _rig(rig, which, controller)
     points = _setpoints(which, model, setpoints)

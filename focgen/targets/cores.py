@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from focgen.errors import InputError
+from focgen.errors import check_choice
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,5 @@ EMULATED = tuple(core.name for core in CORES)
 
 def core(name: str) -> Core:
     """The core of that name. Raises InputError where there is none."""
-    for one in CORES:
-        if one.name == name:
-            return one
-    raise InputError("--target", f"is {name!r}", f"choose of {', '.join(EMULATED)}")
+    check_choice("--target", name, EMULATED)
+    return next(one for one in CORES if one.name == name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -59,17 +59,11 @@ class Cost:
     skipped: str | None = None
 
 
-def entry_of(cost: Cost) -> dict[str, Any]:
-    """A cost as JSON carries it: why it was skipped and nothing else, or what was counted."""
-    if cost.skipped is not None:
-        return {"skipped": cost.skipped}
-    entry = asdict(cost)
-    del entry["skipped"]
-    return entry
-
-
 def cost_of(entry: dict[str, Any]) -> Cost:
-    """The cost that an entry stands for. Raises TypeError and KeyError where it is none."""
+    """The cost that an entry of :func:`focgen.targets.asked.entry_of` stands for.
+
+    Raises TypeError and KeyError where it is none.
+    """
     made = {key: entry[key] and PerStep(**entry[key]) for key in ("instructions_per_step", "cycles_per_step")}
     path = entry["stack_path"]
     return Cost(**{**entry, **made, "stack_path": None if path is None else tuple(path)})

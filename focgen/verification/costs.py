@@ -9,15 +9,16 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from focgen.errors import InputError, MissingExtra
+from focgen.codegen.kernels import TARGETS
+from focgen.errors import InputError, MissingExtra, check_choice
 from focgen.output import write_file
-from focgen.targets.cores import EMULATED, core
-from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr, entry_of
+from focgen.targets.asked import asked_for, entry_of
+from focgen.targets.cores import core
+from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr
 from focgen.targets.emulator import emulator_title
 from focgen.targets.toolchains import Toolchain, absent, toolchains
 from focgen.verification.folder import GeneratedFolder, read_folder
 
-TARGETS = (*EMULATED, "avr")
 COMPILERS = ("zig", "gcc")
 REMEMBERED = "cost.json"
 """The file beside a controller's C that remembers what it cost; no part of what was generated."""
@@ -57,21 +58,12 @@ def cost(folder: str | Path, target: str | Sequence[str] = "all", compiler: str 
 
     Raises InputError for a folder that is none, BuildError where the C does not compile.
     """
-    names = _targets(target)
-    if compiler not in COMPILERS:
-        raise InputError("--compiler", f"is {compiler!r}", f"choose of {', '.join(COMPILERS)}")
+    names = asked_for(target, TARGETS)
+    check_choice("--compiler", compiler, COMPILERS)
     folders = [read_folder(path) for path in _generated(Path(folder))]
     other = None if against is None else read_folder(against)
     beside = {} if other is None else {name: _on(name, other, compiler) for name in names}
     return Costs(tuple(_counted(read, names, compiler, other, beside) for read in folders))
-
-
-def _targets(target: str | Sequence[str]) -> tuple[str, ...]:
-    names = TARGETS if target == "all" else (target,) if isinstance(target, str) else tuple(target)
-    for name in names:
-        if name not in TARGETS:
-            raise InputError("--target", f"is {name!r}", f"choose of {', '.join(TARGETS)}, all")
-    return names
 
 
 def _generated(path: Path) -> list[Path]:

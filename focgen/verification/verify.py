@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from focgen.codegen.kernels import TARGETS as CORES
 from focgen.errors import InputError
-from focgen.targets.cores import EMULATED
+from focgen.targets.asked import asked_for
 from focgen.verification.compare import TargetResult, compare, observed, self_tested
 from focgen.verification.elsewhere import on_avr, on_core
 from focgen.verification.folder import GeneratedFolder, read_folder
@@ -15,7 +16,7 @@ from focgen.verification.host import Library
 
 __all__ = ["TARGETS", "TargetResult", "Verification", "compare", "verify"]
 
-TARGETS = ("host", *EMULATED, "avr")
+TARGETS = ("host", *CORES)
 _SAMPLES = 10_000  # on the host
 
 
@@ -54,16 +55,8 @@ def verify(
     if seed < 0:
         raise InputError("--seed", f"is {seed}", "give 0 or more")
     read = read_folder(folder)
-    results = {name: _on(name, read, samples, seed) for name in _targets(target)}
+    results = {name: _on(name, read, samples, seed) for name in asked_for(target, TARGETS)}
     return Verification(read.plan.name, read.plan.arithmetic, results, read.differences)
-
-
-def _targets(target: str | Sequence[str]) -> tuple[str, ...]:
-    names = TARGETS if target == "all" else (target,) if isinstance(target, str) else tuple(target)
-    for name in names:
-        if name not in TARGETS:
-            raise InputError("--target", f"is {name!r}", f"choose of {', '.join(TARGETS)}, all")
-    return names
 
 
 def _on(name: str, read: GeneratedFolder, samples: int | None, seed: int) -> TargetResult:
