@@ -57,11 +57,12 @@ def compile_shared(
     if done.returncode:
         raise BuildError(
             str(sources[0]),
-            f"does not compile: {_first_complaint(done.stderr)}",
+            f"does not compile: {first_complaint(done.stderr)}",
             "generate the folder again, or set CC to another compiler",
         )
 
 
-def _first_complaint(text: str) -> str:
+def first_complaint(text: str) -> str:
+    """The first line of a compiler's output that speaks of an error."""
     lines = [line.strip() for line in text.splitlines() if "error" in line.lower()]
     return (lines or text.splitlines() or ["it says nothing"])[0]

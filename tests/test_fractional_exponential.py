@@ -1,6 +1,5 @@
 """The exponential memory against exact weights at every lag, 40-digit arithmetic and the full sum."""
 
-import dataclasses
 import math
 
 import mpmath as mp
@@ -11,7 +10,6 @@ from focgen.fractional.exponential import (
     ExponentialMemory,
     fit_exponential,
     fit_states,
-    theoretical_states,
 )
 from focgen.fractional.exponential_certificate import certify
 from focgen.fractional.exponential_fit import ladder
@@ -113,6 +111,14 @@ def test_no_fewer_states_can_do_it(order, horizon, tolerance):
     assert np.min(np.abs(e)) > tolerance / 1.01
 
 
+def theoretical_states(horizon: int, tolerance: float) -> float:
+    """ln(1/ε) ln(8R) / π², how the number of exponentials grows (Braess and Hackbusch 2005).
+
+    Their bound for 1/x has 16/ε in place of 1/ε; orders close below a whole one come near it.
+    """
+    return math.log(1.0 / tolerance) * math.log(8.0 * horizon) / math.pi**2
+
+
 @pytest.mark.parametrize("order", [0.1, 0.4, 0.6])
 @pytest.mark.parametrize("horizon", [1000, 10**4, 10**6])
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
@@ -211,18 +217,6 @@ def test_frequency_response_is_that_of_the_kernel(order):
     expected = [(1 - np.exp(-1j * w)) ** m * np.sum(h * np.exp(-1j * w * lags)) for w in omega]
     np.testing.assert_allclose(memory.frequency_response(omega), expected, rtol=1e-9)
     np.testing.assert_array_equal(memory.kernel([0, 1]), [1.0, memory.kernel(np.array([1]))[0]])
-
-
-@pytest.mark.parametrize("order, bits", [(0.6, 16), (0.9, 16), (0.25, 20)])
-def test_rounded_poles_get_weights_of_their_own(order, bits):
-    memory = fit_exponential(order, 3000, 1e-5)
-    rounded = [round(p * 2.0**bits) / 2.0**bits for p in memory.poles]
-    stale = dataclasses.replace(memory, poles=tuple(rounded)).certificate.kernel
-    refit = memory.with_poles(rounded)
-    assert refit.poles == tuple(rounded)
-    assert refit.tolerance == refit.certificate.kernel < 0.3 * stale
-    found = truths(refit.beta, refit.differences, 3000, refit.poles, refit.weights)
-    assert found[0] <= refit.tolerance
 
 
 def test_the_same_request_gives_the_same_numbers():

@@ -1,6 +1,6 @@
 """Fits of the fractional model: exact without noise, honest intervals with it, the paper's order of models."""
 
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from tests.conftest import paper_rig
 K, T, ALPHA, LEVEL = 0.05, 1.32, 0.6, 0.15
 
 
-@lru_cache(maxsize=None)
+@cache
 def exact_step(step: float, count: int, begin: float, T: float = T, alpha: float = ALPHA) -> np.ndarray:
     """1 − E_α(−t^α/T), t since ``begin``: the model's unit step response, from the Mittag-Leffler function."""
     late = step * np.arange(count) - begin

@@ -49,9 +49,8 @@ def write_csv_gz(path, columns):
 
 def write_parquet(path, columns):
     pyarrow = pytest.importorskip("pyarrow")
-    import pyarrow.parquet
-
-    pyarrow.parquet.write_table(pyarrow.table({k: np.asarray(v) for k, v in columns.items()}), path)
+    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(pyarrow.table({k: np.asarray(v) for k, v in columns.items()}), path)
 
 
 def write_mat(path, columns):

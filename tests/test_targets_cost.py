@@ -15,7 +15,7 @@ from focgen.targets.cores import CORES, core
 from focgen.targets.cost import cost_on
 from focgen.targets.run import TargetLibrary
 from focgen.targets.stack import Stack
-from focgen.targets.steps import per_tap, step_costs
+from focgen.targets.steps import step_costs
 from focgen.targets.toolchains import EXACT, toolchains
 from focgen.verification.costs import REMEMBERED, cost
 from focgen.verification.folder import read_folder
@@ -67,12 +67,23 @@ def test_instructions_are_those_a_slow_count_gives(folders, name):
     assert counts[1:] == fast.tolist() and len(set(fast)) > 1
 
 
+def per_tap(reads, core_name, steps):
+    """Instructions and cycles that one more past sample costs a step; mean of ``steps`` steps."""
+    library = TargetLibrary(core(core_name), ZIG, [r.plan for r in reads], [r.path for r in reads])
+    short, long = (step_costs(library, read.plan, steps) for read in reads)
+    taps = reads[1].plan.length - reads[0].plan.length
+    instructions = (long.instructions.mean() - short.instructions.mean()) / taps
+    if short.cycles is None:
+        return instructions, None
+    return instructions, (long.cycles.mean() - short.cycles.mean()) / taps
+
+
 def test_a_tap_costs_the_slope_between_two_lengths(folders):
     """On the Cortex-M4 a multiplication, an addition, two loads and a share of the loop."""
     reads = folders["f32", 12], folders["f32", 37]
-    instructions, cycles = per_tap([r.plan for r in reads], [r.path for r in reads], "cortex-m4", steps=30)
+    instructions, cycles = per_tap(reads, "cortex-m4", 30)
     assert 4.0 <= instructions <= 9.0 and instructions < cycles < 13.0
-    assert per_tap([r.plan for r in reads], [r.path for r in reads], "cortex-m7", steps=4)[1] is None
+    assert per_tap(reads, "cortex-m7", 4)[1] is None
 
 
 def test_bytes_of_25_more_taps(folders):

@@ -61,7 +61,7 @@ def agree(name: str, chain, plans, folder, samples: int, host: Library, worst: i
         cases = cases_of(plan, samples, 3, worst)
         seen, scales = answered(library, plan, cases)
         result = judged(plan, cases, seen, scales, None)
-        result = with_states(plan, result, cases, seen, answered(host, plan, cases)[0])
+        result = with_states(result, cases, seen, answered(host, plan, cases)[0])
         assert result.sound and result.samples >= samples, f"{plan.name} on {name}: {result.first or result}"
         counted[plan.arithmetic] += result.samples
     return counted

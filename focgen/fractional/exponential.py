@@ -20,7 +20,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from focgen.fractional.exponential_certificate import Certificate, certify
-from focgen.fractional.exponential_fit import Alternation, best_weights, eased, ladder
+from focgen.fractional.exponential_fit import Alternation, eased, ladder
 
 HORIZONS = (100, 10**8)  # samples
 TOLERANCES = (1e-8, 0.1)
@@ -92,15 +92,6 @@ class ExponentialMemory:
             y += lfilter([0.0, weight], [1.0, -pole], v)
         return y
 
-    def with_poles(self, poles) -> ExponentialMemory:
-        """Return the memory with other ``poles``, rounded ones say, and the weights that suit them best.
-
-        Its tolerance is the one its certificate proves. Raises ValueError where the weights would not all be
-        positive.
-        """
-        weights = best_weights(self.beta, self.horizon, np.asarray(poles, dtype=float))
-        return memory_of(self.order, self.horizon, poles, weights)
-
 
 @functools.lru_cache(maxsize=256)
 def fit_exponential(order: float, horizon: int, tolerance: float) -> ExponentialMemory:
@@ -137,14 +128,6 @@ def fit_states(order: float, horizon: int, states: int) -> ExponentialMemory:
     if fit is None:
         raise ValueError(f"no best fit with {states} states exists in float64 at the horizon {horizon}")
     return memory_of(order, horizon, *_poles_and_weights(eased(beta, horizon, fit, math.inf)))
-
-
-def theoretical_states(horizon: int, tolerance: float) -> float:
-    """Return ln(1/ε) ln(8R) / π², how the number of exponentials grows (Braess and Hackbusch 2005).
-
-    Their bound for 1/x has 16/ε in place of 1/ε; orders close below a whole one come near it.
-    """
-    return math.log(1.0 / tolerance) * math.log(8.0 * horizon) / math.pi**2
 
 
 def checked_differences(order: float, horizon: int) -> int:

@@ -11,7 +11,6 @@ from focgen.identification.model import ExperimentFit
 
 _FALL = 0.5  # of the level: the input comes down by at least this in a release
 _WIDE = 0.3  # of a parameter: an interval wider than this says little
-_TIED = 0.95  # correlation of K and T from which on they are traded for each other
 _CHANGED = 0.1  # of the level: the log moves on by this after the release's first sample
 
 

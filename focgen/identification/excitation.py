@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -173,6 +172,3 @@ def _level(pressure: np.ndarray, before: float) -> float:
     """The median of the input where it is more than half-way to its farthest value."""
     away = np.abs(pressure - before)
     return float(np.median(pressure[away >= 0.5 * away.max()]))
-
-
-Kernel = Callable[[float, float, float, int], np.ndarray]

@@ -36,7 +36,6 @@ class FractionalFit:
     K_covariance: np.ndarray
     residuals: list[ResidualModel]
     simulated: list[np.ndarray]
-    correlation: float
 
 
 def fit_fractional(experiments: Sequence[Excitation]) -> FractionalFit:
@@ -168,10 +167,10 @@ def _finished(experiments, problem: _Problem, x: np.ndarray) -> FractionalFit:
         raise FitError(
             experiments[0].name, "the log does not determine K, T and alpha", "hold the step longer"
         ) from None
-    return _with_intervals(experiments, problem, x, spread, models)
+    return _with_intervals(problem, x, spread, models)
 
 
-def _with_intervals(experiments, problem, x, spread, models) -> FractionalFit:
+def _with_intervals(problem, x, spread, models) -> FractionalFit:
     log_tau, alpha, K = x[0], x[1], x[2::2]
     T = float(np.exp(alpha * log_tau))
     slope = np.zeros(len(x))
@@ -186,8 +185,6 @@ def _with_intervals(experiments, problem, x, spread, models) -> FractionalFit:
         "offset": wide(np.diag(spread)[3::2]),
     }
     simulated = [K[i] * r[0] + x[3 + 2 * i] for i, r in enumerate(problem.responses(log_tau, alpha))]
-    variance_T = slope @ spread @ slope
-    correlation = float(spread[2] @ slope / np.sqrt(variance_T * spread[2, 2]))
     return FractionalFit(
-        K.copy(), T, float(alpha), x[3::2].copy(), half, spread[gains, gains], models, simulated, correlation
+        K.copy(), T, float(alpha), x[3::2].copy(), half, spread[gains, gains], models, simulated
     )

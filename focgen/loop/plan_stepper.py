@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from focgen.plan.execute import BankRun, Latest, scheduled_gain
+from focgen.plan.execute import BankRun, Latest, clamp, kind_of, saturate, scheduled_gain
+from focgen.plan.formats import shift
 from focgen.plan.model import Format, Plan, Sum
 from focgen.plan.scenario import nearest_raw
 
@@ -20,18 +21,19 @@ class PlanStepper:
 
     def __init__(self, plan: Plan, columns: int, start: float = 0.0):
         self.plan = plan
-        self.kind = {"float": np.float32, "double": np.float64}.get(plan.error.ctype, np.int64)
+        self.kind = kind_of(plan.error)
         self.direct = _Window(plan.direct, self.kind, columns)
         self.rest = _Window(plan.inner.rest if plan.inner else None, self.kind, columns)
         self.feedback = _Window(plan.feedback.table if plan.feedback else None, self.kind, columns)
         zero = np.zeros(columns, self.kind)
         self.z, self.r, self.carry, self.d = zero, zero, zero, zero
-        u0 = np.full(columns, _clamped(nearest_raw(start, plan.output), plan.output))
+        u0 = np.full(columns, clamp(nearest_raw(start, plan.output), plan.output))
         self.total = u0.astype(self.kind)
         if plan.integrator and not plan.floating:
             self.total = self.total << plan.integrator.to_output
 
     def step(self, reference, measurement, schedule):
+        """One sample of all loops: physical values in, the outputs out, each of shape (columns,)."""
         plan = self.plan
         e = self._input(reference, plan.reference) - self._input(measurement, plan.measurement)
         v = self._filtered(e)
@@ -43,11 +45,11 @@ class PlanStepper:
 
     def _input(self, values, form: Format) -> np.ndarray:
         raw = np.asarray(nearest_raw(values, form), dtype=self.kind)
-        return raw if form.floating else _clamped(raw, form)
+        return raw if form.floating else clamp(raw, form)
 
     def _shift(self, values: np.ndarray, by: int) -> np.ndarray:
         """Right shift rounding half up; nothing where floating."""
-        return values if self.plan.floating or by == 0 else (values + (1 << (by - 1))) >> by
+        return values if self.plan.floating else shift(values, by)
 
     def _filtered(self, e: np.ndarray) -> np.ndarray:
         """v: the sums over e, the inner integral, the recursion."""
@@ -57,7 +59,7 @@ class PlanStepper:
             inner = self._shift(self._inner(self.rest(e)), plan.inner.to_wide)
             p = p + inner if plan.direct else inner
         if plan.feedback is None:
-            return p if plan.floating else _saturated(self._shift(p, plan.narrow), plan.filtered.bits)
+            return p if plan.floating else saturate(self._shift(p, plan.narrow), plan.filtered.bits)
         x = p - self.feedback.past()
         if plan.floating:
             v = x
@@ -65,20 +67,20 @@ class PlanStepper:
             x = x + self.carry
             v = self._shift(x, plan.narrow)
             self.carry = x - (v << plan.narrow)
-            v = _saturated(v, plan.filtered.bits)
+            v = saturate(v, plan.filtered.bits)
         self.feedback.push(v)
         return v
 
     def _inner(self, r: np.ndarray) -> np.ndarray:
-        self.z = _clamped(self.z + (r + self.r), self.plan.inner.state)
+        self.z = clamp(self.z + (r + self.r), self.plan.inner.state)
         self.r = r
         return self.z
 
     def _output(self, d: np.ndarray) -> np.ndarray:
         plan = self.plan
         if plan.integrator is None:
-            return _clamped(d, plan.output)
-        self.total = _clamped(self.total + (d + self.d), plan.integrator.state)
+            return clamp(d, plan.output)
+        self.total = clamp(self.total + (d + self.d), plan.integrator.state)
         self.d = d
         return self._shift(self.total, plan.integrator.to_output)
 
@@ -125,14 +127,5 @@ class _Window:
         total = np.zeros(self.columns, np.int64)
         for start, stop, align in self.blocks:
             part = products[start:stop].sum(axis=0)
-            total = total + (part if align == 0 else (part + (1 << (align - 1))) >> align)
+            total = total + shift(part, align)
         return total
-
-
-def _clamped(values, form: Format):
-    kind = np.asarray(values).dtype.type
-    return np.minimum(np.maximum(values, kind(form.low)), kind(form.high))
-
-
-def _saturated(values: np.ndarray, bits: int) -> np.ndarray:
-    return np.minimum(np.maximum(values, -(1 << (bits - 1))), (1 << (bits - 1)) - 1)

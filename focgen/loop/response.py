@@ -131,7 +131,7 @@ def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
     h, transfer = controller.sample_time, chain_transfer(rig)
     effects, _, _ = linear_part(rig)
     low, nyquist = _LOW * 2.0 * math.pi / h, math.pi / h
-    unit = running_gain(plan, _any_schedule(controller))
+    unit = running_gain(plan, any_schedule(controller))
 
     def held(omega):
         return held_response(transfer, h, omega, effects) * np.exp(-1j * omega * h * delay)
@@ -145,7 +145,7 @@ def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
         return curve(lambda omega: sampled_response(controller, omega, length) * held(omega), low, nyquist)
 
     def running(omega):
-        return running_response(plan, omega, _any_schedule(controller)) / unit * held(omega)
+        return running_response(plan, omega, any_schedule(controller)) / unit * held(omega)
 
     return Shapes(
         curve(ideal, low, _HIGH * nyquist),
@@ -155,7 +155,8 @@ def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
     )
 
 
-def _any_schedule(controller: Controller) -> float | None:
+def any_schedule(controller: Controller) -> float | None:
+    """A value of the scheduling signal to compare responses at; None where the gain is constant."""
     return controller.gain.breakpoints[0] if controller.scheduled else None
 
 
@@ -196,6 +197,7 @@ def margins_at(rig: Rig, controller: Controller, plan: Plan, loops: Shapes, pres
 __all__ = [
     "PointMargins",
     "Shapes",
+    "any_schedule",
     "chain_transfer",
     "designed_response",
     "held_response",

@@ -57,13 +57,6 @@ def build_plan(
     return replace(plan, error_bound=error_bound(plan, folded))
 
 
-def plan_tables(plan: Plan) -> Tables:
-    """The exact weights that a plan was made from."""
-    if plan.exponential:
-        return exponential_tables(plan.controller, plan.memories)
-    return tables(plan.controller, plan.length)
-
-
 def _tables(wanted: Controller) -> tuple[Tables, tuple[ExponentialMemory, ...]]:
     if wanted.memory == "short":
         return tables(wanted, wanted.length), ()

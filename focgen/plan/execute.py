@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.plan.formats import shift
 from focgen.plan.model import (
     FLAG_HIGH,
     FLAG_INPUT,
@@ -45,21 +46,19 @@ def _executed(plan: Plan, scenario: Scenario) -> Trace:
     return Trace(u, d, run.flags(u))
 
 
-def _kind(format_: Format) -> type:
+def kind_of(format_: Format) -> type:
+    """The numpy type that values of a format are computed in."""
     return {"float": np.float32, "double": np.float64}.get(format_.ctype, np.int64)
 
 
-def _shift(values: np.ndarray, by: int) -> np.ndarray:
-    """Right shift rounding half up."""
-    return (values + (1 << (by - 1))) >> by if by else values
-
-
-def _clamp(values: np.ndarray, format_: Format) -> np.ndarray:
-    kind = values.dtype.type
+def clamp(values: np.ndarray, format_: Format) -> np.ndarray:
+    """Within the limits of a format, in the values' own type."""
+    kind = np.asarray(values).dtype.type
     return np.minimum(np.maximum(values, kind(format_.low)), kind(format_.high))
 
 
-def _saturate(values: np.ndarray, bits: int) -> np.ndarray:
+def saturate(values: np.ndarray, bits: int) -> np.ndarray:
+    """Within the two's complement of so many bits."""
     return np.minimum(np.maximum(values, -(1 << (bits - 1))), (1 << (bits - 1)) - 1)
 
 
@@ -79,7 +78,7 @@ class _Run:
 
     def __init__(self, plan: Plan, scenario: Scenario):
         self.plan, self.scenario = plan, scenario
-        self.kind = _kind(plan.error)
+        self.kind = kind_of(plan.error)
         self.shape = scenario.ref.shape
         self.ref = self._input(scenario.ref, plan.reference)
         self.meas = self._input(scenario.meas, plan.measurement)
@@ -92,7 +91,7 @@ class _Run:
 
     def _input(self, values, format_: Format) -> np.ndarray:
         values = np.asarray(values, dtype=self.kind)
-        return values if format_.floating else _clamp(values, format_)
+        return values if format_.floating else clamp(values, format_)
 
     def _segments(self) -> list[_Segment]:
         """Cut every lane at its resets; a lane begins with init, whose error is 0 even where the ranges
@@ -106,7 +105,7 @@ class _Run:
         for (lane, start), after in zip(order, order[1:] + [(-1, 0)]):
             constant, u0 = starts[lane, start]
             stop = after[1] if after[0] == lane else samples
-            found.append(_Segment(lane, start, stop, constant, _clamp(u0, self.plan.output)))
+            found.append(_Segment(lane, start, stop, constant, clamp(u0, self.plan.output)))
         return found
 
     def _start(self, reset: Reset) -> tuple[np.generic, np.generic]:
@@ -174,7 +173,7 @@ class _Run:
             for lag in range(block.last, block.first - 1, -1):
                 weight = self.kind(block.weights[lag - block.first])
                 part[lag:] = part[lag:] + weight * signal[: len(signal) - lag]
-            total = part if signal.dtype.kind == "f" else total + _shift(part, block.align)
+            total = part if signal.dtype.kind == "f" else total + shift(part, block.align)
         return total
 
     # ----------------------------------------------------------------------------------------- recursion
@@ -187,7 +186,7 @@ class _Run:
             p = p + self._inner() if plan.direct else self._inner()
         self.v_rest = self._rest()
         if plan.feedback is None:
-            self.v = p if plan.floating else _saturate(_shift(p, plan.narrow), plan.filtered.bits)
+            self.v = p if plan.floating else saturate(shift(p, plan.narrow), plan.filtered.bits)
         else:
             self.v = self._fed_back(p)
 
@@ -197,13 +196,13 @@ class _Run:
         if plan.feedback is None:
             if plan.floating:
                 return self.direct_rest
-            narrow = {k: _shift(p, plan.narrow) for k, p in self.direct_rest.items()}
-            return {k: _saturate(v, plan.filtered.bits) for k, v in narrow.items()}
+            narrow = {k: shift(p, plan.narrow) for k, p in self.direct_rest.items()}
+            return {k: saturate(v, plan.filtered.bits) for k, v in narrow.items()}
         steady = self.kind(plan.feedback.steady)
         if plan.floating:
             return {k: steady * s.constant for k, s in self.starts.items()}
         by, bits = plan.feedback.steady_shift, plan.filtered.bits
-        return {k: _saturate(_shift(steady * s.constant, by), bits) for k, s in self.starts.items()}
+        return {k: saturate(shift(steady * s.constant, by), bits) for k, s in self.starts.items()}
 
     def _inner(self) -> np.ndarray:
         """z, aligned to p."""
@@ -213,9 +212,9 @@ class _Run:
             for lane in self.starting.get(k, ()):
                 z[lane], before[lane] = 0, self.r_rest[lane, k]
             now = self.r[:, k]
-            z = _clamp(z + (now + before), inner.state)
+            z = clamp(z + (now + before), inner.state)
             out[:, k], before = z, now.copy()
-        return out if self.plan.floating else _shift(out, inner.to_wide)
+        return out if self.plan.floating else shift(out, inner.to_wide)
 
     def _fed_back(self, p: np.ndarray) -> np.ndarray:
         """v_k from p_k and the past of v, whose columns are samples, ``lags`` of them ahead of the first."""
@@ -239,9 +238,9 @@ class _Run:
             x = p[:, k] - s
             if not plan.floating:
                 x = x + carry
-                v = _shift(x, plan.narrow)
+                v = shift(x, plan.narrow)
                 carry = x - (v << plan.narrow)
-                x = _saturate(v, plan.filtered.bits)
+                x = saturate(v, plan.filtered.bits)
             past[:, k + lags] = out[:, k] = x
             latest.push(x)
         return out
@@ -262,11 +261,11 @@ class _Run:
         plan = self.plan
         d = self._increment(self.g * self.v)
         if plan.integrator is None:
-            return _clamp(d, plan.output), d
+            return clamp(d, plan.output), d
         return self._integrated(d), d
 
     def _increment(self, product: np.ndarray) -> np.ndarray:
-        return product if self.plan.floating else _shift(product, self.plan.gain_shift)
+        return product if self.plan.floating else shift(product, self.plan.gain_shift)
 
     def _integrated(self, d: np.ndarray) -> np.ndarray:
         plan, lanes = self.plan, self.shape[0]
@@ -281,10 +280,10 @@ class _Run:
                 total[lane] = self._wide(self.starts[lane, k].u0)
                 before[lane] = self._increment(self.g[lane, k] * self.v_rest[lane, k])
             for t in tracks.get(k, ()):
-                total[t.lane] = self._wide(_clamp(np.asarray(t.u, dtype=self.kind), plan.output))
-            total = _clamp(total + (d[:, k] + before), state)
+                total[t.lane] = self._wide(clamp(np.asarray(t.u, dtype=self.kind), plan.output))
+            total = clamp(total + (d[:, k] + before), state)
             out[:, k], before = total, d[:, k].copy()
-        return out if plan.floating else _saturate(_shift(out, plan.integrator.to_output), plan.output.bits)
+        return out if plan.floating else saturate(shift(out, plan.integrator.to_output), plan.output.bits)
 
     def _wide(self, u):
         """Output counts in counts of the integrator."""
@@ -317,7 +316,7 @@ class _Recursion:
         products = past * self.weights
         if self.kind is not np.int64:
             return np.add.accumulate(products, axis=1)[:, -1] + self.kind(0)
-        return sum(_shift(products[:, a:b].sum(axis=1), align) for a, b, align in self.blocks)
+        return sum(shift(products[:, a:b].sum(axis=1), align) for a, b, align in self.blocks)
 
 
 class Latest:
@@ -355,9 +354,9 @@ class BankRun:
 
     def _whole(self, u: np.ndarray) -> np.ndarray:
         bank = self.bank
-        drive = _shift((u << bank.up) - self.mean, bank.to_drive)
-        self.mean = self.mean + _shift(self.rates * drive, bank.rate_shift)
-        return _shift((self.weights * drive).sum(axis=1), bank.align)
+        drive = shift((u << bank.up) - self.mean, bank.to_drive)
+        self.mean = self.mean + shift(self.rates * drive, bank.rate_shift)
+        return shift((self.weights * drive).sum(axis=1), bank.align)
 
     def _floating(self, u: np.ndarray) -> np.ndarray:
         drive = u - self.mean
@@ -374,9 +373,9 @@ class BankRun:
 
 def scheduled_gain(plan: Plan, s: np.ndarray) -> np.ndarray:
     """g in counts at raw values of the scheduling signal, any shape; ``plan`` has a schedule."""
-    kind = _kind(plan.error)
+    kind = kind_of(plan.error)
     s = np.asarray(s, dtype=kind)
-    return _scheduled(plan.schedule, s if plan.floating else _clamp(s, plan.schedule.signal), kind)
+    return _scheduled(plan.schedule, s if plan.floating else clamp(s, plan.schedule.signal), kind)
 
 
 def _scheduled(schedule: Schedule, s: np.ndarray, kind: type) -> np.ndarray:

@@ -92,8 +92,8 @@ class Interval:
         return max(abs(self.low), abs(self.high))
 
 
-def shift(count: int, by: int) -> int:
-    """Right shift rounding half up, on Python integers."""
+def shift(count, by: int):
+    """Right shift rounding half up, on Python integers and int64 arrays."""
     return (count + (1 << (by - 1))) >> by if by else count
 
 

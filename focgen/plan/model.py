@@ -288,6 +288,11 @@ class Plan:
         return tuple(s for s in found if s)
 
     @property
+    def taps(self) -> int:
+        """How many samples its sums weigh one by one."""
+        return sum(s.taps for s in self.sums)
+
+    @property
     def states(self) -> int:
         """How many modes its memory has; 0 with short memory."""
         return sum(s.modes for s in self.sums)
@@ -295,7 +300,7 @@ class Plan:
     @property
     def multiplies(self) -> int:
         """Multiplications in one step: a tap one, a mode two, gain and slope one each."""
-        return sum(s.taps + 2 * s.modes for s in self.sums) + 1 + (self.schedule is not None)
+        return self.taps + 2 * self.states + 1 + (self.schedule is not None)
 
     @property
     def floating(self) -> bool:

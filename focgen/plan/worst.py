@@ -58,11 +58,20 @@ def _bank(plan: Plan, node: str) -> np.ndarray:
 
 def _part(table: Sum, node: str) -> np.ndarray:
     """The weights by lag, those of other blocks 0."""
-    weights = sum_response(table, _LONGEST).weights
+    return _only(table, node, sum_response(table, _LONGEST).weights, 0)
+
+
+def _part_of_past(table: Sum, node: str) -> np.ndarray:
+    """The same of a sum that begins at lag 1."""
+    return _only(table, node, np.array(table.values), 1)
+
+
+def _only(table: Sum, node: str, weights: np.ndarray, start: int) -> np.ndarray:
+    """``weights`` from lag ``start`` on, without those outside the block that ``node`` names, if it names one."""
     for block in table.blocks:
         if node == f"{table.name}[{block.first}..{block.last}]":
-            weights[: block.first] = 0.0
-            weights[block.last + 1 :] = 0.0
+            weights[: block.first - start] = 0.0
+            weights[block.last + 1 - start :] = 0.0
     return weights
 
 
@@ -92,15 +101,6 @@ def _answer(table: Sum, unit: np.ndarray) -> np.ndarray:
     """To a unit sample, as long as ``unit``."""
     found = sum_response(table, len(unit)).weights[: len(unit)]
     return np.pad(found, (0, len(unit) - len(found)))
-
-
-def _part_of_past(table: Sum, node: str) -> np.ndarray:
-    weights = np.array(table.values)
-    for block in table.blocks:
-        if node == f"{table.name}[{block.first}..{block.last}]":
-            weights[: block.first - 1] = 0.0
-            weights[block.last :] = 0.0
-    return weights
 
 
 def _schedule(plan: Plan, node: str, shape: tuple[int, int]) -> np.ndarray | None:

@@ -15,7 +15,7 @@ from focgen.control.measures import measure_step
 from focgen.loop.chain import Chain, chain
 from focgen.loop.frozen import frozen_loop, frozen_margins
 from focgen.loop.plan_stepper import PlanStepper
-from focgen.loop.response import chain_transfer, held_response, sampled_response, slope_at
+from focgen.loop.response import any_schedule, chain_transfer, held_response, sampled_response, slope_at
 from focgen.loop.run import LoopRun, run_loop
 from focgen.loop.stepper import FloatStepper, Stepper
 from focgen.plan.model import Plan
@@ -76,16 +76,14 @@ def running_loop(base: Controller, rig: Rig, setpoints: tuple[float, ...], plan:
     """The loop of a ``plan``; ``base`` is the study's controller at the plan's sample time."""
     bench = _bench(rig, base, setpoints)
     stepper = PlanStepper(plan, len(bench.points), bench.start.command)
-    at = base.gain.breakpoints[0] if base.scheduled else None
+    at = any_schedule(base)
     unit = running_gain(plan, at)
     open_loop = _curve(rig, base, lambda omega: running_response(plan, omega, at) / unit)
 
     def gain(pressure: float) -> float:
         return running_gain(plan, pressure if base.scheduled else None)
 
-    return _judged(
-        bench, base, stepper, [open_loop.times(gain(p) * slope_at(rig, p)) for p in _pressures(bench)]
-    )
+    return _judged(bench, stepper, [open_loop.times(gain(p) * slope_at(rig, p)) for p in _pressures(bench)])
 
 
 def ideal_loop(base: Controller, rig: Rig, setpoints: tuple[float, ...]) -> Steps:
@@ -94,7 +92,7 @@ def ideal_loop(base: Controller, rig: Rig, setpoints: tuple[float, ...]) -> Step
     stepper = FloatStepper(base, bench.chain.samples, len(bench.points), bench.start.command)
     open_loop = _curve(rig, base, lambda omega: sampled_response(base, omega))
     found = [open_loop.times(float(base.gain_at(p)) * slope_at(rig, p)) for p in _pressures(bench)]
-    return _judged(bench, base, stepper, found)
+    return _judged(bench, stepper, found)
 
 
 def _pressures(bench: Bench) -> list[float]:
@@ -111,7 +109,7 @@ def _curve(rig: Rig, controller: Controller, response) -> Curve:
     return curve(loop, _LOW * 2.0 * math.pi / h, math.pi / h)
 
 
-def _judged(bench: Bench, controller: Controller, stepper: Stepper, curves: list[Curve]) -> Steps:
+def _judged(bench: Bench, stepper: Stepper, curves: list[Curve]) -> Steps:
     reference = np.tile(bench.references, (bench.chain.samples, 1))
     known = bench.rig.signals.pressure is not None
     run = run_loop(bench.chain, stepper, reference, bench.start, _DELAY, known, curvature=False)

@@ -10,7 +10,7 @@ import numpy as np
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding
 from focgen.loop.frozen import frozen_loop, frozen_margins
-from focgen.loop.response import sampled_response
+from focgen.loop.response import any_schedule, sampled_response
 from focgen.plan.model import Plan
 from focgen.plan.response import designed_response, running_gain, running_response
 from focgen.rig.model import Rig
@@ -69,7 +69,7 @@ def omegas(band: Band, sample_time: float) -> np.ndarray:
 
 def memory_spectrum(controller: Controller, plan: Plan, band: Band) -> Spectrum:
     """The plan's response against infinite memory at the same sample time."""
-    omega, at = omegas(band, controller.sample_time), _somewhere(controller)
+    omega, at = omegas(band, controller.sample_time), any_schedule(controller)
     running = running_response(plan, omega, at) / running_gain(plan, at)
     exact = sampled_response(controller, omega)
     half = 0.5 * controller.sample_time if controller.integrator else 1.0
@@ -78,13 +78,9 @@ def memory_spectrum(controller: Controller, plan: Plan, band: Band) -> Spectrum:
 
 def sampling_spectrum(controller: Controller, band: Band) -> Spectrum:
     """Infinite memory at the sample time against the continuous controller."""
-    omega, at = omegas(band, controller.sample_time), _somewhere(controller)
+    omega, at = omegas(band, controller.sample_time), any_schedule(controller)
     exact = designed_response(controller, omega, at) / controller.gain_at(at)
     return _errors(omega, sampled_response(controller, omega) / exact)
-
-
-def _somewhere(controller: Controller) -> float | None:
-    return controller.gain.breakpoints[0] if controller.scheduled else None
 
 
 def _errors(omega: np.ndarray, ratio: np.ndarray) -> Spectrum:

@@ -93,9 +93,3 @@ def _events(scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np
             event[t.sample] |= _TRACK
             given[t.sample, 3] = t.u
     return event, given
-
-
-def taps(plan: Plan) -> int:
-    """Multiplications of a step's history sums."""
-    sums = (plan.direct, plan.inner and plan.inner.rest, plan.feedback and plan.feedback.table)
-    return sum(s.taps for s in sums if s)

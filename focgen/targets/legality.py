@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 from focgen.errors import MissingExtra
 from focgen.targets.cores import Core
@@ -26,7 +26,7 @@ def _capstone():
     return capstone
 
 
-@lru_cache(maxsize=None)
+@cache
 def disassembler(core: Core):
     """Capstone for a core, with details. Raises MissingExtra without it."""
     cs = _capstone()

@@ -19,7 +19,6 @@ import numpy as np
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.targets.cores import Core
-from focgen.targets.driver import taps
 from focgen.targets.emulator import TargetFault
 from focgen.targets.program import Program
 from focgen.targets.run import Work, results
@@ -63,7 +62,7 @@ def _trace(program: Program, plan: Plan, scenario: Scenario) -> Trace:
     for job in jobs:
         for address, content in job.inputs:
             image[address - core.work : address - core.work + len(content)] = content
-    found = _run(program, bytes(image), _PATIENCE + scenario.ref.size * (200 + taps(plan)) * 2e-5)
+    found = _run(program, bytes(image), _PATIENCE + scenario.ref.size * (200 + plan.taps) * 2e-5)
     read = lambda address, size: found[address - core.results : address - core.results + size]  # noqa: E731
     u, d, flags = (np.stack(part) for part in zip(*(results(plan, job, read) for job in jobs)))
     return Trace(u, d if plan.integrator else u, flags)

@@ -12,7 +12,7 @@ import numpy as np
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.targets.cores import Core
-from focgen.targets.driver import DTYPES, RESUME, Answers, driver, header_scales, lane_of, taps
+from focgen.targets.driver import DTYPES, RESUME, Answers, driver, header_scales, lane_of
 from focgen.targets.emulator import Executed, Machine, TargetFault
 from focgen.targets.legality import forbidden
 from focgen.targets.program import WORK_SIZE, Program, build
@@ -119,7 +119,7 @@ class TargetLibrary:
         lanes, states = [], []
         for lane in range(scenario.lanes):
             job = self._placed(self._index(plan), plan, scenario, lane)
-            limit = PATIENCE + job.count * (200 + taps(plan)) * 2e-5
+            limit = PATIENCE + job.count * (200 + plan.taps) * 2e-5
             self.machine.call("focgen_run", self.core.work + 4, seconds=limit)
             lanes.append(results(plan, job, self.machine.read))
             states.append(self._state(plan))

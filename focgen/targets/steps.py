@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Reset, Scenario
-from focgen.targets.cores import core
 from focgen.targets.run import TargetLibrary
 from focgen.targets.timing import timing
-from focgen.targets.toolchains import EXACT, Toolchain, toolchains
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,20 +63,3 @@ def _outside(program, plan: Plan) -> list[tuple[int, int]]:
     names = (f"{plan.name}_run", f"{plan.name}_flags", f"{plan.name}_init", "focgen_run", "focgen_halt")
     found = [program[name] for name in names if name in program]
     return [(s.address, s.address + max(s.size, 2)) for s in found]
-
-
-def per_tap(plans: Sequence[Plan], folders: Sequence[Path], core_name: str, chain: Toolchain | None = None,
-            steps: int = 64, flags: Sequence[str] = EXACT) -> tuple[float, float | None]:  # fmt: skip
-    """Instructions and estimated cycles that one more past sample costs a step: the slope between two plans
-    of the same controller with different lengths; the mean over ``steps`` steps.
-
-    ``plans`` have different names; ``folders`` hold their C. Zig compiles unless ``chain`` is given.
-    """
-    one = core(core_name)
-    library = TargetLibrary(one, chain or toolchains(one)[0], plans, folders, flags)
-    short, long = (step_costs(library, plan, steps) for plan in plans)
-    taps = plans[1].length - plans[0].length
-    instructions = (long.instructions.mean() - short.instructions.mean()) / taps
-    if short.cycles is None:
-        return instructions, None
-    return instructions, (long.cycles.mean() - short.cycles.mean()) / taps

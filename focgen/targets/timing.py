@@ -29,7 +29,6 @@ _REFILL = 2
 _DATA_DEPENDENT = {  # cycles on the Cortex-M3; on the M4 all but division take one
     "smull": (3, 5), "umull": (3, 5), "smlal": (4, 7), "umlal": (4, 7), "sdiv": (2, 12), "udiv": (2, 12),
 }  # fmt: skip
-_JUMPS = ("b", "bl", "bx", "blx", "cbz", "cbnz", "tbb", "tbh")
 _FLOAT = {"vdiv": 14, "vsqrt": 14, "vmla": 3, "vmls": 3, "vnmla": 3, "vnmls": 3, "vfma": 3, "vfms": 3,
           "vfnma": 3, "vfnms": 3}  # fmt: skip
 _ARITHMETIC = ("vadd", "vsub", "vmul", "vnmul", "vcvt", *_FLOAT)

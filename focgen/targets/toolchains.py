@@ -13,6 +13,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from focgen.compiler import first_complaint
 from focgen.errors import BuildError, MissingExtra
 from focgen.targets.cores import Core
 
@@ -117,13 +118,8 @@ def _run(chain: Toolchain, core: Core, source: Path, parts: list[str]) -> None:
         raise BuildError(str(source), f"{chain.name} did not end within {_SLOW:g} s",
                          "try again; the first build also makes Zig's runtime") from None  # fmt: skip
     if done.returncode:
-        raise BuildError(str(source), f"{chain.title} for {core.name}: {_complaint(done.stderr)}",
+        raise BuildError(str(source), f"{chain.title} for {core.name}: {first_complaint(done.stderr)}",
                          "generate the folder again")  # fmt: skip
-
-
-def _complaint(text: str) -> str:
-    lines = [line.strip() for line in text.splitlines() if "error" in line.lower()]
-    return (lines or text.splitlines() or ["it says nothing"])[0]
 
 
 def cache_folder() -> Path:

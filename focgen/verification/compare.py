@@ -11,7 +11,7 @@ import numpy as np
 from focgen.plan.execute import execute
 from focgen.plan.model import ErrorBound, Plan
 from focgen.plan.scenario import Scenario, Trace, to_raw
-from focgen.targets.driver import Answers, header_scales, taps
+from focgen.targets.driver import Answers, header_scales
 from focgen.verification.apart import Crashed, TimedOut, apart
 from focgen.verification.errors_seen import ErrorsSeen, MaxError, errors_seen
 from focgen.verification.folder import GeneratedFolder
@@ -129,7 +129,7 @@ def answered(library: Runs, plan: Plan, cases: Cases) -> tuple[list[Answers], di
 
 def host_limit(plan: Plan, cases: Cases) -> float:
     """Seconds that this computer may take: a hundred times what it should, and at least ``PATIENCE``."""
-    return PATIENCE + cases.samples * (200 + taps(plan)) * 1e-7
+    return PATIENCE + cases.samples * (200 + plan.taps) * 1e-7
 
 
 def failed(how: Exception) -> TargetResult:
@@ -155,7 +155,7 @@ def judged(plan: Plan, cases: Cases, seen: Sequence[Answers], scales: dict[str, 
     return TargetResult(total, mismatches, errors.largest, limits, errors.within, first, header)
 
 
-def with_states(plan: Plan, result: TargetResult, cases: Cases, seen: Sequence[Answers],
+def with_states(result: TargetResult, cases: Cases, seen: Sequence[Answers],
                 host: Sequence[Answers]) -> TargetResult:  # fmt: skip
     """Add the runs after which the state's bytes are not those on the host; where a target's own kernels keep
     another state, its size differs, and only answers can be compared.

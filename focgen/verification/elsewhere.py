@@ -8,7 +8,7 @@ from focgen.errors import MissingExtra
 from focgen.plan.model import Plan
 from focgen.targets import avr, qemu
 from focgen.targets.cores import Core, core
-from focgen.targets.driver import Answers, header_scales, taps
+from focgen.targets.driver import Answers, header_scales
 from focgen.targets.emulator import TargetFault, emulator_title
 from focgen.targets.run import TargetLibrary
 from focgen.targets.toolchains import absent, toolchains
@@ -62,7 +62,7 @@ def on_avr(read: GeneratedFolder, samples: int | None, seed: int) -> TargetResul
     why = avr.missing(plan)
     if why:
         return TargetResult(skipped=why)
-    count = max(100, min(_MOST, _SOFT_BUDGET // (50 + taps(plan)))) if samples is None else samples
+    count = max(100, min(_MOST, _SOFT_BUDGET // (50 + plan.taps))) if samples is None else samples
     cases = cases_of(plan, count, seed, None if count >= _THOROUGH else max(count, _least(plan)))
     library = avr.AvrLibrary(plan, read.path)
     try:
@@ -76,7 +76,7 @@ def default_samples(plan: Plan, one: Core) -> int:
     """As many as take seconds."""
     has = {"f64": one.double, "f32": one.single, "q31": one.wide, "q15": True}
     soft = not has[plan.arithmetic]
-    return max(100, min(_MOST, (_SOFT_BUDGET if soft else _BUDGET) // (50 + taps(plan))))
+    return max(100, min(_MOST, (_SOFT_BUDGET if soft else _BUDGET) // (50 + plan.taps)))
 
 
 def _least(plan: Plan) -> int:
@@ -101,7 +101,7 @@ def _observed(plan: Plan, library: TargetLibrary, cases: Cases, host: list[Answe
     except TargetFault as how:
         return failed(how)
     result = replace(judged(plan, cases, seen, scales, read), selftest=said)
-    return with_states(plan, result, cases, seen, host) if host else result
+    return with_states(result, cases, seen, host) if host else result
 
 
 def _in_qemu(plan: Plan, library: TargetLibrary, cases: Cases, read: GeneratedFolder) -> TargetResult:
