@@ -1,6 +1,6 @@
 """Fits of the fractional model: exact without noise, honest intervals with it, the paper's order of models."""
 
-from functools import cache, lru_cache
+from functools import cache
 
 import numpy as np
 import pytest

@@ -33,6 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rig", metavar="RIG", help="closes the loop (default: what the controller was designed from)"
     )
+    _add_variants(parser)
+    parser.add_argument("--target", metavar="CORE", help="count cycles and flash for this core")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes at a time (default: the cores)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="do the work on this Dask cluster")
+
+
+def _add_variants(parser: argparse.ArgumentParser) -> None:
+    """What is varied, and the set points that every variant is tried at."""
     parser.add_argument("--memory", nargs="+", choices=MEMORIES, help="forms (default: both)")
     parser.add_argument(
         "--lengths",
@@ -69,9 +77,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="Y",
         help="outputs the loop steps to (default: tenths 1 … 7 of the range)",
     )
-    parser.add_argument("--target", metavar="CORE", help="count cycles and flash for this core")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes at a time (default: the cores)")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="do the work on this Dask cluster")
 
 
 def run(args: argparse.Namespace) -> Outcome:

@@ -51,10 +51,7 @@ def identify(
 
     Raises LogError, RigError or FitError; nothing is written then.
     """
-    if not 0 <= gain_degree <= _STEEPEST:
-        raise FitError(
-            "--gain-degree", f"is {gain_degree}", f"give 0 to {_STEEPEST}; 1 is the line of eq. (5)"
-        )
+    _check_degree(gain_degree)
     nominal = rig if isinstance(rig, Rig) else read_rig(rig)
     experiments = _read(logs, nominal, first, last)
     others = _read(unseen, nominal, None, None) if unseen else ()
@@ -71,13 +68,17 @@ def identify(
         nominal, actuator=Actuator(pooled.T, pooled.alpha, pooled.gain), ranges=ranges, effects=()
     )
     pooled = replace(pooled, simulated={x.name: _through_rig(x, found.actuator) for x in excitations})
-    shown = _shown(others, found)
-    result = _compared(
-        excitations, fits, pooled, found, notes + _notes(excitations, fits, nominal) + told, shown
-    )
+    told = notes + _notes(excitations, fits, nominal) + told
+    result = _compared(excitations, fits, pooled, found, told, _shown(others, found))
     if out is not None:
         write_file(out, rig_text(found))
     return result
+
+
+def _check_degree(degree: int) -> None:
+    if not 0 <= degree <= _STEEPEST:
+        remedy = f"give 0 to {_STEEPEST}; 1 is the line of eq. (5)"
+        raise FitError("--gain-degree", f"is {degree}", remedy)
 
 
 def _read(logs, rig: Rig, first, last) -> tuple[Experiment, ...]:

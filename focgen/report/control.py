@@ -11,7 +11,7 @@ from focgen.loop.design import Design
 from focgen.loop.response import shapes
 from focgen.loop.simulate import Simulation
 from focgen.plan.build import build_plan
-from focgen.report.style import COLOURS, CYCLE, GREY, figure, png
+from focgen.report.style import COLOURS, CYCLE, GREY, figure, png, with_unit
 from focgen.rig.model import Rig
 
 
@@ -21,8 +21,8 @@ def simulation_pictures(simulation: Simulation) -> dict[str, bytes]:
         draw = _draw_consecutive if simulation.consecutive else _draw_from_rest
         draw(top, bottom, simulation)
         units = simulation.controller.units
-        top.set_ylabel(_label("output", units.measurement))
-        bottom.set_ylabel(_label("command", units.output))
+        top.set_ylabel(with_unit("output", units.measurement))
+        bottom.set_ylabel(with_unit("command", units.output))
         bottom.set_xlabel("time (s)")
         effects = f"\nwith {', '.join(simulation.effects)}" if simulation.effects else ""
         what = f"({simulation.arithmetic}, {simulation.remembers})"
@@ -54,7 +54,7 @@ def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
     top.plot([], [], "o", color=GREY, mec="white", mew=0.8, label="settled")
     top.legend(ncols=3, loc="lower right")
     top.set_xlim(0.0, _interesting(simulation))
-    bottom.legend(title=_label("set point", simulation.controller.units.measurement), ncols=4, loc="best")
+    bottom.legend(title=with_unit("set point", simulation.controller.units.measurement), ncols=4, loc="best")
 
 
 def _other_loop(axes, simulation: Simulation, index: int, colour) -> None:
@@ -110,50 +110,53 @@ def design_pictures(design: Design, rig: Rig) -> dict[str, bytes]:
 
 
 def _schedule_picture(design: Design, rig: Rig) -> bytes:
-    schedule, unit = design.schedule, design.controller.units.schedule
+    with figure(2, 1, size=(7.0, 5.6), sharex=True) as (fig, (top, bottom)):
+        _draw_gain(top, design, rig)
+        _draw_K_o(bottom, design)
+        top.set_title("The gain schedule is the controller")
+        bottom.set_xlabel(with_unit("pressure", design.controller.units.schedule))
+        return png(fig)
+
+
+def _draw_gain(axes, design: Design, rig: Rig) -> None:
+    """The table that runs, held beyond its ends, and the formula it stands for."""
+    schedule = design.schedule
     first, last = schedule.breakpoints[0], schedule.breakpoints[-1]
     p = np.linspace(first, last, 400)
-    formula = (schedule.intercept + schedule.slope * p) / rig.actuator.K(p)
     beyond = np.linspace(first - 0.3 * (last - first), last + 0.1 * (last - first), 400)
-    with figure(2, 1, size=(7.0, 5.6), sharex=True) as (fig, (top, bottom)):
-        top.plot(
-            beyond,
-            design.controller.gain_at(beyond),
-            color=COLOURS["running"],
-            lw=2.2,
-            label="schedule table",
-        )
-        top.plot(p, formula, color=COLOURS["ideal"], lw=0.7, zorder=3, label="K_o(p)/K(p)")
-        top.plot(schedule.breakpoints, schedule.gains, "o", color=COLOURS["running"])
-        top.axvline(schedule.lower_limit, color=GREY, lw=0.8, ls=":")
-        top.annotate(
-            "held below",
-            (schedule.lower_limit, 0.05),
-            xycoords=("data", "axes fraction"),
-            ha="right",
-            xytext=(-4, 0),
-            textcoords="offset points",
-            fontsize=8,
-            color=GREY,
-        )
-        top.set_ylabel("gain")
-        top.set_title("The gain schedule is the controller")
-        top.legend()
-        bottom.plot(p, schedule.intercept + schedule.slope * p, color=COLOURS["controller"], label="K_o(p)")
-        places = [point.pressure for point in design.points]
-        bottom.plot(
-            places,
-            [point.K_o for point in design.points],
-            "o",
-            color=COLOURS["controller"],
-            label="operating points",
-        )
-        ends = [0.0, *(1.15 * (schedule.intercept + schedule.slope * end) for end in (first, last))]
-        bottom.set_ylim(min(ends), max(ends))
-        bottom.set_ylabel("K_o")
-        bottom.set_xlabel(_label("pressure", unit))
-        bottom.legend(loc="lower right")
-        return png(fig)
+    table, formula = design.controller.gain_at(beyond), _K_o(design, p) / rig.actuator.K(p)
+    axes.plot(beyond, table, color=COLOURS["running"], lw=2.2, label="schedule table")
+    axes.plot(p, formula, color=COLOURS["ideal"], lw=0.7, zorder=3, label="$K_o(p)/K(p)$")
+    axes.plot(schedule.breakpoints, schedule.gains, "o", color=COLOURS["running"])
+    axes.axvline(schedule.lower_limit, color=GREY, lw=0.8, ls=":")
+    axes.annotate(
+        "held below",
+        (schedule.lower_limit, 0.05),
+        xycoords=("data", "axes fraction"),
+        ha="right",
+        xytext=(-4, 0),
+        textcoords="offset points",
+        fontsize=8,
+        color=GREY,
+    )
+    axes.set_ylabel("gain")
+    axes.legend()
+
+
+def _draw_K_o(axes, design: Design) -> None:
+    """The line K_o(p), and the operating points it goes through."""
+    ends = np.array([design.schedule.breakpoints[0], design.schedule.breakpoints[-1]])
+    places, values = [p.pressure for p in design.points], [p.K_o for p in design.points]
+    axes.plot(ends, _K_o(design, ends), color=COLOURS["controller"], label="$K_o(p)$")
+    axes.plot(places, values, "o", color=COLOURS["controller"], label="operating points")
+    reach = [0.0, *(1.15 * _K_o(design, ends))]
+    axes.set_ylim(min(reach), max(reach))
+    axes.set_ylabel("$K_o$")
+    axes.legend(loc="lower right")
+
+
+def _K_o(design: Design, pressure: np.ndarray) -> np.ndarray:
+    return design.schedule.intercept + design.schedule.slope * pressure
 
 
 def _margins_picture(design: Design, rig: Rig) -> bytes:
@@ -185,7 +188,3 @@ def _margins_picture(design: Design, rig: Rig) -> bytes:
         top.set_title(f"Open loop at p = {worst.pressure:.4g} {design.controller.units.schedule}".rstrip())
         top.legend()
         return png(fig)
-
-
-def _label(name: str, unit: str) -> str:
-    return f"{name} ({unit})" if unit else name

@@ -137,7 +137,7 @@ def points_table(design: Design) -> TableOf:
         "settling (s)",
         "overshoot (%)",
         "ideal (s)",
-        "peak p",
+        f"peak p{_in(units.schedule)}",
         *(("with effects (s)", "(%)") if design.points[0].effects else ()),
     )
     rows = tuple(
@@ -158,8 +158,7 @@ def points_table(design: Design) -> TableOf:
     return TableOf(
         heads,
         rows,
-        f"Steps from rest, in {design.controller.arithmetic}, computation delay "
-        f"{design.delay} sample{'' if design.delay == 1 else 's'}",
+        f"Steps from rest, in {design.controller.arithmetic}, {_delayed(design.delay)}",
     )
 
 
@@ -176,7 +175,15 @@ def margins_table(design: Design) -> TableOf:
     for loop, text in meaning.items():
         worst = min(design.margins, key=lambda point: getattr(point, loop).phase_deg)
         rows.append((text, *_margin_cells(getattr(worst, loop)), f"{worst.pressure:.4g}"))
-    heads = ("loop", "gain (dB)", "phase (°)", "delay (s)", "crossover (rad/s)", "stable", "at p")
+    heads = (
+        "loop",
+        "gain (dB)",
+        "phase (°)",
+        "delay (s)",
+        "crossover (rad/s)",
+        "stable",
+        f"at p{_in(design.controller.units.schedule)}",
+    )
     return TableOf(heads, tuple(rows), "Margins, at the operating point with the smallest phase margin")
 
 
@@ -244,7 +251,7 @@ def setpoints_table(simulation: Simulation) -> TableOf:
         "ideal (s)",
         *(("without effects (s)", "(%)") if simulation.effects else ()),
         "frozen (s)",
-        "peak p",
+        f"peak p{_in(simulation.controller.units.schedule)}",
     )
     rows = tuple(_setpoint_cells(result) for result in simulation.setpoints)
     order = "one after the other" if simulation.consecutive else "from rest"
@@ -252,7 +259,7 @@ def setpoints_table(simulation: Simulation) -> TableOf:
         heads,
         rows,
         f"Steps {order}, in {simulation.arithmetic} with {simulation.remembers}, "
-        f"computation delay {simulation.delay}"
+        f"{_delayed(simulation.delay)}"
         + (f"; effects: {', '.join(simulation.effects)}" if simulation.effects else ""),
     )
 
@@ -271,6 +278,10 @@ def _setpoint_cells(r: SetpointResult) -> tuple[str, ...]:
         frozen,
         f"{r.peak_pressure:.3g}",
     )
+
+
+def _delayed(samples: int) -> str:
+    return f"computation delay {samples} sample{'' if samples == 1 else 's'}"
 
 
 def _in(unit: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from focgen.codegen.generate import Generated
 from focgen.diagnosis.model import Diagnosis
 from focgen.identification.model import Identification
@@ -55,6 +57,10 @@ def demo_lead(identification: Identification, design: Design, verified: dict[str
     )
 
 
+def _notes(notes: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"Note: {note}." for note in notes)
+
+
 def _model(found: Identification) -> Section:
     pictures = [
         Picture("pictures/fits.png", "Six steps, and the fractional model of each (as Fig. 5)"),
@@ -67,7 +73,7 @@ def _model(found: Identification) -> Section:
     ]
     return Section(
         "Model",
-        (gain_text(found), *found.warnings),
+        (gain_text(found), *_notes(found.warnings)),
         (quality_table(found), parameter_table(found)),
         tuple(pictures),
         ("identified.toml", "rig.toml", "logs/steps.csv", "logs/sines.csv"),
@@ -81,7 +87,7 @@ def _controller(design: Design) -> Section:
     )
     return Section(
         "Controller",
-        design.notes,
+        _notes(design.notes),
         (points_table(design), margins_table(design)),
         pictures,
         ("controller.toml",),
@@ -92,7 +98,7 @@ def _loop(simulation: Simulation) -> Section:
     caption = "Output and command at seven set points, from rest, bit for bit as the C will run (as Fig. 10)"
     return Section(
         "Closed loop",
-        simulation.notes,
+        _notes(simulation.notes),
         (setpoints_table(simulation),),
         (Picture("pictures/setpoints.png", caption),),
     )
@@ -153,7 +159,8 @@ def _diagnosis(found: Diagnosis, sealed: tuple[str, ...]) -> Section:
 def diagnosis_sentence(found: Diagnosis, sealed: tuple[str, ...]) -> str:
     """What the diagnosis says of the sealed rig, and what the seal says."""
     causes = [
-        " or ".join(f"{c.effect} ({c.confidence:.0%})" for c in cause.candidates) for cause in found.causes
+        " or ".join(f"{c.effect} ({100.0 * c.confidence:.0f} %)" for c in cause.candidates)
+        for cause in found.causes
     ]
     gof = found.gap.gof
     return (
@@ -180,4 +187,6 @@ def firmware_table(generated: dict[str, Generated], verified: dict[str, Verifica
             )
         )
     heads = ("arithmetic", "state", "tables", "samples equal", "largest error", "proven bound", "verified")
-    return TableOf(heads, tuple(rows), "The C, ahead of the integrator, in output units per second")
+    units = {made.plan.controller.units.output for made in generated.values()} - {""}
+    per_second = f"{units.pop()}/s" if len(units) == 1 else "output units per second"
+    return TableOf(heads, tuple(rows), f"The C, ahead of the integrator, in {per_second}")

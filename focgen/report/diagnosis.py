@@ -92,8 +92,8 @@ def residual(e: Explanation) -> bytes:
         by_time.legend(fontsize=7)
         for axis, label in (
             (by_level, e.segment.entry),
-            (by_rate, f"rate of {e.segment.entry}, 1/s"),
-            (by_time, "session's time, s"),
+            (by_rate, f"rate of {e.segment.entry} (1/s)"),
+            (by_time, "session's time (s)"),
         ):
             axis.set_xlabel(label)
         by_rate.locator_params(axis="x", nbins=5)
@@ -157,7 +157,7 @@ def loops(evidence: Evidence, logs: Sequence[Experiment]) -> bytes:
     with figure(len(chosen), 2, squeeze=False, sharex="row", sharey="row") as (fig, axes):
         for row, i in zip(axes, chosen):
             x = logs[i][_entry(logs)]
-            place, label = (x, _entry(logs)) if _places(x) >= _SWEEPING else (logs[i].time, "time, s")
+            place, label = (x, _entry(logs)) if _places(x) >= _SWEEPING else (logs[i].time, "time (s)")
             for axis, name in zip(row, ("refitted", "explained")):
                 where, y, made = _thin(place, logs[i]["output"], evidence.simulated[name][i]["output"])
                 axis.plot(where, y, color=COLOURS["measured"], lw=0.7, label="measured")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from focgen.identification.model import ExperimentFit, Identification
+from focgen.control.units import unit_of
+from focgen.identification.model import ExperimentFit, Identification, Pooled
 from focgen.report.identification_summary import model_label
-from focgen.report.style import COLOURS, CYCLE, GREY, figure, png
+from focgen.report.style import COLOURS, CYCLE, GREY, figure, png, with_unit
 
 _COMPARED = ("iom_1p", "iom_2p1z", "iom_3p2z")
+_LISTED = 16  # experiments in one column of a legend
 _LAST = 0.5  # of a swinging log: the part drawn as loops, when the start has died away
 
 
@@ -54,10 +58,38 @@ def _fits(found: Identification) -> bytes:
             axes.plot(fit.time, fit.measured, color=CYCLE[i % len(CYCLE)], lw=0.8, label=fit.name)
             axes.plot(fit.time, fit.simulated, color=COLOURS["ideal"], lw=1.0)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel(found.experiments[0].fitted)
+        axes.set_ylabel(_named(found, found.experiments[0].fitted))
         axes.set_title("Measured (colour) and fractional model (black)")
-        axes.legend(title="experiment", ncols=2)
+        _legend_beside(axes, [fit.measured[-1] for fit in found.experiments])
         return png(fig)
+
+
+def _legend_beside(axes, ends) -> None:
+    """The experiments to the right of the curves, in the order in which these end."""
+    handles, labels = axes.get_legend_handles_labels()
+    order = np.argsort(ends)[::-1]
+    axes.legend(
+        [handles[i] for i in order],
+        [labels[i] for i in order],
+        title="experiment",
+        ncols=1 + len(order) // _LISTED,
+        loc="upper left",
+        bbox_to_anchor=(1.0, 1.0),
+    )
+
+
+def _named(found: Identification, role: str, ahead: str = "") -> str:
+    """A signal's name, with ``ahead`` before it, and the unit that its column tells."""
+    return with_unit(ahead + role, unit_of(getattr(found.rig.signals, role)))
+
+
+def _gain_unit(found: Identification) -> str:
+    """The unit of K, as far as the columns tell it."""
+    fit, signals = found.experiments[0], found.rig.signals
+    above, below = unit_of(getattr(signals, fit.fitted)), unit_of(getattr(signals, fit.driven_by))
+    if not above or not below:
+        return ""
+    return f"1/({above[2:]} {below})" if above.startswith("1/") else f"{above}/{below}"
 
 
 def _models(found: Identification) -> bytes:
@@ -68,7 +100,7 @@ def _models(found: Identification) -> bytes:
         for label, simulated, colour in _candidates(fit):
             top.plot(fit.time, simulated, color=colour, label=label)
             bottom.plot(fit.time, fit.measured - simulated, color=colour, lw=0.8)
-        top.set_ylabel(fit.fitted)
+        top.set_ylabel(_named(found, fit.fitted))
         top.set_title(f"Experiment {fit.name}: models of different kind")
         bottom.set_ylabel("residual")
         bottom.set_xlabel("time (s)")
@@ -85,44 +117,38 @@ def _candidates(fit: ExperimentFit):
 def _parameters(found: Identification) -> bytes:
     """Fig. 7 with intervals."""
     steps = [fit for fit in found.experiments if fit.step]
-    levels = np.array([fit.level for fit in steps])
-    pooled = found.pooled
+    labels = (with_unit("K", _gain_unit(found)), r"T ($\mathrm{s}^\alpha$)", "α")
     with figure(3, 1, size=(7.0, 6.6), sharex=True) as (fig, axes):
         for ax, key in zip(axes, ("K", "T", "alpha")):
-            values = np.array([getattr(fit, key) for fit in steps])
-            half = np.array([(fit.ci95[key][1] - fit.ci95[key][0]) / 2.0 for fit in steps])
-            ax.errorbar(
-                levels,
-                values,
-                half,
-                fmt="o",
-                color=COLOURS["model"],
-                capsize=3,
-                label="each experiment, 95 %",
-            )
-        reach = np.linspace(levels.min(), levels.max(), 50)
-        axes[0].plot(
-            reach,
-            np.polynomial.polynomial.polyval(reach, pooled.gain),
-            color=COLOURS["ideal"],
-            label=f"K(p), R² = {pooled.gain_r2:.4f}",
-        )
-        for ax, key in zip(axes[1:], ("T", "alpha")):
-            ax.axhspan(*pooled.ci95[key], color=COLOURS["band"])
-            ax.axhline(
-                getattr(pooled, key),
-                color=COLOURS["ideal"],
-                label=f"pooled {getattr(pooled, key):.4g}, 95 %",
-                zorder=1,
-            )
-        for ax, label in zip(axes, ("K", r"T ($\mathrm{s}^\alpha$)", "α")):
+            _draw_each(ax, steps, key)
+        _draw_pooled(axes, found.pooled, [fit.level for fit in steps])
+        for ax, label in zip(axes, labels):
             low, high = ax.get_ylim()
             ax.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
             ax.set_ylabel(label)
             ax.legend(loc="upper left", ncols=2)
-        axes[-1].set_xlabel("level of the step")
+        axes[-1].set_xlabel(_named(found, steps[0].driven_by, "level of the "))
         axes[0].set_title("Parameters of the fractional model over the level")
         return png(fig)
+
+
+def _draw_each(axes, steps: Sequence[ExperimentFit], key: str) -> None:
+    """A parameter of each experiment with its interval."""
+    values = np.array([getattr(fit, key) for fit in steps])
+    half = np.array([(fit.ci95[key][1] - fit.ci95[key][0]) / 2.0 for fit in steps])
+    levels, label = [fit.level for fit in steps], "each experiment, 95 % interval"
+    axes.errorbar(levels, values, half, fmt="o", color=COLOURS["model"], capsize=3, label=label)
+
+
+def _draw_pooled(axes, pooled: Pooled, levels: Sequence[float]) -> None:
+    """K(p), and T and α of all experiments together."""
+    reach = np.linspace(min(levels), max(levels), 50)
+    line = np.polynomial.polynomial.polyval(reach, pooled.gain)
+    axes[0].plot(reach, line, color=COLOURS["ideal"], label=f"K(p), R² = {pooled.gain_r2:.4f}")
+    for ax, key in zip(axes[1:], ("T", "alpha")):
+        value = getattr(pooled, key)
+        ax.axhspan(*pooled.ci95[key], color=COLOURS["band"])
+        ax.axhline(value, color=COLOURS["ideal"], label=f"pooled: {value:.4g}, 95 % interval", zorder=1)
 
 
 def _loops(found: Identification) -> bytes:
@@ -144,7 +170,7 @@ def _loops(found: Identification) -> bytes:
             ax.plot(pressure[late], simulated[late], color=COLOURS["model"], lw=0.9, label="identified rig")
             ax.set_title(name)
         for ax in axes[-1]:
-            ax.set_xlabel("pressure")
-        axes[0, 0].set_ylabel(found.experiments[0].fitted)
+            ax.set_xlabel(_named(found, "pressure"))
+        axes[0, 0].set_ylabel(_named(found, found.experiments[0].fitted))
         axes[0, 0].legend(loc="upper left")
         return png(fig)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from focgen.identification.model import ExperimentFit, Identification
 from focgen.report.page import TableOf, text_table
+
+_DECIMALS = 7  # more are written with an exponent
 
 
 def identification_payload(found: Identification) -> dict:
@@ -74,7 +78,12 @@ def parameter_table(found: Identification) -> TableOf:
 
 
 def _pm(value: float, span: tuple[float, float]) -> str:
-    return f"{value:.4g} ± {(span[1] - span[0]) / 2.0:.2g}"
+    """A value to the digits that its interval leaves it, and half the interval to two digits."""
+    half = (span[1] - span[0]) / 2.0
+    digits = 1 - math.floor(math.log10(half)) if 0.0 < half < math.inf else -1
+    if not 0 <= digits <= _DECIMALS:
+        return f"{value:.4g} ± {half:.2g}"
+    return f"{value:.{digits}f} ± {half:.{digits}f}"
 
 
 def gain_text(found: Identification) -> str:

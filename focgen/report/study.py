@@ -6,12 +6,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.report.style import BLUE, COLOURS, CYCLE, GREEN, GREY, ORANGE, RED, figure, png
+from focgen.report.style import (
+    BLUE,
+    COLOURS,
+    CYCLE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    figure,
+    png,
+    sparse_ticks,
+    with_unit,
+)
 from focgen.studies.model import Curves, Row, Study
 
 _COLOURS = {"f64": BLUE, "f32": GREEN, "q31": ORANGE, "q15": RED}
 _MOST_LINES = 5
 _LEAST = 1e-5  # % of the step: where the distance from the ideal is cut off
+_PLACES = {"short": "length", "exponential": "states"}  # what a form's size is
 _SHARES = {
     "multiplies": "multiplications a step",
     "cycles": "cycles a step",
@@ -43,24 +56,33 @@ def _own(study: Study) -> list[Row]:
 def accuracy(study: Study) -> bytes:
     """Error and bound against length, and against the number of exponentials, on one scale."""
     rows = _own(study)
-    with figure(1, 2, size=(7.6, 3.9), sharey=True, width_ratios=(1.25, 1.0)) as (fig, (left, right)):
-        for memory, axis, place in (("short", left, "length"), ("exponential", right, "states")):
-            for arithmetic, colour in _COLOURS.items():
-                mine = [r for r in rows if r.memory == memory and r.arithmetic == arithmetic]
-                _against(axis, mine, place, colour, arithmetic)
-            axis.set_yscale("log")
-        left.set_xscale("log")
-        left.set_title("Short memory")
-        left.set_xlabel("length L (past samples)")
-        left.set_ylabel("error / largest output")
-        right.set_title("Exponential memory")
-        right.set_xlabel("exponentials")
-        right.xaxis.get_major_locator().set_params(integer=True)
-        right.plot([], [], color=GREY, label="worst error of four inputs")
-        right.plot([], [], color=GREY, ls=":", label="proven bound")
-        right.legend(loc="best")
-        left.legend(loc="lower left")
+    memories = [m for m in _PLACES if any(r.memory == m for r in rows)] or ["short"]
+    size = (7.6, 3.9) if len(memories) > 1 else (6.0, 3.9)
+    with figure(1, len(memories), size=size, sharey=True, squeeze=False) as (fig, axes):
+        for axis, memory in zip(axes[0], memories):
+            _by_size(axis, [r for r in rows if r.memory == memory], memory)
+        first, last = axes[0, 0], axes[0, -1]
+        first.set_ylabel("error / largest output")
+        last.plot([], [], color=GREY, label="worst error of four inputs")
+        last.plot([], [], color=GREY, ls=":", label="proven bound")
+        last.legend(loc="best")
+        sparse_ticks(first.yaxis)
         return png(fig)
+
+
+def _by_size(axis, rows: Sequence[Row], memory: str) -> None:
+    """Error and bound of one form of memory, a colour for each arithmetic."""
+    for arithmetic, colour in _COLOURS.items():
+        _against(axis, [r for r in rows if r.arithmetic == arithmetic], _PLACES[memory], colour, arithmetic)
+    axis.set_yscale("log")
+    axis.set_title(f"{memory.capitalize()} memory")
+    if memory == "short":
+        axis.set_xscale("log")
+        axis.set_xlabel("length L (past samples)")
+        sparse_ticks(axis.xaxis)
+    else:
+        axis.set_xlabel("exponentials")
+        axis.xaxis.get_major_locator().set_params(integer=True)
 
 
 def _against(axis, rows: Sequence[Row], place: str, colour: str, label: str) -> None:
@@ -87,8 +109,10 @@ def fronts(study: Study) -> bytes:
             axes[1].plot([], [], marker, color=GREY, ms=4, label=name)
         for arithmetic in dict.fromkeys(row.arithmetic for row in _own(study)):
             axes[1].plot([], [], "s", color=_COLOURS[arithmetic], ms=4, label=arithmetic)
-        axes[1].plot([], [], color=GREY, lw=0.9, label="nothing is better")
+        axes[1].plot([], [], color=GREY, lw=0.9, label="best at its cost")
         axes[1].legend(loc="best")
+        for axis in (axes[0].xaxis, axes[1].xaxis, axes[0].yaxis):
+            sparse_ticks(axis)
         return png(fig)
 
 
@@ -165,6 +189,7 @@ def frequency(study: Study) -> bytes:
                 fontsize=8,
                 color=GREY,
             )
+        sparse_ticks(bottom.xaxis)
         top.set_ylabel("phase error (°)")
         bottom.set_ylabel("magnitude error (dB)")
         bottom.set_xlabel("frequency (rad/s)")
@@ -186,7 +211,7 @@ def loops(study: Study) -> bytes:
             bottom.semilogy(curves.time, np.maximum(off, _LEAST), color=colour, **_style(row))
         top.plot(time, perfect, color=COLOURS["ideal"], lw=0.9, label="infinite memory")
         top.axhline(ideal.reference, color=GREY, lw=0.8, ls="--")
-        top.set_ylabel(f"output ({unit})" if unit else "output")
+        top.set_ylabel(with_unit("output", unit))
         bottom.set_ylim(_LEAST, None)
         bottom.set_ylabel("off the ideal (% of step)")
         bottom.set_xlabel("time (s)")

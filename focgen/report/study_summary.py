@@ -14,14 +14,14 @@ _HEADS = (
     "error",
     "bound",
     "bias",
-    "phase °",
-    "settling s",
-    "overshoot %",
-    "margin °",
+    "phase (°)",
+    "settling (s)",
+    "overshoot (%)",
+    "margin (°)",
     "multiplies",
-    "state B",
-    "flash B",
-    "stack B",
+    "state (B)",
+    "flash (B)",
+    "stack (B)",
     "instructions",
     "cycles",
 )
@@ -106,7 +106,14 @@ def _percent(value: float) -> str:
 
 def ideal_table(study: Study) -> TableOf:
     """Infinite memory in float64, and what sampling alone costs."""
-    heads = ("sample time s", "settling s", "overshoot %", "IAE s", "margin °", "phase lag of sampling °")
+    heads = (
+        "sample time (s)",
+        "settling (s)",
+        "overshoot (%)",
+        "IAE (s)",
+        "margin (°)",
+        "phase lag of sampling (°)",
+    )
     lines = tuple(_ideal_line(ideal) for ideal in study.ideal)
     return _without_empty(TableOf(heads, lines, "infinite memory, float64"))
 

@@ -103,6 +103,26 @@ def figure(
         yield fig, fig.subplots(rows, columns, **subplots)
 
 
+def with_unit(name: str, unit: str) -> str:
+    """A label: the quantity, and its unit in brackets where it is known."""
+    return f"{name} ({unit})" if unit else name
+
+
+def sparse_ticks(axis) -> None:
+    """Label a logarithmic ``axis`` (``axes.xaxis`` or ``axes.yaxis``, with everything drawn) so that labels
+    stay apart: decades; within two of them 1, 2 and 5; within one a few round numbers.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+    axis.set_minor_formatter(NullFormatter())
+    low, high = axis.get_view_interval()
+    if not 0.0 < low < high < 100.0 * low:
+        return
+    close = high < 6.0 * low
+    axis.set_major_locator(MaxNLocator(4) if close else LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
 def png(fig: Figure) -> bytes:
     """The figure as a PNG without date or version inside: the same figure gives the same bytes."""
     stream = BytesIO()

@@ -68,13 +68,7 @@ def study_memory(
     interrupted study goes on. Raises InputError for options that cannot be used, ControllerError and RigError
     for the files, DesignError where a set point cannot be reached, MissingExtra where Dask is not installed.
     """
-    which = controller if isinstance(controller, Controller) else read_controller(controller)
-    if not fractional_terms(which):
-        raise ControllerError(
-            _name(controller),
-            "has no fractional power of s, so no memory",
-            "study a controller of fractional order",
-        )
+    which = _fractional(controller)
     if target is not None:
         check_choice("--target", target, TARGETS)
     grid = grid_of(which, memories, lengths, tolerances, horizon, arithmetics, sample_times)
@@ -89,8 +83,14 @@ def study_memory(
     return found
 
 
-def _name(controller: Controller | str | Path) -> str:
-    return controller.name if isinstance(controller, Controller) else str(controller)
+def _fractional(given: Controller | str | Path) -> Controller:
+    """The controller. Raises ControllerError where it has no memory to study."""
+    controller = given if isinstance(given, Controller) else read_controller(given)
+    if not fractional_terms(controller):
+        where = controller.name if controller is given else str(given)
+        what = "has no fractional power of s, so no memory"
+        raise ControllerError(where, what, "study a controller of fractional order")
+    return controller
 
 
 def _rig(given, controller: Controller, source) -> tuple[Rig | None, list[str]]:
