@@ -40,7 +40,9 @@ def compile_shared(
     flags: Sequence[str] = (),
     include: Sequence[str | Path] = (),
 ) -> None:
-    """Compile C files into the shared library ``target``. Raises BuildError with the compiler's first complaint."""
+    """Compile C files into the shared library ``target``. Raises BuildError with the compiler's first
+    complaint.
+    """
     folders = [part for folder in include for part in ("-I", str(folder))]
     command = [
         *find_compiler(),

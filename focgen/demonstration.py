@@ -1,4 +1,6 @@
-"""``demo``: the whole chain on the example logs, from CSV to verified C, and a sealed case diagnosed; with a report."""
+"""``demo``: the whole chain on the example logs, from CSV to verified C, and a sealed case diagnosed; with a
+report.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +37,8 @@ _SEED = 5  # of the sealed case
 class Demo:
     """Everything the demo found, and the ``folder`` and ``report`` where it stands.
 
-    ``memory`` is the study of a few lengths. ``diagnosis`` is of a rig whose effects were sealed; ``sealed`` are
-    their names, opened afterwards.
+    ``memory`` is the study of a few lengths. ``diagnosis`` is of a rig whose effects were sealed; ``sealed``
+    are their names, opened afterwards.
     """
 
     folder: Path
@@ -57,7 +59,8 @@ class Demo:
 
 
 def demo(out: str | Path) -> Demo:
-    """Identify, design, simulate, generate in four arithmetics, verify, and diagnose, into the folder ``out``.
+    """Identify, design, simulate, generate in four arithmetics, verify, and diagnose, into the folder
+    ``out``.
 
     Raises InputError where ``out`` cannot be written, MissingExtra where matplotlib is not installed.
     """

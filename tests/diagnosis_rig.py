@@ -1,4 +1,6 @@
-"""A rig for tests, simulated apart from the library: Grünwald–Letnikov sums over the whole past, Euler steps, loops."""
+"""A rig for tests, simulated apart from the library: Grünwald–Letnikov sums over the whole past, Euler steps,
+loops.
+"""
 
 import numpy as np
 
@@ -64,8 +66,10 @@ def session(
     drift=0.0,
     roles=("pressure", "curvature"),
 ):
-    """Experiments of a rig with one of these effects: ``delay`` samples, ``vent`` slower s, dead ``zone``, ``slip`` (a
-    Maxwell element of dry friction, share), a ``bend`` of the sensor, a ``drift`` of the gain a second."""
+    """Experiments of a rig with one of these effects: ``delay`` samples, ``vent`` slower s, dead ``zone``,
+    ``slip`` (a Maxwell element of dry friction, share), a ``bend`` of the sensor, a ``drift`` of the gain a
+    second.
+    """
     rng, logs, start = np.random.default_rng(seed), [], 0.0
     for name, u in commands().items():
         p = _lag(0.1 * np.r_[np.zeros(delay), u][: len(u)], 0.12)

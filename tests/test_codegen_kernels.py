@@ -1,4 +1,6 @@
-"""Sums that look ahead: the layout against its definition, the C of every core's folder against the reference."""
+"""Sums that look ahead: the layout against its definition, the C of every core's folder against the
+reference.
+"""
 
 from __future__ import annotations
 

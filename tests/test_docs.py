@@ -1,4 +1,6 @@
-"""The pages: every link leads somewhere, every command named exists, nothing of one machine stands in them."""
+"""The pages: every link leads somewhere, every command named exists, nothing of one machine stands in
+them.
+"""
 
 import re
 from pathlib import Path

@@ -18,7 +18,9 @@ def rest(*lengths):
 
 
 def ramp_response(transfer, t, h):
-    """The exact response at t to a step that takes the time h to rise, by inversion of its Laplace transform."""
+    """The exact response at t to a step that takes the time h to rise, by inversion of its Laplace
+    transform.
+    """
     f = lambda s: transfer(s) / s**2 * (1 - mpmath.exp(-s * h)) / h  # noqa: E731
     return float(mpmath.invertlaplace(f, t, method="talbot", degree=24))
 

@@ -139,7 +139,9 @@ def test_unseen_sines_fit_worse_than_the_steps(loading):
 
 
 def test_releases_move_the_parameters_off(tmp_path, capsys):
-    """The maker's actuator unloads at 0.4 times its speed: one T cannot be true of both, and the fit says worse."""
+    """The maker's actuator unloads at 0.4 times its speed: one T cannot be true of both, and the fit says
+    worse.
+    """
     argv = ["identify", str(STEPS), "--rig", str(RIG), "--out", str(tmp_path / "new.toml")]
     assert main(argv) == 0
     text = capsys.readouterr().out

@@ -1,4 +1,6 @@
-"""Fits of the fractional model: exact without noise, honest intervals with it, the paper's order of models."""
+"""Fits of the fractional model: exact without noise, honest intervals with it, the paper's order of
+models.
+"""
 
 from functools import cache
 
@@ -22,7 +24,9 @@ K, T, ALPHA, LEVEL = 0.05, 1.32, 0.6, 0.15
 
 @cache
 def exact_step(step: float, count: int, begin: float, T: float = T, alpha: float = ALPHA) -> np.ndarray:
-    """1 − E_α(−t^α/T), t since ``begin``: the model's unit step response, from the Mittag-Leffler function."""
+    """1 − E_α(−t^α/T), t since ``begin``: the model's unit step response, from the Mittag-Leffler
+    function.
+    """
     late = step * np.arange(count) - begin
     after = late > 0.0
     answer = np.zeros(count)
@@ -184,7 +188,9 @@ def log_of_the_step_alone(noise: float, seed: int = 0, offset: float = 0.0) -> E
 
 
 def test_integer_models_have_no_offset_where_no_rest_is_on_record():
-    """The models then differ as in the paper: 0.826, 0.823, 0.802, 0.567 by a fit of others, without any offset."""
+    """The models then differ as in the paper: 0.826, 0.823, 0.802, 0.567 by a fit of others, without any
+    offset.
+    """
     found = module.identify([log_of_the_step_alone(0.02)], paper_rig())
     mean = {model: values["mean"] for model, values in found.gof.items()}
     reached = [mean[model] for model in ("fom", "iom_3p2z", "iom_2p1z", "iom_1p")]

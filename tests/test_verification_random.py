@@ -1,4 +1,6 @@
-"""Random controllers in every arithmetic: the C and the reference, written independently, agree in every bit."""
+"""Random controllers in every arithmetic: the C and the reference, written independently, agree in
+every bit.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +24,9 @@ LENGTHS = (1, 2, 3, 7, 8, 9, 63, 64, 65, 127, 128, 129)  # about the edges of bl
 
 
 def planned(seed: int):
-    """The plans of one random controller, every arithmetic that can carry it; some with a length at a block's edge."""
+    """The plans of one random controller, every arithmetic that can carry it; some with a length at a block's
+    edge.
+    """
     controller = random_controller(seed, 300)
     if seed % 3 == 0:
         controller = replace(controller, length=LENGTHS[seed // 3 % len(LENGTHS)])
@@ -66,7 +70,9 @@ def test_many_random_controllers_agree_in_every_bit(batch, tmp_path):
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_first_order_equals_the_hand_written_recursion(arithmetic, tmp_path):
-    """At α = 1 a lag 1/(T s + 1) is v_k = (e_k + A v_{k−1})/(1 + A), A = T/h: the same in the type's own arithmetic."""
+    """At α = 1 a lag 1/(T s + 1) is v_k = (e_k + A v_{k−1})/(1 + A), A = T/h: the same in the type's own
+    arithmetic.
+    """
     from focgen.fractional.transfer import TransferFunction
     from focgen.plan.scenario import Scenario
     from tests.controllers import simple

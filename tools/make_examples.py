@@ -1,8 +1,8 @@
 """Make the example rig and its logs, the same bytes every time:  python tools/make_examples.py
 
-The logs are synthetic. They come from the nominal rig of the paper with one thing added that its model does not
-have, an actuator that unloads more slowly than it loads, and with noise on every signal. So a fractional model fits
-the positive steps well, and fails where the paper's fails: when the pressure falls.
+The logs are synthetic. They come from the nominal rig of the paper with one thing added that its model does
+not have, an actuator that unloads more slowly than it loads, and with noise on every signal. So a fractional
+model fits the positive steps well, and fails where the paper's fails: when the pressure falls.
 """
 
 from __future__ import annotations

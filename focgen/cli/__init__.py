@@ -1,1 +1,3 @@
-"""The command line: one small file a command, each with HELP, EXAMPLE, add_arguments(parser) and run(args)."""
+"""The command line: one small file a command, each with HELP, EXAMPLE, add_arguments(parser) and
+run(args).
+"""

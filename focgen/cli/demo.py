@@ -67,6 +67,7 @@ def _text(made: Demo) -> str:
     lead = demo_lead(made.identification, made.design, made.verified)
     return (
         f"\n{lead}\n\n{text_table(firmware_table(made.generated, made.verified))}\n\n"
-        f"{made.memory.recommendation}\n\n{diagnosis_sentence(made.diagnosis, made.sealed)}\n\nlook at  {made.report}\n"
+        f"{made.memory.recommendation}\n\n{diagnosis_sentence(made.diagnosis, made.sealed)}\n\n"
+        f"look at  {made.report}\n"
         f"         {made.folder / 'pictures'}\nread     {made.folder / 'firmware' / 'q31'}"
     )

@@ -34,7 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=float,
         metavar="E",
-        help="largest relative error of the exponential memory's weights; default: the controller's, else 1e-4",
+        help="largest relative error of the exponential memory's weights; "
+        "default: the controller's, else 1e-4",
     )
     parser.add_argument(
         "--horizon",
@@ -74,11 +75,13 @@ def _text(made: Generated) -> str:
     rate = f"{unit}/s" if plan.integrator and unit else unit
     ahead = "integrator" if plan.integrator else "limits"
     truncation = "no bound" if bound.truncation is None else f"{bound.truncation:.3g} {rate}".rstrip()
+    grows = _growth(bound.operator_per_sample)
+    within = _within(bound.within_horizon, rate)
     lines = [
         f"{plan.name}: {plan.arithmetic}, {_memory(plan)}, {size['state_bytes']} bytes of state,"
         f" {size['table_bytes']} bytes of tables",
-        f"error ahead of the {ahead}: {_growth(bound.operator_per_sample)}at most {bound.operator:.3g} {rate}".rstrip()
-        + f"; by {plan.memory} memory at most {truncation}{_within(bound.within_horizon, rate)}",
+        f"error ahead of the {ahead}: {grows}at most {bound.operator:.3g} {rate}".rstrip()
+        + f"; by {plan.memory} memory at most {truncation}{within}",
         *(
             f"short memory: {b['coefficient']:.6g} s^{b['order']:g} is {b['bias']:.3g} at rest instead of 0"
             for b in manifest["memory_bias"]

@@ -13,10 +13,12 @@ from focgen.rig.files import rig_text
 
 HELP = "fit K(p)/(T s^alpha + 1) to logs of a rig, and integer-order models beside it"
 EXAMPLE = """example:
-  focgen identify logs/steps.csv --rig rig.toml --out identified.toml --report pictures --unseen logs/sines.csv
+  focgen identify logs/steps.csv --rig rig.toml --out identified.toml --report pictures \\
+    --unseen logs/sines.csv
 
-  fits K, T and alpha to each experiment, pools T and alpha, draws the line K(p) through the gains, and writes the rig
-  with them to identified.toml. Prints the goodness of fit of every model from 1 pole to 3 poles and 2 zeros (Table I)."""
+  fits K, T and alpha to each experiment, pools T and alpha, draws the line K(p) through the gains, and
+  writes the rig with them to identified.toml. Prints the goodness of fit of every model from 1 pole to
+  3 poles and 2 zeros (Table I)."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:

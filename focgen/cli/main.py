@@ -53,7 +53,9 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The parser of the whole command line, or with one command ``only``, so that the others need not be loaded."""
+    """The parser of the whole command line, or with one command ``only``, so that the others need not be
+    loaded.
+    """
     style = argparse.RawDescriptionHelpFormatter
     top = _Parser(prog="focgen", description=_PROLOGUE, formatter_class=style)
     top.add_argument("--version", action="version", version=f"focgen {focgen.__version__}")

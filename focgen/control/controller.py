@@ -65,8 +65,8 @@ class Controller:
     ``ranges.output``; without, the output itself is. ``length`` is the memory length L: the past samples
     j = 1 … L take part. ``sample_time`` in s. ``arithmetic`` is the one it was designed for.
 
-    ``memory`` is "short" or "exponential"; the latter keeps the weights within the relative ``tolerance`` up to
-    ``horizon`` samples and has no use for ``length``.
+    ``memory`` is "short" or "exponential"; the latter keeps the weights within the relative ``tolerance`` up
+    to ``horizon`` samples and has no use for ``length``.
     """
 
     name: str

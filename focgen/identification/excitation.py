@@ -23,11 +23,11 @@ _FEWEST = 30  # samples
 class Excitation:
     """One experiment made ready: the input's powers as the dynamics see them, and the fitted signal.
 
-    ``pressure`` (n,) is the input of the actuator, measured or through the regulator; ``before`` its constant value
-    ahead of the first sample; ``level`` the value it is stepped to. ``drives`` (powers, n) are pressure^m − before^m,
-    m = 1, 2, …, through the sensor where its output is fitted. ``hold`` says what they do between samples,
-    ``sensor_gain`` is the sensor's at rest (1 where the curvature is fitted). ``rest_shown``: whether
-    the log begins before the first step, so that it shows the output's zero.
+    ``pressure`` (n,) is the input of the actuator, measured or through the regulator; ``before`` its constant
+    value ahead of the first sample; ``level`` the value it is stepped to. ``drives`` (powers, n) are
+    pressure^m − before^m, m = 1, 2, …, through the sensor where its output is fitted. ``hold`` says what they
+    do between samples, ``sensor_gain`` is the sensor's at rest (1 where the curvature is fitted).
+    ``rest_shown``: whether the log begins before the first step, so that it shows the output's zero.
     """
 
     name: str
@@ -63,8 +63,9 @@ class Excitation:
     def respond(self, steps: np.ndarray | None, means: np.ndarray | None) -> np.ndarray:
         """Convolve each drive with each kernel; shape (kernels, powers, n).
 
-        ``steps`` (kernels, ≥ n) are step responses at 0, h, …; ``means`` their means over the sample before h, 2h, ….
-        A held input needs ``steps``, a linear one ``means``, and ``steps`` as well where it jumps at first.
+        ``steps`` (kernels, ≥ n) are step responses at 0, h, …; ``means`` their means over the sample before
+        h, 2h, …. A held input needs ``steps``, a linear one ``means``, and ``steps`` as well where it jumps
+        at first.
         """
         n = len(self)
         kernels = (steps if self.hold == "zero" else means)[:, : n - 1]
@@ -81,9 +82,9 @@ class Excitation:
 def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | None = None) -> Excitation:
     """Make an experiment ready for fitting.
 
-    Input is the measured pressure where logged, else the command through the regulator; fitted is the curvature where
-    logged, else the output through the sensor. ``before`` is the input's value ahead of the first sample (None: as at
-    the first sample). Raises LogError where a signal is constant or too short.
+    Input is the measured pressure where logged, else the command through the regulator; fitted is the
+    curvature where logged, else the output through the sensor. ``before`` is the input's value ahead of the
+    first sample (None: as at the first sample). Raises LogError where a signal is constant or too short.
     """
     _check(experiment)
     pressure, level_before, hold, role = _input(experiment, rig, before)
@@ -110,7 +111,8 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
 
 
 def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:
-    """The values the input may have had before the first sample: that of the first sample, and 0 where it differs.
+    """The values the input may have had before the first sample: that of the first sample, and 0 where it
+    differs.
 
     A log that begins with the step itself starts at rest at 0 with its input already up.
     """

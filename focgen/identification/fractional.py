@@ -23,9 +23,9 @@ _DOUBTFUL = 0.6  # residual over spread (1 − GOF) from which on a fit is repea
 class FractionalFit:
     """A fit of one experiment or several, which share T and α.
 
-    ``K`` and ``offset`` (experiments,), ``T`` in s^alpha. ``half`` maps "T", "alpha" to half a 95 % interval and "K",
-    "offset" to those of each experiment (experiments,). ``K_covariance`` (experiments, experiments). ``simulated``:
-    the model's outputs.
+    ``K`` and ``offset`` (experiments,), ``T`` in s^alpha. ``half`` maps "T", "alpha" to half a 95 % interval
+    and "K", "offset" to those of each experiment (experiments,). ``K_covariance`` (experiments, experiments).
+    ``simulated``: the model's outputs.
     """
 
     K: np.ndarray
@@ -39,7 +39,9 @@ class FractionalFit:
 
 
 def fit_fractional(experiments: Sequence[Excitation]) -> FractionalFit:
-    """Fit K and an offset to each experiment, T and α to all. Raises FitError where the data do not determine them."""
+    """Fit K and an offset to each experiment, T and α to all. Raises FitError where the data do not determine
+    them.
+    """
     problem = _Problem(experiments)
     best = _best(problem)
     _check(experiments, best)
@@ -132,7 +134,9 @@ def _fit_from(problem: _Problem, start: np.ndarray):
 
 
 def _start(problem: _Problem, alpha: float) -> np.ndarray:
-    """τ such that the slope of the measured signal's rise is met roughly; K and offset by linear least squares."""
+    """τ such that the slope of the measured signal's rise is met roughly; K and offset by linear least
+    squares.
+    """
     log_tau = float(np.median([np.log(_rise_time(e)) for e in problem.experiments]))
     x = [log_tau, alpha]
     for e, r in zip(problem.experiments, problem.responses(log_tau, alpha)):

@@ -43,11 +43,11 @@ def identify(
 ) -> Identification:
     """Fit K/(T s^α + 1) to each experiment, pool T and α, and draw K(p) through the gains; eq. (3) to (5).
 
-    ``logs`` are paths or experiments of one session, ``first`` and ``last`` (s within each experiment) cut them,
-    ``gain_degree`` is the degree of K(p); with fewer levels than that needs, a lower one is taken and said. The new
-    rig is written to ``out``. The input is the measured pressure where logged, else the command through the
-    regulator; fitted is the curvature where logged, else the output through the sensor. ``unseen`` are logs that the
-    identified rig is shown against, but not fitted to.
+    ``logs`` are paths or experiments of one session, ``first`` and ``last`` (s within each experiment) cut
+    them, ``gain_degree`` is the degree of K(p); with fewer levels than that needs, a lower one is taken and
+    said. The new rig is written to ``out``. The input is the measured pressure where logged, else the command
+    through the regulator; fitted is the curvature where logged, else the output through the sensor.
+    ``unseen`` are logs that the identified rig is shown against, but not fitted to.
 
     Raises LogError, RigError or FitError; nothing is written then.
     """
@@ -222,12 +222,14 @@ def _notes(excitations, fits, nominal: Rig) -> tuple[str, ...]:
     ]
     if isinstance(nominal.actuator, LinearActuator):
         said.append(
-            "the rig's actuator was a transfer function; the identified one is K(p) p through 1/(T s^alpha + 1)"
+            "the rig's actuator was a transfer function; the identified one is K(p) p through "
+            "1/(T s^alpha + 1)"
         )
     sources = {(f.driven_by, f.fitted) for f in fits}
+    inputs = {"pressure": "measured pressure", "command": "command through the regulator"}
+    outputs = {"curvature": "curvature", "output": "output through the sensor"}
     said += [
-        f"driven by the {'measured pressure' if driven == 'pressure' else 'command through the regulator'}, fitted "
-        f"to the {'curvature' if fitted == 'curvature' else 'output through the sensor'}"
+        f"driven by the {inputs[driven]}, fitted to the {outputs[fitted]}"
         for driven, fitted in sorted(sources)
     ]
     return tuple(said)

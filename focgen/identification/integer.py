@@ -1,9 +1,10 @@
 """Integer-order models, from 1 pole to 3 poles and 2 zeros, fitted by the same algorithm for comparison.
 
-A strictly proper model is a denominator, of factors s + a and s² + b s + c with positive coefficients (so it is
-stable), and a numerator, on which the output depends linearly. Levenberg–Marquardt runs over the denominator's
-coefficients, from several starts; numerator and offset are projected out (Golub and Pereyra, 1973). Among the starts
-of a shape are the optima of the smaller ones, so that a larger model never fits worse.
+A strictly proper model is a denominator, of factors s + a and s² + b s + c with positive coefficients (so it
+is stable), and a numerator, on which the output depends linearly. Levenberg–Marquardt runs over the
+denominator's coefficients, from several starts; numerator and offset are projected out (Golub and Pereyra,
+1973). Among the starts of a shape are the optima of the smaller ones, so that a larger model never fits
+worse.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ _FIRST_ROUNDS, _ROUNDS = 8, 25  # of Levenberg–Marquardt: from every start, an
 
 @dataclass(frozen=True, eq=False)
 class IntegerFit:
-    """``num`` and ``den``: coefficients by falling power of s, den monic. ``simulated`` (n,): the model's output."""
+    """``num`` and ``den``: coefficients by falling power of s, den monic. ``simulated`` (n,): the model's
+    output.
+    """
 
     poles: int
     zeros: int

@@ -1,7 +1,7 @@
 """Step responses of 1/((τ s)^α + 1), with their derivatives in log τ and α, at every sample at once.
 
-Each is inverted from its own Laplace transform, so the derivatives are as exact as the response. For α > 1 the
-pair of poles p = e^{±iπ/α}/τ leaves the negative real axis and is taken out in closed form.
+Each is inverted from its own Laplace transform, so the derivatives are as exact as the response. For α > 1
+the pair of poles p = e^{±iπ/α}/τ leaves the negative real axis and is taken out in closed form.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""The gain as a polynomial of the pressure, K(p) = gain[0] + gain[1] p + …, through the gains of single steps."""
+"""The gain as a polynomial of the pressure, K(p) = gain[0] + gain[1] p + …, through the gains of single
+steps.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ _APART = 0.02  # of the largest level: nearer than this, two levels are one
 
 @dataclass(frozen=True)
 class GainLine:
-    """``gain``: coefficients by rising power of p; ``half``: half their 95 % intervals; ``r2`` as for any regression.
+    """``gain``: coefficients by rising power of p; ``half``: half their 95 % intervals; ``r2`` as for any
+    regression.
 
     ``r2`` is 1 where as many levels as coefficients leave no choice.
     """
@@ -33,8 +36,8 @@ def distinct_levels(levels: np.ndarray) -> int:
 def fit_line(levels: np.ndarray, K: np.ndarray, covariance: np.ndarray, degree: int) -> GainLine:
     """Ordinary least squares of K (n,) over ``levels`` (n,).
 
-    Its intervals follow from the ``covariance`` (n, n) of K, widened where K scatters about the line by more than
-    that. Raises FitError where there are fewer distinct levels than coefficients.
+    Its intervals follow from the ``covariance`` (n, n) of K, widened where K scatters about the line by more
+    than that. Raises FitError where there are fewer distinct levels than coefficients.
     """
     if distinct_levels(levels) <= degree:
         what = f"{distinct_levels(levels)} distinct levels do not determine K(p) of degree {degree}"

@@ -16,9 +16,10 @@ Span = tuple[float, float]
 class ExperimentFit:
     """K/(T s^alpha + 1) fitted to one experiment.
 
-    ``K`` in output per pressure units, ``T`` in s^alpha, ``level`` the pressure it was stepped to, ``ci95`` maps K, T
-    and alpha to 95 % intervals. ``fitted`` and ``driven_by`` are the roles fitted and driving. ``time`` (n,) in s,
-    ``pressure``, ``measured`` and ``simulated`` (n,). ``step`` says whether it is a step, which K(p) is drawn through.
+    ``K`` in output per pressure units, ``T`` in s^alpha, ``level`` the pressure it was stepped to, ``ci95``
+    maps K, T and alpha to 95 % intervals. ``fitted`` and ``driven_by`` are the roles fitted and driving.
+    ``time`` (n,) in s, ``pressure``, ``measured`` and ``simulated`` (n,). ``step`` says whether it is a step,
+    which K(p) is drawn through.
     """
 
     name: str
@@ -43,7 +44,8 @@ class ExperimentFit:
 class Pooled:
     """One T and alpha for all steps, and the gain polynomial through their K.
 
-    ``ci95`` maps T, alpha and gain to 95 % intervals, ``K`` (with intervals ``K_ci95``) belongs to the steps in order.
+    ``ci95`` maps T, alpha and gain to 95 % intervals, ``K`` (with intervals ``K_ci95``) belongs to the steps
+    in order.
     """
 
     T: float
@@ -72,9 +74,9 @@ class Unseen:
 class Identification:
     """The identified ``rig``, what it rests on, and how it compares with integer-order models.
 
-    ``gof`` maps a model ("fom", "iom_1p", …, "rig" for the pooled one) to experiment → GOF, with "mean"; ``bic``
-    likewise for Schwarz's criterion (smaller is better). ``warnings``: what these logs cannot show. ``unseen``: logs it was
-    not fitted to.
+    ``gof`` maps a model ("fom", "iom_1p", …, "rig" for the pooled one) to experiment → GOF, with "mean";
+    ``bic`` likewise for Schwarz's criterion (smaller is better). ``warnings``: what these logs cannot show.
+    ``unseen``: logs it was not fitted to.
     """
 
     experiments: tuple[ExperimentFit, ...]

@@ -1,8 +1,8 @@
 """Covariance of a least-squares fit whose residuals are correlated in time.
 
-The residual is modelled as an autoregressive process; its order is chosen by BIC, so that white residuals give the
-ordinary covariance. References: Burg's recursion (Kay, Modern Spectral Estimation, 1988); the sandwich
-(J'J)⁻¹ J'ΓJ (J'J)⁻¹ with Γ the residual's autocovariance (Ljung, System Identification, 1999, §9.5).
+The residual is modelled as an autoregressive process; its order is chosen by BIC, so that white residuals
+give the ordinary covariance. References: Burg's recursion (Kay, Modern Spectral Estimation, 1988); the
+sandwich (J'J)⁻¹ J'ΓJ (J'J)⁻¹ with Γ the residual's autocovariance (Ljung, System Identification, 1999, §9.5).
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ _HIGHEST = 20  # order
 
 @dataclass(frozen=True, eq=False)
 class ResidualModel:
-    """a(q) r = white noise: ``a`` = [1, a₁, …] and the ``variance`` of the white noise, of ``count`` residuals."""
+    """a(q) r = white noise: ``a`` = [1, a₁, …] and the ``variance`` of the white noise, of ``count``
+    residuals.
+    """
 
     a: np.ndarray
     variance: float
@@ -26,7 +28,9 @@ class ResidualModel:
 
     @property
     def effective(self) -> float:
-        """How many independent samples say as much about a mean: count · (Σa)² γ₀/σ²-wise, at most ``count``."""
+        """How many independent samples say as much about a mean: count · (Σa)² γ₀/σ²-wise, at most
+        ``count``.
+        """
         return min(float(self.count), self.count * float(np.sum(self.a)) ** 2 * self._power() / self.variance)
 
     def _power(self) -> float:
@@ -60,7 +64,8 @@ def residual_model(residual: np.ndarray) -> ResidualModel:
 
 
 def covariance(jacobian: np.ndarray, models: list[ResidualModel]) -> np.ndarray:
-    """Covariance (k, k) of the k parameters of a fit; ``jacobian`` (n, k) has the rows of all ``models`` in order.
+    """Covariance (k, k) of the k parameters of a fit; ``jacobian`` (n, k) has the rows of all ``models`` in
+    order.
 
     The parameters' own number is taken off the degrees of freedom. Raises numpy.linalg.LinAlgError where the
     parameters cannot be told apart.

@@ -28,7 +28,8 @@ def seen_ranges(given: Ranges, experiments: Sequence[Experiment]) -> tuple[Range
             span = _with_room(min(map(np.min, seen)), max(map(np.max, seen)))
             given = replace(given, **{role: span})
             notes.append(
-                f"[ranges] {role} is not given: {span[0]:g} … {span[1]:g}, from the logs with a quarter of room"
+                f"[ranges] {role} is not given: {span[0]:g} … {span[1]:g}, "
+                "from the logs with a quarter of room"
             )
     return given, tuple(notes)
 

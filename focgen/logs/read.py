@@ -39,7 +39,8 @@ def read_logs(
     last: float | None = None,
     limits: Limits | None = None,
 ) -> tuple[Experiment, ...]:
-    """Read the experiments of one session, in the order of their time stamps, or as given where those overlap.
+    """Read the experiments of one session, in the order of their time stamps, or as given where those
+    overlap.
 
     ``sample_time`` (s) is the rig's: what is not uniformly sampled is resampled to it. ``first`` and ``last``
     cut each experiment (s since its first sample). ``limits`` are each role's (low, high) in its unit, which
@@ -147,7 +148,9 @@ def _other(columns, role: str, rows: np.ndarray) -> bool:
 
 
 def _check_limits(found: list[tuple[str, Experiment]], limits: Limits) -> None:
-    """Raise LogError where a signal leaves its range by an order of magnitude, or uses next to nothing of it."""
+    """Raise LogError where a signal leaves its range by an order of magnitude, or uses next to
+    nothing of it.
+    """
     for role, (low, high) in limits.items():
         largest = max(abs(low), abs(high))
         peaks = [(float(np.abs(e[role]).max()), path, e) for path, e in found if role in e]

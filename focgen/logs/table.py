@@ -38,7 +38,9 @@ class LogTable:
         return len(next(iter(self.columns.values()), ()))
 
     def closest(self, name: str, taken: Collection[str] = ()) -> str | None:
-        """The column, not one of those ``taken``, whose name is nearest to ``name``, or None where none is near."""
+        """The column, not one of those ``taken``, whose name is nearest to ``name``, or None where none is
+        near.
+        """
         lowered = {column.lower(): column for column in self.columns if column not in taken}
         near = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
         return lowered[near[0]] if near else None
@@ -61,7 +63,9 @@ class LogTable:
         return [cell if isinstance(cell, str) else f"{cell:g}" for cell in _plain(self.columns[name])]
 
     def numbers(self, name: str) -> np.ndarray:
-        """A column as float64; empty cells become NaN. Raises LogError for anything else that is no number."""
+        """A column as float64; empty cells become NaN. Raises LogError for anything else that is no
+        number.
+        """
         column = self.columns[name]
         try:
             values = (

@@ -1,4 +1,6 @@
-"""Logs in .tdms (LabVIEW): one channel a column, named by the channel, or "group/channel" where names repeat."""
+"""Logs in .tdms (LabVIEW): one channel a column, named by the channel, or "group/channel" where names
+repeat.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from focgen.logs.table import LogTable
 
 
 def read(path: Path) -> LogTable:
-    """Read a file. Raises LogError where it is damaged or its channels differ in length, MissingExtra without nptdms."""
+    """Read a file. Raises LogError where it is damaged or its channels differ in length, MissingExtra without
+    nptdms.
+    """
     try:
         import nptdms
         from nptdms.log import log_manager

@@ -67,7 +67,9 @@ def _part_of_past(table: Sum, node: str) -> np.ndarray:
 
 
 def _only(table: Sum, node: str, weights: np.ndarray, start: int) -> np.ndarray:
-    """``weights`` from lag ``start`` on, without those outside the block that ``node`` names, if it names one."""
+    """``weights`` from lag ``start`` on, without those outside the block that ``node`` names, if it names
+    one.
+    """
     for block in table.blocks:
         if node == f"{table.name}[{block.first}..{block.last}]":
             weights[: block.first - start] = 0.0

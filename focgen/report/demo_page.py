@@ -27,7 +27,9 @@ def demo_page(
     diagnosis: Diagnosis,
     sealed: tuple[str, ...],
 ) -> Page:
-    """The page; its pictures are in ``pictures/``, the C in ``firmware/``, the sealed case in ``diagnosis/``."""
+    """The page; its pictures are in ``pictures/``, the C in ``firmware/``, the sealed case in
+    ``diagnosis/``.
+    """
     sections = (
         _model(identification),
         _controller(design),
@@ -49,11 +51,11 @@ def demo_lead(identification: Identification, design: Design, verified: dict[str
     samples = sum(v.targets["host"].samples for v in verified.values())
     wrong = sum(v.targets["host"].mismatches for v in verified.values())
     return (
-        f"A fractional model with T = {pooled.T:.3g} and α = {pooled.alpha:.3g} fits six step tests with a mean GOF of "
-        f"{gof['fom']['mean']:.3f} (one pole: {gof['iom_1p']['mean']:.3f}; three poles and two zeros: "
-        f"{gof['iom_3p2z']['mean']:.3f}). Inverted, it gives a controller that settles in {design.settling_s:.2f} s on "
-        f"average with at most {design.overshoot_pct:.1f} % overshoot. Its C, in four arithmetics, equals the Python "
-        f"reference in {samples - wrong} of {samples} samples."
+        f"A fractional model with T = {pooled.T:.3g} and α = {pooled.alpha:.3g} fits six step tests with a "
+        f"mean GOF of {gof['fom']['mean']:.3f} (one pole: {gof['iom_1p']['mean']:.3f}; three poles and two "
+        f"zeros: {gof['iom_3p2z']['mean']:.3f}). Inverted, it gives a controller that settles in "
+        f"{design.settling_s:.2f} s on average with at most {design.overshoot_pct:.1f} % overshoot. "
+        f"Its C, in four arithmetics, equals the Python reference in {samples - wrong} of {samples} samples."
     )
 
 
@@ -141,7 +143,8 @@ def _firmware(generated: dict[str, Generated], verified: dict[str, Verification]
 def _diagnosis(found: Diagnosis, sealed: tuple[str, ...]) -> Section:
     shown = {
         "ladder.png": "Where the gap is: measured signals put in place of simulated ones, stage by stage",
-        "residual.png": "What the refitted model leaves, against level, rate, direction and time, and with the effect",
+        "residual.png": "What the refitted model leaves, against level, rate, direction and time, "
+        "and with the effect",
         "loops.png": "Output against input, measured and simulated, before and after",
         "candidates.png": "Which effect: the candidates, and how far each is behind the best",
         "waterfall.png": "How far: what parameters, effect and noise account for",
@@ -164,9 +167,9 @@ def diagnosis_sentence(found: Diagnosis, sealed: tuple[str, ...]) -> str:
     ]
     gof = found.gap.gof
     return (
-        f"A rig with a sealed effect: the diagnosis says {' and '.join(causes) or found.verdict}, and takes the "
-        f"goodness of fit from {gof['refitted']:.3f} to {gof['explained']:.3f} of a possible {gof['possible']:.3f}. "
-        f"The seal says {', '.join(sealed) or 'nothing'}."
+        f"A rig with a sealed effect: the diagnosis says {' and '.join(causes) or found.verdict}, and takes "
+        f"the goodness of fit from {gof['refitted']:.3f} to {gof['explained']:.3f} of a possible "
+        f"{gof['possible']:.3f}. The seal says {', '.join(sealed) or 'nothing'}."
     )
 
 

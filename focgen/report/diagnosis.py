@@ -37,7 +37,9 @@ def _gap_ratio(e: Explanation) -> float:
 
 
 def ladder(evidence: Evidence) -> bytes:
-    """Root-mean-square residual of every segment on its measured input: as given, refitted, with the effects."""
+    """Root-mean-square residual of every segment on its measured input: as given, refitted, with the
+    effects.
+    """
     with figure(1, 1) as (fig, axis):
         for i, e in enumerate(evidence.explanations):
             given = e.nominal.problem.residual(e.given)
@@ -64,8 +66,8 @@ def _thin(*signals: np.ndarray) -> list[np.ndarray]:
 def residual(e: Explanation) -> bytes:
     """The worst segment's residual against level, rate, direction and time, before and after the effects.
 
-    Lines are means: over bins of level and of rate, and of time; those over the level are drawn apart for rising
-    and falling input, so that a gap between them is a loop.
+    Lines are means: over bins of level and of rate, and of time; those over the level are drawn apart for
+    rising and falling input, so that a gap between them is a loop.
     """
     run, before, after = e.segment.run, problem_residual(e.nominal), problem_residual(e.best)
     level = _steady(e.segment.x, run)
@@ -207,9 +209,8 @@ def waterfall(diagnosis: Diagnosis) -> bytes:
             axis.bar(name, height, bottom=bottom, color=COLOURS[colour])
             axis.annotate(f"{height:.1f} %", (name, bottom + max(height, 0)), ha="center", va="bottom")
         axis.set_ylabel("% of the mean square error as given")
-        axis.set_title(
-            f"GOF {gap.gof['as given']:.3f} → {gap.gof['explained']:.3f} of a possible {gap.gof['possible']:.3f}"
-        )
+        given, explained, possible = (gap.gof[key] for key in ("as given", "explained", "possible"))
+        axis.set_title(f"GOF {given:.3f} → {explained:.3f} of a possible {possible:.3f}")
         return png(fig)
 
 

@@ -34,7 +34,9 @@ def start_of(x: Excitation) -> np.ndarray:
 
 
 def plain_fit(x: Excitation, start: np.ndarray) -> np.ndarray:
-    """K, T and α by scipy's Levenberg–Marquardt around the recursion of eq. (10), all 2000 samples of memory."""
+    """K, T and α by scipy's Levenberg–Marquardt around the recursion of eq. (10), all 2000 samples of
+    memory.
+    """
 
     def residual(parameters):
         gain, T, alpha = parameters
@@ -72,7 +74,8 @@ def run() -> str:
     lines = [
         f"A fit of K, T and α to {COUNT} samples with 2 % noise, median of {ROUNDS}, same data and start.",
         f"least_squares(lm) around lfilter, eq. (10)  {1e3 * plain:8.1f} ms",
-        f"fit_fractional, offset and intervals too    {1e3 * ours:8.1f} ms    {plain / ours:.1f} times as fast",
+        f"fit_fractional, offset and intervals too    {1e3 * ours:8.1f} ms    "
+        f"{plain / ours:.1f} times as fast",
         "",
         "Error without noise, plain | ours, and the ratio of the errors in α.",
     ]
