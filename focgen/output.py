@@ -29,14 +29,29 @@ def new_folder(target: str | Path) -> Iterator[Path]:
         ) from None
     try:
         yield scratch
-        for source in sorted(p for p in scratch.rglob("*") if p.is_file()):
-            place = target / source.relative_to(scratch)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(source, place)
+        _move(scratch, target)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
         if not any(target.iterdir()):
             target.rmdir()
+
+
+def _move(scratch: Path, target: Path) -> None:
+    """Every file to its place, once it is sure that nothing else stands there."""
+    files = sorted(p.relative_to(scratch) for p in scratch.rglob("*") if p.is_file())
+    for name in files:
+        if (target / name).is_dir():
+            raise InputError(str(target / name), "is a folder where a file belongs", "move it away")
+        for parent in list(name.parents)[:-1]:
+            if (target / parent).exists() and not (target / parent).is_dir():
+                raise InputError(str(target / parent), "is a file where a folder belongs", "move it away")
+    for name in files:
+        try:
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(scratch / name, target / name)
+        except OSError as reason:
+            what = f"cannot be written ({reason.strerror})"
+            raise InputError(str(target / name), what, "choose another --out") from None
 
 
 def write_files(target: str | Path, files: Mapping[str, str | bytes]) -> None:

@@ -76,6 +76,18 @@ def test_an_unwritable_place_is_reported(tmp_path):
             write()
 
 
+def test_what_stands_in_the_way_is_reported_before_anything_is_written(tmp_path):
+    (tmp_path / "out" / "z.c").mkdir(parents=True)
+    with pytest.raises(InputError, match="is a folder where a file belongs"):
+        write_files(tmp_path / "out", {"a.c": "text", "z.c": "text"})
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["z.c"]
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "sub").write_text("")
+    with pytest.raises(InputError, match="is a file where a folder belongs"):
+        write_files(tmp_path / "other", {"a.c": "text", "sub/b.c": "text"})
+    assert [p.name for p in (tmp_path / "other").iterdir()] == ["sub"]
+
+
 def test_a_bar_shows_how_far_and_how_long():
     assert bar("study", 0, 48, 0.0) == f"study {'░' * 24} 0/48"
     assert bar("study", 12, 48, 10.0) == f"study {'█' * 6}{'░' * 18} 12/48, 30 s left"

@@ -56,6 +56,10 @@ FAULTS = {
     "no output": (RIG.replace('output = "kappa"\n', ""), "lacks 'output'"),
     "no input": (RIG.replace('command = "u_V"\n', ""), "neither 'command' nor 'pressure'"),
     "sample time 0": (RIG.replace("sample_time = 0.01", "sample_time = 0"), "above 0"),
+    "sample time beyond floats": (
+        RIG.replace("sample_time = 0.01", f"sample_time = 1{'0' * 400}"),
+        "not a finite number",
+    ),
     "sample time NaN": (RIG.replace("sample_time = 0.01", "sample_time = nan"), "not a finite number"),
     "alpha too high": (RIG.replace("alpha = 0.6", "alpha = 2.0"), "order in (0, 2)"),
     "alpha 0": (RIG.replace("alpha = 0.6", "alpha = 0.0"), "above 0"),

@@ -183,6 +183,7 @@ def test_faults_are_one_line(tmp_path, capsys):
     write_controller(whole, tmp_path / "whole.toml")
     _made(tmp_path)
     for argv in (
+        ["memory", str(tmp_path / "controller.toml"), "--jobs", "-1"],
         ["memory", str(tmp_path / "whole.toml")],
         ["memory", str(tmp_path / "controller.toml"), "--setpoints", "7"],
         ["memory", str(tmp_path / "none.toml")],

@@ -393,6 +393,10 @@ def written(name, text):
     return lambda folder: (folder / name).write_text(text)
 
 
+def appended(path, text):
+    path.write_text(path.read_text() + text)
+
+
 UNUSABLE = {
     "no manifest": missing("manifest.json"),
     "no header": missing("spba.h"),
@@ -412,6 +416,10 @@ UNUSABLE = {
         folder, lambda m: m["error_bound"]["quantisation"].update(operator="small")
     ),
     "does not compile": written("spba.c", "this is no C\n"),
+    "does not link": lambda folder: appended(
+        folder / "spba.c",
+        "int spba_x(void);\nint spba_x(void)\n{\n    extern int nowhere(void);\n    return nowhere();\n}\n",
+    ),
     "everything": lambda folder: shutil.rmtree(folder),
 }
 

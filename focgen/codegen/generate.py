@@ -21,11 +21,10 @@ from focgen.errors import InputError, check_choice
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
 from focgen.output import write_files
 from focgen.plan.build import build_plan
-from focgen.plan.model import Plan
+from focgen.plan.model import LONGEST, Plan
 from focgen.resources import shipped
 
 PACKAGES = ("plain", "cmake", "arduino", "platformio", "zephyr", "fmu")
-_LONGEST = 65_534  # the ring's slots are counted in 16 bits
 
 
 @dataclass(frozen=True)
@@ -116,9 +115,9 @@ def _check(arithmetic: str | None, memory: str | None, length: int) -> None:
         check_choice("--memory", memory, MEMORIES)
     if not isinstance(length, int) or isinstance(length, bool) or length < 1:
         raise InputError("--length", f"is {length!r}", "give a memory length of at least 1 sample")
-    if length > _LONGEST:
+    if length > LONGEST:
         raise InputError(
-            "--length", f"is {length}, more than the ring in C can count", f"give at most {_LONGEST}"
+            "--length", f"is {length}, more than the ring in C can count", f"give at most {LONGEST}"
         )
 
 
@@ -146,5 +145,7 @@ def _refuse_what_is_missing(package) -> None:
     check_choice("--for", package, PACKAGES)
     if package != "plain":
         raise InputError(
-            "--for", f"{package} is not available in this version", "use --for plain and add the three files"
+            "--for",
+            f"{package} is not available in this version",
+            "use --for plain and add its files to your build",
         )

@@ -135,8 +135,8 @@ def _complete(table: LogTable, columns, rows: np.ndarray, where: str) -> dict[st
         ):
             continue
         if gaps.any():
-            row = table.line(int(rows[np.argmax(gaps)]))
-            what = f"{role} is empty or not a number in {row} and {gaps.sum() - 1} more"
+            row, others = table.line(int(rows[np.argmax(gaps)])), int(gaps.sum()) - 1
+            what = f"{role} is empty or not a number in {row}" + (f" and {others} more" if others else "")
             raise LogError(where, what, "fill the gaps, or cut them off with --from and --to")
         values[role] = part
     return values

@@ -25,6 +25,7 @@ from focgen.loop.trial import Steps, run_steps
 from focgen.loop.tuning import HORIZON, OVERSHOOT, Tuned, Wish, fastest, meeting, tune
 from focgen.output import write_file
 from focgen.plan.build import build_plan
+from focgen.plan.model import LONGEST
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 
@@ -151,8 +152,8 @@ def _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance) -> 
     if overshoot is not None and not (math.isfinite(overshoot) and overshoot >= 0.0):
         raise DesignError("--overshoot", f"is {overshoot:g}", "give percent, 0 or more")
     check_choice("--arithmetic", arithmetic, ARITHMETICS, DesignError)
-    if length is not None and length < 1:
-        raise DesignError("--length", f"is {length}", "give at least 1 past sample")
+    if length is not None and not 1 <= length <= LONGEST:
+        raise DesignError("--length", f"is {length}", f"give 1 to {LONGEST} past samples")
     if delay not in (0, 1):
         raise DesignError("--delay", f"is {delay}", "give 0 or 1 sample")
     if not 0.0 < tolerance < 1.0:

@@ -145,6 +145,9 @@ __all__ = [
     "Sum",
 ]
 
+LONGEST = 65_534
+"""Past samples that a history in C can hold: the ring's slots are counted in 16 bits."""
+
 FLAG_HIGH, FLAG_LOW, FLAG_SCHEDULE, FLAG_INPUT, FLAG_INVALID = 1, 2, 4, 8, 16
 
 

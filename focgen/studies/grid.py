@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.errors import InputError, check_choice
+from focgen.fractional.exponential import HORIZONS
+from focgen.fractional.exponential import TOLERANCES as SPAN
+from focgen.plan.model import LONGEST
 from focgen.studies.model import Variant
 
 LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 TOLERANCES = (0.1, 0.03, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
 _FACTORS = (0.5, 1.0, 2.0)  # of the sample time
-_LONGEST = 65_534
-_HORIZONS = (100, 10**8)
 _PLANT_LENGTHS = (100, 1000, 10_000)
 _PLANT_TOLERANCE = 1e-4
 
@@ -60,12 +61,12 @@ class Grid:
             arithmetic,
             sample_time,
             tolerance=tolerance,
-            horizon=min(max(reach, _HORIZONS[0]), _HORIZONS[1]),
+            horizon=min(max(reach, HORIZONS[0]), HORIZONS[1]),
         )
 
     def of_the_plant(self, sample_time: float) -> list[Variant]:
         """The memories that the plant is simulated with, in float64."""
-        longer = min(max(self.horizon, 10_000), _HORIZONS[1])
+        longer = min(max(self.horizon, 10_000), HORIZONS[1])
         found = [self.short("f64", sample_time, length) for length in _PLANT_LENGTHS]
         return [
             *found,
@@ -109,12 +110,12 @@ def _check(grid: Grid) -> None:
     _each(
         "--lengths",
         grid.lengths,
-        lambda n: isinstance(n, int) and 1 <= n <= _LONGEST,
-        f"give 1 … {_LONGEST} past samples",
+        lambda n: isinstance(n, int) and 1 <= n <= LONGEST,
+        f"give 1 … {LONGEST} past samples",
     )
-    _each("--tolerances", grid.tolerances, lambda e: 1e-8 <= e <= 0.1, "give 1e-8 … 0.1")
+    _each("--tolerances", grid.tolerances, lambda e: SPAN[0] <= e <= SPAN[1], "give 1e-8 … 0.1")
     _each("--sample-times", grid.sample_times, lambda h: math.isfinite(h) and h > 0.0, "give times above 0 s")
-    _each("--horizon", (grid.horizon,), lambda n: _HORIZONS[0] <= n <= _HORIZONS[1], "give 100 … 1e8 samples")
+    _each("--horizon", (grid.horizon,), lambda n: HORIZONS[0] <= n <= HORIZONS[1], "give 100 … 1e8 samples")
 
 
 def _each(option: str, values, fits, remedy: str) -> None:

@@ -27,11 +27,14 @@ _PATIENCE = "10s"  # until a scheduler must have answered
 class Workers:
     """Whoever does the jobs: ``processes`` of this machine, or the Dask cluster at ``scheduler``.
 
-    They are called when there is first something to do, and leave at the end of the ``with`` block. Calling
-    them raises InputError where the scheduler does not answer, MissingExtra where Dask is not installed.
+    They are called when there is first something to do, and leave at the end of the ``with`` block. Raises
+    InputError for less than one process; calling them does where the scheduler does not answer, and
+    MissingExtra where Dask is not installed.
     """
 
     def __init__(self, processes: int | None = None, scheduler: str | None = None):
+        if processes is not None and processes < 1:
+            raise InputError("--jobs", f"is {processes}", "give at least 1 process")
         self._processes, self._scheduler = processes or os.cpu_count() or 1, scheduler
         self._stack, self._called = ExitStack(), None
 

@@ -10,6 +10,7 @@ import numpy as np
 from cffi import FFI
 
 from focgen.compiler import compile_shared
+from focgen.errors import BuildError
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of
@@ -45,7 +46,12 @@ class Library:
                     self._ffi.cdef(f"uint32_t {plan.name}_selftest(void);")
             target = Path(scratch) / "controllers.so"
             compile_shared(sources, target, flags, list(dict.fromkeys(folders)))
-            self._library = self._ffi.dlopen(str(target))
+            try:
+                self._library = self._ffi.dlopen(str(target))
+            except OSError as reason:
+                raise BuildError(
+                    str(sources[0]), f"does not link: {_said(reason, target)}", "generate the folder again"
+                ) from None
 
     def run(self, plan: Plan, scenario: Scenario) -> Trace:
         """Run raw inputs; returns raw u and d and the flags, shape (lanes, samples).
@@ -89,6 +95,11 @@ class Library:
         pointers = [self._ffi.cast(f"{ctype} *", a.ctypes.data) for ctype, a in zip(types, arrays)]
         getattr(self._library, f"{plan.name}_run")(count, *pointers)
         return u, d, flags
+
+
+def _said(reason: OSError, target: Path) -> str:
+    """What the loader complains of, without the name of a file that is gone."""
+    return str(reason).rpartition(f"{target}: ")[2].partition(".  ")[0]
 
 
 def _declaration(plan: Plan) -> str:
