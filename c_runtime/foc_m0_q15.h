@@ -3,8 +3,8 @@
  * SPDX-License-Identifier: 0BSD
  *
  * A whole function, so that no register is left to chance: it saves what it must, calls nothing, and reads
- * its arguments as AAPCS has them. Loads are of aligned words and halfwords only. The C of foc_tiles.h says
- * what it does. Cycles are those of ARM's tables. */
+ * its arguments as AAPCS has them. Loads are of aligned words and halfwords only. The C of
+ * foc_ahead_q15.h says what it does. Cycles are those of ARM's tables. */
 #ifndef FOC_M0_Q15_H
 #define FOC_M0_Q15_H
 

@@ -4,8 +4,8 @@
  *
  * A whole function, so that no register is left to chance: it saves r4 ... r11, calls nothing, and reads its
  * argument as AAPCS has it. Loads are of aligned words, pairs and halfwords only. Integers are exact, so
- * their order is free. What it does is foc_run_X of foc_ahead.h, run after run. Cycles are those of ARM's
- * tables. */
+ * their order is free. What it does is foc_run_q31 of foc_ahead_q31.h, run after run. Cycles are those
+ * of ARM's tables. */
 #ifndef FOC_M3_Q31_H
 #define FOC_M3_Q31_H
 

@@ -85,7 +85,7 @@ def test_the_text_for_a_core_is_the_golden_one(tmp_path, request):
         write_files(folder, found)
     golden = {p.name: p.read_bytes().decode() for p in folder.iterdir()}
     assert golden == {name: text.decode() for name, text in found.items()}
-    for name in ("foc_ahead.h", "foc_tiles.h", "foc_m4_q15.h"):
+    for name in ("foc_ahead_q15.h", "foc_tiles.h", "foc_m4_q15.h"):
         assert (tmp_path / name).read_bytes() == (GOLDEN.parents[1] / "c_runtime" / name).read_bytes()
         lines = (tmp_path / name).read_text(encoding="ascii").splitlines()
         assert max(map(len, lines)) <= 112 and all(line == line.rstrip() for line in lines)

@@ -197,14 +197,14 @@ def test_an_unknown_core_is_refused(tmp_path):
 
 
 FAULTS = {
-    "a tile too early": ("foc_ahead.h", "now / 4u + 1u", "now / 4u"),
+    "a tile too early": ("foc_tiles.h", "now / 4u + 1u", "now / 4u"),
     "a sum of the step before": ("k.c", "ahead[s->error_now & 3u]", "ahead[(s->error_now + 1u) & 3u]"),
-    "no turn": ("foc_ahead.h", "if (step == 0u) {", "if (step == 1u) {"),
-    "the block's sum kept": ("foc_ahead.h", "ahead[8u + i] = 0;", ""),
-    "the ring's end": ("foc_ahead.h", "if (tiles <= straight) {", "if (tiles <= straight + 1u) {"),
-    "a weight beside": ("foc_ahead.h", "d = weights[0];", "d = weights[1];"),
-    "no rest": ("foc_ahead.h", "0, slices[4]", "0, slices[3]"),
-    "the latest samples": ("foc_ahead.h", "copy[i] = ring[slot];", "copy[i] = ring[0];"),
+    "no turn": ("foc_ahead_q15.h", "if (step == 0u) {", "if (step == 1u) {"),
+    "the block's sum kept": ("foc_ahead_q15.h", "ahead[8u + i] = 0;", ""),
+    "the ring's end": ("foc_ahead_q15.h", "if (tiles <= straight) {", "if (tiles <= straight + 1u) {"),
+    "a weight beside": ("foc_ahead_q15.h", "d = weights[0];", "d = weights[1];"),
+    "no rest": ("foc_ahead_q15.h", "0, slices[4]", "0, slices[3]"),
+    "the latest samples": ("foc_ahead_q15.h", "copy[i] = ring[slot];", "copy[i] = ring[0];"),
 }
 
 

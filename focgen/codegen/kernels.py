@@ -78,7 +78,11 @@ class Kernels:
         if not looks and not self.long(plan):
             return ()
         own = _FILES.get((self.target, plan.arithmetic))
-        return (*((own,) if own else ()), "foc_ahead.h" if looks else "foc_long.h", "foc_tiles.h")
+        return (
+            *((own,) if own else ()),
+            f"foc_ahead_{plan.arithmetic}.h" if looks else "foc_long.h",
+            "foc_tiles.h",
+        )
 
 
 PORTABLE = Kernels()

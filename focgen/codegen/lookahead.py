@@ -1,9 +1,9 @@
 """History sums that look four samples ahead: how the weights are laid out and the work is shared out.
 
 The sums of four successive steps, a *group*, are taken together, so that each load of a weight and of a
-sample serves four products; ``foc_ahead.h`` does it. The samples known when the group before it began are
-its far part, lags 16 and more (8 and more in floating point); a quarter of that work is done in each of that
-group's four steps. The near lags are summed in their own step.
+sample serves four products; ``foc_ahead_q15.h`` and its like do it. The samples known when the group before
+it began are its far part, lags 16 and more (8 and more in floating point); a quarter of that work is done in
+each of that group's four steps. The near lags are summed in their own step.
 
 A block of lags ``first`` … ``last`` becomes tiles of four samples times four sums. With the group in the
 making beginning at sample T, its tiles cover samples T − 4·back … T − 4·(first // 4) + 3, where

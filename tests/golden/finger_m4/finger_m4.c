@@ -18,7 +18,7 @@
 
 #include "foc_rt.h"
 #include "foc_m4_q15.h" /* the sums in cortex-m4's own instructions; the same bits everywhere */
-#include "foc_ahead.h"
+#include "foc_ahead_q15.h"
 
 #if FOC_RT_VERSION != 1
 #error "foc_rt.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
