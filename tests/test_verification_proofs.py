@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+from focgen.codegen.kernels import Kernels
 from tests.proofs import esbmc, eva
 from tests.proofs.faults import FAULTS, sow
 from tests.proofs.harness import reachable
-from tests.proofs.spread import ARITHMETICS, controllers, generated
+from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
+from tests.proofs.verdict import first_objection
+
+AHEAD_FAULTS = {
+    "one tile more": (r"const unsigned tiles = run->tiles;", "const unsigned tiles = run->tiles + 1u;"),
+    "the ring's end a tile too late": (r"size / 4u - start;", "size / 4u - start + 1u;"),
+    "a block is not begun anew": (r"ahead\[8u \+ i\] = 0;", ""),
+    "a group is not begun anew": (r"ahead\[4u \+ i\] = 0;", ""),
+}
 
 
 def needs(tool, name: str, install: str) -> None:
@@ -34,36 +44,72 @@ def test_lemmas_of_the_runtime(tmp_path: Path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
-def test_what_sums_read(arithmetic, tmp_path):
+def test_sums(arithmetic, tmp_path):
+    """What they read, and for a short one that nothing overflows."""
     needs_esbmc()
-    plan = generated(tmp_path, "all", arithmetic, 8)
-    sums = esbmc.sums(plan, tmp_path) if plan.floating else []
+    plan = generated(tmp_path, "all", arithmetic, 4)
+    sums = esbmc.sums(plan, tmp_path) if plan.floating else esbmc.overflow(plan, tmp_path, "--z3")
     assert all(verdict.proved for verdict in [*sums, esbmc.reads(plan, tmp_path), esbmc.ring(tmp_path)])
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("name", remembering())
+def test_what_modes_keep(name, tmp_path):
+    needs_esbmc()
+    for verdict in esbmc.means(generated(tmp_path, name, "q15", 0), tmp_path):
+        assert verdict.proved, verdict
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("arithmetic", ["q15", "q31"])
-@pytest.mark.parametrize("name", controllers(8))
+@pytest.mark.parametrize("name", (*controllers(8), *remembering()))
 def test_any_call_from_any_state(name, arithmetic, tmp_path):
     needs_eva()
     plan = generated(tmp_path, name, arithmetic, 24)
     assert eva.check(plan, tmp_path).proved
 
 
+def test_any_call_from_any_state_with_modes(tmp_path):
+    needs_eva()
+    assert eva.check(generated(tmp_path, "all_modes", "q15", 0), tmp_path).proved
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("target, arithmetic", KERNELS)
+def test_any_call_in_the_c_of_a_cores_sums(target, arithmetic, tmp_path):
+    needs_eva()
+    kernels = Kernels(target)
+    plan = generated(tmp_path, "all", arithmetic, 27, kernels)
+    assert eva.check(plan, tmp_path, kernels).proved
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fault", AHEAD_FAULTS)
+def test_a_fault_in_the_sums_that_look_ahead_is_caught(fault, tmp_path):
+    needs_eva()
+    kernels = Kernels("rv32imac")
+    plan = generated(tmp_path, "all", "q15", 27, kernels)
+    pattern, by = AHEAD_FAULTS[fault]
+    text, places = re.subn(pattern, by, (tmp_path / "foc_ahead.h").read_text())
+    assert places
+    (tmp_path / "foc_ahead.h").write_text(text)
+    assert not eva.check(plan, tmp_path, kernels).proved
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_caught(fault, tmp_path):
-    plan = generated(tmp_path, "all", "q15", 8)
+    plan = generated(tmp_path, FAULTS[fault].controller, "q15", 8)
     sow(tmp_path, fault)
-    if esbmc.program() and FAULTS[fault].esbmc:
-        assert not FAULTS[fault].esbmc(plan, tmp_path).proved
+    if esbmc.program():
+        assert not first_objection(FAULTS[fault].esbmc(plan, tmp_path)).proved
     if eva.program():
         assert not eva.check(plan, tmp_path).proved
     if not (esbmc.program() or eva.program()):
         pytest.skip("neither ESBMC nor Frama-C is on this machine")
 
 
-@pytest.mark.parametrize("name", controllers(8))
+@pytest.mark.parametrize("name", (*controllers(8), *remembering()))
 @pytest.mark.parametrize("arithmetic", ["q15", "q31"])
 def test_every_member_of_a_state_has_its_interval(name, arithmetic, tmp_path):
     """A member that the proofs do not know would be one that nothing is assumed or asked of."""

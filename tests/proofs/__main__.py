@@ -10,46 +10,62 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from focgen.codegen.kernels import Kernels
 from tests.proofs import esbmc, eva
 from tests.proofs.faults import FAULTS, sow
-from tests.proofs.spread import ARITHMETICS, controllers, generated
-from tests.proofs.verdict import Verdict
+from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
+from tests.proofs.verdict import Verdict, first_objection
 
-LENGTH, SHORT, FLOATS = 256, 8, 32  # memory lengths: Eva's, ESBMC's sums, Eva's floats
+LENGTH, SLOTS, FLOATS = (
+    256,
+    64,
+    32,
+)  # memory lengths: of all; of sums asked about slot by slot; of Eva's floats
 FIXED = ("q15", "q31")
+SUMS = {"q15": (16, "--boolector"), "q31": (6, "--z3"), "f32": (8, "--boolector"), "f64": (8, "--boolector")}
+"""Lengths at which ESBMC answers within half a minute of sums, and the solver that does."""
 
 
 def by_esbmc(folder: Path) -> Iterator[tuple[str, Verdict]]:
     """Lemmas of the runtime, then of controllers in every arithmetic."""
     for arithmetic in ARITHMETICS:
-        plan = generated(folder, "all", arithmetic, SHORT)
+        length, solver = SUMS[arithmetic]
+        plan = generated(folder, "all", arithmetic, length)
         if arithmetic == "q15":
             yield "runtime", esbmc.ring(folder)
             yield "runtime", esbmc.usable(folder)
-        if arithmetic in FIXED:
-            yield f"all {arithmetic}", esbmc.carry(plan, folder)
-        for verdict in esbmc.sums(plan, folder) if plan.floating else ():
-            yield f"all {arithmetic}, L = {SHORT}", verdict
-    for arithmetic in ARITHMETICS:
+        asked = esbmc.sums(plan, folder) if plan.floating else esbmc.overflow(plan, folder, solver)
+        for verdict in asked:
+            yield f"all {arithmetic}, L = {length}", verdict
         plan = generated(folder, "inverse", arithmetic, LENGTH)
         yield f"inverse {arithmetic}", esbmc.reads(plan, folder)
+    for arithmetic in FIXED:
+        for name in ("filter", "all"):
+            yield f"{name} {arithmetic}", esbmc.carry(generated(folder, name, arithmetic, LENGTH), folder)
+        for name in remembering():
+            for verdict in esbmc.means(generated(folder, name, arithmetic, 0), folder):
+                yield f"{name} {arithmetic}", verdict
 
 
 def by_eva(folder: Path) -> Iterator[tuple[str, Verdict]]:
     """Whole controllers; the floating forms' accesses and shifts at a shorter memory."""
-    for name in controllers(LENGTH):
+    for name in (*controllers(LENGTH), *remembering()):
         for arithmetic in ARITHMETICS:
             plan = generated(folder, name, arithmetic, LENGTH if arithmetic in FIXED else FLOATS)
             yield f"{name} {arithmetic}", eva.check(plan, folder)
+    for target, arithmetic in KERNELS:
+        kernels = Kernels(target)
+        plan = generated(folder, "all", arithmetic, FLOATS if arithmetic == "f32" else SLOTS, kernels)
+        yield f"all {arithmetic}, C for {target}", eva.check(plan, folder, kernels)
 
 
 def faulty(folder: Path) -> Iterator[tuple[str, Verdict]]:
     """Seeded faults; here a verdict without an objection is the failure."""
-    for name in FAULTS:
-        plan = generated(folder, "all", "q15", SHORT)
+    for name, fault in FAULTS.items():
+        plan = generated(folder, fault.controller, "q15", 8)
         sow(folder, name)
-        if esbmc.program() and FAULTS[name].esbmc:
-            yield name, FAULTS[name].esbmc(plan, folder)
+        if esbmc.program():
+            yield name, first_objection(fault.esbmc(plan, folder))
         if eva.program():
             yield name, eva.check(plan, folder)
 

@@ -16,15 +16,21 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.manifest import flags
 from focgen.codegen.state import members
 from focgen.plan.model import Plan
 from tests.proofs.harness import inside, reachable
-from tests.proofs.spread import ARITHMETICS, controllers, generated
+from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
 
 FLAGS = """-std=c99 -O1 -g -ffp-contract=off
     -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all""".split()
-_LENGTH = 11  # short, so that rings wrap often
+_SHORT, _AHEAD = 11, 27  # past samples: few, so that rings wrap often; as few as looking ahead takes
+CASES = [
+    *((name, a, _SHORT, PORTABLE) for name in (*controllers(_SHORT), *remembering()) for a in ARITHMETICS),
+    *(("all", a, _AHEAD, Kernels(target)) for target, a in KERNELS),
+]
+"""What is fuzzed: a controller, its arithmetic and length, and its form of the sums."""
 _DEFAULT = 600.0  # seconds in all
 
 
@@ -40,7 +46,7 @@ class Fuzzed:
     found: str
 
 
-def target(plan: Plan) -> str:
+def target(plan: Plan, kernels: Kernels = PORTABLE) -> str:
     """The C of a target for libFuzzer."""
     name, signal = plan.name, plan.output.ctype
     sched = ", argument(&at, end)" if plan.schedule else ""
@@ -48,16 +54,16 @@ def target(plan: Plan) -> str:
         "name": name,
         "signal": signal,
         "sched": sched,
-        "oracle": "\n".join(_oracle(plan)),
+        "oracle": "\n".join(_oracle(plan, kernels)),
         "flags": sum(flags(plan).values()),
     }
 
 
-def _oracle(plan: Plan) -> list[str]:
-    ranges, lines = reachable(plan), []
-    for m in members(plan):
+def _oracle(plan: Plan, kernels: Kernels) -> list[str]:
+    ranges, lines = reachable(plan, kernels), []
+    for m in members(plan, kernels):
         asked = []
-        if ranges[m.name]:
+        if ranges.get(m.name):
             asked.append(inside(m, ranges[m.name]))
         if m.ctype in ("float", "double"):
             asked.append("$ - $ == 0")  # neither NaN nor infinite
@@ -128,9 +134,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *at, size_t size)
 """
 
 
-def fuzz(plan: Plan, folder: Path, seconds: float, seed: int = 1) -> Fuzzed:
+def fuzz(plan: Plan, folder: Path, seconds: float, seed: int = 1, kernels: Kernels = PORTABLE) -> Fuzzed:
     """Build the target of a plan whose C is in ``folder`` and run it for so long."""
-    (folder / "target.c").write_text(target(plan))
+    (folder / "target.c").write_text(target(plan, kernels))
     program = folder / "target.exe"
     subprocess.run(["clang", *FLAGS, str(folder / "target.c"), "-o", str(program)], check=True, cwd=folder)
     time = f"-max_total_time={max(1, round(seconds))}"
@@ -143,7 +149,7 @@ def fuzz(plan: Plan, folder: Path, seconds: float, seed: int = 1) -> Fuzzed:
     coverage = re.findall(r"cov: (\d+)", said)
     fault = re.search(r"(runtime error: .*|ERROR: \S+: .*|SUMMARY: .*)", said)
     found = (fault[1] if fault else f"exit status {done.returncode}") if done.returncode else ""
-    name = f"{plan.name} {plan.arithmetic}"
+    name = f"{plan.name} {plan.arithmetic}" + (f", C for {kernels.target}" if kernels.target else "")
     return Fuzzed(name, int(executions[1]) if executions else 0, int(coverage[-1]) if coverage else 0, found)
 
 
@@ -155,15 +161,14 @@ def main() -> int:
     if not shutil.which("clang"):
         print("fuzzing needs clang with libFuzzer, which is not on this machine (Debian: apt install clang)")
         return 1
-    cases = [(name, arithmetic) for name in controllers(_LENGTH) for arithmetic in ARITHMETICS]
     results = []
-    for name, arithmetic in cases:
+    for name, arithmetic, length, kernels in CASES:
         with tempfile.TemporaryDirectory(prefix="focgen-fuzz-") as scratch:
-            plan = generated(Path(scratch), name, arithmetic, _LENGTH)
-            one = fuzz(plan, Path(scratch), seconds / len(cases))
+            plan = generated(Path(scratch), name, arithmetic, length, kernels)
+            one = fuzz(plan, Path(scratch), seconds / len(CASES), kernels=kernels)
         results.append(one)
         said = one.found or "clean"
-        print(f"{one.name:<12} {one.executions:>10} sequences, {one.coverage:>4} edges: {said}")
+        print(f"{one.name:<30} {one.executions:>10} sequences, {one.coverage:>4} edges: {said}")
         sys.stdout.flush()
     print(f"{sum(r.executions for r in results)} sequences in all")
     return int(any(r.found for r in results))

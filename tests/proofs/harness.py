@@ -8,47 +8,40 @@ part of what is proved.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from focgen.codegen.banks import means
+from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import literal
 from focgen.codegen.state import Member, members
-from focgen.plan.formats import limit
-from focgen.plan.model import Format, Plan
+from focgen.plan.formats import Interval, limit, span
+from focgen.plan.model import Plan
 
 
-@dataclass(frozen=True)
-class Interval:
-    """What a member can be, both ends included; None: any value of its type."""
-
-    low: int
-    high: int
-
-
-def reachable(plan: Plan) -> dict[str, Interval | None]:
-    """The interval of every member of the state. Raises KeyError for a member that is not known here."""
-    known = {"error_now": Interval(0, plan.error_lags), "flags": None, "starting": Interval(0, 1)}
-    if plan.feedback:
-        known["filtered_now"] = Interval(0, plan.filtered_lags)
+def reachable(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, Interval | None]:
+    """The interval of every member of the state; of sums that look ahead :mod:`tests.proofs.lookahead` tells.
+    Raises KeyError for a member that is not known here.
+    """
+    kept = [m.name for m in members(plan, kernels) if not m.name.endswith("_ahead")]
+    known = {"flags": None, "starting": Interval(0, 1)}
+    known |= {f"{ring}_now": Interval(0, kernels.slots(plan, ring) - 1) for ring in ("error", "filtered")}
     if plan.floating:
-        return {m.name: known.get(m.name) for m in members(plan)}
+        return {name: known.get(name) for name in kept}
     half = (1 << plan.narrow) >> 1
     worst = {proof.node: proof.worst for proof in plan.proofs}
+    for table in plan.sums:
+        each = {means(table, i): worst[f"{table.name} bank {i} mean"] for i in range(len(table.banks))}
+        known |= {name: _around(most) for name, most in each.items()}
+    remembered = plan.feedback and plan.feedback.table.banks
     known |= {
-        "error": _hull(plan.error),
-        "filtered": None,
+        "error": span(plan.error).hull(0),
+        "filtered": _around(worst["v"]) if remembered else None,
         "carry": Interval(-half, half),
-        "integral": _hull(plan.integrator.state, zero=False) if plan.integrator else None,
+        "integral": span(plan.integrator.state) if plan.integrator else None,
         "increment": _around(_room(plan)) if plan.integrator else None,
         "resting": None if plan.feedback else _around(worst["v"]),
-        "inner": _hull(plan.inner.state) if plan.inner else None,
+        "inner": span(plan.inner.state).hull(0) if plan.inner else None,
         "inner_input": _around(worst["rest total"]) if plan.inner else None,
     }
-    return {m.name: known[m.name] for m in members(plan)}
-
-
-def _hull(form: Format, zero: bool = True) -> Interval:
-    low, high = int(form.low), int(form.high)
-    return Interval(min(low, 0), max(high, 0)) if zero else Interval(low, high)
+    return {name: known[name] for name in kept}
 
 
 def _room(plan: Plan) -> int:
@@ -62,22 +55,29 @@ def _around(worst: int) -> Interval:
     return Interval(-worst, worst)
 
 
-def harness(plan: Plan, dialect: str, asked: tuple[str, ...] | None = None, call: str = "any") -> str:
-    """The C of a harness. ``dialect``: "eva" or "esbmc". It makes one ``call`` ("init", "reset", "track",
-    "step" or any of them) and asks about the members ``asked`` afterwards, by default about all that cannot
-    be any value of their type.
-    """
-    speak = {"eva": _Eva(), "esbmc": _Esbmc()}[dialect]
+def harness(plan: Plan, asked: set[str]) -> str:
+    """The C of a harness: any call from any state; the members ``asked`` are within their intervals again."""
     ranges = reachable(plan)
-    lines = [f'#include "{plan.name}.c"', speak.head, f"static {plan.name}_state s;", "int main(void)\n{"]
-    lines += [line for m in members(plan) for line in _every(m, speak.choose(m, ranges[m.name]))]
-    lines += _calls(plan, speak, call)
-    about = [m for m in members(plan) if ranges[m.name] and (asked is None or m.name in asked)]
-    lines += [line for m in about for line in _every(m, speak.ask(m, ranges[m.name]))]
-    return "\n".join([*lines, "    return 0;", "}", ""])
+    anything = [line for m in members(plan) for line in every(m, chosen(m, ranges[m.name]))]
+    again = [line for m in members(plan) if m.name in asked for line in every(m, within(m, ranges[m.name]))]
+    cases = [f"    case {i}: {one} break;" for i, one in enumerate(calls(plan).values())]
+    switch = [f"    switch ({any_of('uint8_t')} & 3) {{", *cases, "    }"]
+    return program(plan, [function("int main", [*anything, *arguments(plan), *switch, *again])])
 
 
-def _every(member: Member, statement: str) -> list[str]:
+def program(plan: Plan, functions: list[str]) -> str:
+    """A file that has the controller in it, and a state."""
+    head = [f'#include "{plan.name}.c"', '#include "__fc_builtin.h"', f"static {plan.name}_state s;"]
+    return "\n".join([*head, *functions, ""])
+
+
+def function(named: str, lines: list[str], takes: str = "void") -> str:
+    """A C function."""
+    ends = ["    return 0;"] if named.startswith("int") else []
+    return "\n".join([f"{named}({takes})", "{", *lines, *ends, "}"])
+
+
+def every(member: Member, statement: str) -> list[str]:
     """A statement about ``s.MEMBER``, for each of its slots."""
     if not member.array:
         return ["    " + statement.replace("$", f"s.{member.name}")]
@@ -85,64 +85,46 @@ def _every(member: Member, statement: str) -> list[str]:
     return [loop, "        " + statement.replace("$", f"s.{member.name}[i]"), "    }"]
 
 
-def _calls(plan: Plan, speak, call: str) -> list[str]:
-    signal, name = plan.output.ctype, plan.name
-    calls = {
+def arguments(plan: Plan) -> list[str]:
+    """Declarations of a, b and c: any values of the signals' type."""
+    signal = plan.output.ctype
+    return [f"    {signal} {argument} = {any_of(signal)};" for argument in "abc"]
+
+
+def calls(plan: Plan) -> dict[str, str]:
+    """A call of each function that changes a state, by what it does."""
+    name = plan.name
+    return {
         "init": f"{name}_init(&s);",
         "reset": f"{name}_reset(&s, a, b, c);",
         "track": f"{name}_track(&s, a);",
         "step": f"(void){name}_step(&s, a, b{', c' if plan.schedule else ''});",
     }
-    lines = [f"    {signal} {argument} = {speak.any(signal)};" for argument in "abc"]
-    if call != "any":
-        return [*lines, f"    {calls[call]}"]
-    cases = [f"    case {i}: {one} break;" for i, one in enumerate(calls.values())]
-    return [*lines, f"    switch ({speak.any('uint8_t')} & 3) {{", *cases, "    }"]
 
 
-class _Eva:
-    """Frama-C's abstract interpreter."""
-
-    head = '#include "__fc_builtin.h"'
-
-    def any(self, ctype: str) -> str:
-        if ctype in ("float", "double"):
-            return f"Frama_C_{ctype}_interval({_ends(ctype)})"
-        return self.between(ctype, *_type_range(ctype))
-
-    def between(self, ctype: str, low: int, high: int) -> str:
-        kind = "long_long_" if ctype == "int64_t" else ""
-        low, high = (literal(end, ctype) for end in (low, high))
-        return f"({ctype})Frama_C_{kind}interval({low}, {high})"
-
-    def choose(self, member: Member, interval: Interval | None) -> str:
-        ends = interval and (interval.low, interval.high)
-        return f"$ = {self.between(member.ctype, *ends) if ends else self.any(member.ctype)};"
-
-    def ask(self, member: Member, interval: Interval) -> str:
-        return f"/*@ assert {member.name}: {interval.low} <= $ <= {interval.high}; */"
+def any_of(ctype: str) -> str:
+    """Any value of a type."""
+    if ctype in ("float", "double"):
+        return f"Frama_C_{ctype}_interval({_ends(ctype)})"
+    return between(ctype, *_type_range(ctype))
 
 
-class _Esbmc:
-    """A bounded model checker; the loops of a step have known bounds."""
+def between(ctype: str, low: int, high: int) -> str:
+    """Any value from ``low`` to ``high``."""
+    kind = "long_long_" if ctype == "int64_t" else ""
+    low, high = (literal(end, ctype) for end in (low, high))
+    return f"({ctype})Frama_C_{kind}interval({low}, {high})"
 
-    head = (
-        "\n".join(
-            f"{ctype} nondet_{ctype}(void);"
-            for ctype in ("uint8_t", "uint16_t", "int16_t", "int32_t", "int64_t", "float", "double")
-        )
-        + "\nvoid __ESBMC_assume(_Bool);\nvoid __ESBMC_assert(_Bool, const char *);"
-    )
 
-    def any(self, ctype: str) -> str:
-        return f"nondet_{ctype}()"
+def chosen(member: Member, interval: Interval | None) -> str:
+    """``$``, a member or a slot of it, is any value of its interval."""
+    value = between(member.ctype, interval.low, interval.high) if interval else any_of(member.ctype)
+    return f"$ = {value};"
 
-    def choose(self, member: Member, interval: Interval | None) -> str:
-        chosen = f"$ = {self.any(member.ctype)};"
-        return chosen + (f" __ESBMC_assume({inside(member, interval)});" if interval else "")
 
-    def ask(self, member: Member, interval: Interval) -> str:
-        return f'__ESBMC_assert({inside(member, interval)}, "{member.name}");'
+def within(member: Member, interval: Interval) -> str:
+    """``$`` is within its interval."""
+    return f"/*@ assert {member.name}: {interval.low} <= $ <= {interval.high}; */"
 
 
 def inside(member: Member, interval: Interval) -> str:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from focgen.codegen.generate import folder_files
+from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.control.controller import Controller, ControllerRanges, GainSchedule
 from focgen.control.files import controller_text
 from focgen.fractional.transfer import TransferFunction
@@ -14,6 +15,8 @@ from focgen.plan.build import build_plan
 from focgen.plan.model import Plan
 
 ARITHMETICS = ("q15", "q31", "f32", "f64")
+KERNELS = (("rv32imac", "q15"), ("rv32imac", "q31"), ("cortex-m4", "f32"), ("cortex-m0plus", "q31"))
+"""A target and an arithmetic for each form of the cores' sums in C: looking ahead, and by halves."""
 _POINTS = (0.05, 0.1, 0.2, 0.25)
 _GAINS = tuple((85.66 * p + 6.692) / (0.0015 + 0.345 * p) for p in _POINTS)
 
@@ -42,19 +45,23 @@ def controllers(length: int) -> dict[str, Controller]:
 
 
 def remembering() -> dict[str, Controller]:
-    """The same with an exponential memory: in the numerator alone, and in everything."""
+    """The same with an exponential memory: in the numerator alone, and in everything; and "slow_modes", which
+    remembers changes (an order above 1) for so long that every arithmetic needs its bank for slow modes.
+    """
     found = controllers(24)
+    form = dict(memory="exponential", tolerance=1e-2, horizon=2000)
+    names = {name: f"{name}_modes" for name in ("inverse", "all")}
+    changes = TransferFunction([(0.02, 1.3), (1.0, 0.0)])
+    slow = replace(found["filter"], name="slow_modes", transfer=changes, **{**form, "horizon": 1_000_000})
     return {
-        f"{name}_modes": replace(
-            found[name], name=f"{name}_modes", memory="exponential", tolerance=1e-2, horizon=2000
-        )
-        for name in ("inverse", "all")
+        **{called: replace(found[name], name=called, **form) for name, called in names.items()},
+        "slow_modes": slow,
     }
 
 
-def generated(folder: Path, name: str, arithmetic: str, length: int) -> Plan:
+def generated(folder: Path, name: str, arithmetic: str, length: int, kernels: Kernels = PORTABLE) -> Plan:
     """Write one of them into a folder, under its own name, and return its plan."""
     controller = {**controllers(length), **remembering()}[name]
     plan = build_plan(controller, arithmetic, name=name)
-    write_files(folder, folder_files(plan, controller_text(controller).encode()))
+    write_files(folder, folder_files(plan, controller_text(controller).encode(), kernels=kernels))
     return plan

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -18,3 +19,13 @@ class Verdict:
     def proved(self) -> bool:
         """Whether nothing was found."""
         return not self.found
+
+
+def first_objection(verdicts: Iterable[Verdict]) -> Verdict:
+    """The first verdict with an objection, or the last one, with the time of all until then."""
+    seconds = 0.0
+    for one in verdicts:
+        seconds += one.seconds
+        if one.found:
+            break
+    return replace(one, seconds=seconds)
