@@ -22,7 +22,7 @@ from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.state import carries
 from focgen.plan.model import Plan
 from tests.proofs import lookahead
-from tests.proofs.harness import harness, reachable
+from tests.proofs.harness import apart, harness, reachable
 from tests.proofs.verdict import Verdict
 
 _OPTIONS = """-machdep gcc_x86_32 -warn-special-float none -eva -eva-slevel 100000
@@ -45,6 +45,7 @@ def check(plan: Plan, folder: Path, kernels: Kernels = PORTABLE, seconds: float 
     asked = {name for name, interval in reachable(plan, kernels).items() if interval} - elsewhere(plan)
     own = kernels.headers(plan)
     text = lookahead.harness(plan, kernels, asked) if own else harness(plan, asked)
+    (folder / "apart.c").write_text(apart(plan, (folder / f"{plan.name}.c").read_text(), kernels))
     (folder / "eva.c").write_text(text)
     began = time.perf_counter()
     try:

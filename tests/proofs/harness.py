@@ -8,6 +8,8 @@ part of what is proved.
 
 from __future__ import annotations
 
+import re
+
 from focgen.codegen.banks import means
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import literal
@@ -66,9 +68,20 @@ def harness(plan: Plan, asked: set[str]) -> str:
 
 
 def program(plan: Plan, functions: list[str]) -> str:
-    """A file that has the controller in it, and a state."""
-    head = [f'#include "{plan.name}.c"', '#include "__fc_builtin.h"', f"static {plan.name}_state s;"]
+    """A file that has the controller in it, its arrays :func:`apart`, and a state."""
+    head = ['#include "apart.c"', '#include "__fc_builtin.h"', f"static {plan.name}_state s;"]
     return "\n".join([*head, *functions, ""])
+
+
+def apart(plan: Plan, text: str, kernels: Kernels = PORTABLE) -> str:
+    """A controller's C in which every array of its state is an object of its own: beyond the end of an array
+    in a struct stands the next member, and a verifier finds nothing wrong with reading that.
+    """
+    arrays = [m for m in members(plan, kernels) if m.array]
+    own = [f"static {m.ctype} own_{m.name}[{m.array}];" for m in arrays]
+    names = "|".join(m.name for m in arrays)
+    header = f'#include "{plan.name}.h"\n'
+    return re.sub(rf"\bs->({names})\b", r"own_\1", text.replace(header, header + "\n".join([*own, ""])))
 
 
 def function(named: str, lines: list[str], takes: str = "void") -> str:
@@ -78,11 +91,11 @@ def function(named: str, lines: list[str], takes: str = "void") -> str:
 
 
 def every(member: Member, statement: str) -> list[str]:
-    """A statement about ``s.MEMBER``, for each of its slots."""
+    """A statement about a member, for each of its slots."""
     if not member.array:
         return ["    " + statement.replace("$", f"s.{member.name}")]
     loop = f"    for (unsigned i = 0; i < {member.array}; i++) {{"
-    return [loop, "        " + statement.replace("$", f"s.{member.name}[i]"), "    }"]
+    return [loop, "        " + statement.replace("$", f"own_{member.name}[i]"), "    }"]
 
 
 def arguments(plan: Plan) -> list[str]:

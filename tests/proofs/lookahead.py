@@ -90,7 +90,7 @@ def _switch(now: str, looking: list[Member], sums: dict[str, tuple[State, ...]],
         cases.append(f"    case {phase}:")
         for m in looking:
             of = [
-                statement(m, one).replace("$", f"s.{m.name}[{i}]")
+                statement(m, one).replace("$", f"own_{m.name}[{i}]")
                 for i, one in enumerate(sums[m.name][phase])
             ]
             cases += [f"        {line}" for line in of]
