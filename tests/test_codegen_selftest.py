@@ -222,6 +222,44 @@ def test_the_command_writes_it_on_request_only(tmp_path, capsys):
     assert "lacks spba_selftest.h" in capsys.readouterr().err
 
 
+def test_generated_again_without_one_it_is_gone_and_nothing_else(tmp_path):
+    """Nor headers that only the form before needed; what somebody else wrote or changed stays."""
+    again = lambda **how: generate(CONTROLLERS["spba"], tmp_path, "q15", **how)  # noqa: E731
+    again(selftest=True, memory="exponential", tolerance=0.05, horizon=1000)
+    for own in ("mine_selftest.c", "notes.txt", "foc_mine.h"):
+        (tmp_path / own).write_text("mine")
+    assert (tmp_path / "foc_memory.h").is_file() and (tmp_path / "spba_selftest.c").is_file()
+    generate(CONTROLLERS["filter"], tmp_path, "q15")  # another controller takes the manifest, no file
+    assert (tmp_path / "spba_selftest.c").is_file() and (tmp_path / "foc_memory.h").is_file()
+    again(selftest=True, target="cortex-m4")
+    changed = tmp_path / "foc_ahead.h"
+    changed.write_text(changed.read_text() + "/* mine */")
+    made = again()
+    here = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
+    kept = {
+        "mine_selftest.c",
+        "notes.txt",
+        "foc_mine.h",
+        "foc_ahead.h",
+        "foc_memory.h",
+        "filter.c",
+        "filter.h",
+    }
+    assert here == {*made.files, *kept}
+    assert verify(tmp_path, 200).holds
+
+
+@pytest.mark.parametrize(
+    "content", ["", "[]", "{", '{"name": "spba", "selftest": {}, "inputs": {"../x": ""}}']
+)
+def test_a_manifest_that_is_none_removes_nothing_outside(tmp_path, content):
+    (tmp_path / "x").write_text("mine")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "manifest.json").write_text(content)
+    generate(CONTROLLERS["spba"], tmp_path / "out", "q15")
+    assert (tmp_path / "x").is_file()
+
+
 def test_the_manifest_says_what_it_takes(sound):
     for arithmetic in ARITHMETICS:
         folder = sound / f"spba_{arithmetic}"

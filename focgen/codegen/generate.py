@@ -10,6 +10,7 @@ from typing import Any
 from focgen.codegen.folder import example_context, readme_context
 from focgen.codegen.header import header_context
 from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels, runtime_files
+from focgen.codegen.leftovers import leftovers
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.codegen.names import check_name
 from focgen.codegen.render import render
@@ -50,7 +51,8 @@ def generate(
     horizon: int | None = None,
     selftest: bool = False,
 ) -> Generated:
-    """Write C for a controller into the folder ``out``, whole or not at all.
+    """Write C for a controller into the folder ``out``, whole or not at all; what an earlier run wrote there
+    for it and this one does not, goes.
 
     ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15),
     ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one, ``tolerance`` (1e-8 … 0.1)
@@ -70,7 +72,10 @@ def generate(
     called = check_name(made.name if name is None else name, where)
     plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon)
     files = folder_files(plan, text, selftest, kernels)
+    old = leftovers(Path(out), called, files)
     write_files(out, files)
+    for path in old:
+        path.unlink(missing_ok=True)
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
 
 

@@ -1,0 +1,38 @@
+"""Files of an earlier run of ``generate`` in the same folder, which the present one does not replace."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from pathlib import Path
+
+from focgen.codegen.manifest import sha256
+
+
+def leftovers(folder: Path, name: str, files: Collection[str]) -> tuple[Path, ...]:
+    """What the manifest in ``folder`` says was written for the controller ``name`` and is not among the new
+    ``files``: a self-test, and headers of the runtime that are still as they were written.
+
+    Files of a controller of another name stay, and so does whatever no manifest tells of.
+    """
+    manifest = _manifest(folder)
+    if manifest.get("name") != name:
+        return ()
+    test = [f"{name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
+    inputs = manifest.get("inputs")
+    written = inputs.items() if isinstance(inputs, dict) else ()
+    headers = [file for file, digest in written if file.startswith("foc_") and _is(folder / file, digest)]
+    old = [folder / file for file in (*test, *headers) if file not in files and Path(file).name == file]
+    return tuple(path for path in old if path.is_file())
+
+
+def _manifest(folder: Path) -> dict:
+    try:
+        found = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _is(path: Path, digest: str) -> bool:
+    return path.is_file() and sha256(path.read_bytes()) == digest
