@@ -259,6 +259,18 @@ def test_an_avr_says_the_same(arithmetic, tmp_path):
     assert verify(folder, 300, target="avr").targets["avr"].mismatches > 0
 
 
+@pytest.mark.parametrize("arithmetic", ("q15", "q31", "f32"))
+def test_the_self_test_runs_on_an_avr(arithmetic, tmp_path):
+    """What ``verify`` says of it is what the emulated board says; a history that is not kept shows."""
+    folder = generate(paper_controller(12), tmp_path, arithmetic, selftest=True).folder
+    if avr.missing(read_folder(folder).plan):
+        pytest.skip(avr.missing(read_folder(folder).plan))
+    assert verify(folder, 100, target="avr").targets["avr"].selftest == 0
+    path = folder / "spba.c"
+    path.write_text(path.read_text().replace("s->error[s->error_now] = e;", "(void)e;"))
+    assert avr.AvrLibrary(read_folder(folder).plan, folder, selftest=True).selftest() > 0
+
+
 def test_an_avr_has_no_double(tmp_path):
     folder = generate(paper_controller(8), tmp_path, "f64").folder
     assert "32 bits" in verify(folder, 100, target="avr").targets["avr"].skipped

@@ -37,6 +37,8 @@ HOW = "cycles counted by simavr, from the call of the step to its return"
 _RAM = 8192 - 256  # bytes; some for the stack and for what feeds the step
 _DATA = 0x80_0000  # where ELF files of AVRs place memory
 _END_OF_LANE = 8
+_STEP_CYCLES, _TEST_CYCLES = 200, 20_000  # millions that a step and a self-test may take
+_TEST_SECONDS = 1200.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +85,13 @@ def _simulator() -> Path | None:
 
 class AvrLibrary:
     """The C of a plan on an emulated ATmega2560; ``flash``: bytes that it adds to an empty program.
+    ``selftest``: whether its folder has NAME_selftest.c, which is a program of its own.
 
     Raises BuildError where it does not compile.
     """
 
-    def __init__(self, plan: Plan, folder: Path):
-        self.plan, self.folder = plan, folder
+    def __init__(self, plan: Plan, folder: Path, selftest: bool = False):
+        self.plan, self.folder, self.test = plan, folder, b""
         with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
             feeder, idle = Path(scratch) / "feeder.c", Path(scratch) / "idle.c"
             feeder.write_text(render("avr.c.jinja", driver_context(plan)))
@@ -98,6 +101,9 @@ class AvrLibrary:
             self.object = _compiled([own], folder, "-c")
             around = _flash(_compiled([feeder], folder, "-c")) - _flash(_compiled([idle], folder, "-c"))
             self.flash = _flash(self.elf) - _flash(_compiled([idle], folder)) - around
+            if selftest:
+                feeder.write_text(render("avr_selftest.c.jinja", driver_context(plan)))
+                self.test = _compiled([feeder, own, folder / f"{plan.name}_selftest.c"], folder)
         self._symbols = _symbols(self.elf)
         signal, increment = (DTYPES[f.ctype]().itemsize for f in (plan.output, plan.increment))
         self._in, self._out = 7 * signal + 1, signal + increment + 1
@@ -110,9 +116,11 @@ class AvrLibrary:
         """Run raw inputs. Raises TargetFault where the program crashes or does not return."""
         lanes = range(scenario.lanes)
         inputs = b"".join(self._records(scenario, lane) for lane in lanes)
-        found = self._simulated(inputs, scenario.samples * scenario.lanes)
+        place, state = self._symbols["tried"]
+        places = [self._symbols["cell"][0], self._in, self._out, place, state]
+        seconds = 60.0 + scenario.samples * scenario.lanes * 20.0
+        found = _simulated(self.elf, inputs, places, _STEP_CYCLES, seconds)
         size, count = self._out + 4, scenario.samples
-        state = self._symbols["tried"][1]
         rows, states, at = [], [], 0
         for _ in lanes:
             rows.append(np.frombuffer(found[at : at + count * size], self._kind()))
@@ -124,6 +132,14 @@ class AvrLibrary:
         trace = Trace(table["u"].copy(), d.copy(), table["flags"].copy())
         return AvrRun(Answers(trace, tuple(states)), table["cycles"].astype(np.int64),
                       struct.unpack("<I", found[at : at + 4])[0])  # fmt: skip
+
+    def selftest(self) -> int:
+        """What NAME_selftest() returns there: 0, or the first step that is wrong. Raises TargetFault as
+        :meth:`run` does.
+        """
+        cell = _symbols(self.test)["cell"][0]
+        found = _simulated(self.test, b"\0", [cell, 1, 4, cell, 0], _TEST_CYCLES, _TEST_SECONDS)
+        return struct.unpack_from("<I", found)[0]
 
     def _kind(self) -> np.dtype:
         fields = [("u", DTYPES[self.plan.output.ctype]), ("d", DTYPES[self.plan.increment.ctype])]
@@ -140,23 +156,26 @@ class AvrLibrary:
         records["event"][-1] |= _END_OF_LANE
         return records.tobytes()
 
-    def _simulated(self, inputs: bytes, samples: int) -> bytes:
-        cell, (state, size), free = self._symbols["cell"][0], self._symbols["tried"], self._symbols["_end"][0]
-        with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-            base = Path(scratch)
-            (base / "avr.elf").write_bytes(self.elf)
-            (base / "inputs").write_bytes(inputs)
-            numbers = [cell, self._in, self._out, state, size, free]
-            command = [str(_simulator()), str(base / "avr.elf"), MCU, *map(str, numbers)]
-            try:
-                done = subprocess.run([*command, str(base / "inputs"), str(base / "results")],
-                                      capture_output=True, timeout=60.0 + samples * 20.0)  # fmt: skip
-            except subprocess.TimeoutExpired:
-                raise TargetFault(f"did not return within {60.0 + samples * 20.0:g} s") from None
-            if done.returncode:
-                said = {3: "did not return within 200 million cycles", 4: "crashed in the emulator"}
-                raise TargetFault(said.get(done.returncode, f"could not be emulated ({done.returncode})"))
-            return (base / "results").read_bytes()
+
+def _simulated(elf: bytes, inputs: bytes, places: list[int], most: int, seconds: float) -> bytes:
+    """What simavr gives for ``inputs``; ``places``: CELL, IN, OUT, STATE and SIZE of simavr_run.c, ``most``
+    million cycles an answer. Raises TargetFault where the program crashes or does not return.
+    """
+    numbers = [*places, _symbols(elf)["_end"][0], most]
+    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+        base = Path(scratch)
+        (base / "avr.elf").write_bytes(elf)
+        (base / "inputs").write_bytes(inputs)
+        command = [str(_simulator()), str(base / "avr.elf"), MCU, *map(str, numbers)]
+        try:
+            done = subprocess.run([*command, str(base / "inputs"), str(base / "results")],
+                                  capture_output=True, timeout=seconds)  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise TargetFault(f"did not return within {seconds:g} s") from None
+        if done.returncode:
+            said = {3: f"did not return within {most} million cycles", 4: "crashed in the emulator"}
+            raise TargetFault(said.get(done.returncode, f"could not be emulated ({done.returncode})"))
+        return (base / "results").read_bytes()
 
 
 def _compiled(sources: list[Path], folder: Path, *more: str) -> bytes:

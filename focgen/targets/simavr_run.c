@@ -1,13 +1,13 @@
 /* Feeds a program that simavr emulates with samples, and takes its results; see avr.c.jinja.
  *
- *   simavr_run ELF MCU CELL IN OUT STATE SIZE PAINT INPUTS RESULTS
+ *   simavr_run ELF MCU CELL IN OUT STATE SIZE PAINT LONGEST INPUTS RESULTS
  *
  * CELL: address of the inputs, IN bytes of them, OUT bytes of results behind; STATE, SIZE: the state; PAINT:
- * where free memory begins. INPUTS holds IN bytes a sample. RESULTS gets, a sample, OUT bytes and 4 of cycles, then
+ * where free memory begins; LONGEST: million cycles that an answer may take. INPUTS holds IN bytes a sample. RESULTS gets, a sample, OUT bytes and 4 of cycles, then
  * the state's bytes where the sample's event (the byte behind three signals) has bit 3; at the end 4 bytes: how
  * much of the stack was used.
  *
- * Ends with 3 where a step takes more than 200 million cycles, with 4 where the program crashes.
+ * Ends with 3 where an answer takes longer, with 4 where the program crashes.
  */
 #include <stdint.h>
 #include <stdio.h>
@@ -21,10 +21,9 @@
 #define GPIOR0 0x3e
 #define GPIOR1 0x4a
 #define PAINT 0xa5
-#define LONGEST 200000000u
 
 static uint32_t cell, in_bytes, out_bytes, state, state_bytes, paint;
-static uint64_t begin, cycles, asked;
+static uint64_t begin, cycles, asked, longest;
 static FILE *inputs, *results;
 static int finished;
 
@@ -71,7 +70,7 @@ int main(int argc, char **argv)
     uint32_t deepest;
     avr_t *avr;
 
-    if (argc != 11) {
+    if (argc != 12) {
         return 2;
     }
     memset(&firmware, 0, sizeof firmware);
@@ -80,7 +79,8 @@ int main(int argc, char **argv)
     }
     cell = (uint32_t)atol(argv[3]), in_bytes = (uint32_t)atol(argv[4]), out_bytes = (uint32_t)atol(argv[5]);
     state = (uint32_t)atol(argv[6]), state_bytes = (uint32_t)atol(argv[7]), paint = (uint32_t)atol(argv[8]);
-    inputs = fopen(argv[9], "rb"), results = fopen(argv[10], "wb");
+    longest = (uint64_t)atol(argv[9]) * 1000000u;
+    inputs = fopen(argv[10], "rb"), results = fopen(argv[11], "wb");
     if (inputs == 0 || results == 0) {
         return 2;
     }
@@ -97,7 +97,7 @@ int main(int argc, char **argv)
         if (now == cpu_Done || now == cpu_Crashed) {
             return 4;
         }
-        if (avr->cycle - asked > LONGEST) {
+        if (avr->cycle - asked > longest) {
             return 3;
         }
     }

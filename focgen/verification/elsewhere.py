@@ -64,12 +64,13 @@ def on_avr(read: GeneratedFolder, samples: int | None, seed: int) -> TargetResul
         return TargetResult(skipped=why)
     count = max(100, min(_MOST, _SOFT_BUDGET // (50 + plan.taps))) if samples is None else samples
     cases = cases_of(plan, count, seed, None if count >= _THOROUGH else max(count, _least(plan)))
-    library = avr.AvrLibrary(plan, read.path)
+    library = avr.AvrLibrary(plan, read.path, read.selftest)
     try:
         seen = [library.answers(plan, case.scenario) for case in cases.cases]
+        said = library.selftest() if read.selftest else None
     except TargetFault as how:
         return replace(failed(how), tools=(avr.tools(),))
-    return replace(judged(plan, cases, seen, header_scales(plan), read), tools=(avr.tools(),))
+    return replace(judged(plan, cases, seen, header_scales(plan), read), selftest=said, tools=(avr.tools(),))
 
 
 def default_samples(plan: Plan, one: Core) -> int:
