@@ -232,7 +232,7 @@ def test_generated_again_without_one_it_is_gone_and_nothing_else(tmp_path):
     generate(CONTROLLERS["filter"], tmp_path, "q15")  # another controller takes the manifest, no file
     assert (tmp_path / "spba_selftest.c").is_file() and (tmp_path / "foc_memory.h").is_file()
     again(selftest=True, target="cortex-m4")
-    changed = tmp_path / "foc_ahead.h"
+    changed = tmp_path / "foc_ahead_q15.h"
     changed.write_text(changed.read_text() + "/* mine */")
     made = again()
     here = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
@@ -240,7 +240,7 @@ def test_generated_again_without_one_it_is_gone_and_nothing_else(tmp_path):
         "mine_selftest.c",
         "notes.txt",
         "foc_mine.h",
-        "foc_ahead.h",
+        "foc_ahead_q15.h",
         "foc_memory.h",
         "filter.c",
         "filter.h",

@@ -90,9 +90,9 @@ def test_a_fault_in_the_sums_that_look_ahead_is_caught(fault, tmp_path):
     kernels = Kernels("rv32imac")
     plan = generated(tmp_path, "inverse", "q15", 60, kernels)  # so long that the end divides runs
     pattern, by = AHEAD_FAULTS[fault]
-    text, places = re.subn(pattern, by, (tmp_path / "foc_ahead.h").read_text())
+    text, places = re.subn(pattern, by, (tmp_path / "foc_ahead_q15.h").read_text())
     assert places
-    (tmp_path / "foc_ahead.h").write_text(text)
+    (tmp_path / "foc_ahead_q15.h").write_text(text)
     assert not eva.check(plan, tmp_path, kernels).proved
 
 

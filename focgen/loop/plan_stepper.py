@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from focgen.plan.execute import BankRun, Latest, clamp, kind_of, saturate, scheduled_gain
+from focgen.plan.execute import clamp, kind_of, saturate, scheduled_gain
 from focgen.plan.formats import shift
+from focgen.plan.histories import BankRun, Latest
 from focgen.plan.model import Format, Plan, Sum
 from focgen.plan.scenario import nearest_raw
 

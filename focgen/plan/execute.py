@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.plan.formats import shift
+from focgen.plan.histories import BankRun, Latest, Recursion
 from focgen.plan.model import (
     FLAG_HIGH,
     FLAG_INPUT,
     FLAG_LOW,
     FLAG_SCHEDULE,
-    Bank,
     Format,
     Plan,
     Schedule,
@@ -38,12 +38,7 @@ def execute(plan: Plan, scenario: Scenario) -> Trace:
 
 def _executed(plan: Plan, scenario: Scenario) -> Trace:
     """The same where every input of every step can be used."""
-    run = _Run(plan, scenario)
-    run.sums()
-    run.recursion()
-    run.gains()
-    u, d = run.output()
-    return Trace(u, d, run.flags(u))
+    return Run(plan, scenario).trace
 
 
 def kind_of(format_: Format) -> type:
@@ -73,8 +68,10 @@ class _Segment:
     u0: np.generic
 
 
-class _Run:
-    """One execution; attributes are signals of shape (lanes, samples)."""
+class Run:
+    """One execution; attributes are signals of shape (lanes, samples), but for what the last sample leaves:
+    ``carry``, ``inner`` and ``integral`` (lanes,), and the modes in ``memory``.
+    """
 
     def __init__(self, plan: Plan, scenario: Scenario):
         self.plan, self.scenario = plan, scenario
@@ -83,11 +80,18 @@ class _Run:
         self.ref = self._input(scenario.ref, plan.reference)
         self.meas = self._input(scenario.meas, plan.measurement)
         self.e = self.ref - self.meas
+        self.memory: dict[str, list[BankRun]] = {}
+        self.carry = self.inner = self.integral = np.zeros(self.shape[0], self.kind)
         self.segments = self._segments()
         self.starts = {(s.lane, s.start): s for s in self.segments}
         self.starting: dict[int, list[int]] = {}  # lanes by the sample at which a segment of theirs begins
         for s in self.segments:
             self.starting.setdefault(s.start, []).append(s.lane)
+        self.sums()
+        self.recursion()
+        self.gains()
+        u, self.d = self.output()
+        self.trace = Trace(u, self.d, self.flags(u))
 
     def _input(self, values, format_: Format) -> np.ndarray:
         values = np.asarray(values, dtype=self.kind)
@@ -138,7 +142,7 @@ class _Run:
     def _remembered(self, table: Sum) -> tuple[np.ndarray, dict]:
         """Taps, and modes sample by sample; at rest modes add nothing."""
         total, rest = self._by_taps(table)
-        memory = [BankRun(bank, self.kind, self.shape[0]) for bank in table.banks]
+        memory = self.memory[table.name] = [BankRun(bank, self.kind, self.shape[0]) for bank in table.banks]
         past = Latest(self.shape[0], self.kind)
         for k in range(self.shape[1]):
             for lane in self.starting.get(k, ()):
@@ -214,6 +218,7 @@ class _Run:
             now = self.r[:, k]
             z = clamp(z + (now + before), inner.state)
             out[:, k], before = z, now.copy()
+        self.inner = z
         return out if self.plan.floating else shift(out, inner.to_wide)
 
     def _fed_back(self, p: np.ndarray) -> np.ndarray:
@@ -222,8 +227,9 @@ class _Run:
         lags = plan.feedback.table.last
         past = np.zeros((lanes, lags + samples), self.kind)
         carry, out = np.zeros(lanes, self.kind), np.empty(self.shape, self.kind)
-        table = _Recursion(plan.feedback.table, self.kind)
+        table = Recursion(plan.feedback.table, self.kind)
         memory = [BankRun(bank, self.kind, lanes) for bank in plan.feedback.table.banks]
+        self.memory[plan.feedback.table.name] = memory
         latest = Latest(lanes, self.kind)
         for k in range(samples):
             for lane in self.starting.get(k, ()):
@@ -243,6 +249,7 @@ class _Run:
                 x = saturate(v, plan.filtered.bits)
             past[:, k + lags] = out[:, k] = x
             latest.push(x)
+        self.carry = carry
         return out
 
     # -------------------------------------------------------------------------------------- gain, output
@@ -259,12 +266,12 @@ class _Run:
     def output(self) -> tuple[np.ndarray, np.ndarray]:
         """u and d."""
         plan = self.plan
-        d = self._increment(self.g * self.v)
+        d = self.increment(self.g * self.v)
         if plan.integrator is None:
             return clamp(d, plan.output), d
         return self._integrated(d), d
 
-    def _increment(self, product: np.ndarray) -> np.ndarray:
+    def increment(self, product: np.ndarray) -> np.ndarray:
         return product if self.plan.floating else shift(product, self.plan.gain_shift)
 
     def _integrated(self, d: np.ndarray) -> np.ndarray:
@@ -277,15 +284,20 @@ class _Run:
                 tracks.setdefault(t.sample, []).append(t)
         for k in range(self.shape[1]):
             for lane in self.starting.get(k, ()):
-                total[lane] = self._wide(self.starts[lane, k].u0)
-                before[lane] = self._increment(self.g[lane, k] * self.v_rest[lane, k])
+                total[lane] = self.wide(self.starts[lane, k].u0)
+                before[lane] = self.increment(self.g[lane, k] * self.v_rest[lane, k])
             for t in tracks.get(k, ()):
-                total[t.lane] = self._wide(clamp(np.asarray(t.u, dtype=self.kind), plan.output))
+                total[t.lane] = self.tracked(t.u)
             total = clamp(total + (d[:, k] + before), state)
             out[:, k], before = total, d[:, k].copy()
+        self.integral = total
         return out if plan.floating else saturate(shift(out, plan.integrator.to_output), plan.output.bits)
 
-    def _wide(self, u):
+    def tracked(self, u) -> np.generic:
+        """The integral that follows the output ``u``."""
+        return self.wide(clamp(np.asarray(u, dtype=self.kind), self.plan.output))
+
+    def wide(self, u):
         """Output counts in counts of the integrator."""
         return u if self.plan.floating else u << self.plan.integrator.to_output
 
@@ -301,74 +313,6 @@ class _Run:
             found = found + FLAG_SCHEDULE * ((self.s < first) | (self.s > last))
             outside |= False if plan.floating else np.asarray(scenario.sched) != self.s
         return (found + FLAG_INPUT * outside).astype(np.uint8)
-
-
-class _Recursion:
-    """S of the past, shape (lanes, lags), oldest first."""
-
-    def __init__(self, table: Sum, kind: type):
-        self.kind, self.table = kind, table
-        self.weights = np.array(table.weights[::-1], dtype=kind)
-        self.last = table.last
-        self.blocks = [(table.last - b.last, table.last - b.first + 1, b.align) for b in table.blocks]
-
-    def __call__(self, past: np.ndarray) -> np.ndarray:
-        products = past * self.weights
-        if self.kind is not np.int64:
-            return np.add.accumulate(products, axis=1)[:, -1] + self.kind(0)
-        return sum(shift(products[:, a:b].sum(axis=1), align) for a, b, align in self.blocks)
-
-
-class Latest:
-    """The two latest values of a history, shape (lanes,)."""
-
-    def __init__(self, lanes: int, kind: type):
-        self.last, self.before = np.zeros(lanes, kind), np.zeros(lanes, kind)
-
-    def settle(self, lane: int, constant) -> None:
-        self.last[lane] = self.before[lane] = constant
-
-    def push(self, values: np.ndarray) -> None:
-        self.before, self.last = self.last, values.copy()
-
-
-class BankRun:
-    """One bank, sample by sample; ``mean`` L and ``rest`` r have the shape (lanes, modes)."""
-
-    def __init__(self, bank: Bank, kind: type, lanes: int):
-        self.bank, self.kind = bank, kind
-        self.rates, self.weights = np.array(bank.rates, kind), np.array(bank.weights, kind)
-        self.mean = np.zeros((lanes, bank.modes), kind)
-        self.rest = np.zeros((lanes, bank.modes), kind)
-
-    def settle(self, lane: int, constant) -> None:
-        """As if the history had been ``constant`` for ever."""
-        still = constant if self.bank.differences == 1 else self.kind(0)
-        self.mean[lane] = still if self.kind is not np.int64 else still << self.bank.up
-        self.rest[lane] = 0
-
-    def step(self, past: Latest) -> np.ndarray:
-        """M of this sample, in counts of the total; then the means take in what is past."""
-        u = past.last if self.bank.differences == 1 else past.last - past.before
-        return self._whole(u[:, None]) if self.kind is np.int64 else self._floating(u[:, None])
-
-    def _whole(self, u: np.ndarray) -> np.ndarray:
-        bank = self.bank
-        drive = shift((u << bank.up) - self.mean, bank.to_drive)
-        self.mean = self.mean + shift(self.rates * drive, bank.rate_shift)
-        return shift((self.weights * drive).sum(axis=1), bank.align)
-
-    def _floating(self, u: np.ndarray) -> np.ndarray:
-        drive = u - self.mean
-        if self.bank.compensated:
-            drive = drive - self.rest
-            step = self.rest + self.rates * drive
-            mean = self.mean + step
-            self.rest = step - (mean - self.mean)
-            self.mean = mean
-        else:
-            self.mean = self.mean + self.rates * drive
-        return np.add.accumulate(self.weights * drive, axis=1)[:, -1] + self.kind(0)
 
 
 def scheduled_gain(plan: Plan, s: np.ndarray) -> np.ndarray:

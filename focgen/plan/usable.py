@@ -95,8 +95,8 @@ def holding(
 
     ``execute`` runs a scenario that has none. d is 0 where a step was left out.
     """
-    order = np.argsort(invalid, axis=1, kind="stable")  # the good ones first, in their order
-    ran = execute(plan, _without(plan, scenario, invalid, order))
+    order = _good_first(invalid)
+    ran = execute(plan, good_samples(plan, scenario, invalid))
     u, d, flags = (np.zeros_like(part) for part in (ran.u, ran.d, ran.flags))
     for whole, part in ((u, ran.u), (d, ran.d), (flags, ran.flags)):
         np.put_along_axis(whole, order, part, axis=1)
@@ -107,8 +107,14 @@ def holding(
     return Trace(u, np.where(invalid, d.dtype.type(0), d), flags)
 
 
-def _without(plan: Plan, scenario: Scenario, invalid: np.ndarray, order: np.ndarray) -> Scenario:
+def _good_first(invalid: np.ndarray) -> np.ndarray:
+    """The order of samples in which the good ones come first, as they stand."""
+    return np.argsort(invalid, axis=1, kind="stable")
+
+
+def good_samples(plan: Plan, scenario: Scenario, invalid: np.ndarray) -> Scenario:
     """The good samples of each lane, then zeros; an event comes before the next good sample."""
+    order = _good_first(invalid)
     signals = {
         name: np.take_along_axis(np.where(invalid, values.dtype.type(0), values), order, axis=1)
         for name in ("ref", "meas", "sched")

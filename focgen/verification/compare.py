@@ -8,7 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from focgen.plan.execute import execute
+from focgen.codegen.kernels import PORTABLE, Kernels
+from focgen.plan.ending import Ending, endings
 from focgen.plan.model import ErrorBound, Plan
 from focgen.plan.scenario import Scenario, Trace, to_raw
 from focgen.targets.driver import Answers, header_scales
@@ -17,6 +18,7 @@ from focgen.verification.errors_seen import ErrorsSeen, MaxError, errors_seen
 from focgen.verification.folder import GeneratedFolder
 from focgen.verification.host import Library
 from focgen.verification.scenarios import mixed, raw_scenarios, thinned
+from focgen.verification.states import wrong_member
 
 PATIENCE = 20.0
 """Seconds that C may take at least before it is said not to return."""
@@ -65,11 +67,12 @@ class Runs(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A scenario of raw inputs, and what the reference answers."""
+    """A scenario of raw inputs, what the reference answers, and how it leaves the state of every lane."""
 
     label: str
     scenario: Scenario
     expected: Trace
+    endings: tuple[Ending, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +95,7 @@ def cases_of(plan: Plan, samples: int, seed: int, worst: int | None = None) -> C
         scenarios["worst cases"] = thinned(scenarios["worst cases"], worst)
     physical = mixed(plan.controller, samples, seed + 1)
     scenarios["errors"] = to_raw(plan, physical)
-    found = (Case(label, s, execute(plan, s)) for label, s in scenarios.items() if s is not None)
+    found = (Case(label, s, *endings(plan, s)) for label, s in scenarios.items() if s is not None)
     return Cases(tuple(found), physical)
 
 
@@ -138,37 +141,39 @@ def failed(how: Exception) -> TargetResult:
     return TargetResult(mismatches=1, within=False, first=said.get(type(how), f"the C {how}"))
 
 
-def judged(plan: Plan, cases: Cases, seen: Sequence[Answers], scales: dict[str, float],
-           read: GeneratedFolder | None) -> TargetResult:  # fmt: skip
-    """Compare what was seen with what was expected."""
-    bound = plan.error_bound if read is None else read.bound
+def judged(
+    plan: Plan,
+    cases: Cases,
+    seen: Sequence[Answers],
+    scales: dict[str, float],
+    read: GeneratedFolder | None,
+    kernels: Kernels = PORTABLE,
+    packed: bool = False,
+) -> TargetResult:
+    """Compare what was seen with what was expected; ``kernels`` are the folder's where one was ``read``;
+    ``packed``: in the states nothing is aligned.
+    """
+    bound, kernels = (plan.error_bound, kernels) if read is None else (read.bound, read.kernels)
     total, mismatches, first = 0, 0, None
     for case, answer in zip(cases.cases, seen):
         wrong = _differs(plan, answer.trace, case.expected)
         total += wrong.size
         mismatches += int(np.count_nonzero(wrong))
-        if first is None and wrong.any():
-            first = _described(case, answer.trace, wrong)
+        states = _states(plan, case, answer, kernels, packed)
+        mismatches += len(states)
+        if first is None and (wrong.any() or states):
+            first = _described(case, answer.trace, wrong) if wrong.any() else states[0]
     errors = _errors(plan, cases, seen[-1].trace, bound)
     limits = {"operator": bound.operator, "output_per_sample": bound.output_per_sample}
     header = _header(plan, scales)
     return TargetResult(total, mismatches, errors.largest, limits, errors.within, first, header)
 
 
-def with_states(result: TargetResult, cases: Cases, seen: Sequence[Answers],
-                host: Sequence[Answers]) -> TargetResult:  # fmt: skip
-    """Add the runs after which the state's bytes are not those on the host; where a target's own kernels keep
-    another state, its size differs, and only answers can be compared.
-    """
-    different = [
-        f"{case.label}, run {lane}: the state's bytes differ from those on the host"
-        for case, there, here in zip(cases.cases, seen, host)
-        for lane, (a, b) in enumerate(zip(there.states, here.states))
-        if len(a) == len(b) and a != b
-    ]
-    if not different:
-        return result
-    return replace(result, mismatches=result.mismatches + len(different), first=result.first or different[0])
+def _states(plan: Plan, case: Case, answer: Answers, kernels: Kernels, packed: bool) -> list[str]:
+    """The runs of a case that leave another state than the reference does; none where none was read."""
+    both = zip(answer.states, case.endings)
+    found = (wrong_member(plan, state, ending, kernels, packed) for state, ending in both)
+    return [f"{case.label}, after run {lane}: {wrong}" for lane, wrong in enumerate(found) if wrong]
 
 
 def _header(plan: Plan, found: dict[str, float]) -> tuple[str, ...]:

@@ -12,19 +12,15 @@ from focgen.targets.driver import Answers, header_scales
 from focgen.targets.emulator import TargetFault, emulator_title
 from focgen.targets.run import TargetLibrary
 from focgen.targets.toolchains import absent, toolchains
-from focgen.verification.apart import Crashed, TimedOut, apart
 from focgen.verification.compare import (
     Cases,
     TargetResult,
     answered,
     cases_of,
     failed,
-    host_limit,
     judged,
-    with_states,
 )
 from focgen.verification.folder import GeneratedFolder
-from focgen.verification.host import Library
 
 _MOST = 2000  # samples by default
 _THOROUGH = 100_000  # samples from which on nothing is left out
@@ -40,11 +36,10 @@ def on_core(name: str, read: GeneratedFolder, samples: int | None, seed: int) ->
     except MissingExtra as missing:
         return TargetResult(skipped=f"{missing.what} ({missing.remedy})")
     cases = cases_of(plan, count, seed, None if count >= _THOROUGH else max(count, _least(plan)))
-    host = _on_host(read, cases)
     results = []
     for chain in chains:
         library = TargetLibrary(one, chain, [plan], [read.path], selftest=read.selftest)
-        result = _observed(plan, library, cases, host, read)
+        result = _observed(plan, library, cases, read)
         results.append(replace(result, tools=(f"{chain.title}, {title}",), illegal=library.illegal()))
         if qemu.absent(one) is None and result.max_error is not None:  # what has come to an end there
             again = _in_qemu(plan, library, cases, read)
@@ -70,7 +65,8 @@ def on_avr(read: GeneratedFolder, samples: int | None, seed: int) -> TargetResul
         said = library.selftest() if read.selftest else None
     except TargetFault as how:
         return replace(failed(how), tools=(avr.tools(),))
-    return replace(judged(plan, cases, seen, header_scales(plan), read), selftest=said, tools=(avr.tools(),))
+    result = judged(plan, cases, seen, header_scales(plan), read, packed=True)
+    return replace(result, selftest=said, tools=(avr.tools(),))
 
 
 def default_samples(plan: Plan, one: Core) -> int:
@@ -85,24 +81,13 @@ def _least(plan: Plan) -> int:
     return 0 if plan.floating else plan.error_lags + 2
 
 
-def _on_host(read: GeneratedFolder, cases: Cases) -> list[Answers] | None:
-    """What this computer answers, to compare states with; None where its C does not come back."""
-    library = Library([read.plan], [read.path])
-    try:
-        return apart(answered, library, read.plan, cases, seconds=host_limit(read.plan, cases))[0]
-    except (Crashed, TimedOut):
-        return None
-
-
-def _observed(plan: Plan, library: TargetLibrary, cases: Cases, host: list[Answers] | None,
-              read: GeneratedFolder) -> TargetResult:  # fmt: skip
+def _observed(plan: Plan, library: TargetLibrary, cases: Cases, read: GeneratedFolder) -> TargetResult:
     try:
         seen, scales = answered(library, plan, cases)
         said = library.selftest(plan) if read.selftest else None
     except TargetFault as how:
         return failed(how)
-    result = replace(judged(plan, cases, seen, scales, read), selftest=said)
-    return with_states(result, cases, seen, host) if host else result
+    return replace(judged(plan, cases, seen, scales, read), selftest=said)
 
 
 def _in_qemu(plan: Plan, library: TargetLibrary, cases: Cases, read: GeneratedFolder) -> TargetResult:

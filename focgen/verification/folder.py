@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from focgen.codegen.kernels import Kernels, runtime_files
+from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.control.controller import Controller
 from focgen.control.files import read_controller
@@ -23,7 +23,8 @@ _ROUNDING = 1e-9  # relative
 @dataclass(frozen=True, eq=False)
 class GeneratedFolder:
     """``plan`` from the folder's own controller.toml; ``bound`` as the manifest claims it; ``differences``
-    between what the manifest says and what the plan gives; ``selftest``: whether it has NAME_selftest.c.
+    between what the manifest says and what the plan gives; ``selftest``: whether it has NAME_selftest.c;
+    ``kernels``: how it computes its sums.
     """
 
     path: Path
@@ -31,6 +32,7 @@ class GeneratedFolder:
     bound: ErrorBound
     differences: tuple[str, ...]
     selftest: bool = False
+    kernels: Kernels = PORTABLE
 
 
 def read_folder(path: str | Path) -> GeneratedFolder:
@@ -56,7 +58,7 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     inputs = {name: sha256((path / name).read_bytes()) for name in ("controller.toml", *headers)}
     expected = json.loads(json.dumps(manifest_of(plan, inputs, "selftest" in manifest, kernels)))
     differences = tuple(_differences(expected, manifest, ""))
-    return GeneratedFolder(path, plan, claimed, differences, bool(test))
+    return GeneratedFolder(path, plan, claimed, differences, bool(test), kernels)
 
 
 def _plan(controller: Controller, manifest: dict[str, Any]) -> Plan:

@@ -1,0 +1,115 @@
+"""What a run of the reference leaves behind in a controller's state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.plan.execute import Run, execute
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Reset, Scenario, Trace, Track
+from focgen.plan.usable import good_samples, invalid_samples, usable
+
+
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """Raw values after a lane's last sample, by what :mod:`focgen.plan.model` calls them.
+
+    ``error`` and ``filtered``: the samples since init or the latest reset, oldest first; before them each was
+    ``error_rest`` and ``filtered_rest`` for ever. ``r``: the inner integral's latest addend. ``starting``:
+    no step has been made since. ``means`` and ``rests``: of every mode, by the name of its sum and the
+    number of its bank. What a plan does not have is 0.
+    """
+
+    error: np.ndarray
+    filtered: np.ndarray
+    error_rest: np.generic
+    filtered_rest: np.generic
+    carry: np.generic
+    inner: np.generic
+    r: np.generic
+    integral: np.generic
+    increment: np.generic
+    starting: bool
+    means: dict[tuple[str, int], np.ndarray]
+    rests: dict[tuple[str, int], np.ndarray]
+    output: np.generic
+    flags: int
+
+
+def endings(plan: Plan, scenario: Scenario) -> tuple[Trace, tuple[Ending, ...]]:
+    """Run a plan as :func:`focgen.plan.execute.execute` does; what it answers, and how each lane ends."""
+    invalid = invalid_samples(plan, scenario)
+    if not invalid.any():
+        run = Run(plan, scenario)
+        return run.trace, tuple(_ended(run, lane, run.trace, lane) for lane in range(scenario.lanes))
+    trace, packed = execute(plan, scenario), good_samples(plan, scenario, invalid)
+    counts = np.count_nonzero(~invalid, axis=1)
+    return trace, tuple(_lane(plan, packed, lane, int(n), trace) for lane, n in enumerate(counts))
+
+
+def _lane(plan: Plan, packed: Scenario, lane: int, count: int, trace: Trace) -> Ending:
+    """A lane that ends after ``count`` good samples, and what has been called after the last of them."""
+    resets, tracks = (
+        [replace(event, lane=0) for event in of if event.lane == lane and event.sample <= count]
+        for of in (packed.resets, packed.tracks)
+    )
+    reset = any(r.sample == count for r in resets)
+    last = count + 1 if reset or not count else count  # a sample to begin with: only its beginning counts
+    run = Run(plan, _part(packed, lane, last, resets, [t for t in tracks if t.sample < last]))
+    found = _begun(run, count, trace, lane) if last > count else _ended(run, 0, trace, lane)
+    for track in tracks:
+        if track.sample == count and usable(track.u, plan.output) and plan.integrator:
+            found = replace(found, integral=run.tracked(track.u))
+    return found
+
+
+def _part(packed: Scenario, lane: int, samples: int, resets: list[Reset], tracks: list[Track]) -> Scenario:
+    signals = [None if x is None else x[lane : lane + 1] for x in (packed.ref, packed.meas, packed.sched)]
+    signals = [None if x is None else np.pad(x, ((0, 0), (0, 1)))[:, :samples] for x in signals]
+    return Scenario(*signals, tuple(resets), tuple(tracks))
+
+
+def _ended(run: Run, lane: int, trace: Trace, of: int) -> Ending:
+    """After the run's last sample."""
+    start = max(sample for at, sample in run.starts if at == lane)
+    banks = {(name, i): one for name, memory in run.memory.items() for i, one in enumerate(memory)}
+    return Ending(
+        error=run.e[lane, start:],
+        filtered=run.v[lane, start:],
+        error_rest=run.starts[lane, start].constant,
+        filtered_rest=run.v_rest[lane, start],
+        carry=run.carry[lane],
+        inner=run.inner[lane],
+        r=run.r[lane, -1] if run.plan.inner else run.kind(0),
+        integral=run.integral[lane],
+        increment=run.d[lane, -1],
+        starting=False,
+        means={key: one.mean[lane] for key, one in banks.items()},
+        rests={key: one.rest[lane] for key, one in banks.items()},
+        output=trace.u[of, -1],
+        flags=int(trace.flags[of, -1]),
+    )
+
+
+def _begun(run: Run, start: int, trace: Trace, of: int) -> Ending:
+    """Ahead of a segment's first sample."""
+    plan, rest, zero = run.plan, run.starts[0, start], run.kind(0)
+    v = run.v_rest[0, start]
+    for memory, past in ((m, v if name == "feedback" else rest.constant) for name, m in run.memory.items()):
+        for one in memory:
+            one.settle(0, past)
+    scheduled = plan.schedule is not None
+    increment = zero if scheduled else run.increment(run.kind(plan.constant_gain) * v)
+    return replace(
+        _ended(run, 0, trace, of),
+        error=run.e[0, :0],
+        filtered=run.v[0, :0],
+        carry=zero,
+        inner=zero,
+        r=run.r_rest[0, start] if plan.inner else zero,
+        integral=run.wide(rest.u0),
+        increment=increment,
+        starting=scheduled,
+    )
