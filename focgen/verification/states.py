@@ -88,7 +88,7 @@ def _ring(past: np.ndarray, rest, size: int, start: int) -> tuple[np.ndarray, in
 
 
 def looked_ahead(ahead: LookAhead, past: np.ndarray, rest) -> np.ndarray:
-    """The sums of foc_ahead_ARITHMETIC.h after the samples ``past``, before which all were ``rest``: of the present
+    """The sums that look ahead after the samples ``past``, before which all were ``rest``: of the present
     group, and as far as they have been made of the next.
     """
     group, phase = divmod(len(past) - 1, AHEAD)
