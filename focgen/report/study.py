@@ -25,6 +25,7 @@ _COLOURS = {"f64": BLUE, "f32": GREEN, "q31": ORANGE, "q15": RED}
 _MOST_LINES = 5
 _LEAST = 1e-5  # % of the step: where the distance from the ideal is cut off
 _PLACES = {"short": "length", "exponential": "states"}  # what a form's size is
+_MARKERS = {"short": "o", "exponential": "D"}
 _SHARES = {
     "multiplies": "multiplications a step",
     "cycles": "cycles a step",
@@ -105,8 +106,8 @@ def fronts(study: Study) -> bytes:
             )
         axes[0].set_ylabel("error / largest output")
         axes[0].set_title("What accuracy costs")
-        for name, marker in (("short memory", "o"), ("exponential memory", "D")):
-            axes[1].plot([], [], marker, color=GREY, ms=4, label=name)
+        for memory in dict.fromkeys(row.memory for row in _own(study)):
+            axes[1].plot([], [], _MARKERS[memory], color=GREY, ms=4, label=f"{memory} memory")
         for arithmetic in dict.fromkeys(row.arithmetic for row in _own(study)):
             axes[1].plot([], [], "s", color=_COLOURS[arithmetic], ms=4, label=arithmetic)
         axes[1].plot([], [], color=GREY, lw=0.9, label="best at its cost")
@@ -124,8 +125,8 @@ def _target(study: Study) -> str:
 def _front(axis, study: Study, cost: str) -> None:
     for row in _own(study):
         if getattr(row, cost) is not None:
-            marker = "D" if row.memory == "exponential" else "o"
-            axis.plot(getattr(row, cost), row.error, marker, color=_COLOURS[row.arithmetic], ms=4, alpha=0.85)
+            marker, colour = _MARKERS[row.memory], _COLOURS[row.arithmetic]
+            axis.plot(getattr(row, cost), row.error, marker, color=colour, ms=4, alpha=0.85)
     best = [study.rows[i] for i in study.pareto[cost]]
     axis.step(
         [getattr(r, cost) for r in best], [r.error for r in best], where="post", color=GREY, lw=0.9, zorder=1

@@ -112,14 +112,17 @@ def sparse_ticks(axis) -> None:
     """Label a logarithmic ``axis`` (``axes.xaxis`` or ``axes.yaxis``, with everything drawn) so that labels
     stay apart: decades; within two of them 1, 2 and 5; within one a few round numbers.
     """
-    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
     axis.set_minor_formatter(NullFormatter())
     low, high = axis.get_view_interval()
     if not 0.0 < low < high < 100.0 * low:
         return
-    close = high < 6.0 * low
-    axis.set_major_locator(MaxNLocator(4) if close else LogLocator(subs=(1.0, 2.0, 5.0)))
+    if high < 6.0 * low:
+        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        axis.set_minor_locator(NullLocator())
+    else:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
