@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
+from focgen.plan.histories import BankRun, Latest
 from focgen.plan.scenario import Reset, Scenario, Track, to_raw
 from focgen.plan.usable import reach, usable
 from focgen.verification.scenarios import mixed
@@ -184,10 +186,10 @@ def test_what_is_strewn_is_of_every_kind():
 @pytest.mark.parametrize("seed", range(500, 540))
 def test_no_usable_input_overflows(seed):
     """The largest usable inputs, with the signs that are worst and at random: all stays finite; and nothing
-    reaches what is proved to be the most."""
-    controller = random_controller(seed, 40)
+    reaches what is proved to be the most. Every other controller remembers by modes."""
+    controller, memory = random_controller(seed, 40), ("short", "exponential")[seed % 2]
     try:
-        plan = build_plan(controller, "f32")
+        plan = build_plan(controller, "f32", memory=memory)
     except PlanError:
         pytest.skip("not to be realised as float")
     rng, last = np.random.default_rng(seed), LAST_GOOD["f32"]
@@ -198,6 +200,41 @@ def test_no_usable_input_overflows(seed):
         seen = execute(plan, Scenario(signs * last, -signs * last, sched))
     assert np.isfinite(seen.u).all() and np.isfinite(seen.d).all() and not (seen.flags & 16).any()
     assert np.abs(seen.d).max() <= reach(plan, 2.0**49)
+
+
+@pytest.mark.parametrize("order", [0.3, 0.6, 0.9])
+def test_the_room_counts_what_modes_can_add(order):
+    """A long past at one end, then the other: every drive is twice the input. In the bound, which takes twice
+    the sum for the output, modes have the room for it and no more."""
+    plan = build_plan(simple(TransferFunction([(1.0, order)]), memory="exponential"), "f32")
+    last, added, most = np.float32(LAST_GOOD["f32"]), 0.0, 2.0**49
+    for bank in plan.direct.banks:
+        past, memory = Latest(1, np.float32), BankRun(bank, np.float32, 1)
+        memory.settle(0, last + last)
+        past.settle(0, -last - last)
+        added += abs(float(memory.step(past)[0]))
+    taps = replace(plan, direct=replace(plan.direct, banks=()))
+    assert 0.999 < 2.0 * added / (reach(plan, most) - reach(taps, most)) < 1.0 + 1e-6
+
+
+def test_a_memory_without_room_is_refused_and_one_with_room_does_not_overflow():
+    """The largest gain that is taken, tried with what is worst."""
+    memory = dict(memory="exponential", tolerance=0.05, horizon=1000)
+    transfer = TransferFunction([(1.0, 1.3), (1.0, 0.0)], [(0.05, 0.8), (1.0, 0.0)])
+    steps = np.repeat(np.random.default_rng(3).choice([-1, 1], (8, 40)), 9, axis=1).astype(np.float32)
+    taken, refused = 10.0, 30.0
+    while refused - taken > 0.05:
+        gain = 10.0 ** (0.5 * (taken + refused))
+        try:
+            plan = build_plan(simple(transfer, gain=gain, **memory), "f32")
+            taken = 0.5 * (taken + refused)
+        except PlanError as why:
+            assert "too large for f32" in str(why)
+            refused = 0.5 * (taken + refused)
+    plan = build_plan(simple(transfer, gain=10.0**taken, **memory), "f32")
+    with np.errstate(over="raise", invalid="raise"):
+        seen = execute(plan, Scenario(steps * LAST_GOOD["f32"], -steps * LAST_GOOD["f32"], None))
+    assert np.isfinite(seen.d).all() and np.abs(seen.d).max() > 1e-3 * np.finfo(np.float32).max
 
 
 def test_a_range_or_a_gain_without_room_is_refused():

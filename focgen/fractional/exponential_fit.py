@@ -166,7 +166,8 @@ def _newton_step(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray | Non
     if not (np.all(scale > 0) and np.all(np.isfinite(jacobian))):
         return None
     try:
-        step = np.linalg.solve(jacobian / scale, residual) / scale
+        with np.errstate(over="ignore"):  # a step that no number can hold is none
+            step = np.linalg.solve(jacobian / scale, residual) / scale
     except np.linalg.LinAlgError:
         return None
     return step if np.all(np.isfinite(step)) else None

@@ -57,8 +57,9 @@ def reach(plan: Plan, error: float) -> float:
         own = inverse_of_recursion(plan)
         v = max(own.norm * (p + z), abs(plan.feedback.steady) * error) if own else np.inf
         after = p + z + _l1(plan.feedback.table) * v
+    drives = [_drive(table) * (error if table.history == "error" else v) for table in plan.sums]
     gain = max(abs(plan.gain.low), abs(plan.gain.high))
-    return max(after, z + 2.0 * r, v, _largest(plan.output) + 2.0 * gain * v)
+    return max(after, z + 2.0 * r, v, _largest(plan.output) + 2.0 * gain * v, *drives)
 
 
 def _l1(table: Sum | None) -> float:
@@ -67,6 +68,13 @@ def _l1(table: Sum | None) -> float:
         return 0.0
     modes = sum(2.0 * bank.differences * float(np.abs(bank.values).sum()) for bank in table.banks)
     return float(np.abs(table.values).sum()) + modes
+
+
+def _drive(table: Sum) -> float:
+    """How far the drive of any mode can be, for a history of at most 1; 0 where there is none. A mean and
+    what it still has to take up are less.
+    """
+    return max((2.0 * bank.differences for bank in table.banks), default=0.0)
 
 
 def _largest(form: Format) -> float:
