@@ -48,7 +48,7 @@ def test_sums(arithmetic, tmp_path):
     """What they read, and for a short one that nothing overflows."""
     needs_esbmc()
     plan = generated(tmp_path, "all", arithmetic, 4)
-    sums = esbmc.sums(plan, tmp_path) if plan.floating else esbmc.overflow(plan, tmp_path, "--z3")
+    sums = esbmc.sums(plan, tmp_path) if plan.floating else esbmc.overflow(plan, tmp_path)
     assert all(verdict.proved for verdict in [*sums, esbmc.reads(plan, tmp_path), esbmc.ring(tmp_path)])
 
 

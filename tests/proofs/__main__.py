@@ -16,25 +16,22 @@ from tests.proofs.faults import FAULTS, sow
 from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
 from tests.proofs.verdict import Verdict, first_objection
 
-LENGTH, SLOTS, FLOATS = (
-    256,
-    64,
-    32,
-)  # memory lengths: of all; of sums asked about slot by slot; of Eva's floats
+LENGTH, SLOTS, FLOATS = 256, 64, 32
+"""Memory lengths: of most; of sums asked about slot by slot; of what Eva is asked of floating forms."""
 FIXED = ("q15", "q31")
-SUMS = {"q15": (16, "--boolector"), "q31": (6, "--z3"), "f32": (8, "--boolector"), "f64": (8, "--boolector")}
-"""Lengths at which ESBMC answers within half a minute of sums, and the solver that does."""
+SUMS = {"q15": 16, "q31": 6, "f32": 8, "f64": 8}
+"""Lengths at which ESBMC answers within about half a minute of sums."""
 
 
 def by_esbmc(folder: Path) -> Iterator[tuple[str, Verdict]]:
     """Lemmas of the runtime, then of controllers in every arithmetic."""
     for arithmetic in ARITHMETICS:
-        length, solver = SUMS[arithmetic]
+        length = SUMS[arithmetic]
         plan = generated(folder, "all", arithmetic, length)
         if arithmetic == "q15":
             yield "runtime", esbmc.ring(folder)
             yield "runtime", esbmc.usable(folder)
-        asked = esbmc.sums(plan, folder) if plan.floating else esbmc.overflow(plan, folder, solver)
+        asked = esbmc.sums(plan, folder) if plan.floating else esbmc.overflow(plan, folder)
         for verdict in asked:
             yield f"all {arithmetic}, L = {length}", verdict
         plan = generated(folder, "inverse", arithmetic, LENGTH)
