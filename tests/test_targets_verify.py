@@ -105,7 +105,7 @@ def test_random_controllers_agree_in_every_bit_on_an_avr(arithmetic, memory, tmp
     for plan in plans:
         library, cases = avr.AvrLibrary(plan, tmp_path), cases_of(plan, 9000, 3, 3000)
         seen = [library.answers(plan, case.scenario) for case in cases.cases]
-        result = judged(plan, cases, seen, header_scales(plan), None, packed=True)
+        result = judged(plan, cases, seen, header_scales(plan), None, alignment=library.alignment)
         assert result.sound, f"{plan.name}: {result.first}"
         counted += result.samples
     assert counted >= 100_000

@@ -60,7 +60,9 @@ def _result(result: TargetResult) -> str:
         return f"skipped: {result.skipped}"
     lines = []
     if result.max_error is not None:
-        lines.append(f"{result.samples - result.mismatches} of {result.samples} samples equal in every bit")
+        equal = f"{result.samples - result.mismatches} of {result.samples}"
+        left = f", and the states of {result.states} runs" if result.states and not result.mismatches else ""
+        lines.append(f"{equal} samples equal in every bit{left}")
     if result.first:
         lines.append(f"first difference: {result.first}" if lines else result.first)
     if result.selftest is not None:

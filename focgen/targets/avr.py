@@ -90,6 +90,8 @@ class AvrLibrary:
     Raises BuildError where it does not compile.
     """
 
+    alignment = 1
+
     def __init__(self, plan: Plan, folder: Path, selftest: bool = False):
         self.plan, self.folder, self.test = plan, folder, b""
         with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:

@@ -94,6 +94,8 @@ class TargetLibrary:
     BuildError where they do not compile, MissingExtra where the tools are missing.
     """
 
+    alignment = 8
+
     def __init__(self, core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence[Path],
                  flags: Sequence[str] = EXACT, selftest: bool = False):  # fmt: skip
         self.plans = tuple(plans)

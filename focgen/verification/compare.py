@@ -33,8 +33,8 @@ class TargetResult:
     ``within`` whether it holds. ``first`` describes the first mismatch, ``header`` every scale of the header
     that is not the manifest's. ``tools``: what compiled and ran it; ``illegal``: instructions that the target
     does not have; ``absent``: further tools that would have been used. ``selftest``: what NAME_selftest()
-    returned, 0 where it agrees; None where it was not run. ``skipped``: why the target was not run; the rest
-    means nothing then.
+    returned, 0 where it agrees; None where it was not run. ``states``: how many states, one a run, were
+    compared member by member. ``skipped``: why the target was not run; the rest means nothing then.
     """
 
     samples: int = 0
@@ -49,6 +49,7 @@ class TargetResult:
     illegal: tuple[str, ...] = ()
     absent: tuple[str, ...] = ()
     selftest: int | None = None
+    states: int = 0
 
     @property
     def sound(self) -> bool:
@@ -58,7 +59,11 @@ class TargetResult:
 
 
 class Runs(Protocol):
-    """The C of plans somewhere: on this computer, on an emulated core."""
+    """The C of plans somewhere: on this computer, on an emulated core. ``alignment`` (bytes): the largest of
+    a type there.
+    """
+
+    alignment: int
 
     def answers(self, plan: Plan, scenario: Scenario) -> Answers: ...
 
@@ -104,7 +109,7 @@ def compare(
 ) -> TargetResult:
     """Run a plan's C and its reference over everything; the bound is the folder's, else the plan's."""
     cases = cases_of(plan, samples, seed)
-    return judged(plan, cases, *answered(library, plan, cases), read)
+    return judged(plan, cases, *answered(library, plan, cases), read, alignment=library.alignment)
 
 
 def observed(plan: Plan, library: Runs, samples: int, seed: int, read: GeneratedFolder) -> TargetResult:
@@ -114,7 +119,7 @@ def observed(plan: Plan, library: Runs, samples: int, seed: int, read: Generated
         seen = apart(answered, library, plan, cases, seconds=host_limit(plan, cases))
     except (Crashed, TimedOut) as how:
         return failed(how)
-    return judged(plan, cases, *seen, read)
+    return judged(plan, cases, *seen, read, alignment=library.alignment)
 
 
 def self_tested(result: TargetResult, plan: Plan, library: Library) -> TargetResult:
@@ -148,31 +153,31 @@ def judged(
     scales: dict[str, float],
     read: GeneratedFolder | None,
     kernels: Kernels = PORTABLE,
-    packed: bool = False,
+    alignment: int = 8,
 ) -> TargetResult:
     """Compare what was seen with what was expected; ``kernels`` are the folder's where one was ``read``;
-    ``packed``: in the states nothing is aligned.
+    ``alignment`` (bytes) is the largest that a member of a state has where it ran.
     """
     bound, kernels = (plan.error_bound, kernels) if read is None else (read.bound, read.kernels)
-    total, mismatches, first = 0, 0, None
+    total, mismatches, first, states = 0, 0, None, 0
     for case, answer in zip(cases.cases, seen):
         wrong = _differs(plan, answer.trace, case.expected)
         total += wrong.size
         mismatches += int(np.count_nonzero(wrong))
-        states = _states(plan, case, answer, kernels, packed)
-        mismatches += len(states)
-        if first is None and (wrong.any() or states):
-            first = _described(case, answer.trace, wrong) if wrong.any() else states[0]
+        left = _states(plan, case, answer, kernels, alignment)
+        mismatches, states = mismatches + len(left), states + len(answer.states)
+        if first is None and (wrong.any() or left):
+            first = _described(case, answer.trace, wrong) if wrong.any() else left[0]
     errors = _errors(plan, cases, seen[-1].trace, bound)
     limits = {"operator": bound.operator, "output_per_sample": bound.output_per_sample}
-    header = _header(plan, scales)
-    return TargetResult(total, mismatches, errors.largest, limits, errors.within, first, header)
+    found = TargetResult(total, mismatches, errors.largest, limits, errors.within, first, states=states)
+    return replace(found, header=_header(plan, scales))
 
 
-def _states(plan: Plan, case: Case, answer: Answers, kernels: Kernels, packed: bool) -> list[str]:
+def _states(plan: Plan, case: Case, answer: Answers, kernels: Kernels, alignment: int) -> list[str]:
     """The runs of a case that leave another state than the reference does; none where none was read."""
     both = zip(answer.states, case.endings)
-    found = (wrong_member(plan, state, ending, kernels, packed) for state, ending in both)
+    found = (wrong_member(plan, state, ending, kernels, alignment) for state, ending in both)
     return [f"{case.label}, after run {lane}: {wrong}" for lane, wrong in enumerate(found) if wrong]
 
 

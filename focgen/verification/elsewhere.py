@@ -65,7 +65,7 @@ def on_avr(read: GeneratedFolder, samples: int | None, seed: int) -> TargetResul
         said = library.selftest() if read.selftest else None
     except TargetFault as how:
         return replace(failed(how), tools=(avr.tools(),))
-    result = judged(plan, cases, seen, header_scales(plan), read, packed=True)
+    result = judged(plan, cases, seen, header_scales(plan), read, alignment=library.alignment)
     return replace(result, selftest=said, tools=(avr.tools(),))
 
 
@@ -105,6 +105,7 @@ def _joined(results: list[TargetResult]) -> TargetResult:
     return replace(
         worst,
         samples=sum(r.samples for r in results),
+        states=sum(r.states for r in results),
         mismatches=sum(r.mismatches for r in results),
         within=all(r.within for r in results),
         first=next((f"{r.tools[0]}: {r.first}" for r in results if r.first), None),

@@ -34,6 +34,7 @@ class Library:
         selftest: bool = False,
     ):
         self._ffi = FFI()
+        self.alignment = max(self._ffi.alignof(ctype) for ctype in ("int64_t", "double"))
         with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
             sources = []
             for plan, folder in zip(plans, folders):

@@ -18,12 +18,12 @@ _DTYPES = {"float": np.float32, "double": np.float64}
 
 
 def wrong_member(plan: Plan, state: bytes, ending: Ending, kernels: Kernels = PORTABLE,
-                 packed: bool = False) -> str | None:  # fmt: skip
+                 alignment: int = 8) -> str | None:  # fmt: skip
     """The first member of a state that is not the reference's, in words; None where all are. +0 and −0 are
-    alike. ``packed``: nothing is aligned, as on an AVR; else types are aligned to their size.
+    alike. Types are aligned to their size, but to no more than ``alignment`` bytes: 1 on an AVR.
     """
     expected, end = remembered(plan, ending, kernels), 0
-    for member, place in _places(members(plan, kernels), packed):
+    for member, place in _places(members(plan, kernels), alignment):
         kind = np.dtype(_DTYPES.get(member.ctype, member.ctype.removesuffix("_t")))
         end = place + kind.itemsize * member.count
         if end > len(state):
@@ -37,12 +37,13 @@ def wrong_member(plan: Plan, state: bytes, ending: Ending, kernels: Kernels = PO
     return None
 
 
-def _places(found: tuple[Member, ...], packed: bool) -> Iterator[tuple[Member, int]]:
+def _places(found: tuple[Member, ...], alignment: int) -> Iterator[tuple[Member, int]]:
     """Every member and its offset in bytes."""
     at = 0
     for member in found:
         size = size_of(member.ctype)
-        at = at if packed else -(-at // size) * size
+        step = min(size, alignment)
+        at = -(-at // step) * step
         yield member, at
         at += size * member.count
 
