@@ -1,8 +1,10 @@
 """The parts of a diagnosis, each against what is known of it."""
 
 import numpy as np
+import pytest
 
 from focgen.diagnosis.disturbance import disturbance
+from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
 from focgen.diagnosis.fit import Weighing, fit
 from focgen.diagnosis.segments import make
@@ -72,13 +74,35 @@ def test_a_signal_is_freed_of_its_noise_where_its_model_holds():
     found = fit(problem, problem.nominal(), Weighing(np.ones(1)))
     made = found.problem.simulate(found.vector)
     noisy = np.sqrt(np.mean((problem.segment.y - clean) ** 2))
-    for left, noise, part in ((0.0, True, 0.5), (0.0, False, 0.8), (0.2, True, 1.0)):
+    for left, noise, part in ((0.0, True, 0.5), (0.0, False, 0.9), (0.2, True, 1.0)):
         got = freed(problem.segment, made, 1.0, left, noise)
         assert np.sqrt(np.mean((got - clean) ** 2)) < part * noisy
 
 
 def test_the_promise_is_less_sure_where_the_gap_is_little_more_than_noise():
-    loud, quiet = (predict(np.full(5, gap), np.full(5, 1.05), 1.0) for gap in (1.5, 50.0))
+    left = np.full(5, 1.05)
+    loud, quiet = (predict(np.full(5, gap), left, left, 1.0) for gap in (1.5, 50.0))
     width = [p.interval[1] - p.interval[0] for p in (loud, quiet)]
     assert width[0] > 2 * width[1]
-    assert predict(np.ones(5), np.ones(5), 1.0) is None
+    assert predict(np.ones(5), np.ones(5), np.ones(5), 1.0) is None
+
+
+def test_levels_that_are_only_passed_are_not_repeated():
+    def step(level):
+        return level * -np.expm1(-np.arange(600) * 0.02 / 0.1)
+
+    def seen(*levels):
+        x = np.concatenate([p for v in levels for p in (step(v), v - step(v))])
+        return excitation([x + 0.01 * np.random.default_rng(0).standard_normal(len(x))], 0.02, 1.0)
+
+    rising, mixed, highest_first = seen(0.3, 0.6, 0.9), seen(0.5, 1.0, 0.5), seen(1.0, 0.3, 0.5)
+    assert (rising.repeats, rising.revisits) == (0, 0)
+    assert (mixed.repeats, mixed.revisits) == (1, 1)
+    assert (highest_first.repeats, highest_first.revisits) == (2, 0)
+
+
+def test_what_fits_lose_on_parts_they_did_not_see_is_not_promised():
+    gap, left = np.full(5, 20.0), np.full(5, 1.1)
+    sure, unsure = (predict(gap, left, blind, 1.0) for blind in (left, np.full(5, 3.0)))
+    assert sure.value - unsure.value == pytest.approx(0.5 * (3.0 - 1.1) / 19.0)
+    assert unsure.interval[0] < sure.interval[0] - 0.05

@@ -15,6 +15,7 @@ from focgen.diagnosis.noise import autocovariance, whiten
 
 BURSTS = 15.0  # kurtosis of the innovations; 3 for noise
 LOUD = 10.0  # loudest stretch of a response over the usual one
+RESTLESS = (6.0, 4.0)  # kurtosis and loudest of what may be an effect that is a little wrong, but is no noise
 HUMS = 0.25  # of the power in one line, in the greater part of the long experiments; up to a tenth for noise
 _LONG = 400  # samples of an experiment in which a line stands out
 SWINGS = 20.0  # power at periods beyond eight responses over that between one and four; 1 for noise
@@ -39,6 +40,11 @@ class Disturbance:
     def bursts(self) -> bool:
         """Whether it comes and goes."""
         return self.kurtosis > BURSTS and self.loudest > LOUD
+
+    @property
+    def restless(self) -> bool:
+        """Whether it is less steady than noise."""
+        return self.kurtosis > RESTLESS[0] and self.loudest > RESTLESS[1]
 
     @property
     def swings(self) -> bool:

@@ -8,6 +8,8 @@ import numpy as np
 
 from focgen.rig.effects import Excitation
 
+_STEADY = 0.03  # of the range: the root mean square about its mean of a level that is held
+
 
 def excitation(parts: Sequence[np.ndarray], h: float, response: float) -> Excitation:
     """Summary of input signals (experiments in order), sampled every ``h`` s, of a rig that responds in
@@ -16,7 +18,8 @@ def excitation(parts: Sequence[np.ndarray], h: float, response: float) -> Excita
     coarse = [np.round(np.abs(p) / top * 10).astype(int) for p in parts]
     changes = [c[np.flatnonzero(np.diff(c, prepend=c[0] - 1))] for c in coarse]
     visited = sorted({int(v) for c in coarse for v in np.unique(c) if v > 0})
-    path = np.concatenate(changes) if changes else np.zeros(0, int)
+    stays = max(3, int(0.5 * response / h))
+    path = np.concatenate([_held(p / top, stays) for p in parts])
     return Excitation(
         levels=len(visited),
         lowest=visited[0] / 10 if visited else 1.0,
@@ -26,6 +29,7 @@ def excitation(parts: Sequence[np.ndarray], h: float, response: float) -> Excita
         fastest=min(_fastest(p / top, h) for p in parts) / response,
         experiments=len(parts),
         repeats=_repeats(path),
+        revisits=_revisits(path),
         duration=sum(map(len, parts)) * h / response,
         samples=response / h,
     )
@@ -49,10 +53,29 @@ def _fastest(x: np.ndarray, h: float) -> float:
     return np.inf if steepest == 0 else h * max(1.0, 0.1 / steepest)
 
 
+def _held(x: np.ndarray, stays: int) -> np.ndarray:
+    """The levels, in tenths, at which the input stays for ``stays`` samples, without those that it passes;
+    before the first it was at rest."""
+    parts = np.abs(x[: len(x) // stays * stays]).reshape(-1, stays)
+    levels = np.round(10.0 * parts.mean(axis=1)[parts.std(axis=1) < _STEADY]).astype(int)
+    return np.r_[0, levels[np.flatnonzero(np.diff(levels, prepend=-1))]]
+
+
 def _repeats(path: np.ndarray) -> int:
     """How often a level is reached from below again after a higher one was."""
     most, count = 0, 0
     for before, now in zip(path, path[1:]):
         count += int(0 < now < most and now > before)
         most = max(most, int(now))
+    return count
+
+
+def _revisits(path: np.ndarray) -> int:
+    """How often a level is reached from below after a higher one that it had been reached before."""
+    since: dict[int, int] = {}  # the highest level since each was first reached
+    count = 0
+    for before, now in zip(path, path[1:]):
+        since = {level: max(most, int(now)) for level, most in since.items()}
+        if now > before:
+            count += int(since.setdefault(int(now), int(now)) > now)
     return count

@@ -30,12 +30,15 @@ _SHARE = (
     0.15,
 )  # of the gap that a further family has to close, and one that is easily confused with those found,
 _MERGED = (0.15, 0.25)  # where the stages are merged
+_CLEAN = (0.55, 0.75)  # of the remaining mean square: one that takes away as much has to close only
+_SMALL = (0.015, 0.04)  # of the gap, for what a form lacks is seldom just what another family makes
 _ASTRAY = 1.1  # of the sum of squares without a rounding: beyond it the rounding is left to the end
 _VISIBLE = (
     0.015,
     0.05,
 )  # of the remaining mean square, the first effect and any further: below, one is of no use
 _KNOWN = 0.12  # of what an effect takes from a residual has to be foretold by inputs
+_SURE = 0.6  # of the remaining mean square: what takes away as much takes no noise away
 _NOISY = (
     0.15,
     0.03,
@@ -244,19 +247,25 @@ def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
     name, *others = (c.effect for c in reversed(winner.problem.clues))
     alike = any(name in library()[o].confused_with or o in library()[name].confused_with for o in others)
     asked = _MERGED if len(winner.problem.segment.stages) > 1 else _SHARE
+    if now - then > _CLEAN[alike] * now:
+        asked = _SMALL
     return now - then < asked[alike] * (first - min(noise, then))
 
 
 def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:
     """Whether the residual falls visibly, by the part ``whole`` of what inputs foretell of it, and mostly
-    so: what is not foretold is noise, and what takes that away no effect."""
+    so: what is not foretold is noise, and what takes that away no effect, unless it is most of all that is
+    left and no rounding, whose errors look like noise."""
     before, after = (weighed(f) for f in (base, better))
     old, new = np.mean(before**2), np.mean(after**2)
     if old - new < visible * new:
         return False
     response, segment = base.problem.references.clocks["response"], base.problem.segment
     known, left = foretold(segment, before, response), foretold(segment, after, response)
-    return known * old - left * new > _KNOWN * (old - new) and old - new > whole * old * known
+    rounded = any(c.form.seen for c in base.problem.clues)
+    sure = old - new > _SURE * old and not rounded
+    told = sure or known * old - left * new > _KNOWN * (old - new)
+    return told and old - new > whole * old * known
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:

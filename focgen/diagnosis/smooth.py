@@ -19,13 +19,13 @@ WRONG = 0.05  # of the residual foretold by inputs: beyond it the simulation is 
 def freed(segment: Segment, simulated: np.ndarray, response: float, left: float, noise: bool) -> np.ndarray:
     """The segment's output: as simulated, plus the residual below the pace of the rig; ``response`` in s.
 
-    ``left``: the share of the residual that inputs foretell; where there is one, little is smoothed away,
-    and where there is none and the residual is but ``noise``, all of it is.
+    ``left``: the share of the residual that inputs foretell; where there is one, or the residual is not but
+    ``noise`` (it hums, comes in bursts), little is smoothed away; else all that is not foretold.
     """
     if noise and left < _RIGHT:
         return simulated
     residual = segment.parts(segment.y - simulated)
-    if left > WRONG:
+    if left > WRONG or not noise:
         return simulated + np.concatenate([savgol_filter(p, 7, 3) if len(p) > 7 else p for p in residual])
     width = max(4.0, 0.15 * response / segment.run.h)
     slow = [gaussian_filter1d(part, min(width, len(part) / 6), mode="nearest") for part in residual]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,21 +11,25 @@ from focgen.diagnosis import compose
 from focgen.diagnosis.confidence import confidences, tied
 from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.explain import Explanation
-from focgen.diagnosis.fit import Weighing, fit, problem_residual, weighed
+from focgen.diagnosis.fit import Weighing, fit, weighed
+from focgen.diagnosis.floor import floor as noise_floor
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit
 from focgen.diagnosis.next_experiment import propose
 from focgen.diagnosis.rivals import Cause
 from focgen.diagnosis.running import Running
 from focgen.diagnosis.search import evidence as nats
 from focgen.diagnosis.shrink import Shrink, predict
+from focgen.diagnosis.unseen import foreseen
 from focgen.diagnosis.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
+from focgen.rig.effects import library
 from focgen.rig.engine import slot_in
 from focgen.rig.model import Rig
 from focgen.rig.replay import goodness
 
 UNEXPLAINED = 0.5  # of what could be explained: beyond it no effect of the library is the cause
 LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it something is there
+_HARDLY = 0.7  # of a mean square still there: its effects explain hardly anything
 _PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
 
 
@@ -46,11 +51,10 @@ def reach(
         "refitted": compose.simulated(rigs.refitted, (), logs),
         "explained": compose.simulated(rigs.fitted, rigs.placed, logs),
     }
-    floor = _floor(explanations[-1])
     squares = {name: compose.squares(logs, m) for name, m in made.items()}
-    floor = min(floor, float(np.mean(squares["explained"])))
-    total = predict(squares["refitted"], squares["explained"], floor) if causes else None
-    found = _ordered([_found(e, c, rigs, logs, squares, floor) for e, c in causes])
+    floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
+    total = _promised(rig, logs, explanations, unknown, squares, floor) if causes else None
+    found = _ordered([_found(e, c, rigs, logs, squares, floor, total) for e, c in causes])
     found += _departures(controller)
     word = _word(found, unknown, explanations)
     shares = stage_shares(found, unknown, explanations)
@@ -70,6 +74,12 @@ def reach(
         _plain_fits(explanations),
     )
     return rigs, diagnosis, Evidence(made, tuple(explanations))
+
+
+def _promised(rig: Rig, logs, explanations, unknown, squares, floor: float) -> Shrink | None:
+    """The shrink to expect of new experiments, from what those at hand foretell of each other."""
+    held = [replace(e, best=e.nominal) if e in unknown else e for e in explanations]
+    return predict(squares["refitted"], squares["explained"], foreseen(rig, logs, held), floor)
 
 
 def _plain_fits(explanations: Sequence[Explanation]) -> tuple[PlainFit, ...]:
@@ -95,15 +105,27 @@ def _departures(controller: Running | None) -> tuple[Found, ...]:
 
 
 def is_unknown(e: Explanation) -> bool:
-    """Whether most of what inputs foretell of the nominal residual is still there after the effects, or
-    without any the residual is not just noise."""
-    if not e.causes and (disturbed(e).bursts or disturbed(e).swings or disturbed(e).hums):
+    """Whether most of what inputs foretell of the nominal residual is still there after the effects, or what
+    hardly any of them explains is not just noise."""
+    if _stirred(e):
         return True
     if e.left.share < LEFT:
         return False
     before, after = (float(np.mean(weighed(f) ** 2)) for f in (e.nominal, e.best))
     noise = after * (1 - e.left.share)
     return bool(after - noise > UNEXPLAINED * (before - noise))
+
+
+def _stirred(e: Explanation) -> bool:
+    """Whether bursts, slow swings or a hum are there, and the effects found, if any, take hardly any of the
+    residual away. What a rounding leaves comes in bursts by nature."""
+    left = disturbed(e)
+    loud = left.bursts or left.swings or left.hums
+    if not e.causes:
+        return loud
+    before, after = (float(np.mean(weighed(f) ** 2)) for f in (e.nominal, e.best))
+    rounded = any(library()[c.rivals[0].effect].noiselike for c in e.causes)
+    return after > _HARDLY * before and (loud or left.restless) and not rounded
 
 
 def disturbed(e: Explanation) -> Disturbance:
@@ -116,12 +138,6 @@ def _without(rigs: compose.Rigs, causes, unknown) -> compose.Rigs:
     lost = {(c.rivals[0].effect, c.rivals[0].stage) for e, c in causes if e in unknown}
     kept = tuple(p for p in rigs.placed if (p.effect, p.stage) not in lost)
     return compose.Rigs(rigs.refitted, rigs.fitted if kept else rigs.refitted, kept)
-
-
-def _floor(last: Explanation) -> float:
-    """The noise's mean square at the output: what is left there, less what inputs foretell of it."""
-    parts = last.segment.parts(problem_residual(last.best))
-    return float(np.mean([np.mean(p**2) for p in parts]) * (1 - last.left.share))
 
 
 def _word(found, unknown, explanations) -> str:
@@ -143,30 +159,26 @@ def _moved(e: Explanation) -> bool:
     return bool(visible and nats(e.nominal, given) - 0.5 * own * np.log(len(given.innovations)) > _PARAMETERS)
 
 
-def _found(e: Explanation, cause: Cause, rigs: compose.Rigs, logs, squares, floor: float) -> Found:
+def _found(
+    e: Explanation, cause: Cause, rigs: compose.Rigs, logs, squares, floor: float, total: Shrink | None
+) -> Found:
     kept = tied(cause.rivals)
     sure = confidences(cause.rivals, cause.share)[: len(kept)]
-    name = cause.rivals[0].effect
-    others = tuple(p for p in rigs.placed if not (p.effect == name and p.stage == cause.rivals[0].stage))
-    share = _share_lost(e, cause, rigs, others, logs, squares, floor)
+    lost = _share_lost(cause, rigs, logs, squares, floor, total or Shrink(0.0, (0.0, 0.0)))
     candidates = tuple(_candidate(r, float(p)) for r, p in zip(kept, sure))
-    return Found(cause.rivals[0].stage, candidates, share.value, share.interval)
+    return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
 
 
-def _share_lost(e, cause, rigs, others, logs, squares, floor) -> Shrink:
-    """The total shrink times the cause's share of its segment's."""
-    total = predict(squares["refitted"], squares["explained"], floor) or Shrink(0.0, (0.0, 0.0))
+def _share_lost(cause: Cause, rigs: compose.Rigs, logs, squares, floor: float, total: Shrink) -> Shrink:
+    """The part of the shrink that is lost without the cause; its interval is as wide as the total's."""
+    best = cause.rivals[0]
+    others = tuple(p for p in rigs.placed if (p.effect, p.stage) != (best.effect, best.stage))
     if not others:
         return total
     without = compose.squares(logs, compose.simulated(rigs.fitted, others, logs))
-    lost = predict(np.maximum(squares["refitted"], 0), np.maximum(squares["explained"], 0), floor)
     could = max(float(np.mean(squares["refitted"])) - floor, 1e-300)
-    value = float(
-        np.clip(
-            (np.mean(np.minimum(without, squares["refitted"])) - np.mean(squares["explained"])) / could, 0, 1
-        )
-    )
-    wide = (lost.interval[1] - lost.interval[0]) / 2 if lost else 0.1
+    lost = np.mean(np.minimum(without, squares["refitted"])) - np.mean(squares["explained"])
+    value, wide = float(np.clip(lost / could, 0, 1)), (total.interval[1] - total.interval[0]) / 2
     return Shrink(value, (max(value - wide, -1.0), min(value + wide, 1.0)))
 
 

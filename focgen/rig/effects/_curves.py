@@ -1,10 +1,14 @@
-"""A smooth static curve of any shape, shared by the families that bend."""
+"""Smooth static curves of any shape, shared by the families that bend."""
+
+from functools import lru_cache
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from focgen.rig.effects._effect import Form, Parameter
 
 _BEYOND = 1.2  # of the largest level seen: the bend grows no further there
+_KNOTS = np.linspace(0.0, 1.0, 6)  # of the largest level seen
 
 
 def _quartic(x, values, run):
@@ -13,10 +17,44 @@ def _quartic(x, values, run):
     return x * (1.0 + sum(size * place ** (i + 1) for i, size in enumerate(sizes)))
 
 
+def _scale():
+    """The largest level seen: a unit, not a thing to fit."""
+    return Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
+
+
 def quartic(slot):
     """x (1 + a q + b q² + c q³), q = |x| over the largest level."""
     sizes = (
         Parameter(n, lower=-2.0, upper=2.0, starts=(0.02,), zero=0.0) for n in ("first", "second", "third")
     )
-    scale = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
-    return Form("quartic", slot, (*sizes, scale), _quartic)
+    return Form("quartic", slot, (*sizes, _scale()), _quartic)
+
+
+@lru_cache
+def _cardinal() -> CubicSpline:
+    """The natural splines that are 1 at one knot beyond zero and 0 at the others."""
+    return CubicSpline(_KNOTS, np.eye(len(_KNOTS))[:, 1:], bc_type="natural")
+
+
+def _bend(place: np.ndarray, sizes: tuple[float, ...]) -> np.ndarray:
+    """The spline through ``sizes`` at the knots beyond zero; level beyond the last."""
+    c = np.tensordot(_cardinal().c, np.asarray(sizes), axes=1)
+    place = np.minimum(place, _KNOTS[-1])
+    piece = np.minimum((place * (len(_KNOTS) - 1)).astype(int), len(_KNOTS) - 2)
+    q = place - _KNOTS[piece]
+    a, b, slope, start = (row[piece] for row in c)
+    return ((a * q + b) * q + slope) * q + start
+
+
+def spline(slot, place=lambda x, run: np.abs(x), leaves=None):
+    """x (1 + S(q)), S a natural cubic spline from zero, q = ``place(x, run)`` over the largest level."""
+
+    def act(x, values, run):
+        *sizes, scale = values
+        return x * (1.0 + _bend(place(x, run) / scale, sizes))
+
+    sizes = (
+        Parameter(n, lower=-2.0, upper=4.0, starts=(0.02,), zero=0.0)
+        for n in ("at_20", "at_40", "at_60", "at_80", "at_100")
+    )
+    return Form("spline", slot, (*sizes, _scale()), act, leaves=leaves)

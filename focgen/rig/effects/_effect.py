@@ -112,7 +112,8 @@ class Excitation:
     range visited above zero; ``unloads``, ``reversals``: how often the input falls by a tenth of the range,
     turns round above zero; ``hold``: the longest constant input in response times; ``fastest``: the fastest
     tenth-of-range change in response times; ``experiments``; ``repeats``: of a level after a higher one;
-    ``duration`` in response times; ``samples`` per response time.
+    ``revisits``: the same where it was reached before that one, too; ``duration`` in response times;
+    ``samples`` per response time.
     """
 
     levels: int
@@ -123,6 +124,7 @@ class Excitation:
     fastest: float
     experiments: int
     repeats: int
+    revisits: int
     duration: float
     samples: float
 

@@ -9,6 +9,10 @@ _SHARE = Parameter("share", lower=0.0, upper=0.7, starts=(0.2, 0.2), zero=0.0)
 _WIDTH = Parameter("width", level=1, lower=2e-3, upper=0.6, starts=(0.05, 0.2), log=True)
 
 
+# the broad one, four times as wide, must still be reversed: wider than that, it is but a bent line
+_NARROW = Parameter("width", level=1, lower=2e-3, upper=0.12, starts=(0.04, 0.1), log=True)
+
+
 def _prandtl_ishlinskii(x, values, run):
     share, width = values
     loops = sum(kernels.play(x, run.rest, width * f) for f in (0.5, 1.0, 1.5)) / 3.0
@@ -65,7 +69,7 @@ def forms(slot):
             (
                 Parameter("narrow", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0),
                 Parameter("broad", lower=-0.5, upper=0.9, starts=(0.1, 0.1), zero=0.0),
-                _WIDTH,
+                _NARROW,
             ),
             _wide,
         ),

@@ -8,7 +8,7 @@ EFFECT = Effect(
     stage="actuator",
     meaning="the gain moves slowly with time, whatever the load",
     reveals="the same experiment at the start and at the end",
-    confused_with=("sensor_drift", "softening", "creep", "leak"),
+    confused_with=("sensor_drift", "softening", "creep", "leak", "gain_nonlinearity"),
     needs=lambda e: None if e.repeats else "no level is repeated later in the session",
     forms=_trends.forms("drive", 0, lambda x, trend: x * (1.0 + trend)),
 )

@@ -52,5 +52,6 @@ EFFECT = Effect(
             _gent,
         ),
         _curves.quartic("drive"),
+        _curves.spline("drive"),
     ],
 )

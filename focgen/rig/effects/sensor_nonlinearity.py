@@ -43,6 +43,7 @@ EFFECT = Effect(
         Form("exponential", "strain", (_bend("bend", -1, 0.1, -0.3),), _exponential),
         Form("cubic", "strain", (_bend("bend", -1, 0.1), _bend("twist", -2, 0.05)), _cubic),
         _curves.quartic("strain"),
+        _curves.spline("strain"),
         Form(
             "folded",
             "strain",

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 _GROWTH = Parameter("growth", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
@@ -52,9 +53,9 @@ EFFECT = Effect(
     name="softening",
     stage="actuator",
     meaning="gain grows with the largest load seen or the work done (Mullins)",
-    reveals="a level repeated after a higher one, steps in mixed order",
+    reveals="a level before and after a higher one, steps in mixed order",
     confused_with=("gain_nonlinearity", "gain_drift", "creep"),
-    needs=lambda e: None if e.repeats else "no level is repeated after a higher one",
+    needs=lambda e: None if e.revisits else "no level is reached before and after a higher one",
     forms=[
         Form(
             "largest",
@@ -66,5 +67,6 @@ EFFECT = Effect(
         Form("saturating", "drive", (_GROWTH, _scale(0.3, 1.0)), _saturating, leaves=_leaves_peak),
         Form("reloading", "drive", (_GROWTH, _scale(0.1, 0.5)), _reloading, leaves=_leaves_peak),
         Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
+        _curves.spline("drive", _peak, _leaves_peak),
     ],
 )
