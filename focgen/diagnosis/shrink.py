@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 _DRAWS = 400
-_FORM = 0.02  # share that a form a little wrong may lose on new experiments,
-_LOUD = 0.12  # what the noise adds to it, in root mean squares of the gap,
-_REST = 0.3  # and the part of what is left unexplained that may come or go
+_FORM = 0.03  # share that a form a little wrong may lose on new experiments,
+_LOUD = 0.15  # what the noise adds to it, in root mean squares of the gap,
+_REST = 0.4  # and the part of what is left unexplained that may come or go
 _BLIND = 0.5  # of what fits lose on parts of the session they did not see: so much is not promised,
-_DOUBTED = 0.5  # so much more is doubted,
+_DOUBTED = 1.0  # so much more is doubted,
 _LOST = 0.15  # and a greater loss counts as this: a session's parts see less than the session
+_AHEAD = 0.1  # share that a drift may cost that goes on as no log can show
 _MOST = 1.02  # measured on few experiments, noise may make it more than all
 
 
@@ -24,12 +25,15 @@ class Shrink:
     interval: tuple[float, float]
 
 
-def predict(refitted: np.ndarray, explained: np.ndarray, foreseen: np.ndarray, floor: float) -> Shrink | None:
+def predict(
+    refitted: np.ndarray, explained: np.ndarray, foreseen: np.ndarray, floor: float, drifts: bool = False
+) -> Shrink | None:
     """From mean squares by experiment (m,), fitted and foreseen by fits that did not see them, and the
     floor's mean square; None where nothing can shrink.
 
     The interval is at least as wide as the errors of the promise were on simulated rigs of foreign forms: a
-    few hundredths, more where the gap is little more than the noise or part of it is unexplained.
+    few hundredths, more where the gap is little more than the noise, part of it is unexplained, or part of
+    what explains it ``drifts``.
     """
     if not np.mean(refitted) > floor * 1.0001:
         return None
@@ -41,7 +45,7 @@ def predict(refitted: np.ndarray, explained: np.ndarray, foreseen: np.ndarray, f
     low, high = np.quantile([d for d in draws if np.isfinite(d)] or [value], [0.05, 0.95])
     value -= _BLIND * lost
     wide = _FORM + _LOUD * np.sqrt(floor / np.mean(refitted)) + _REST * (1.0 - value) + _DOUBTED * lost
-    low, high = min(low, value - wide), max(high, value + 0.5 * wide)
+    low, high = min(low, value - wide - _AHEAD * drifts), max(high, value + 0.5 * wide)
     return Shrink(value, (float(max(low, -1.0)), float(min(high, _MOST))))
 
 

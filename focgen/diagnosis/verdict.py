@@ -79,7 +79,9 @@ def reach(
 def _promised(rig: Rig, logs, explanations, unknown, squares, floor: float) -> Shrink | None:
     """The shrink to expect of new experiments, from what those at hand foretell of each other."""
     held = [replace(e, best=e.nominal) if e in unknown else e for e in explanations]
-    return predict(squares["refitted"], squares["explained"], foreseen(rig, logs, held), floor)
+    found = {c.effect for e in held for c in e.best.problem.clues}
+    drifts = any(p.clock == "session" for name in found for f in library()[name].forms for p in f.parameters)
+    return predict(squares["refitted"], squares["explained"], foreseen(rig, logs, held), floor, drifts)
 
 
 def _plain_fits(explanations: Sequence[Explanation]) -> tuple[PlainFit, ...]:
