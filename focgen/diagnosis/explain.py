@@ -244,10 +244,12 @@ def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
     )
     response = winner.problem.references.clocks["response"]
     noise = now * (1.0 - foretold(winner.problem.segment, weighed(rankings[-1].base), response))
-    name, *others = (c.effect for c in reversed(winner.problem.clues))
-    alike = any(name in library()[o].confused_with or o in library()[name].confused_with for o in others)
+    *others, last = winner.problem.clues
+    name, close = last.effect, library()[last.effect].confused_with
+    near = [c for c in others if c.effect in close or name in library()[c.effect].confused_with]
+    alike = bool(near)
     asked = _MERGED if len(winner.problem.segment.stages) > 1 else _SHARE
-    if now - then > _CLEAN[alike] * now:
+    if now - then > _CLEAN[alike] * now and not any(c.form.drawn for c in near):
         asked = _SMALL
     return now - then < asked[alike] * (first - min(noise, then))
 

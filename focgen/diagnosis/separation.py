@@ -18,7 +18,6 @@ _FORM = (
 )  # of the gain: what a form a little wrong may cost, in one stage, and where stages are merged
 _UNTOLD = 0.05
 _DRAWN = 0.03  # the same where the better one is a curve drawn through points: it describes, and explains little
-_MANY = 4  # parameters: a form of more is such a curve
 _COUNTED = 8.0  # nats: what counting parameters may decide, where the experiments are not made to tell
 _ROUGH = 2.0  # nats: what is held against own parameters far from those given is known no better
 
@@ -38,7 +37,7 @@ def separation(better: Fit, other: Fit, nominal: Fit, indistinct: bool = False) 
     sums = difference[: n // length * length].reshape(-1, length).sum(axis=1)
     spread = float(np.std(sums, ddof=1) * np.sqrt(len(sums))) if len(sums) > 2 else np.inf
     gain = 0.5 * n * np.log(max(nominal.sse, 1e-300) / max(better.sse, 1e-300))
-    drawn = any(len(c.form.parameters) > _MANY for c in better.problem.clues)
+    drawn = any(c.form.drawn for c in better.problem.clues)
     part = _DRAWN if drawn else _FORM[len(better.problem.segment.stages) > 1]
     part = max(part, _UNTOLD * indistinct)
     spread = float(np.hypot(max(spread, _COUNTED if indistinct else 1.0), part * gain))

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+_POINTS = 5  # parameters: a form of more is a curve through points
 STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
     "regulator": ("command", "supply"),
@@ -102,6 +103,11 @@ class Form:
     seen: Callable[[np.ndarray], tuple[float, ...] | None] | None = None
     leaves: Callable[[np.ndarray, tuple[float, ...], Run], dict[str, float]] | None = None
     response: Callable[[tuple[float, ...], np.ndarray], np.ndarray] | None = None
+
+    @property
+    def drawn(self) -> bool:
+        """Whether it is a curve drawn through points: such a form describes, and explains little."""
+        return len(self.parameters) > _POINTS
 
 
 @dataclass(frozen=True)
