@@ -9,8 +9,8 @@ import pytest
 
 import focgen
 from focgen.cli.main import commands, main, parser
-from focgen.cli.outcome import to_json
 from focgen.errors import InputError
+from focgen.jsontext import to_json
 from focgen.output import new_folder, write_file, write_files
 from focgen.progress import bar
 

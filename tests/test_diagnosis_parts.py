@@ -1,5 +1,7 @@
 """The parts of a diagnosis, each against what is known of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -77,6 +79,15 @@ def test_a_signal_is_freed_of_its_noise_where_its_model_holds():
     for left, noise, part in ((0.0, True, 0.5), (0.0, False, 0.9), (0.2, True, 1.0)):
         got = freed(problem.segment, made, 1.0, left, noise)
         assert np.sqrt(np.mean((got - clean) ** 2)) < part * noisy
+
+
+def test_a_hum_is_no_noise_to_be_freed_of():
+    problem, t = actuator(noise=0.0), np.arange(len(actuator(noise=0.0).segment.y)) * H
+    hum = 0.02 * problem.segment.level_out * np.sin(2.0 * np.pi * t)
+    made = problem.segment.y
+    humming = replace(problem.segment, y=made + hum)
+    kept, lost = (np.std(freed(humming, made, 4.0, 0.0, noise) - made) for noise in (False, True))
+    assert kept > 0.9 * np.std(hum) and lost < 0.1 * np.std(hum)
 
 
 def test_the_promise_is_less_sure_where_the_gap_is_little_more_than_noise():

@@ -1,5 +1,7 @@
 """Diagnoses of rigs simulated apart from the library."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,6 +65,17 @@ def test_the_promise_holds_on_new_experiments(tmp_path):
     assert found.shrink_interval[0] <= achieved <= found.shrink_interval[1] + 0.02
 
 
+def test_the_floor_under_a_coarse_reading_is_its_noise():
+    logs, step = session(2), 6e-4
+    coarse = [
+        replace(log, signals={**log.signals, "output": step * np.round(log["output"] / step)}) for log in logs
+    ]
+    found = diagnose(RIG, coarse)
+    assert named(found) == [["sensor_quantization"]]
+    assert found.gap.floor == pytest.approx(0.006 * 0.011, rel=0.2)
+    assert found.gap.explained > 2.0 * found.gap.floor
+
+
 def test_told_the_effect_it_considers_nothing_else():
     found = diagnose(RIG, session(11, vent=0.8), only=("sensor_lag", "valve_asymmetry"))
     assert {c.effect for f in found.causes for c in f.candidates} <= {"sensor_lag", "valve_asymmetry"}
@@ -86,8 +99,6 @@ def test_missing_signals_make_the_stage_an_inference():
 
 def test_units_do_not_matter():
     logs = session(11, zone=0.045)
-    from dataclasses import replace
-
     from focgen.rig.model import Actuator
 
     rig = replace(

@@ -3,6 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.signal import lsim
 
 from focgen.fractional.transfer import TransferFunction
@@ -113,3 +114,21 @@ def test_unloading_speed_acts_only_when_unloading():
     plain = respond(x, rest(401), 0.05, 1.0, 0.8, 20.0)
     np.testing.assert_allclose(slow[:200], plain[:200], atol=1e-12)
     assert np.all(slow[205:300] > plain[205:300] + 0.01)
+
+
+def test_a_curve_drawn_through_points_is_the_natural_spline():
+    form = form_of("gain_nonlinearity", "spline")
+    assert form.drawn and not form_of("gain_nonlinearity", "quartic").drawn
+    sizes, x = (0.1, -0.2, 0.3, 0.05, 0.4), np.linspace(0.0, 3.0, 61)
+    spline = CubicSpline(np.linspace(0.0, 2.0, 6), [0.0, *sizes], bc_type="natural")
+    exact = x * (1.0 + spline(np.minimum(x, 2.0)))
+    assert form.act(x, (*sizes, 2.0), None) == pytest.approx(exact, abs=1e-12)
+
+
+def test_softening_along_a_curve_keeps_to_the_largest_load():
+    form = form_of("softening", "spline")
+    x = np.array([0.0, 0.5, 1.0, 0.5, 1.0])
+    run = Run.of([len(x)], [0.0], 1.0)
+    y = form.act(x, (0.2, 0.4, 0.6, 0.8, 1.0, 1.0), run)
+    assert y[3] > y[1] and y[4] == y[2] == pytest.approx(2.0)
+    assert form.leaves(x, (), run) == {"largest": 1.0}

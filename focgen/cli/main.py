@@ -11,8 +11,8 @@ from pkgutil import iter_modules
 
 import focgen
 import focgen.cli
-from focgen.cli.outcome import to_json
 from focgen.errors import FocgenError
+from focgen.jsontext import to_json
 
 # The order of the help page; a command exists where focgen/cli has its file.
 _COMMANDS = (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 
 from focgen.cli.outcome import Outcome
 from focgen.output import write_files
@@ -91,7 +90,7 @@ def _score(args: argparse.Namespace) -> Outcome:
         oracle=args.oracle,
         baseline=not args.no_baseline,
         partial=args.partial,
-        jobs=args.jobs or os.cpu_count() or 1,
+        jobs=args.jobs,
     )
     text = full_text(summary.sets)
     if args.out:

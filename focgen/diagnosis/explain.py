@@ -130,21 +130,11 @@ def explain(
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
     segment, given = problem.segment, problem.nominal()
-    rankings: list[Ranking] = []
     base, vector = _seen(problem, given, clues)
     seen = base if len(base.clues) and _misled(problem, base, vector) else None
     if seen is not None:
         values, base, vector = vector[len(given) :], problem, given
-    while len(rankings) < _DEPTH:
-        untried = [c for c in clues if c not in base.clues and not c.form.seen]
-        rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
-        best = _chosen(rankings, threshold, trusted)
-        if best is None and guests and _much_left(rankings[-1].base):
-            clues, guests = clues + guests, []
-            continue
-        if best is None:
-            break
-        base, vector = best.problem, best.vector
+    rankings, clues = _grown(base, vector, clues, guests, threshold, trusted)
     weighing = Weighing(rankings[-1].ar)
     best = _dropped(rankings[-1].base, weighing, threshold)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
@@ -163,6 +153,30 @@ def explain(
         leftover(segment, weighed(nominal), response),
         rankings[0].errors,
     )
+
+
+def _grown(
+    base: Problem,
+    vector: np.ndarray,
+    clues: list[Clue],
+    guests: list[Clue],
+    threshold: float,
+    trusted: bool,
+) -> tuple[list[Ranking], list[Clue]]:
+    """A ranking for each effect that the data ask for, the last one being of what is left; and the clues
+    that were tried."""
+    rankings: list[Ranking] = []
+    while len(rankings) < _DEPTH:
+        untried = [c for c in clues if c not in base.clues and not c.form.seen]
+        rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
+        best = _chosen(rankings, threshold, trusted)
+        if best is None and guests and _much_left(rankings[-1].base):
+            clues, guests = clues + guests, []
+            continue
+        if best is None:
+            break
+        base, vector = best.problem, best.vector
+    return rankings, clues
 
 
 def _seen(problem: Problem, given: np.ndarray, clues: Sequence[Clue]) -> tuple[Problem, np.ndarray]:

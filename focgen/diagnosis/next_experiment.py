@@ -19,7 +19,6 @@ from focgen.diagnosis.rivals import Rival
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import Chain
-from focgen.rig.model import Rig
 
 _ENOUGH = 3.0  # standard deviations
 _MOST = 99.0
@@ -27,7 +26,7 @@ _ROLES = {"regulator": "pressure", "actuator": "curvature"}
 
 
 def propose(
-    rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation], found: Sequence[Found]
+    logs: Sequence[Experiment], explanations: Sequence[Explanation], found: Sequence[Found]
 ) -> NextExperiment | None:
     """For the least certain cause with rivals; None where nothing is tied."""
     for e in explanations:
@@ -35,11 +34,11 @@ def propose(
             names = {c.effect for f in found for c in f.candidates if len(f.candidates) > 1}
             rivals = [r for r in cause.rivals if r.effect in names]
             if len(rivals) > 1 and cause.rivals[0].effect in names:
-                return _between(rig, logs, e, rivals[0], rivals[1])
+                return _between(logs, e, rivals[0], rivals[1])
     return None
 
 
-def _between(rig: Rig, logs, e: Explanation, a: Rival, b: Rival) -> NextExperiment:
+def _between(logs, e: Explanation, a: Rival, b: Rival) -> NextExperiment:
     response = a.fit.problem.references.clocks["response"]
     entry, h = e.segment.entry, logs[0].sample_time
     choices = menu(e.segment.level_in, response, h)

@@ -70,7 +70,7 @@ def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
     if not resolved:
         return Running(float(np.sqrt(before)), False, tuple(stamps))
     found = []
-    for departure, made in _rivals(controller, logged, command, best):
+    for departure, made in _rivals(controller, logged, command):
         after = _departure(command, made)
         found.append(replace(departure, share=float(1.0 - after / before) if before > 0 else 0.0))
     found = sorted((d for d in found if d.share > _GOOD), key=lambda d: -d.share)[:1]
@@ -98,7 +98,7 @@ def _departure(command, made) -> float:
     return float(np.mean(np.concatenate([np.diff(a - b) for a, b in zip(command, made)]) ** 2))
 
 
-def _rivals(controller: Controller, logs, command, best) -> Iterator[tuple[Departure, list[np.ndarray]]]:
+def _rivals(controller: Controller, logs, command) -> Iterator[tuple[Departure, list[np.ndarray]]]:
     for length in sorted({*_LENGTHS, controller.length}):
         if length < max(map(len, logs)):
             made = _commands(logs, lambda s, n=length: ideal(controller, s, n).u, controller)

@@ -17,7 +17,9 @@ _FORM = (
     0.01,
 )  # of the gain: what a form a little wrong may cost, in one stage, and where stages are merged
 _UNTOLD = 0.05
-_DRAWN = 0.03  # the same where the better one is a curve drawn through points: it describes, and explains little
+_DRAWN = (
+    0.03  # the same where the better one is a curve drawn through points: it describes, and explains little
+)
 _COUNTED = 8.0  # nats: what counting parameters may decide, where the experiments are not made to tell
 _ROUGH = 2.0  # nats: what is held against own parameters far from those given is known no better
 

@@ -60,14 +60,14 @@ def reach(
     shares = stage_shares(found, unknown, explanations)
     diagnosis = Diagnosis(
         word,
-        locate(explanations, shares, found, unknown, word),
+        locate(explanations, shares, found),
         found,
         _gap(rig, logs, made, squares, floor),
         total.value if total else None,
         total.interval if total else None,
         "refitted.toml",
         "augmented.toml",
-        propose(rig, logs, explanations, found),
+        propose(logs, explanations, found),
         _description(unknown),
         (),
         tuple(note for log in logs for note in log.notes),

@@ -35,7 +35,7 @@ def _foretold(e: Explanation) -> float:
     return float(np.mean(weighed(e.nominal) ** 2)) * e.left_nominal.share
 
 
-def locate(explanations: Sequence[Explanation], share: dict[str, float], found, unknown, word: str) -> Where:
+def locate(explanations: Sequence[Explanation], share: dict[str, float], found: Sequence[Found]) -> Where:
     """The stage with the largest share, and the regimes of its segment."""
     top = max(share, key=lambda k: share[k])
     if not share[top]:

@@ -10,6 +10,7 @@ import tomlkit
 
 from focgen.diagnosis.compose import Rigs
 from focgen.diagnosis.model import Diagnosis, Evidence
+from focgen.jsontext import to_json
 from focgen.logs.experiment import Experiment
 from focgen.output import write_files
 from focgen.rig.files import rig_table
@@ -24,8 +25,6 @@ def write(
     drawn: bool = True,
 ) -> None:
     """Write all files into ``out``, or none; pictures where they are to be ``drawn``."""
-    from focgen.cli.outcome import to_json
-
     files: dict[str, str | bytes] = {
         "diagnosis.json": to_json(diagnosis),
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),

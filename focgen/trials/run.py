@@ -39,6 +39,13 @@ class Ran:
     waiting: int
 
 
+def processes(jobs: int | None) -> int:
+    """How many to run at a time: ``jobs``, or as many as there are cores. Raises InputError below one."""
+    if jobs is not None and jobs < 1:
+        raise InputError("--jobs", f"is {jobs}", "give at least 1")
+    return jobs or os.cpu_count() or 1
+
+
 def facts_of(folder: Path) -> dict:
     """The content of trial.json. Raises InputError where the folder holds no trial."""
     try:
@@ -53,8 +60,9 @@ def run(
     """Diagnose every case that has not been, of several trials in turn; ``jobs`` at a time (default:
     the cores), ``limit`` s for each; after ``minutes`` none is begun any more.
 
-    Raises InputError where a folder holds no trial.
+    Raises InputError where a folder holds no trial, and for less than one process.
     """
+    at_once = processes(jobs)
     places = [Path(folder) for folder in folders]
     cases = _in_turn([[(place, n) for n in facts_of(place)["commitments"]] for place in places])
     waiting = [(place, n) for place, n in cases if not ran(place / "runs" / n)]
@@ -66,7 +74,7 @@ def run(
         diagnose_case(place / "cases" / number, place / "runs" / number, limit)
         return True
 
-    with ThreadPoolExecutor(jobs or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(at_once) as pool:
         asked = [pool.submit(one, *case) for case in waiting]
         now = sum(job.result() for job in track(as_completed(asked), "trial run", len(asked)))
     failed = [

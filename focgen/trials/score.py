@@ -18,7 +18,7 @@ from focgen.progress import say, track
 from focgen.trials import achieved, baselines
 from focgen.trials.judging import Judged, judge
 from focgen.trials.rows import Row, rows, stated_in
-from focgen.trials.run import diagnose_case, facts_of, outcome_of, ran
+from focgen.trials.run import diagnose_case, facts_of, outcome_of, processes, ran
 from focgen.trials.sealing import unseal
 from focgen.trials.worker import oracle_possible
 
@@ -62,18 +62,23 @@ class Summary:
 
 
 def score(
-    *folders: str | Path, oracle: bool = False, baseline: bool = True, partial: bool = False, jobs: int = 1
+    *folders: str | Path,
+    oracle: bool = False,
+    baseline: bool = True,
+    partial: bool = False,
+    jobs: int | None = None,
 ) -> Summary:
     """Score trials that have been run.
 
     ``oracle``: also diagnose the singles and pairs knowing the effects; ``baseline``: also ask the residual
     correlation; ``partial``: leave cases out that have not been diagnosed yet, instead of counting them as
-    misses; ``jobs``: processes.
+    misses; ``jobs``: processes at a time (default: the cores).
 
     Writes scores.json into each folder. Raises InputError where a label, a case or an unseen log is not what
     was committed to.
     """
-    return Summary(tuple(_scored(Path(folder), oracle, baseline, partial, jobs) for folder in folders))
+    at_once = processes(jobs)
+    return Summary(tuple(_scored(Path(folder), oracle, baseline, partial, at_once) for folder in folders))
 
 
 def _scored(folder: Path, oracle: bool, baseline: bool, partial: bool, jobs: int) -> Scores:
