@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.menu import Choice, menu
 from focgen.diagnosis.model import Found, NextExperiment
@@ -22,6 +23,7 @@ from focgen.rig.engine import Chain
 
 _ENOUGH = 3.0  # standard deviations
 _MOST = 99.0
+_RIVALS = 3  # of those tied, the likeliest
 _ROLES = {"regulator": "pressure", "actuator": "curvature"}
 
 
@@ -34,26 +36,35 @@ def propose(
             names = {c.effect for f in found for c in f.candidates if len(f.candidates) > 1}
             rivals = [r for r in cause.rivals if r.effect in names]
             if len(rivals) > 1 and cause.rivals[0].effect in names:
-                return _between(logs, e, rivals[0], rivals[1])
+                return _between(logs, e, rivals[0], rivals[1 : 1 + _RIVALS])
     return None
 
 
-def _between(logs, e: Explanation, a: Rival, b: Rival) -> NextExperiment:
+def _between(logs, e: Explanation, a: Rival, others: Sequence[Rival]) -> NextExperiment:
+    """The experiment that tells ``a`` from the ``others``: what counts is the one that it tells least."""
     response = a.fit.problem.references.clocks["response"]
     entry, h = e.segment.entry, logs[0].sample_time
     choices = menu(e.segment.level_in, response, h)
-    options = [(_separation(e, a, b, c, None), c, None) for c in choices]
-    inner = [s for s in e.segment.stages[:-1]]
-    options += [(_separation(e, a, b, c, stage), c, stage) for c in choices[:4] for stage in inner]
+    asked = [(c, None) for c in choices] + [(c, s) for c in choices[:4] for s in e.segment.stages[:-1]]
+    options = [(min(_separation(e, a, b, c, stage) for b in others), c, stage) for c, stage in asked]
     good = [o for o in options if o[0] >= _ENOUGH] or [max(options, key=lambda o: o[0])]
     value, choice, stage = max(good, key=lambda o: o[0] / np.sqrt(o[1].seconds))
     logged = f", with the {_ROLES[stage]} logged" if stage else ""
+    rivals = [r.effect for r in others]
     return NextExperiment(
-        f"telling {a.effect} from {b.effect}",
+        f"telling {a.effect} from {' and '.join(rivals)}{_lacking(e, [a.effect, *rivals])}",
         f"{choice.what}, on the {entry} from 0 to {e.segment.level_in:.4g}, {choice.seconds:.0f} s{logged}",
         float(min(value, _MOST)),
-        {"seconds": choice.seconds, "also_log": _ROLES.get(stage), "rivals": [a.effect, b.effect]},
+        {"seconds": choice.seconds, "also_log": _ROLES.get(stage), "rivals": [a.effect, *rivals]},
     )
+
+
+def _lacking(e: Explanation, names: Sequence[str]) -> str:
+    """What the segment's experiments lack to show any of the effects."""
+    response = e.nominal.problem.references.clocks["response"]
+    seen = excitation(e.segment.parts(e.segment.x), e.segment.run.h, response)
+    missing = dict.fromkeys(m for name in names if (m := library()[name].needs(seen)))
+    return f" (so far, {'; '.join(missing)})" if missing else ""
 
 
 def _separation(e: Explanation, a: Rival, b: Rival, choice: Choice, stage: str | None) -> float:
@@ -88,14 +99,3 @@ def _separation(e: Explanation, a: Rival, b: Rival, choice: Choice, stage: str |
     left = float(difference @ difference - slope @ np.linalg.pinv(information) @ slope)
     # what tells them apart is not the size but its square over the spread of the likelihood ratio
     return float(np.sqrt(max(left, 0.0) / max(sigma2, 1e-300)) / 2)
-
-
-def lacking(explanations: Sequence[Explanation], excitation) -> list[str]:
-    """What the experiments lack to show effects of the segments' stages, by effect."""
-    stages = {s for e in explanations for s in e.segment.stages}
-    found = []
-    for effect in library().values():
-        missing = effect.needs(excitation) if effect.stage in stages else None
-        if missing:
-            found.append(f"{effect.name}: {missing}")
-    return found
