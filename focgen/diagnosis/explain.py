@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import Fit, Weighing, fit, weighed
 from focgen.diagnosis.leftover import Leftover, foretold, leftover
 from focgen.diagnosis.own import Own
@@ -38,7 +39,8 @@ _VISIBLE = (
     0.05,
 )  # of the remaining mean square, the first effect and any further: below, one is of no use
 _KNOWN = 0.12  # of what an effect takes from a residual has to be foretold by inputs
-_SURE = 0.6  # of the remaining mean square: what takes away as much takes no noise away
+_SURE = (0.4, 0.6)  # of the remaining mean square: the first effect, and any further, that takes away as much
+# takes no noise away
 _NOISY = (
     0.15,
     0.03,
@@ -218,10 +220,11 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 
 
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
-    """All clues where inputs foretell something of the residual, else none."""
+    """All clues where inputs foretell something of the residual or it is slower than noise is, else none."""
     ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
-    share = foretold(base.segment, weighed(ground), base.references.clocks["response"])
-    return clues if share > _TELLING else []
+    left, segment, response = weighed(ground), base.segment, base.references.clocks["response"]
+    told = foretold(segment, left, response) > _TELLING
+    return clues if told or disturbance(segment.parts(left), segment.run.h, response).swings else []
 
 
 def _chosen(rankings: Sequence[Ranking], threshold: float, trusted: bool) -> Fit | None:
@@ -279,7 +282,7 @@ def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:
     response, segment = base.problem.references.clocks["response"], base.problem.segment
     known, left = foretold(segment, before, response), foretold(segment, after, response)
     rounded = any(c.form.seen for c in base.problem.clues)
-    sure = old - new > _SURE * old and not rounded
+    sure = old - new > _SURE[bool(base.problem.clues)] * old and not rounded
     told = sure or known * old - left * new > _KNOWN * (old - new)
     return told and old - new > whole * old * known
 
