@@ -99,7 +99,7 @@ def test_many_controllers_on_the_core(name, arithmetic, compiler, tmp_path):
     plans = planned(name, arithmetic, seeds, lengths)
     library = on_core(name, chain, plans, tmp_path)
     for plan in plans:
-        result = compare(plan, library, 4000, seed=5)
+        result = compare(plan, library, 4000, seed=5, kernels=Kernels(name))
         assert result.mismatches == 0, f"{plan.name}, {plan.length}: {result.first}"
 
 

@@ -105,11 +105,18 @@ def cases_of(plan: Plan, samples: int, seed: int, worst: int | None = None) -> C
 
 
 def compare(
-    plan: Plan, library: Runs, samples: int, seed: int, read: GeneratedFolder | None = None
+    plan: Plan,
+    library: Runs,
+    samples: int,
+    seed: int,
+    read: GeneratedFolder | None = None,
+    kernels: Kernels = PORTABLE,
 ) -> TargetResult:
-    """Run a plan's C and its reference over everything; the bound is the folder's, else the plan's."""
+    """Run a plan's C and its reference over everything; bound and kernels are the folder's, else the plan's
+    and those given.
+    """
     cases = cases_of(plan, samples, seed)
-    return judged(plan, cases, *answered(library, plan, cases), read, alignment=library.alignment)
+    return judged(plan, cases, *answered(library, plan, cases), read, kernels, library.alignment)
 
 
 def observed(plan: Plan, library: Runs, samples: int, seed: int, read: GeneratedFolder) -> TargetResult:
