@@ -146,10 +146,10 @@ def _memory_section(plan: Plan) -> str:
     words = (
         "The memory is a sum of exponentials. Every fractional power of s keeps a few means of its history,"
         f" each over a time of its own ({_times(plan)}); the weights that the past has through them follow"
-        f" the exact ones for {plan.horizon} samples: {orders} (relative error, proved for every lag). Nothing"
-        " is cut off, so a constant is remembered without an error, and a step costs the same however far the"
-        " memory reaches. Means cannot leave the range of what they average: the bounds above hold for any"
-        f" number of samples.{_SLOW[plan.arithmetic] * _has_slow(plan)}"
+        f" the exact ones for {plan.horizon} samples: {orders} (relative error, proved for every lag)."
+        " Nothing is cut off, so a constant is remembered without an error, and a step costs the same however"
+        " far the memory reaches. Means cannot leave the range of what they average: the bounds above hold"
+        f" for any number of samples.{_SLOW[plan.arithmetic] * _has_slow(plan)}"
     )
     return "\n".join(wrapped(words.split(" "), 116))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.diagnosis.disturbance import disturbance
-from focgen.diagnosis.fit import Fit, Weighing, fit, weighed
+from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.leftover import Leftover, foretold, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
@@ -104,7 +104,7 @@ def guests_in(segment: Segment, rig: Rig) -> list[Clue]:
 
 def _much_left(base: Fit) -> bool:
     """Whether inputs foretell most of what is left."""
-    return foretold(base.problem.segment, weighed(base), base.problem.references.clocks["response"]) > _MUCH
+    return foretold(base.problem.segment, base.weighed, base.problem.references.clocks["response"]) > _MUCH
 
 
 def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
@@ -151,8 +151,8 @@ def explain(
         best,
         weighing.ar,
         causes,
-        leftover(segment, weighed(best), response),
-        leftover(segment, weighed(nominal), response),
+        leftover(segment, best.weighed, response),
+        leftover(segment, nominal.weighed, response),
         rankings[0].errors,
     )
 
@@ -208,7 +208,7 @@ def _beside(
     problem = best.problem.with_clues([*best.problem.clues, *clues])
     both = fit(problem, np.r_[best.vector, values], weighing, 0)
     added = tuple(Cause((Rival(c.effect, c.stage, 0.0, 0.0, both),), 0.0, 0.0) for c in clues)
-    closer = np.mean(weighed(both) ** 2) < np.mean(weighed(best) ** 2)
+    closer = np.mean(both.weighed**2) < np.mean(best.weighed**2)
     return both if closer else best, (*causes, *added)
 
 
@@ -222,7 +222,7 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
     """All clues where inputs foretell something of the residual or it is slower than noise is, else none."""
     ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
-    left, segment, response = weighed(ground), base.segment, base.references.clocks["response"]
+    left, segment, response = ground.weighed, base.segment, base.references.clocks["response"]
     told = foretold(segment, left, response) > _TELLING
     return clues if told or disturbance(segment.parts(left), segment.run.h, response).swings else []
 
@@ -256,11 +256,9 @@ def _chosen(rankings: Sequence[Ranking], threshold: float, trusted: bool) -> Fit
 def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
     """Whether a further family closes only a small part of the gap: what the first one's form lacks looks
     like that, the more so to a family that is easily confused with it."""
-    first, now, then = (
-        float(np.mean(weighed(f) ** 2)) for f in (rankings[0].base, rankings[-1].base, winner)
-    )
+    first, now, then = (float(np.mean(f.weighed**2)) for f in (rankings[0].base, rankings[-1].base, winner))
     response = winner.problem.references.clocks["response"]
-    noise = now * (1.0 - foretold(winner.problem.segment, weighed(rankings[-1].base), response))
+    noise = now * (1.0 - foretold(winner.problem.segment, rankings[-1].base.weighed, response))
     *others, last = winner.problem.clues
     name, close = last.effect, library()[last.effect].confused_with
     near = [c for c in others if c.effect in close or name in library()[c.effect].confused_with]
@@ -275,7 +273,7 @@ def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:
     """Whether the residual falls visibly, by the part ``whole`` of what inputs foretell of it, and mostly
     so: what is not foretold is noise, and what takes that away no effect, unless it is most of all that is
     left and no rounding, whose errors look like noise."""
-    before, after = (weighed(f) for f in (base, better))
+    before, after = (f.weighed for f in (base, better))
     old, new = np.mean(before**2), np.mean(after**2)
     if old - new < visible * new:
         return False

@@ -37,10 +37,15 @@ class Fit:
         """Nats against its own parameters, for being far from those given."""
         return self.problem.own.doubt(self.vector)
 
+    @cached_property
+    def weighed(self) -> np.ndarray:
+        """The residual (n,) by trust, as a share of the output's level."""
+        return self.problem.weighed(self.vector)
+
     def residual(self) -> list[np.ndarray]:
         """Measured less simulated, by experiment, as a share of the output's level, each sample by its
         trust."""
-        return self.problem.segment.parts(self.problem.weighed(self.vector))
+        return self.problem.segment.parts(self.weighed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +147,3 @@ def _step(normal, slope, damping, vector, low, high) -> np.ndarray:
 def problem_residual(of: Fit) -> np.ndarray:
     """Measured less simulated (n,)."""
     return of.problem.residual(of.vector)
-
-
-def weighed(of: Fit) -> np.ndarray:
-    """The residual (n,) by trust, as a share of the output's level."""
-    return of.problem.weighed(of.vector)

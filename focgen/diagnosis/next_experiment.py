@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.menu import Choice, menu
 from focgen.diagnosis.model import Found, NextExperiment
@@ -61,8 +60,7 @@ def _between(logs, e: Explanation, a: Rival, others: Sequence[Rival]) -> NextExp
 
 def _lacking(e: Explanation, names: Sequence[str]) -> str:
     """What the segment's experiments lack to show any of the effects."""
-    response = e.nominal.problem.references.clocks["response"]
-    seen = excitation(e.segment.parts(e.segment.x), e.segment.run.h, response)
+    seen = e.nominal.problem.excitation
     missing = dict.fromkeys(m for name in names if (m := library()[name].needs(seen)))
     return f" (so far, {'; '.join(missing)})" if missing else ""
 

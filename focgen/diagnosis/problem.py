@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.segments import Segment
-from focgen.rig.effects import Form
+from focgen.rig.effects import Excitation, Form
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.model import Rig
 
@@ -60,6 +62,12 @@ class Problem:
         self.own_start = self.own.start()
         self.has_offset = self.own.stage == "actuator" and len(self.own_start) > 0
         self.nuisances = 1 if self.has_offset else 2
+
+    @cached_property
+    def excitation(self) -> Excitation:
+        """What the experiments do to the segment."""
+        segment = self.segment
+        return excitation(segment.parts(segment.x), segment.run.h, self.references.clocks["response"])
 
     def with_clues(self, clues: Sequence[Clue]) -> Problem:
         """The same segment under other effects."""

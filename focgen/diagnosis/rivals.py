@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.diagnosis.excitation import excitation
-from focgen.diagnosis.fit import Fit, Weighing, fit, weighed
+from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.separation import separation
@@ -65,8 +64,8 @@ def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tup
                 (r for r in rankings if r.base.problem.clues == without.problem.clues), None
             ) or rank(without.problem, without.vector, others)
             rivals += _rivals(best, without, ranking, clues, weighing, len(own) > 1)
-        before, after = (np.mean(weighed(f) ** 2) for f in (nominal, best))
-        lost = np.mean(weighed(without) ** 2) - after
+        before, after = (np.mean(f.weighed**2) for f in (nominal, best))
+        lost = np.mean(without.weighed**2) - after
         share = float(np.clip(lost / max(before - after, 1e-300), 0, 1))
         rivals.sort(key=lambda r: r.separation)
         found.append(Cause(tuple(rivals), evidence(best, without), share))
@@ -93,8 +92,7 @@ def _rivals(
 def _indistinct(best: Fit, ranking: Ranking) -> set[str]:
     """The families that these experiments are not made to tell from those of ``best``: easily confused with
     one of them, and one of the two lacking what would show it."""
-    segment, response = best.problem.segment, best.problem.references.clocks["response"]
-    seen = excitation(segment.parts(segment.x), segment.run.h, response)
+    seen = best.problem.excitation
     found = set()
     for a in (library()[c.effect] for c in best.problem.clues):
         for b in (library()[name] for name in ranking.best):

@@ -108,7 +108,7 @@ def _colour(leader: Fit) -> np.ndarray:
     """The whitening filter of what the best fit leaves. Where inputs foretell much of that it is no noise
     yet, and a filter that takes out its colour would hide what is missing: then there is none."""
     problem = leader.problem
-    share = foretold(problem.segment, problem.weighed(leader.vector), problem.references.clocks["response"])
+    share = foretold(problem.segment, leader.weighed, problem.references.clocks["response"])
     return np.ones(1) if share > _MISFIT else fit_ar(leader.residual())
 
 

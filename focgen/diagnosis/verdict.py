@@ -11,7 +11,7 @@ from focgen.diagnosis import compose
 from focgen.diagnosis.confidence import confidences, tied
 from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.explain import Explanation
-from focgen.diagnosis.fit import Weighing, fit, weighed
+from focgen.diagnosis.fit import Weighing, fit
 from focgen.diagnosis.floor import floor as noise_floor
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit
 from focgen.diagnosis.next_experiment import propose
@@ -113,7 +113,7 @@ def is_unknown(e: Explanation) -> bool:
         return True
     if e.left.share < LEFT:
         return False
-    before, after = (float(np.mean(weighed(f) ** 2)) for f in (e.nominal, e.best))
+    before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
     noise = after * (1 - e.left.share)
     return bool(after - noise > UNEXPLAINED * (before - noise))
 
@@ -125,7 +125,7 @@ def _stirred(e: Explanation) -> bool:
     loud = left.bursts or left.swings or left.hums
     if not e.causes:
         return loud
-    before, after = (float(np.mean(weighed(f) ** 2)) for f in (e.nominal, e.best))
+    before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
     rounded = any(library()[c.rivals[0].effect].noiselike for c in e.causes)
     return after > _HARDLY * before and (loud or left.restless) and not rounded
 
@@ -133,7 +133,7 @@ def _stirred(e: Explanation) -> bool:
 def disturbed(e: Explanation) -> Disturbance:
     """What is left of a segment, as a disturbance."""
     response = e.nominal.problem.references.clocks["response"]
-    return disturbance(e.segment.parts(weighed(e.best)), e.segment.run.h, response)
+    return disturbance(e.segment.parts(e.best.weighed), e.segment.run.h, response)
 
 
 def _without(rigs: compose.Rigs, causes, unknown) -> compose.Rigs:
@@ -157,7 +157,7 @@ def _moved(e: Explanation) -> bool:
         return False
     weighing = Weighing(e.ar)
     given = fit(e.nominal.problem, e.given, weighing, 0)
-    visible = np.mean(weighed(given) ** 2) > 1.01 * np.mean(weighed(e.nominal) ** 2)
+    visible = np.mean(given.weighed**2) > 1.01 * np.mean(e.nominal.weighed**2)
     return bool(visible and nats(e.nominal, given) - 0.5 * own * np.log(len(given.innovations)) > _PARAMETERS)
 
 

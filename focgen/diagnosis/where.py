@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from focgen.diagnosis.explain import Explanation
-from focgen.diagnosis.fit import problem_residual, weighed
+from focgen.diagnosis.fit import problem_residual
 from focgen.diagnosis.model import Found, Where
 
 STAGES = ("regulator", "actuator", "sensor", "controller")
@@ -32,7 +32,7 @@ def stage_shares(
 
 def _foretold(e: Explanation) -> float:
     """What inputs foretell of the nominal residual: mean square, as a share of the level's."""
-    return float(np.mean(weighed(e.nominal) ** 2)) * e.left_nominal.share
+    return float(np.mean(e.nominal.weighed**2)) * e.left_nominal.share
 
 
 def locate(explanations: Sequence[Explanation], share: dict[str, float], found: Sequence[Found]) -> Where:

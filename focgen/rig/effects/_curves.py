@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from focgen.rig.effects._effect import Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Form, Parameter
 
 _BEYOND = 1.2  # of the largest level seen: the bend grows no further there
 _KNOTS = np.linspace(0.0, 1.0, 6)  # of the largest level seen
@@ -17,17 +17,12 @@ def _quartic(x, values, run):
     return x * (1.0 + sum(size * place ** (i + 1) for i, size in enumerate(sizes)))
 
 
-def _scale():
-    """The largest level seen: a unit, not a thing to fit."""
-    return Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
-
-
 def quartic(slot):
     """x (1 + a q + b q² + c q³), q = |x| over the largest level."""
     sizes = (
         Parameter(n, lower=-2.0, upper=2.0, starts=(0.02,), zero=0.0) for n in ("first", "second", "third")
     )
-    return Form("quartic", slot, (*sizes, _scale()), _quartic)
+    return Form("quartic", slot, (*sizes, LARGEST), _quartic)
 
 
 @lru_cache
@@ -57,4 +52,4 @@ def spline(slot, place=lambda x, run: np.abs(x), leaves=None):
         Parameter(n, lower=-2.0, upper=4.0, starts=(0.02,), zero=0.0)
         for n in ("at_20", "at_40", "at_60", "at_80", "at_100")
     )
-    return Form("spline", slot, (*sizes, _scale()), act, leaves=leaves)
+    return Form("spline", slot, (*sizes, LARGEST), act, leaves=leaves)

@@ -46,6 +46,10 @@ class Parameter:
     log: bool = False
 
 
+LARGEST = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
+"""The largest level seen where a form acts: a unit to it, not a thing to fit."""
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A session being simulated, its experiments one after the other in every array of shape (n,).

@@ -3,7 +3,7 @@
 import numpy as np
 
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Form, Parameter
 
 _SHARE = Parameter("share", lower=0.0, upper=0.7, starts=(0.2, 0.2), zero=0.0)
 _WIDTH = Parameter("width", level=1, lower=2e-3, upper=0.6, starts=(0.05, 0.2), log=True)
@@ -80,7 +80,7 @@ def forms(slot):
                 Parameter("even", lower=0.0, upper=0.7, starts=(0.1, 0.1), zero=0.0),
                 Parameter("growing", lower=-0.5, upper=0.7, starts=(0.1, 0.1), zero=0.0),
                 _WIDTH,
-                Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
+                LARGEST,
             ),
             _widening,
         ),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from focgen.rig.effects import _curves
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
 
 
 def _cubic(x, values, run):
@@ -21,9 +21,6 @@ def _exponential(x, values, run):
     return x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
 
 
-_ONE = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
-
-
 EFFECT = Effect(
     name="gain_nonlinearity",
     stage="actuator",
@@ -36,7 +33,7 @@ EFFECT = Effect(
         Form(
             "cubic",
             "drive",
-            (Parameter("size", lower=-0.9, upper=5.0, starts=(0.1, -0.1), zero=0.0), _ONE),
+            (Parameter("size", lower=-0.9, upper=5.0, starts=(0.1, -0.1), zero=0.0), LARGEST),
             _cubic,
         ),
         Form(

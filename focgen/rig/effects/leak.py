@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
 
 
 def _laminar(x, values, run):
@@ -49,7 +49,7 @@ EFFECT = Effect(
             "supply",
             (
                 Parameter("share", lower=0.0, upper=0.8, starts=(0.05,), zero=0.0),
-                Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)),
+                LARGEST,
             ),
             _growing,
         ),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from focgen.rig.effects import _curves
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
 
 _GROWTH = Parameter("growth", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
@@ -60,7 +60,7 @@ EFFECT = Effect(
         Form(
             "largest",
             "drive",
-            (_GROWTH, Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))),
+            (_GROWTH, LARGEST),
             _largest,
             leaves=_leaves_peak,
         ),
