@@ -259,6 +259,19 @@ FAULTS = {
     "length beyond the ring": (paper_rig(), {"length": 10**8}, "give 1 to 65534"),
     "arithmetic": (paper_rig(), {"arithmetic": "q7"}, "choose one of"),
     "delay": (paper_rig(), {"delay": 2}, "0 or 1 sample"),
+    "T of no size": (replace(paper_rig(), actuator=Actuator(1e-300, 0.6, (0.345,))), {}, "1e-502 to"),
+    "a regulator of no size": (
+        replace(
+            paper_rig(), regulator=TransferFunction([(152.48, 0)], [(1, 2), (53.39, 1), (1.528e-140, 0)])
+        ),
+        {},
+        "too far apart",
+    ),
+    "an actuator of no size": (
+        linear_rig([(1.0, 0.0)], [(1.0, 2.0), (5.0, 0.001), (1e-5, 0.0)]),
+        {},
+        "cannot be inverted (its time constants are too far apart",
+    ),
     "slower than can be simulated": (paper_rig(), {"settling": 5000.0}, "raise the rig's sample_time"),
 }
 

@@ -83,5 +83,11 @@ def test_poles_next_to_the_edge_of_the_sector(side, size):
     assert distance(found, expected) < 1e-6  # a double pole is known to the root of rounding
 
 
+def test_sizes_beyond_numbers_are_refused():
+    """s + 5 s^0.001 + 1e-5: the last two balance at s = 1e-5699."""
+    with pytest.raises(ArithmeticError, match="too far apart"):
+        first_sheet_zeros(TransferFunction([(1, 0)], [(1, 1), (5, 0.001), (1e-5, 0)]).den, SECTOR)
+
+
 def test_a_power_of_s_has_no_zeros():
     assert len(first_sheet_zeros(TransferFunction([(1, 0)], [(3, 1.7)]).den, SECTOR)) == 0

@@ -180,37 +180,23 @@ def test_logs_without_a_step_are_refused(tmp_path, capsys):
     assert "none is a step" in line
 
 
-def test_a_rig_that_cannot_be_written_leaves_no_pictures(tmp_path, capsys):
+@pytest.mark.parametrize(
+    "out, report", [("file/new.toml", "pictures"), ("new.toml", "file/pictures")], ids=["rig", "pictures"]
+)
+def test_where_one_cannot_be_written_neither_is(tmp_path, capsys, out, report):
     (tmp_path / "file").write_text("in the way")
-    argv = [
-        "identify",
-        str(STEPS),
-        "--rig",
-        str(RIG),
-        "--to",
-        "8",
-        "--out",
-        str(tmp_path / "file" / "new.toml"),
-        "--report",
-        str(tmp_path / "pictures"),
-    ]
-    assert main(argv) == 2 and "file" in capsys.readouterr().err
+    argv = ["identify", str(STEPS), "--rig", str(RIG), "--to", "8"]
+    assert main([*argv, "--out", str(tmp_path / out), "--report", str(tmp_path / report)]) == 2
+    assert "file" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
-def test_pictures_that_cannot_be_written_leave_no_rig(tmp_path, capsys):
-    (tmp_path / "file").write_text("in the way")
-    argv = [
-        "identify",
-        str(STEPS),
-        "--rig",
-        str(RIG),
-        "--to",
-        "8",
-        "--out",
-        str(tmp_path / "new.toml"),
-        "--report",
-        str(tmp_path / "file" / "pictures"),
-    ]
-    assert main(argv) == 2 and "file" in capsys.readouterr().err
-    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+def test_a_stage_of_no_size_is_refused(tmp_path, capsys):
+    """A sensor whose terms only balance at 1e300 s; the output is fitted through it."""
+    rig = tmp_path / "made" / "rig.toml"
+    rig.parent.mkdir()
+    text = RIG.read_text().replace("[10.0, 0.0]]\n\n[act", "[10.0, 0.0], [5.0, 0.001]]\n\n[act")
+    rig.write_text("\n".join(line for line in text.splitlines() if not line.startswith("curvature")))
+    (tmp_path / "out").mkdir()
+    line = refused(["identify", str(STEPS), "--rig", str(rig), "--to", "8"], tmp_path / "out", capsys)
+    assert "sensor: cannot be simulated (its time constants are too far apart" in line

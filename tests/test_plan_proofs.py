@@ -262,6 +262,10 @@ def test_what_cannot_be_planned_is_refused_with_a_remedy():
     narrow = ControllerRanges((-1e12, 1e12), (-1e12, 1e12), (0.0, 1e-6))
     assert "output range" in str(refused(simple(unit, ranges=narrow, gain=1e9)))
     assert "zero" in str(refused(simple(unit, gain=0.0)))
+    immense = refused(simple(TransferFunction([(1e60, 0.5)])))
+    assert immense.where == "simple [transfer]" and "weight" in immense.what
+    immense = refused(simple(TransferFunction([(1e60, 0.5)])), memory="exponential", tolerance=1e-3)
+    assert immense.where == "simple [transfer]"
     assert "numerator" in str(refused(simple(TransferFunction([]))))
     assert "integrator = true" in str(refused(simple(TransferFunction([(1.0, -1.4)]))))
     assert "orders up to" in str(refused(simple(TransferFunction([(1.0, 9.0)]))))

@@ -149,7 +149,7 @@ def _root(actuator: Actuator, drive: float, low: float, high: float) -> float:
 
     if actuator.drive(high) == drive:
         return float(high)
-    return float(brentq(lambda p: actuator.drive(p) - drive, low, high, xtol=1e-15, rtol=1e-14))
+    return float(brentq(lambda p: actuator.drive(p) - drive, low, high, xtol=1e-15, rtol=1e-14, maxiter=5000))
 
 
 def _unreachable(rig: Rig, output: float, what: str, within: str) -> DesignError:

@@ -115,7 +115,10 @@ def _shifted(terms: Polynomial, by: float) -> Polynomial:
 
 def _refuse_right_half(where: str, terms: Polynomial, what: str, remedy: str) -> None:
     low = terms[-1].order
-    found = first_sheet_zeros(tuple(Term(c, o - low) for c, o in terms), _HALF_PLANE + 0.05)
+    try:
+        found = first_sheet_zeros(tuple(Term(c, o - low) for c, o in terms), _HALF_PLANE + 0.05)
+    except ArithmeticError as reason:
+        raise DesignError(where, f"cannot be inverted ({reason})", "check its num and den") from None
     right = found[np.abs(np.angle(found)) <= _HALF_PLANE + _AXIS]
     if len(right):
         place = max(right, key=lambda root: root.real)

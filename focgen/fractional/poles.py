@@ -14,6 +14,8 @@ from focgen.fractional.transfer import Polynomial
 
 _MERGED = 1e-3  # zeros this close, relative to their size, are located together
 _CIRCLE = 64
+_REACH = 600.0  # of an exponent: beyond it a term's size is no number any more
+_MOST_STEPS = 1_000_000  # along an edge; further halving would find nothing new
 
 
 def first_sheet_zeros(terms: Polynomial, sector: float) -> np.ndarray:
@@ -46,6 +48,9 @@ class _Sector:
         self.orders = np.array([t.order for t in terms]) - terms[-1].order
         # where one term outweighs the sum of the others there is no zero
         self.low, self.high = self._dominated(-1), self._dominated(0)
+        if max(-self.low, self.high) * self.orders[0] > _REACH:
+            ends = f"{-self.high / math.log(10.0):.0f} to 1e{-self.low / math.log(10.0):.0f}"
+            raise ArithmeticError(f"its time constants are too far apart, 1e{ends} s")
         self.angle = max((angle, angle + 0.01, angle - 0.01), key=self._clearance)
 
     def parts(self, x) -> np.ndarray:
@@ -92,6 +97,8 @@ class _Sector:
             if not coarse.any():
                 return float(np.sum(np.angle(values[1:] / values[:-1])))
             x = np.sort(np.concatenate([x, (x[:-1] + 0.5 * steps)[coarse]]))
+            if len(x) > _MOST_STEPS:
+                break
         raise ArithmeticError("a pole lies on the edge of the sector")
 
     def zeros(self) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -149,8 +150,21 @@ def _input(experiment: Experiment, rig: Rig, before: float | None) -> tuple[np.n
     gain = rig.regulator.dc_gain
     if not np.isfinite(gain):
         raise FitError("regulator", "integrates, so it has no rest to start from", "log the pressure")
-    moved = Convolution(rig.regulator, experiment.sample_time, "zero").run(command - rest)
+    moved = _through("regulator", rig.regulator, experiment.sample_time, "zero")(command - rest)
     return gain * rest + moved, gain * rest, "linear", "command"
+
+
+def _through(name: str, stage: TransferFunction, step: float, hold: str) -> Callable:
+    """What a stage makes of its input, as a function."""
+    convolution = Convolution(stage, step, hold)
+
+    def run(signal: np.ndarray) -> np.ndarray:
+        try:
+            return convolution.run(signal)
+        except ArithmeticError as reason:
+            raise FitError(name, f"cannot be simulated ({reason})", "check its num and den") from None
+
+    return run
 
 
 def _value_before(values: np.ndarray, before: float | None) -> float:
@@ -166,7 +180,7 @@ def _through_sensor(sensor: TransferFunction, drives: np.ndarray, step: float, h
     gain = sensor.dc_gain
     if not np.isfinite(gain):
         raise FitError("sensor", "integrates, so it has no rest to start from", "log the curvature")
-    run = Convolution(sensor, step, hold).run
+    run = _through("sensor", sensor, step, hold)
     return gain, np.array([run(drive) for drive in drives]), "linear"
 
 

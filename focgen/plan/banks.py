@@ -97,17 +97,18 @@ def departure(u: Interval, mean: Interval, up: int) -> Interval:
     return Interval(-1, 1) * Interval(0, max((u.high << up) - mean.low, mean.high - (u.low << up)))
 
 
-def bank_drafts(modes: tuple[Modes, ...], each: Interval, word: Word) -> list[BankDraft]:
-    """One draft for each fractional term and speed; ``each`` is the range of the history's counts."""
+def bank_drafts(modes: tuple[Modes, ...], each: Interval, word: Word, where: str) -> list[BankDraft]:
+    """One draft for each fractional term and speed; ``each`` is the range of the history's counts. Raises
+    PlanError, naming ``where``, where no format covers the weights."""
     arithmetic = _ARITHMETIC[word.bits]
     return [
-        _draft(Modes(m.order, m.rates[place], m.weights[place]), speed, each, word)
+        _draft(Modes(m.order, m.rates[place], m.weights[place]), speed, each, word, where)
         for m in modes
         for speed, place in by_speed(arithmetic, m.rates)
     ]
 
 
-def _draft(modes: Modes, speed: Speed, each: Interval, word: Word) -> BankDraft:
+def _draft(modes: Modes, speed: Speed, each: Interval, word: Word, where: str) -> BankDraft:
     u, guard = driven_by(each, modes.differences), 0
     while True:
         up = speed.to_drive - guard
@@ -118,7 +119,7 @@ def _draft(modes: Modes, speed: Speed, each: Interval, word: Word) -> BankDraft:
             break
         guard += 1
     counts = tuple(int(c) for c in speed.nearest(modes.rates))
-    exponent = finest_exponent(modes.weights, drive.worst, word)
+    exponent = finest_exponent(modes.weights, drive.worst, word, where)
     return BankDraft(modes.order, speed, counts, modes.weights, exponent, guard, mean, drive, word)
 
 

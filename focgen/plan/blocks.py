@@ -42,15 +42,31 @@ class Draft:
         return Draft(self.first, self.real, max(self.exponent, exponent))
 
 
-def split(weights: np.ndarray, first: int, largest: int, word: Word) -> list[Draft]:
+@dataclass(frozen=True)
+class _Cut:
+    """What every block keeps to: samples up to ``largest`` counts, ``word``, and an error ``allowed``."""
+
+    largest: int
+    word: Word
+    allowed: float
+    where: str
+
+    def exponent(self, weights: np.ndarray) -> int:
+        return finest_exponent(weights, self.largest, self.word, self.where)
+
+
+def split(
+    weights: np.ndarray, first: int, largest: int, word: Word, where: str = "[transfer]"
+) -> list[Draft]:
     """Cut weights, by rising lag from ``first`` on, into blocks, newest first.
 
-    ``largest`` is the largest magnitude of a sample in counts.
+    ``largest`` is the largest magnitude of a sample in counts. Raises PlanError, naming ``where``, where no
+    format covers the weights.
     """
-    allowed = 2.0 ** -(word.bits + 1) * float(np.abs(weights).sum())
+    cut = _Cut(largest, word, 2.0 ** -(word.bits + 1) * float(np.abs(weights).sum()), where)
     drafts = []
     for start, stop in _octaves(first, first + len(weights)):
-        drafts += _halved(weights[start - first : stop - first], start, largest, word, allowed)
+        drafts += _halved(weights[start - first : stop - first], start, cut)
     return drafts
 
 
@@ -63,24 +79,24 @@ def _octaves(first: int, stop: int):
         start = end
 
 
-def _halved(weights: np.ndarray, first: int, largest: int, word: Word, allowed: float) -> list[Draft]:
+def _halved(weights: np.ndarray, first: int, cut: _Cut) -> list[Draft]:
     if not weights.any():
         return [Draft(first, weights, 0)]
-    draft = Draft(first, weights, finest_exponent(weights, largest, word))
+    draft = Draft(first, weights, cut.exponent(weights))
     lost = np.any((draft.counts == 0) & (weights != 0.0))
-    if len(weights) == 1 or not (lost or draft.error > allowed):
+    if len(weights) == 1 or not (lost or draft.error > cut.allowed):
         return [draft]
     half = len(weights) // 2
-    newer = _halved(weights[:half], first, largest, word, allowed)
-    return newer + _halved(weights[half:], first + half, largest, word, allowed)
+    return _halved(weights[:half], first, cut) + _halved(weights[half:], first + half, cut)
 
 
-def finest_exponent(weights: np.ndarray, largest: int, word: Word) -> int:
-    """The finest scale at which every weight and the block's sum fit."""
+def finest_exponent(weights: np.ndarray, largest: int, word: Word, where: str) -> int:
+    """The finest scale at which every weight and the block's sum fit. Raises PlanError, naming ``where``,
+    where it is out of reach."""
     magnitude = np.abs(weights)
     room = limit(word.sum_bits) - (1 << (word.sum_bits - SPARE))
-    by_weight = exponent_for(float(magnitude.max()), word.limit, "[transfer]", "a weight")
-    by_sum = exponent_for(float(magnitude.sum()) * largest, room, "[transfer]", "a sum of weights")
+    by_weight = exponent_for(float(magnitude.max()), word.limit, where, "a weight")
+    by_sum = exponent_for(float(magnitude.sum()) * largest, room, where, "a sum of weights")
     exponent = max(by_weight, by_sum)
     while int(np.abs(np.rint(weights * 2.0**-exponent)).sum()) * largest > room:
         exponent += 1

@@ -89,7 +89,7 @@ def _format(bits: int, exponent: int, reach: Interval, unit: str = "") -> Format
 def filter_of(controller: Controller, tables: Tables, inputs: Signals, word: Word) -> Filter:
     """Formats and integer weights from e to v. Raises PlanError where the recursion is not stable or does not
     fit."""
-    sample = _Sample(inputs.exponent, span(inputs.error), word)
+    sample = _Sample(inputs.exponent, span(inputs.error), word, f"{controller.name} [transfer]")
     direct = sample.parts(tables.direct, 0) if tables.direct else None
     inner = _inner(controller, tables, sample) if tables.rest else None
     if tables.feedback is None:
@@ -99,18 +99,19 @@ def filter_of(controller: Controller, tables: Tables, inputs: Signals, word: Wor
 
 @dataclass(frozen=True)
 class _Sample:
-    """log2 of a history's lsb, the range of its counts, and the arithmetic."""
+    """log2 of a history's lsb, the range of its counts, the arithmetic, and where its weights come from."""
 
     exponent: int
     each: Interval
     word: Word
+    where: str
 
     def parts(self, table: Table, first: int) -> _Parts:
         """Modes lose the end of a type's range to the rounding of their means."""
         most = self.word.limit - 1
         each = Interval(max(self.each.low, -most), min(self.each.high, most))
-        taps = split(table.weights[first:], first, self.each.worst, self.word)
-        return _Parts(taps, bank_drafts(table.modes, each, self.word))
+        taps = split(table.weights[first:], first, self.each.worst, self.word, self.where)
+        return _Parts(taps, bank_drafts(table.modes, each, self.word, self.where))
 
     def sum(self, name: str, history: str, parts: _Parts, total: int, unit: str = "") -> Sum:
         blocks = finished(parts.taps, self.exponent, total, self.each, self.word, unit)
@@ -198,7 +199,7 @@ def _without_feedback(direct, inner, sample: _Sample) -> Filter:
 def _with_feedback(direct, inner, sample: _Sample, controller: Controller, tables: Tables) -> Filter:
     word = sample.word
     whole = Interval(-word.limit - 1, word.limit)
-    back = _Sample(0, whole, word).parts(tables.feedback, 1)
+    back = _Sample(0, whole, word, sample.where).parts(tables.feedback, 1)
     own = _quantised_inverse(back, controller, word)
     b = direct.response if direct else Response(np.zeros(1))
     reach = own.norm_after(b.weights, b.left_out) * sample.each.worst * 2.0**sample.exponent
@@ -237,7 +238,7 @@ def _recursion(direct, inner, sample: _Sample, back: _Parts, exponent: int) -> F
     """The filter with v in counts of 2^``exponent``; None where the wide format cannot be finer than v."""
     word = sample.word
     whole = Interval(-word.limit - 1, word.limit)
-    past = _Sample(exponent, whole, word)
+    past = _Sample(exponent, whole, word, sample.where)
     wide = max(_floor(direct, inner, sample), exponent + back.coarsest)
     while wide <= exponent:
         made, placed, p = _combined(direct, inner, sample, wide)

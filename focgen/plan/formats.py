@@ -52,7 +52,7 @@ def exponent_for(largest: float, counts: int, where: str, what: str) -> int:
     while nearest(largest * 2.0**-k) > counts:
         k += 1
     if not -_FARTHEST < k < _FARTHEST:
-        remedy = "give [ranges] in units that are nearer to 1"
+        remedy = "choose units in which it is nearer to 1"
         raise PlanError(where, f"{what} reaches {largest:.3g}, which no fixed-point format covers", remedy)
     return k
 

@@ -32,7 +32,7 @@ def span_of(low: float, high: float, exponent: int, where: str, what: str) -> In
         remedy = "subtract the offset from the signals, or choose a wider arithmetic"
         raise PlanError(
             where,
-            f"the {what} range [{low:g}, {high:g}] spans only {counts.high - counts.low} counts",
+            f"the {what} range [{low:.10g}, {high:.10g}] spans only {counts.high - counts.low} counts",
             remedy,
         )
     return counts

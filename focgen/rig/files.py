@@ -43,7 +43,19 @@ def _signals(top: Table) -> Signals:
     table.done()
     if found["command"] is None and found["pressure"] is None:
         raise table.fail(None, "has neither 'command' nor 'pressure'", "name the column of the input")
-    return Signals(**required, **found)
+    signals = Signals(**required, **found)
+    _check_columns(table, signals)
+    return signals
+
+
+def _check_columns(table: Table, signals: Signals) -> None:
+    """Refuse a column with two roles: the stage between them would be taken for 1 without a word."""
+    roles: dict[str, str] = {}
+    for role, column in asdict(signals).items():
+        if column is not None and column in roles:
+            remedy = "give each role its own column, and leave out what is not logged"
+            raise table.fail(role, f"is the column {column!r}, as {roles[column]!r} is", remedy)
+        roles[column] = role
 
 
 def _stage(table: Table | None) -> TransferFunction:
