@@ -17,7 +17,7 @@ from focgen.identification.model import Identification
 from focgen.loop.design import Design, design
 from focgen.loop.simulate import Simulation, simulate
 from focgen.output import new_folder
-from focgen.progress import say
+from focgen.progress import led_by, say
 from focgen.report.control import design_pictures, simulation_pictures
 from focgen.report.demo_page import demo_page
 from focgen.report.identification import identification_pictures
@@ -129,7 +129,8 @@ def _blind(folder: Path) -> tuple[Diagnosis, tuple[str, ...]]:
     made = make(folder, cases=1, seed=_SEED, signals="C", suite="short", kinds=("single",))
     number, committed = next(iter(made.commitments.items()))
     case, seal = folder / "cases" / number, folder / "sealed" / number
-    found = diagnose(case / "rig.toml", sorted((case / "logs").glob("*.csv")), out=folder / "found")
+    with led_by("     the signals from "):
+        found = diagnose(case / "rig.toml", sorted((case / "logs").glob("*.csv")), out=folder / "found")
     label = unseal(seal / "label.json", committed, seal / "unseen")
     return found, tuple(effect["effect"] for effect in label["truth"])
 

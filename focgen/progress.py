@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sized
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -12,9 +14,22 @@ Item = TypeVar("Item")
 _WIDTH = 24  # characters of the bar
 
 
+_lead: ContextVar[str] = ContextVar("lead", default="")  # what stands before every line
+
+
 def say(line: str) -> None:
     """Print one line of progress; results go to stdout, this does not."""
-    print(line, file=sys.stderr, flush=True)
+    print(f"{_lead.get()}{line}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def led_by(words: str) -> Iterator[None]:
+    """Put ``words`` before every line that is said meanwhile: a step says what its parts are about."""
+    kept = _lead.set(words)
+    try:
+        yield
+    finally:
+        _lead.reset(kept)
 
 
 def track(items: Iterable[Item], label: str, total: int | None = None) -> Iterator[Item]:

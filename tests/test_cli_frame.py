@@ -12,7 +12,7 @@ from focgen.cli.main import commands, main, parser
 from focgen.errors import InputError
 from focgen.jsontext import to_json
 from focgen.output import new_folder, write_file, write_files
-from focgen.progress import bar
+from focgen.progress import bar, led_by, say
 
 
 @pytest.mark.parametrize(
@@ -86,6 +86,13 @@ def test_what_stands_in_the_way_is_reported_before_anything_is_written(tmp_path)
     with pytest.raises(InputError, match="is a file where a folder belongs"):
         write_files(tmp_path / "other", {"a.c": "text", "sub/b.c": "text"})
     assert [p.name for p in (tmp_path / "other").iterdir()] == ["sub"]
+
+
+def test_a_step_leads_the_lines_of_its_parts(capsys):
+    with led_by("  from "):
+        say("command to pressure")
+    say("next")
+    assert capsys.readouterr() == ("", "  from command to pressure\nnext\n")
 
 
 def test_a_bar_shows_how_far_and_how_long():

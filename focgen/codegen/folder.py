@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import focgen
@@ -135,7 +136,8 @@ def _tightest(plan: Plan) -> str:
     if not plan.proofs:
         return ""
     proof = min(plan.proofs, key=lambda p: p.margin_bits)
-    return f"`{proof.node}`, {proof.worst} of {proof.limit} ({proof.ctype})"
+    share = math.ceil(1000.0 * proof.worst / proof.limit) / 10.0  # upwards: it is a bound
+    return f"`{proof.node}`, at most {share:g} % of its {proof.ctype}"
 
 
 def _memory_section(plan: Plan) -> str:

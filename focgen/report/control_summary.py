@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict
 
 from focgen.control.margins import Margins
-from focgen.loop.design import Design
+from focgen.loop.design import Design, ScheduleReport
 from focgen.loop.response import PointMargins
 from focgen.loop.simulate import SetpointResult, Simulation
 from focgen.report.page import TableOf, text_table
@@ -59,15 +59,20 @@ def _worst(points: tuple[PointMargins, ...], loop: str) -> dict:
     return {**asdict(getattr(worst, loop)), "pressure": worst.pressure, "by_operating_point": rows}
 
 
+def _line_text(schedule: ScheduleReport) -> str:
+    if not schedule.breakpoints:
+        return f"K_o = {schedule.intercept:.4g}"
+    sign = "−" if schedule.slope < 0.0 else "+"
+    return f"K_o(p) = {schedule.intercept:.4g} {sign} {abs(schedule.slope):.4g} p"
+
+
 def design_text(design: Design) -> str:
     """The design for people."""
     schedule, controller = design.schedule, design.controller
     integral = " / s" if controller.integrator else ""
     lines = [
         f"{controller.name}: C(s) = {_gain_text(design)} ({controller.transfer}){integral}",
-        f"K_o(p) = {schedule.intercept:.4g} {schedule.slope:+.4g} p"
-        if schedule.breakpoints
-        else f"K_o = {schedule.intercept:.4g}",
+        _line_text(schedule),
     ]
     if schedule.breakpoints:
         lines += _schedule_lines(design)
