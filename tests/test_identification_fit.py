@@ -9,9 +9,10 @@ import pytest
 from scipy.signal import lfilter
 
 from focgen.errors import FitError, LogError
-from focgen.fractional.responses import mittag_leffler
+from focgen.fractional.responses import mittag_leffler, step_response
+from focgen.fractional.transfer import TransferFunction
 from focgen.identification import identify as module
-from focgen.identification.excitation import prepare
+from focgen.identification.excitation import hold_of, prepare
 from focgen.identification.fractional import fit_fractional
 from focgen.identification.integer import SHAPES, fit_integer_models
 from focgen.identification.kernel import step_means, step_responses
@@ -61,6 +62,40 @@ def test_parameters_come_back_exactly_without_noise(alpha, release):
     fit = fitted(step_log(0.01, 21.0 if release is None else 30.0, release, alpha=alpha, offset=0.003))
     assert abs(fit.alpha - alpha) <= 1e-7 and abs(fit.T / T - 1.0) <= 1e-6 and abs(fit.K[0] / K - 1.0) <= 1e-6
     assert fit.offset[0] == pytest.approx(0.003, abs=1e-9)
+
+
+def chain_log(roles: tuple[str, ...]) -> Experiment:
+    """A step of the command through regulator, actuator and sensor, each exact; only ``roles`` are logged."""
+    rig, time = paper_rig(), 0.01 * np.arange(2000)
+    late = time > 1.0
+    stages = {"pressure": rig.regulator, "curvature": TransferFunction([(K, 0)], [(T, ALPHA), (1, 0)])}
+    signals, so_far = {"command": 1.5 * (time >= 1.0)}, TransferFunction([(1.5, 0)])
+    for role, stage in (*stages.items(), ("output", rig.sensor)):
+        so_far, signals[role] = so_far * stage, np.zeros(len(time))
+        signals[role][late] = step_response(so_far, time[late] - 1.0)
+    return Experiment("step", 0.01, {role: signals[role] for role in roles})
+
+
+@pytest.mark.parametrize("driven_by", ["pressure", "command"])
+@pytest.mark.parametrize("fitted_to", ["curvature", "output"])
+def test_what_is_not_logged_is_made_by_the_rig(driven_by, fitted_to):
+    """The command goes through the regulator, the model through the sensor; the pressure is taken as straight
+    between samples, which it is not: 3e-5 in α.
+    """
+    x = prepare(chain_log(tuple(dict.fromkeys((driven_by, fitted_to, "output")))), paper_rig())
+    assert (x.input_role, x.fitted_role) == (driven_by, fitted_to)
+    fit = fit_fractional([x])
+    assert abs(fit.alpha - ALPHA) < 1e-4 and fit.T == pytest.approx(T, rel=1e-4)
+    assert fit.K[0] == pytest.approx(K, rel=1e-4)
+
+
+def test_an_input_is_held_where_it_jumps():
+    time = 0.01 * np.arange(2000)
+    rise = 0.15 * (1.0 - np.exp(-np.maximum(time - 1.0, 0.0) / 0.05))
+    held = [0.15 * (time > 1.0), np.round(time / 3.0), 0.15 * (time > 1.0) - 0.15 * (time > 9.0), 0.0 * time]
+    moving = [rise, np.round(rise, 3), rise + np.random.default_rng(0).normal(size=2000), np.sin(time)]
+    assert [hold_of(values) for values in held] == ["zero"] * 4
+    assert [hold_of(values) for values in moving] == ["linear"] * 4
 
 
 def coverage(colour: float, seeds: int) -> float:

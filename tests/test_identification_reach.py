@@ -26,7 +26,7 @@ def experiment(**signals):
 def test_a_range_spans_zero_and_what_was_seen_with_room(seen, span):
     ranges, notes = seen_ranges(Ranges(), [experiment(command=[0.0, 1.0], output=seen)])
     assert ranges == Ranges(output=span)
-    assert len(notes) == 1 and "output" in notes[0] and f"{span[1]:g}" in notes[0]
+    assert len(notes) == 1 and f"output is not given: {span[0]:g} … {span[1]:g}," in notes[0]
 
 
 def test_what_is_given_stays_and_all_experiments_count():

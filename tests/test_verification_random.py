@@ -2,6 +2,7 @@
 every bit.
 """
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,8 +19,9 @@ from focgen.verification.verify import compare
 from tests.controllers import random_controller
 
 ARITHMETICS = ("f64", "f32", "q31", "q15")
-BATCH = 25  # controllers to a compilation
-WANTED = 200
+WANTED = 200  # controllers in every arithmetic
+BATCHES = 8  # compilations
+SEEDS = 27  # to a batch: now and then one cannot be realised
 LENGTHS = (1, 2, 3, 7, 8, 9, 63, 64, 65, 127, 128, 129)  # about the edges of blocks
 
 
@@ -43,8 +45,8 @@ def compiled(plans, folder: Path) -> Library:
     return Library(plans, [folder] * len(plans), flags=("-std=c99", "-O1", "-ffp-contract=off"))
 
 
-def check(seeds, folder: Path, samples: int) -> int:
-    """Compare every plan of the seeds; returns how many there were."""
+def check(seeds, folder: Path, samples: int) -> Counter[str]:
+    """Compare every plan of the seeds; returns how many there were of each arithmetic."""
     plans = [plan for seed in seeds for plan in planned(seed)]
     library = compiled(plans, folder)
     for plan in plans:
@@ -52,20 +54,20 @@ def check(seeds, folder: Path, samples: int) -> int:
         assert result.mismatches == 0, f"{plan.name}: {result.first}"
         assert result.within, f"{plan.name}: {result.max_error} against {result.error_bound}"
         assert result.samples >= samples
-    return len(plans)
+    return Counter(plan.arithmetic for plan in plans)
 
 
-@pytest.mark.parametrize("batch", range(WANTED // BATCH))
+@pytest.mark.parametrize("batch", range(BATCHES))
 def test_random_controllers_agree_in_every_bit(batch, tmp_path):
-    """Batches of 25 controllers; nearly all of them fit every arithmetic."""
-    seeds = range(batch * BATCH, (batch + 1) * BATCH)
-    assert check(seeds, tmp_path, 10_000) >= 0.75 * 4 * BATCH
+    """200 controllers in four arithmetics, 10⁴ samples each."""
+    found = check(range(batch * SEEDS, (batch + 1) * SEEDS), tmp_path, 10_000)
+    assert min(found[arithmetic] for arithmetic in ARITHMETICS) >= WANTED // BATCHES
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("batch", range(40))
 def test_many_random_controllers_agree_in_every_bit(batch, tmp_path):
-    assert check(range(1000 + batch * BATCH, 1000 + (batch + 1) * BATCH), tmp_path, 40_000) > 0
+    assert check(range(1000 + batch * SEEDS, 1000 + (batch + 1) * SEEDS), tmp_path, 40_000)
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)

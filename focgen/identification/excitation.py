@@ -15,7 +15,8 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.model import UNITY, Rig
 
-_HELD = 0.1  # share of samples in which a held input changes
+_HELD = 0.1  # share of samples in which a held input changes at most
+_JUMPS = 0.5  # share of its way that a held input makes in jumps at least
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
 _FEWEST = 30  # samples
 
@@ -172,8 +173,16 @@ def _value_before(values: np.ndarray, before: float | None) -> float:
 
 
 def hold_of(values: np.ndarray) -> str:
-    """ "zero" for an input that is held (it changes in few of its samples), else "linear"."""
-    return "zero" if np.count_nonzero(np.diff(values)) <= _HELD * len(values) else "linear"
+    """ "zero" for an input that is held, else "linear".
+
+    A held one changes in few of its samples, and in jumps: not in two samples in a row, as a pressure does on
+    its way up that then rests.
+    """
+    way = np.abs(np.diff(values))
+    moves = np.pad(way > 0.0, 1)
+    jumps = way[moves[1:-1] & ~moves[:-2] & ~moves[2:]].sum()
+    few = np.count_nonzero(way) <= _HELD * len(values)
+    return "zero" if few and jumps >= _JUMPS * way.sum() else "linear"
 
 
 def _through_sensor(sensor: TransferFunction, drives: np.ndarray, step: float, hold: str) -> tuple:

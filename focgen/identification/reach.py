@@ -38,7 +38,7 @@ def _with_room(low: float, high: float) -> tuple[float, float]:
     """The span of zero and both ends, widened; an end that only noise moves off zero (2 %) stays zero."""
     reach = max(high, -low, 0.0)
     low, high = (end if abs(end) > 0.02 * reach else 0.0 for end in (min(low, 0.0), max(high, 0.0)))
-    return -_outwards(-_ROOM * low), _outwards(_ROOM * high)
+    return 0.0 - _outwards(-_ROOM * low), _outwards(_ROOM * high)
 
 
 def _outwards(value: float) -> float:
