@@ -30,7 +30,7 @@ def test_agrees_with_python_control_on_random_loops():
     stable = 0
     for _ in range(80):
         loop = random_loop(rng)
-        found = margins(curve(lambda omega: loop(1j * omega), 1e-4, 1e5))
+        found = margins(curve(lambda omega, loop=loop: loop(1j * omega), 1e-4, 1e5))
         gain, phase, *_ = control.stability_margins(loop)
         really = bool((control.feedback(loop).poles().real < 0).all())
         assert found.stable == really
@@ -60,7 +60,9 @@ def test_fractional_integrator_in_closed_form(order, gain):
 def test_delay_is_found_by_its_closed_form():
     """k e^(−sD)/s: gain margin π/(2 k D), delay margin π/(2 k) − D; unstable beyond."""
     for gain, delay in ((1.0, 0.3), (2.0, 0.7), (5.0, 0.4)):
-        found = margins(curve(lambda w: gain * np.exp(-1j * w * delay) / (1j * w), 1e-4, 1e3))
+        found = margins(
+            curve(lambda w, gain=gain, delay=delay: gain * np.exp(-1j * w * delay) / (1j * w), 1e-4, 1e3)
+        )
         ratio = math.pi / (2 * gain * delay)
         assert found.stable == (ratio > 1.0)
         if ratio > 1.0:

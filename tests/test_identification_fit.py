@@ -16,6 +16,7 @@ from focgen.identification.excitation import hold_of, prepare
 from focgen.identification.fractional import fit_fractional
 from focgen.identification.integer import SHAPES, fit_integer_models
 from focgen.identification.kernel import step_means, step_responses
+from focgen.identification.line import fit_line
 from focgen.identification.quality import gof
 from focgen.logs.experiment import Experiment
 from tests.conftest import paper_rig
@@ -178,6 +179,44 @@ def test_pooled_rig_has_the_line():
     assert found.gof["rig"]["mean"] > 0.9999
     assert any("positive steps only" in w for w in found.warnings)
     assert any("levels rise" in w for w in found.warnings)
+
+
+def between(p: float, q: float) -> Experiment:
+    """At rest at p for ever, then stepped to q."""
+    drive = lambda p: (0.0015 + 0.345 * p) * p  # noqa: E731
+    pressure = np.where(np.arange(2000) >= 50, q, p)
+    curvature = drive(p) + (drive(q) - drive(p)) * exact_step(0.02, 2000, 1.0)
+    return Experiment(
+        f"{p} to {q}", 0.02, {"pressure": pressure, "curvature": curvature, "output": curvature}
+    )
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [
+        [(0.1, 0.0), (0.15, 0.0), (0.2, 0.0)],
+        [(0.0, 0.1), (0.1, 0.0), (0.0, 0.2), (0.2, 0.0)],
+        [(0.05, 0.1), (0.1, 0.2), (0.15, 0.05)],
+    ],
+    ids=["releases", "up and down", "between levels"],
+)
+def test_steps_from_anywhere_to_anywhere_give_the_line(ends):
+    found = module.identify([between(*each) for each in ends], paper_rig())
+    assert found.pooled.gain == pytest.approx((0.0015, 0.345), rel=1e-6)
+    assert found.gof["rig"]["mean"] > 0.9999
+    assert [fit.level for fit in found.experiments] == [max(each) for each in ends]
+    assert not any("positive steps only" in w for w in found.warnings)
+    assert sum("mean slope of K(p) p" in note for note in found.notes) == sum(
+        min(each) > 0.0 for each in ends
+    )
+
+
+def test_a_curve_of_the_gain_comes_back_from_steps_between_levels():
+    """K(p) of degree 2: a step from p to q has the secant of K(p) p for its gain."""
+    ends = np.array([(0.0, 0.1), (0.1, 0.2), (0.2, 0.05), (0.15, 0.0), (0.0, 0.2)])
+    drive = np.polynomial.Polynomial([0.0, 0.02, -0.3, 2.0])
+    slopes = np.diff(drive(ends)).ravel() / np.diff(ends).ravel()
+    assert fit_line(ends, slopes, np.eye(5), 2).gain == pytest.approx((0.02, -0.3, 2.0), rel=1e-9)
 
 
 def test_releases_are_fitted_and_silence_the_warning():

@@ -9,9 +9,8 @@ import numpy as np
 from focgen.identification.excitation import Excitation
 from focgen.identification.model import ExperimentFit
 
-_FALL = 0.5  # of the level: the input comes down by at least this in a release
+_FALL = 0.5  # of the step: the input comes nearer to 0 by at least this in a release
 _WIDE = 0.3  # of a parameter: an interval wider than this says little
-_CHANGED = 0.1  # of the level: the log moves on by this after the release's first sample
 
 
 def warnings_of(excitations: Sequence[Excitation], fits: Sequence[ExperimentFit]) -> tuple[str, ...]:
@@ -22,7 +21,7 @@ def warnings_of(excitations: Sequence[Excitation], fits: Sequence[ExperimentFit]
             "positive steps only: whether the actuator unloads as it loads, and its hysteresis, cannot be "
             "seen; log the releases too, and a slow sine"
         )
-    levels = np.array([x.level for x in excitations])
+    levels = np.array([x.loaded for x in excitations])
     rising = len(levels) > 2 and bool(np.all(np.diff(levels) > 0.0))
     if rising:
         found.append(
@@ -39,9 +38,10 @@ def warnings_of(excitations: Sequence[Excitation], fits: Sequence[ExperimentFit]
 
 
 def _releases(x: Excitation) -> bool:
-    away = (x.pressure - x.before) / (x.level - x.before if x.level != x.before else 1.0)
-    peak = int(np.argmax(away >= 1.0 - _CHANGED))
-    return bool(away[peak:].min() <= 1.0 - _FALL) and len(away) - peak > 1
+    """Whether the input comes back towards 0 in the log, for more than a single last sample."""
+    size = np.abs(np.concatenate([[x.before], x.pressure]))
+    fallen = np.maximum.accumulate(size) - size >= _FALL * abs(x.level - x.before)
+    return bool(x.level != x.before and np.count_nonzero(fallen) > 1)
 
 
 def _half(fit: ExperimentFit, key: str) -> float:

@@ -18,6 +18,7 @@ from focgen.rig.model import UNITY, Rig
 _HELD = 0.1  # share of samples in which a held input changes at most
 _JUMPS = 0.5  # share of its way that a held input makes in jumps at least
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
+_AWAY = 0.1  # of a step's farther end: the nearer one is not 0
 _FEWEST = 30  # samples
 
 
@@ -48,6 +49,16 @@ class Excitation:
 
     def __len__(self) -> int:
         return len(self.measured)
+
+    @property
+    def loaded(self) -> float:
+        """The end of the step that is farther from 0: what it is stepped to, or released from."""
+        return max(self.level, self.before, key=abs)
+
+    @property
+    def between(self) -> bool:
+        """Whether it is a step between two levels, neither of them 0."""
+        return min(abs(self.level), abs(self.before)) > _AWAY * abs(self.loaded)
 
     @property
     def jumps(self) -> bool:

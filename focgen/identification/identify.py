@@ -57,12 +57,7 @@ def identify(
     others = _read(unseen, nominal, None, None) if unseen else ()
     excitations = [_prepared(e, nominal, gain_degree + 1) for e in experiments]
     fits = tuple(_fit(x) for x in track(excitations, "fitting experiment"))
-    steps = [x for x, fit in zip(excitations, fits) if fit.step]
-    if not steps:
-        raise FitError(
-            "logs", "none is a step of the input", "add step logs; K(p), T and alpha come from them"
-        )
-    pooled, notes = _pooled(steps, gain_degree)
+    pooled, notes = _pooled(_steps(excitations, fits), gain_degree)
     ranges, told = seen_ranges(nominal.ranges, experiments)
     found = replace(
         nominal, actuator=Actuator(pooled.T, pooled.alpha, pooled.gain), ranges=ranges, effects=()
@@ -104,7 +99,7 @@ def _fit(x: Excitation) -> ExperimentFit:
         name=x.name,
         **found,
         offset=float(fit.offset[0]),
-        level=x.level,
+        level=x.loaded,
         ci95={key: (found[key] - half[key], found[key] + half[key]) for key in found},
         gof=gof(x.measured, fit.simulated[0]),
         fitted=x.fitted_role,
@@ -116,6 +111,15 @@ def _fit(x: Excitation) -> ExperimentFit:
         integer=fit_integer_models(x, _needs_offset(x, fit)),
         step=is_step(x),
     )
+
+
+def _steps(excitations: list[Excitation], fits: tuple[ExperimentFit, ...]) -> list[Excitation]:
+    steps = [x for x, fit in zip(excitations, fits, strict=True) if fit.step]
+    if not steps:
+        raise FitError(
+            "logs", "none is a step of the input", "add step logs; K(p), T and alpha come from them"
+        )
+    return steps
 
 
 def _needs_offset(x: Excitation, fit: FractionalFit) -> bool:
@@ -136,9 +140,9 @@ def is_step(x: Excitation) -> bool:
 
 def _pooled(steps: list[Excitation], degree: int) -> tuple[Pooled, tuple[str, ...]]:
     fit = fit_fractional(steps)
-    levels = np.array([x.level for x in steps])
-    degree, notes = _feasible_degree(levels, degree)
-    line = fit_line(levels, fit.K, fit.K_covariance, degree)
+    ends = np.array([(x.before, x.level) for x in steps])
+    degree, notes = _feasible_degree(ends, degree)
+    line = fit_line(ends, fit.K, fit.K_covariance, degree)
     span = lambda value, half: (float(value - half), float(value + half))  # noqa: E731
     ci95 = {
         "T": span(fit.T, fit.half["T"]),
@@ -157,8 +161,8 @@ def _pooled(steps: list[Excitation], degree: int) -> tuple[Pooled, tuple[str, ..
     ), notes
 
 
-def _feasible_degree(levels: np.ndarray, degree: int) -> tuple[int, tuple[str, ...]]:
-    possible = min(degree, distinct_levels(levels) - 1)
+def _feasible_degree(ends: np.ndarray, degree: int) -> tuple[int, tuple[str, ...]]:
+    possible = min(degree, distinct_levels(ends) - 1)
     if possible == degree:
         return degree, ()
     return possible, (
@@ -219,6 +223,11 @@ def _notes(excitations, fits, nominal: Rig) -> tuple[str, ...]:
     ]
     said += [
         f"{f.name}: not a step; fitted by itself, left out of T, alpha and K(p)" for f in fits if not f.step
+    ]
+    said += [
+        f"{x.name}: a step from {x.before:.3g} to {x.level:.3g}; its K is the mean slope of K(p) p on it"
+        for x, f in zip(excitations, fits, strict=True)
+        if f.step and x.between
     ]
     if isinstance(nominal.actuator, LinearActuator):
         said.append(

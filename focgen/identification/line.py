@@ -1,5 +1,8 @@
 """The gain as a polynomial of the pressure, K(p) = gain[0] + gain[1] p + …, through the gains of single
 steps.
+
+A step from p to q moves the drive K(p) p by its own K times q − p. So this K is the drive's mean slope there:
+K(q) where it starts at 0, K(p) where it ends at 0, and everywhere linear in the polynomial's coefficients.
 """
 
 from __future__ import annotations
@@ -27,25 +30,32 @@ class GainLine:
     r2: float
 
 
-def distinct_levels(levels: np.ndarray) -> int:
-    """How many levels lie apart."""
-    rising = np.sort(levels)
-    return int(1 + np.count_nonzero(np.diff(rising) > _APART * np.abs(levels).max()))
+def distinct_levels(steps: np.ndarray) -> int:
+    """How many steps (n, 2), from one pressure to another, lie apart; a release tells what its load did."""
+    rising = np.sort(steps.sum(axis=1))
+    return int(1 + np.count_nonzero(np.diff(rising) > _APART * np.abs(rising).max()))
 
 
-def fit_line(levels: np.ndarray, K: np.ndarray, covariance: np.ndarray, degree: int) -> GainLine:
-    """Ordinary least squares of K (n,) over ``levels`` (n,).
+def _secants(steps: np.ndarray, count: int) -> np.ndarray:
+    """(q^m − p^m)/(q − p) of each step from p to q, m = 1 … ``count``; shape (n, count)."""
+    p, q = steps[:, :1], steps[:, 1:]
+    powers = np.arange(count)
+    return np.hstack([(q ** powers[:m] * p ** powers[:m][::-1]).sum(1, keepdims=True) for m in powers + 1])
+
+
+def fit_line(steps: np.ndarray, K: np.ndarray, covariance: np.ndarray, degree: int) -> GainLine:
+    """Ordinary least squares of K (n,) over ``steps`` (n, 2), each from one pressure to another.
 
     Its intervals follow from the ``covariance`` (n, n) of K, widened where K scatters about the line by more
     than that. Raises FitError where there are fewer distinct levels than coefficients.
     """
-    if distinct_levels(levels) <= degree:
-        what = f"{distinct_levels(levels)} distinct levels do not determine K(p) of degree {degree}"
+    if distinct_levels(steps) <= degree:
+        what = f"{distinct_levels(steps)} distinct levels do not determine K(p) of degree {degree}"
         raise FitError("--gain-degree", what, "log more levels or ask for a lower degree")
-    powers = np.vander(levels, degree + 1, increasing=True)
-    solve = np.linalg.pinv(powers)
+    secants = _secants(steps, degree + 1)
+    solve = np.linalg.pinv(secants)
     gain = solve @ K
-    left, free = K - powers @ gain, len(K) - degree - 1
+    left, free = K - secants @ gain, len(K) - degree - 1
     spread = solve @ covariance @ solve.T * _excess(left, covariance, free)
     width = student.ppf(0.975, free) if _excess(left, covariance, free) > 1.0 else 1.959964
     return GainLine(tuple(gain.tolist()), tuple((width * np.sqrt(np.diag(spread))).tolist()), _r2(K, left))

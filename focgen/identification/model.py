@@ -16,8 +16,9 @@ Span = tuple[float, float]
 class ExperimentFit:
     """K/(T s^alpha + 1) fitted to one experiment.
 
-    ``K`` in output per pressure units, ``T`` in s^alpha, ``level`` the pressure it was stepped to, ``ci95``
-    maps K, T and alpha to 95 % intervals. ``fitted`` and ``driven_by`` are the roles fitted and driving.
+    ``K`` in output per pressure units, ``T`` in s^alpha, ``level`` the pressure it was stepped to, or
+    released from; ``ci95`` maps K, T and alpha to 95 % intervals. ``fitted`` and ``driven_by`` are the roles
+    fitted and driving.
     ``time`` (n,) in s, ``pressure``, ``measured`` and ``simulated`` (n,). ``step`` says whether it is a step,
     which K(p) is drawn through.
     """

@@ -68,31 +68,27 @@ def _line_text(schedule: ScheduleReport) -> str:
 
 def design_text(design: Design) -> str:
     """The design for people."""
+    tables = text_table(points_table(design)), text_table(margins_table(design))
+    notes = "\n".join([memory_line(design), *(f"note: {note}" for note in design.notes)])
+    return "\n\n".join(["\n".join(schedule_lines(design)), *tables, notes, _wish_line(design)])
+
+
+def schedule_lines(design: Design) -> list[str]:
+    """The controller, K_o(p), and how its table realises that: its error, and where it is held."""
     schedule, controller = design.schedule, design.controller
     integral = " / s" if controller.integrator else ""
     lines = [
         f"{controller.name}: C(s) = {_gain_text(design)} ({controller.transfer}){integral}",
         _line_text(schedule),
     ]
-    if schedule.breakpoints:
-        lines += _schedule_lines(design)
-    lines += [
-        "",
-        text_table(points_table(design)),
-        "",
-        text_table(margins_table(design)),
-        "",
-        _memory_line(design),
-    ]
-    lines += [f"note: {note}" for note in design.notes]
-    return "\n".join([*lines, "", _wish_line(design)])
+    return lines + _table_lines(design) if schedule.breakpoints else lines
 
 
 def _gain_text(design: Design) -> str:
     return "K_o(p)/K(p) ·" if design.schedule.breakpoints else f"{design.controller.gain:.6g} ·"
 
 
-def _schedule_lines(design: Design) -> list[str]:
+def _table_lines(design: Design) -> list[str]:
     schedule = design.schedule
     lines = [
         f"schedule: {len(schedule.breakpoints)} breakpoints from {schedule.breakpoints[0]:.4g} to "
@@ -109,7 +105,8 @@ def _schedule_lines(design: Design) -> list[str]:
     return lines
 
 
-def _memory_line(design: Design) -> str:
+def memory_line(design: Design) -> str:
+    """The memory length, why it was taken, and what it costs at rest."""
     memory = design.memory
     text = (
         f"memory: L = {memory.length} ({memory.seconds:.3g} s), {memory.reason}: "

@@ -9,7 +9,13 @@ from focgen.diagnosis.model import Diagnosis
 from focgen.identification.model import Identification
 from focgen.loop.design import Design
 from focgen.loop.simulate import Simulation
-from focgen.report.control_summary import margins_table, points_table, setpoints_table
+from focgen.report.control_summary import (
+    margins_table,
+    memory_line,
+    points_table,
+    schedule_lines,
+    setpoints_table,
+)
 from focgen.report.identification_summary import gain_text, parameter_table, quality_table
 from focgen.report.page import Page, Picture, Section, TableOf
 from focgen.report.study_summary import rows_table
@@ -63,6 +69,10 @@ def _notes(notes: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"Note: {note}." for note in notes)
 
 
+def _sentence(line: str) -> str:
+    return f"{line[0].upper()}{line[1:]}."
+
+
 def _model(found: Identification) -> Section:
     pictures = [
         Picture("pictures/fits.png", "Six steps, and the fractional model of each (as Fig. 5)"),
@@ -87,9 +97,10 @@ def _controller(design: Design) -> Section:
         Picture("pictures/schedule.png", "The gain schedule, and the formula it stands for"),
         Picture("pictures/margins.png", "The open loop, ideal and as it will run"),
     )
+    formula, *rest = schedule_lines(design)
     return Section(
         "Controller",
-        _notes(design.notes),
+        (formula, *map(_sentence, [*rest, memory_line(design)]), *_notes(design.notes)),
         (points_table(design), margins_table(design)),
         pictures,
         ("controller.toml",),

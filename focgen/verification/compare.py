@@ -167,7 +167,7 @@ def judged(
     """
     bound, kernels = (plan.error_bound, kernels) if read is None else (read.bound, read.kernels)
     total, mismatches, first, states = 0, 0, None, 0
-    for case, answer in zip(cases.cases, seen):
+    for case, answer in zip(cases.cases, seen, strict=True):
         wrong = _differs(plan, answer.trace, case.expected)
         total += wrong.size
         mismatches += int(np.count_nonzero(wrong))

@@ -55,7 +55,7 @@ def run() -> str:
     for count in (1000, 10_000, 100_000):
         u = np.ones(count)
         truth = step_response(MODEL, STEP * np.arange(count))
-        times = {name: best_time(lambda f=f: f(u)) for name, f in SIMULATORS.items()}
+        times = {name: best_time(lambda f=f, u=u: f(u)) for name, f in SIMULATORS.items()}
         for name, seconds in times.items():
             ratio = seconds / times["Convolution, held"]
             rows[name] += f"{seconds * 1e3:11.2f} ms {ratio:6.1f}x"

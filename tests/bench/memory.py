@@ -90,8 +90,8 @@ def _against_rival() -> list[str]:
         cost = taps + 2 * modes
         lines.append(_row(f"fracmem L{taps} p{modes}", cost, taps + modes, goal))
         for good_enough, what in (
-            (lambda found: max(found.values()) <= max(goal.values()), "largest"),
-            (lambda found: all(found[key] <= goal[key] for key in goal), "each"),
+            (lambda found, goal=goal: max(found.values()) <= max(goal.values()), "largest"),
+            (lambda found, goal=goal: all(found[key] <= goal[key] for key in goal), "each"),
         ):
             memory, found = _cheapest(0.6, HORIZON, good_enough)
             ratios[what].append(cost / memory.multiplies)
