@@ -2,6 +2,7 @@
 them.
 """
 
+import doctest
 import re
 from pathlib import Path
 
@@ -23,6 +24,12 @@ def test_every_link_leads_somewhere(page):
 def test_every_command_named_exists(page):
     lines = re.findall(r"^focgen ([a-z]+)", page.read_text(encoding="utf-8"), re.MULTILINE)
     assert set(lines) <= set(commands())
+
+
+def test_the_page_of_python_is_true(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    failed, tried = doctest.testfile(str(ROOT / "docs" / "python.md"), module_relative=False)
+    assert tried > 20 and not failed
 
 
 def test_readme_begins_with_what_it_is_and_how_to_start():
