@@ -144,7 +144,8 @@ def _draw_pooled(axes, pooled: Pooled, levels: Sequence[float]) -> None:
     """K(p), and T and α of all experiments together."""
     reach = np.linspace(min(levels), max(levels), 50)
     line = np.polynomial.polynomial.polyval(reach, pooled.gain)
-    axes[0].plot(reach, line, color=COLOURS["ideal"], label=f"K(p), R² = {pooled.gain_r2:.4f}")
+    label = f"K(p), R² = {pooled.gain_r2:.4f}" if len(pooled.gain) > 1 else "K, pooled"
+    axes[0].plot(reach, line, color=COLOURS["ideal"], label=label)
     for ax, key in zip(axes[1:], ("T", "alpha")):
         value = getattr(pooled, key)
         ax.axhspan(*pooled.ci95[key], color=COLOURS["band"])

@@ -87,13 +87,14 @@ def _pm(value: float, span: tuple[float, float]) -> str:
 
 
 def gain_text(found: Identification) -> str:
-    """K(p) with its intervals and R²."""
+    """K(p) with its intervals, and R² where it is more than a constant."""
     powers = ("", " p", *(f" p^{i}" for i in range(2, len(found.pooled.gain))))
     terms = " + ".join(
         f"({_pm(g, span)}){power}"
         for g, span, power in zip(found.pooled.gain, found.pooled.ci95["gain"], powers)
     )
-    return f"K(p) = {terms},  R² = {found.pooled.gain_r2:.4f}"
+    r2 = f",  R² = {found.pooled.gain_r2:.4f}" if len(found.pooled.gain) > 1 else ""
+    return f"K(p) = {terms}{r2}"
 
 
 def identification_text(found: Identification) -> str:

@@ -215,10 +215,15 @@ def _described(case: Case, seen: Trace, wrong: np.ndarray) -> str:
     lane, sample = (int(i) for i in np.argwhere(wrong)[np.argmin(np.argwhere(wrong)[:, 1])])
     at, expected = (lane, sample), case.expected
     return (
-        f"{case.label}, run {lane}, sample {sample}: C gives u = {seen.u[at]}, flags {seen.flags[at]}; "
-        f"the reference u = {expected.u[at]}, flags {expected.flags[at]} "
+        f"{case.label}, run {lane}, sample {sample}: C gives {_answer(seen, at)}; "
+        f"the reference {_answer(expected, at)} "
         f"(ref {case.scenario.ref[at]}, meas {case.scenario.meas[at]})"
     )
+
+
+def _answer(trace: Trace, at: tuple[int, int]) -> str:
+    """A sample's output, increment (equal to it without an integrator) and flags."""
+    return f"u = {trace.u[at]}, increment {trace.d[at]}, flags {trace.flags[at]}"
 
 
 def _errors(plan: Plan, cases: Cases, seen: Trace, bound: ErrorBound) -> ErrorsSeen:
