@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +19,10 @@ from focgen.rig.model import UNITY, Rig
 _HELD = 0.1  # share of samples in which a held input changes at most
 _JUMPS = 0.5  # share of its way that a held input makes in jumps at least
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
-_AWAY = 0.1  # of a step's farther end: the nearer one is not 0
+_AWAY = 0.1  # of a step: nearer to one of its ends the input is at it
+_SURELY = 0.8  # of the samples before it is away: the last ones may be its beginning
+_SEVERAL = 10  # samples whose mean is a better rest than the first of them
+_DRIFT = 3.0  # standard errors of a slope: what is steeper does not rest
 _FEWEST = 30  # samples
 
 
@@ -51,6 +55,11 @@ class Excitation:
         return len(self.measured)
 
     @property
+    def ends(self) -> tuple[float, float]:
+        """The pressures that a step goes from and to."""
+        return self.before, self.level
+
+    @property
     def loaded(self) -> float:
         """The end of the step that is farther from 0: what it is stepped to, or released from."""
         return max(self.level, self.before, key=abs)
@@ -58,7 +67,7 @@ class Excitation:
     @property
     def between(self) -> bool:
         """Whether it is a step between two levels, neither of them 0."""
-        return min(abs(self.level), abs(self.before)) > _AWAY * abs(self.loaded)
+        return min(map(abs, self.ends)) > _AWAY * abs(self.loaded)
 
     @property
     def jumps(self) -> bool:
@@ -153,8 +162,10 @@ def _check(experiment: Experiment) -> None:
 def _input(experiment: Experiment, rig: Rig, before: float | None) -> tuple[np.ndarray, float, str, str]:
     """The actuator's input: (samples, value before them, hold, role it comes from)."""
     if "pressure" in experiment:
-        values = experiment["pressure"]
-        return values, _value_before(values, before), hold_of(values), "pressure"
+        values, hold = experiment["pressure"], hold_of(experiment["pressure"])
+        if before is None:
+            values = np.concatenate([[_rest_of(values)], values[1:]])  # the first sample's noise is no step
+        return values, _value_before(values, before), hold, "pressure"
     command = experiment["command"]
     rest = _value_before(command, before)
     if rig.regulator == UNITY:
@@ -181,6 +192,18 @@ def _through(name: str, stage: TransferFunction, step: float, hold: str) -> Call
 
 def _value_before(values: np.ndarray, before: float | None) -> float:
     return float(values[0]) if before is None else before
+
+
+def _rest_of(values: np.ndarray) -> float:
+    """The mean of the samples before the input moves; the first sample where it moves at once."""
+    away = np.abs(values - values[0]) >= _AWAY * np.ptp(values)
+    resting = values[: int(_SURELY * np.argmax(away))]
+    if len(resting) < _SEVERAL or np.ptp(resting) == 0.0:
+        return float(values[0])
+    place = np.arange(len(resting)) - 0.5 * (len(resting) - 1)
+    slope = float(place @ resting) / float(place @ place)
+    steepest = _DRIFT * float(np.std(resting)) / math.sqrt(float(place @ place))
+    return float(np.mean(resting)) if abs(slope) <= steepest else float(values[0])
 
 
 def hold_of(values: np.ndarray) -> str:

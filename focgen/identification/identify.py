@@ -140,7 +140,7 @@ def is_step(x: Excitation) -> bool:
 
 def _pooled(steps: list[Excitation], degree: int) -> tuple[Pooled, tuple[str, ...]]:
     fit = fit_fractional(steps)
-    ends = np.array([(x.before, x.level) for x in steps])
+    ends = np.array([x.ends for x in steps])
     degree, notes = _feasible_degree(ends, degree)
     line = fit_line(ends, fit.K, fit.K_covariance, degree)
     span = lambda value, half: (float(value - half), float(value + half))  # noqa: E731
@@ -225,7 +225,7 @@ def _notes(excitations, fits, nominal: Rig) -> tuple[str, ...]:
         f"{f.name}: not a step; fitted by itself, left out of T, alpha and K(p)" for f in fits if not f.step
     ]
     said += [
-        f"{x.name}: a step from {x.before:.3g} to {x.level:.3g}; its K is the mean slope of K(p) p on it"
+        f"{x.name}: a step from {x.ends[0]:.3g} to {x.ends[1]:.3g}; its K is the mean slope of K(p) p on it"
         for x, f in zip(excitations, fits, strict=True)
         if f.step and x.between
     ]
