@@ -9,6 +9,7 @@ write_files(folder, {"steps.png": picture})
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
@@ -129,7 +130,9 @@ def sparse_ticks(axis) -> None:
 def png(fig: Figure) -> bytes:
     """The figure as a PNG without date or version inside: the same figure gives the same bytes."""
     stream = BytesIO()
-    with _matplotlib().rc_context(_RC):
+    with _matplotlib().rc_context(_RC), warnings.catch_warnings():
+        # where a legend took a second to place: that the computer is busy is no fault of the figure
+        warnings.filterwarnings("ignore", "Creating legend with loc", UserWarning)
         fig.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
     return stream.getvalue()
 
