@@ -244,6 +244,9 @@ def test_a_range_or_a_gain_without_room_is_refused():
     assert build_plan(lead(ranges=wide), "f64")
     with pytest.raises(PlanError, match="the gain for an input is too large for f32"):
         build_plan(lead(gain=1e30), "f32")
+    for beyond in (lead(gain=1e60), lead(ranges=ControllerRanges((-1.0, 1.0), (-1.0, 1.0), (0.0, 1e60)))):
+        with pytest.raises(PlanError, match="(too large for f32|beyond float32).*choose f64"):
+            build_plan(beyond, "f32")
 
 
 # -------------------------------------------------------------------------------------- compilers' flags

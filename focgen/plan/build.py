@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.errors import PlanError
 from focgen.fractional.exponential import ExponentialMemory
@@ -46,7 +48,8 @@ def build_plan(
     folded, memories = _tables(wanted)
     check_stable(controller, folded, wanted.length)
     draft = _fixed if wanted.arithmetic in WORDS else _floating
-    plan = draft(controller, wanted.arithmetic, wanted.length, name or controller.name, folded)
+    with np.errstate(over="ignore"):  # a number beyond the type has no room, and is refused for that below
+        plan = draft(controller, wanted.arithmetic, wanted.length, name or controller.name, folded)
     if wanted.memory == "exponential":
         asked = {"tolerance": wanted.tolerance, "horizon": wanted.horizon}
         plan = replace(plan, memory="exponential", memories=memories, **asked)

@@ -59,5 +59,4 @@ def actuation(controller: Controller, output: Format, kind: type[np.floating], c
 
 def signal(ends: tuple[float, float], kind: type[np.floating], ctype: str, unit: str) -> Format:
     """The format of an input or the output with the given physical range."""
-    with np.errstate(over="ignore"):  # a range beyond the type has no room, and is refused for that
-        return Format(ctype, 1.0, float(kind(ends[0])), float(kind(ends[1])), unit)
+    return Format(ctype, 1.0, float(kind(ends[0])), float(kind(ends[1])), unit)
