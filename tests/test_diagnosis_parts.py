@@ -1,14 +1,17 @@
 """The parts of a diagnosis, each against what is known of it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from focgen.diagnosis.confidence import confidences
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
 from focgen.diagnosis.fit import Weighing, fit
+from focgen.diagnosis.rivals import Rival, _indistinct
 from focgen.diagnosis.segments import make
 from focgen.diagnosis.shrink import predict
 from focgen.diagnosis.smooth import freed
@@ -117,3 +120,25 @@ def test_what_fits_lose_on_parts_they_did_not_see_is_not_promised():
     sure, unsure = (predict(gap, left, blind, 1.0) for blind in (left, np.full(5, 3.0)))
     assert sure.value - unsure.value == pytest.approx(0.5 * (3.0 - 1.1) / 19.0)
     assert unsure.interval[0] < sure.interval[0] - 0.05
+
+
+def test_confidences_favour_the_first_and_leave_room_for_none_of_them():
+    rivals = [Rival(name, "sensor", z, 10.0, None) for name, z in (("a", 0.0), ("b", 0.1), ("c", 1.9))]
+    sure, lesser = confidences(rivals), confidences(rivals, share=0.1)
+    assert sure[0] > 3 * sure[1] > 3 * sure[2] > 0
+    assert 0.9 < sum(sure) < 1 and sum(lesser) < 0.75
+    assert confidences(rivals[:1])[0] > 0.9
+
+
+def _open(x):
+    """The families that input ``x`` is not made to tell from a contact."""
+    best = SimpleNamespace(
+        problem=SimpleNamespace(clues=[SimpleNamespace(effect="contact")], excitation=excitation([x], H, 1.0))
+    )
+    return _indistinct(best, SimpleNamespace(best=dict.fromkeys(("softening", "gain_drift", "resonance"))))
+
+
+def test_rising_steps_do_not_tell_an_obstacle_from_what_a_bent_gain_is_confused_with():
+    rising, mixed = (np.repeat(u, 200) for u in ([0.2, 0.4, 0.6, 0.8, 1.0], [0.4, 0.2, 0.4, 1.0, 0.2, 0.4]))
+    assert _open(rising) == {"softening", "gain_drift"}
+    assert _open(mixed) == set()

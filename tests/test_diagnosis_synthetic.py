@@ -76,6 +76,41 @@ def test_the_floor_under_a_coarse_reading_is_its_noise():
     assert found.gap.explained > 2.0 * found.gap.floor
 
 
+def _converted(log, step, uneven, lazy):
+    """A log read by a converter whose thresholds lie ``uneven`` off and that comes back ``lazy`` late, of a
+    step."""
+    y, code, codes = log["output"] / step, 0.0, []
+    for value in y:
+        if abs(value - code) > 0.5 + lazy / 2:
+            code = np.floor(value + 0.5 + uneven * np.sin(11.3 * np.floor(value + 0.5)))
+        codes.append(code)
+    return replace(log, signals={**log.signals, "output": step * np.array(codes)})
+
+
+@pytest.mark.parametrize("uneven, lazy", [(0.15, 0.0), (0.0, 0.25), (0.1, 0.1)])
+def test_uneven_and_sluggish_steps_are_no_effect_of_their_own(uneven, lazy):
+    coarse = [_converted(log, 9e-4, uneven, lazy) for log in session(4, roles=("pressure",))]
+    assert named(diagnose(RIG, coarse)) == [["sensor_quantization"]]
+
+
+def test_an_effect_beside_a_converter_is_found():
+    coarse = [_converted(log, 4e-4, 0.1, 0.1) for log in session(5, vent=0.8, roles=())]
+    found = named(diagnose(RIG, coarse))
+    assert ["sensor_quantization"] in found and any("valve_asymmetry" in names for names in found)
+
+
+def test_a_curve_that_stands_for_two_effects_is_told_apart():
+    logs = session(6, zone=0.03, roles=())
+    clipped = [
+        replace(log, signals={**log.signals, "output": np.minimum(log["output"], 0.0045)}) for log in logs
+    ]
+    found = named(diagnose(RIG, clipped))
+    assert len(found) == 2
+    assert any("dead_zone" in names for names in found) and any(
+        "sensor_saturation" in names for names in found
+    )
+
+
 def test_told_the_effect_it_considers_nothing_else():
     found = diagnose(RIG, session(11, vent=0.8), only=("sensor_lag", "valve_asymmetry"))
     assert {c.effect for f in found.causes for c in f.candidates} <= {"sensor_lag", "valve_asymmetry"}

@@ -11,12 +11,11 @@ from focgen.diagnosis.rivals import Rival
 SET_WITHIN = 2.0  # separations below this leave a rival in the set
 CLOSE = 0.5  # and it must reach this part of the best one's evidence,
 NEAR = 8.0  # or fall short of it by no more than these nats
-TEMPER = 1.0  # weight of a rival: exp(-TEMPER · max(z, 0)^POWER)
-POWER = 1.0
+FIRST, TEMPER = 1.7, 0.15  # weight of another than the best that stays in the set: exp(-FIRST - TEMPER z)
 ELSEWHERE = (
-    0.03,
-    0.12,
-)  # probability that the cause is none of the candidates; of a lesser cause, beside a larger one
+    0.045,
+    0.35,
+)  # probability that the cause is none of the set; of a lesser cause, beside a larger one
 LESSER = 0.3  # of what the segment's causes explain: below it a cause is a lesser one
 
 
@@ -28,9 +27,13 @@ def tied(rivals: Sequence[Rival]) -> tuple[Rival, ...]:
     )
 
 
-def confidences(rivals: Sequence[Rival], share: float = 1.0) -> np.ndarray:
-    """The probability of every rival; they sum to less than 1. ``share``: what the cause explains of its
-    segment's gap."""
-    z = np.array([max(r.separation, 0.0) for r in rivals])
-    weight = np.exp(-TEMPER * z**POWER)
+def confidences(kept: Sequence[Rival], share: float = 1.0) -> np.ndarray:
+    """The probability of every rival of the set ``kept``, the best first; they sum to less than 1.
+    ``share``: what the cause explains of its segment's gap.
+
+    That one is the best, by however little, tells more than by how much, as long as it stays below
+    ``SET_WITHIN``.
+    """
+    z = np.array([max(r.separation, 0.0) for r in kept])
+    weight = np.exp(-FIRST * (np.arange(len(z)) > 0) - TEMPER * z)
     return (1.0 - ELSEWHERE[share < LESSER]) * weight / weight.sum()

@@ -23,7 +23,8 @@ from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.rig.replay import experiments
 
-UNTRUSTED = 0.2  # of a segment's residual foretold by inputs: its output still carries noise into the next
+UNTRUSTED = 0.2  # of a segment's residual foretold by inputs: its output still carries noise into the next,
+# as it carries what the form of an effect found lacks
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
@@ -106,7 +107,7 @@ def explain_all(
         found.append(e)
         best = found[-1].best
         response = best.problem.references.clocks["response"]
-        trusted = found[-1].left.share < UNTRUSTED
+        trusted = found[-1].left.share < UNTRUSTED and not found[-1].causes
         x = freed(
             segment,
             best.problem.simulate(best.vector),

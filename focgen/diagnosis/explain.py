@@ -7,18 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.diagnosis.converter import Converter, converter_of
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.leftover import Leftover, foretold, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
-from focgen.diagnosis.rivals import Cause, Rival, doubted, left_out
+from focgen.diagnosis.reconsider import reconsidered
+from focgen.diagnosis.rivals import Cause, doubted, left_out
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.segments import Segment, is_single, owner
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
-from focgen.rig.engine import fits_in, slot_in
+from focgen.rig.engine import fits_in
 from focgen.rig.model import Rig
 
 _DEPTH = 4
@@ -32,8 +34,10 @@ _SHARE = (
 )  # of the gap that a further family has to close, and one that is easily confused with those found,
 _MERGED = (0.15, 0.25)  # where the stages are merged
 _CLEAN = (0.55, 0.75)  # of the remaining mean square: one that takes away as much has to close only
+_WHITE = 0.01  # of a residual's mean square foretold by inputs: below it nothing is left but noise
+_PURE = (0.2, 0.3)  # of the remaining mean square: one that takes away as much and leaves noise has to close
+_LITTLE = (0.015, 0.05)  # of the gap
 _SMALL = (0.015, 0.04)  # of the gap, for what a form lacks is seldom just what another family makes
-_ASTRAY = 1.1  # of the sum of squares without a rounding: beyond it the rounding is left to the end
 _VISIBLE = (
     0.015,
     0.05,
@@ -47,10 +51,21 @@ _NOISY = (
 )  # the same where the input is measured, its noise still in it or not: that looks like a small effect
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What an effect has to show to be one. ``threshold``: nats of evidence that noise alone does not reach;
+    ``trusted``: whether the input could be freed of its noise; ``converter``: that hides small ones."""
+
+    threshold: float
+    trusted: bool
+    converter: Converter | None
+
+
 @dataclass(frozen=True, eq=False)
 class Explanation:
     """A segment explained. ``nominal``: its own parameters refitted; ``best``: with the effects; ``errors``:
-    by family, the root-mean-square residual with that effect alone, as a share of the refitted nominal's."""
+    by family, the root-mean-square residual with that effect alone, as a share of the refitted nominal's;
+    ``converter``: the coarse one that the output shows."""
 
     segment: Segment
     given: np.ndarray
@@ -61,6 +76,7 @@ class Explanation:
     left: Leftover
     left_nominal: Leftover
     errors: dict[str, float]
+    converter: Converter | None = None
 
     @property
     def stage(self) -> str | None:
@@ -131,18 +147,15 @@ def explain(
     problem, clues, guests = _held(rig, segment, logs), clues_for(segment, rig), guests_in(segment, rig)
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
-    segment, given = problem.segment, problem.nominal()
-    base, vector = _seen(problem, given, clues)
-    seen = base if len(base.clues) and _misled(problem, base, vector) else None
-    if seen is not None:
-        values, base, vector = vector[len(given) :], problem, given
-    rankings, clues = _grown(base, vector, clues, guests, threshold, trusted)
+    segment, given, converter = problem.segment, problem.nominal(), converter_of(problem, clues)
+    asked = Asked(threshold, trusted, converter)
+    rankings, clues = _grown(problem, given, clues, guests, asked)
     weighing = Weighing(rankings[-1].ar)
     best = _dropped(rankings[-1].base, weighing, threshold)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     best, causes = doubted(best, nominal, rankings, clues, weighing)
-    if seen is not None:
-        best, causes = _beside(best, seen.clues, values, causes, weighing)
+    if converter is not None:
+        best, causes = converter.beside(best, nominal, causes, weighing)
     response = problem.references.clocks["response"]
     return Explanation(
         segment,
@@ -154,6 +167,7 @@ def explain(
         leftover(segment, best.weighed, response),
         leftover(segment, nominal.weighed, response),
         rankings[0].errors,
+        converter,
     )
 
 
@@ -162,8 +176,7 @@ def _grown(
     vector: np.ndarray,
     clues: list[Clue],
     guests: list[Clue],
-    threshold: float,
-    trusted: bool,
+    asked: Asked,
 ) -> tuple[list[Ranking], list[Clue]]:
     """A ranking for each effect that the data ask for, the last one being of what is left; and the clues
     that were tried."""
@@ -171,7 +184,7 @@ def _grown(
     while len(rankings) < _DEPTH:
         untried = [c for c in clues if c not in base.clues and not c.form.seen]
         rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
-        best = _chosen(rankings, threshold, trusted)
+        best = _chosen(rankings, asked, clues)
         if best is None and guests and _much_left(rankings[-1].base):
             clues, guests = clues + guests, []
             continue
@@ -179,37 +192,6 @@ def _grown(
             break
         base, vector = best.problem, best.vector
     return rankings, clues
-
-
-def _seen(problem: Problem, given: np.ndarray, clues: Sequence[Clue]) -> tuple[Problem, np.ndarray]:
-    """The problem with what can be read off the output itself, as a rounding, and a vector to start from."""
-    base, vector = problem, given
-    for clue in clues:
-        values = clue.form.seen(problem.segment.y) if clue.form.seen else None
-        if values is not None and clue.effect not in {c.effect for c in base.clues}:
-            slot = slot_in(clue.form, clue.stage)
-            scaled = [v / problem.references.scale(p, slot) for p, v in zip(clue.form.parameters, values)]
-            base, vector = base.with_clues([*base.clues, clue]), np.r_[vector, scaled]
-    return base, vector
-
-
-def _misled(problem: Problem, seen: Problem, vector: np.ndarray) -> bool:
-    """Whether a fit with a rounding goes astray, as where the rest of the model is far off: its steps have
-    no slope."""
-    plain = fit(problem, problem.nominal(), Weighing(np.ones(1)), 6)
-    return fit(seen, vector, Weighing(np.ones(1)), 6).sse > _ASTRAY * plain.sse
-
-
-def _beside(
-    best: Fit, clues: Sequence[Clue], values: np.ndarray, causes: tuple[Cause, ...], weighing: Weighing
-) -> tuple[Fit, tuple[Cause, ...]]:
-    """With what was seen in the output itself put to what was found without it: a cause, and where it brings
-    the model closer a part of it."""
-    problem = best.problem.with_clues([*best.problem.clues, *clues])
-    both = fit(problem, np.r_[best.vector, values], weighing, 0)
-    added = tuple(Cause((Rival(c.effect, c.stage, 0.0, 0.0, both),), 0.0, 0.0) for c in clues)
-    closer = np.mean(both.weighed**2) < np.mean(best.weighed**2)
-    return both if closer else best, (*causes, *added)
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
@@ -227,30 +209,38 @@ def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[
     return clues if told or disturbance(segment.parts(left), segment.run.h, response).swings else []
 
 
-def _chosen(rankings: Sequence[Ranking], threshold: float, trusted: bool) -> Fit | None:
+def _chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> Fit | None:
     """The winner where it is beyond chance and of use. Another form of what was found already goes before a
     further family, unless that explains clearly more: no form is quite what the rig does, and others mend
     what it lacks."""
     ranking = rankings[-1]
-    if ranking.winner is None or ranking.gain[ranking.winner] < threshold:
+    if ranking.winner is None or ranking.gain[ranking.winner] < asked.threshold:
         return None
-    winner, already = ranking.best[ranking.winner], {c.effect for c in ranking.base.problem.clues}
-    known = [ranking.best[name] for name in already if name in ranking.best]
-    again = max(known, key=lambda f: evidence(f, ranking.base), default=None)
-    mended = (
-        again
-        if again is not None
-        and evidence(again, ranking.base) > threshold
-        and _mends(ranking.base, again, _VISIBLE[1], 0.0)
-        else None
-    )
-    if again is not None and evidence(again, ranking.base) > _MENDING * ranking.gain[ranking.winner]:
+    winner, again = ranking.best[ranking.winner], _again(ranking)
+    gained = evidence(again, ranking.base) if again is not None else 0.0
+    mends = gained > asked.threshold and _mends(ranking.base, again, _VISIBLE[1], 0.0, asked.converter)
+    mended = again if mends else None
+    if gained > _MENDING * ranking.gain[ranking.winner]:
         return mended
-    further = bool(already)
-    measured = ranking.base.problem.segment.entry != "command"
-    visible = _NOISY[trusted] if measured and not (further and trusted) else _VISIBLE[further]
-    whole = _mends(ranking.base, winner, visible, _WHOLE * further)
-    return winner if whole and not (further and _marginal(rankings, winner)) else mended
+    if not ranking.base.problem.clues:
+        return winner if _useful(rankings, winner, asked) else mended
+    tried = (f for f in (reconsidered(rankings, winner, clues), winner))
+    return next((f for f in tried if _useful(rankings, f, asked) and not _marginal(rankings, f)), mended)
+
+
+def _again(ranking: Ranking) -> Fit | None:
+    """The best further form of a family found already."""
+    already = {c.effect for c in ranking.base.problem.clues}
+    known = [ranking.best[name] for name in already if name in ranking.best]
+    return max(known, key=lambda f: evidence(f, ranking.base), default=None)
+
+
+def _useful(rankings: Sequence[Ranking], winner: Fit, asked: Asked) -> bool:
+    """Whether a family mends what an effect has to; a further one most of what inputs foretell."""
+    base = rankings[-1].base
+    measured, further = base.problem.segment.entry != "command", len(base.problem.clues) > 0
+    visible = _NOISY[asked.trusted] if measured and not (further and asked.trusted) else _VISIBLE[further]
+    return _mends(base, winner, visible, _WHOLE * further, asked.converter)
 
 
 def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
@@ -258,29 +248,32 @@ def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
     like that, the more so to a family that is easily confused with it."""
     first, now, then = (float(np.mean(f.weighed**2)) for f in (rankings[0].base, rankings[-1].base, winner))
     response = winner.problem.references.clocks["response"]
-    noise = now * (1.0 - foretold(winner.problem.segment, rankings[-1].base.weighed, response))
+    segment = winner.problem.segment
+    noise = now * (1.0 - foretold(segment, rankings[-1].base.weighed, response))
     *others, last = winner.problem.clues
     name, close = last.effect, library()[last.effect].confused_with
     near = [c for c in others if c.effect in close or name in library()[c.effect].confused_with]
     alike = bool(near)
     asked = _MERGED if len(winner.problem.segment.stages) > 1 else _SHARE
-    if now - then > _CLEAN[alike] * now and not any(c.form.drawn for c in near):
+    drawn = any(c.form.drawn for c in near)
+    if now - then > _CLEAN[alike] * now and not drawn:
         asked = _SMALL
+    elif now - then > _PURE[alike] * now and not drawn:
+        asked = _LITTLE if foretold(segment, winner.weighed, response) < _WHITE else asked
     return now - then < asked[alike] * (first - min(noise, then))
 
 
-def _mends(base: Fit, better: Fit, visible: float, whole: float) -> bool:
+def _mends(base: Fit, better: Fit, visible: float, whole: float, converter: Converter | None) -> bool:
     """Whether the residual falls visibly, by the part ``whole`` of what inputs foretell of it, and mostly
     so: what is not foretold is noise, and what takes that away no effect, unless it is most of all that is
-    left and no rounding, whose errors look like noise."""
+    left; and what a coarse ``converter`` hides is no effect either."""
     before, after = (f.weighed for f in (base, better))
     old, new = np.mean(before**2), np.mean(after**2)
-    if old - new < visible * new:
+    if old - new < visible * new or (converter is not None and converter.hides(base, better)):
         return False
     response, segment = base.problem.references.clocks["response"], base.problem.segment
     known, left = foretold(segment, before, response), foretold(segment, after, response)
-    rounded = any(c.form.seen for c in base.problem.clues)
-    sure = old - new > _SURE[bool(base.problem.clues)] * old and not rounded
+    sure = old - new > _SURE[bool(base.problem.clues)] * old
     told = sure or known * old - left * new > _KNOWN * (old - new)
     return told and old - new > whole * old * known
 
@@ -289,13 +282,9 @@ def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
     """Without the effects that the later ones made needless."""
     while len(best.problem.clues) > 1:
         found = []
-        for i, clue in enumerate(best.problem.clues):
-            if clue.form.seen:
-                continue
-            without = left_out(best, [best.problem.clues[i]], weighing)
+        for clue in best.problem.clues:
+            without = left_out(best, [clue], weighing)
             found.append((evidence(best, without), without))
-        if not found:
-            break
         least, without = min(found, key=lambda pair: pair[0])
         if least > threshold:
             break

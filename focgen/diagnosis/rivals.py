@@ -91,15 +91,27 @@ def _rivals(
 
 def _indistinct(best: Fit, ranking: Ranking) -> set[str]:
     """The families that these experiments are not made to tell from those of ``best``: easily confused with
-    one of them, and one of the two lacking what would show it."""
-    seen = best.problem.excitation
+    one of them, and one of the two lacking what would show it; or confused with what that one is confused
+    with, and lacking it themselves."""
+    seen, known = best.problem.excitation, library()
     found = set()
-    for a in (library()[c.effect] for c in best.problem.clues):
-        for b in (library()[name] for name in ranking.best):
-            alike = a.name in b.confused_with or b.name in a.confused_with
-            if alike and (a.needs(seen) or b.needs(seen)):
-                found.add(b.name)
+    for a in dict.fromkeys(c.effect for c in best.problem.clues):
+        near = _confused(a)
+        further = set().union(*map(_confused, near))
+        for b in ranking.best:
+            lacks = known[b].needs(seen)
+            if (b in near and (lacks or known[a].needs(seen))) or (b in further and lacks):
+                found.add(b)
     return found
+
+
+def _confused(name: str) -> set[str]:
+    """The families that are easily confused with one, whichever of the two says so."""
+    return {
+        e.name
+        for e in library().values()
+        if name in e.confused_with or e.name in library()[name].confused_with
+    }
 
 
 def _second_form(of: Fit, clues, weighing: Weighing) -> Fit:

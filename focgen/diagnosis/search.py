@@ -17,6 +17,7 @@ _COARSE = 5000  # samples of the first, coarse pass
 _DEEP = 5  # how many forms are fitted to the end beside the families' best
 _QUICK = 0.3  # of the best quick fit's fall in the sum of squares: forms below are left at that
 _MISFIT = 0.15  # of a residual's mean square foretold by inputs: beyond it the colour is not the noise's
+_ADRIFT = 1.15  # of a fit's mean square without a colour
 _NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
 _FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
 _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
@@ -63,8 +64,7 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
     tried = [t for clue in clues if (t := best_start(thin, ground.vector, clue, rough, known)) is not None]
     errors = _errors(tried, ground)
     tried = _promising(tried, ground)
-    rough = Weighing(_colour(min([ground, *tried], key=lambda t: t.sse)))
-    ground = fit(thin, ground.vector, rough, 6)
+    rough, ground = _coloured(ground, min([ground, *tried], key=lambda t: t.sse), 6)
     tried = sorted(
         (fit(t.problem, t.vector, rough, 10, 0.05) for t in tried), key=lambda t: -evidence(t, ground)
     )
@@ -112,6 +112,17 @@ def _colour(leader: Fit) -> np.ndarray:
     return np.ones(1) if share > _MISFIT else fit_ar(leader.residual())
 
 
+def _coloured(ground: Fit, leader: Fit, iterations: int) -> tuple[Weighing, Fit]:
+    """The weighing by the colour of what ``leader`` leaves, and the ground fitted so. Where that drives the
+    ground away from the data the colour is not the noise's: then none."""
+    weighing = Weighing(_colour(leader))
+    moved = fit(ground.problem, ground.vector, weighing, iterations)
+    if np.mean(moved.weighed**2) < _ADRIFT * np.mean(ground.weighed**2):
+        return weighing, moved
+    weighing = Weighing(np.ones(1))
+    return weighing, fit(ground.problem, ground.vector, weighing, iterations)
+
+
 def _errors(tried: Sequence[Fit], ground: Fit) -> dict[str, float]:
     """Each family's least root mean square over the ground's."""
     found: dict[str, float] = {}
@@ -125,8 +136,7 @@ def finish(ground: Fit, tried: Sequence[Fit], errors: dict[str, float]) -> Ranki
     """Fit on every sample, in the colour of what the best one leaves."""
     leader = min([ground, *tried], key=lambda t: t.sse)
     for iterations in (3, 6):
-        weighing = Weighing(_colour(leader))
-        ground = fit(ground.problem, ground.vector, weighing, iterations)
+        weighing, ground = _coloured(ground, leader, iterations)
         tried = [fit(t.problem, t.vector, weighing, iterations, 0.02) for t in tried]
         tried = sorted(tried, key=lambda t: t.sse)
         leader = min([ground, *tried], key=lambda t: t.sse)

@@ -108,7 +108,9 @@ def _departures(controller: Running | None) -> tuple[Found, ...]:
 
 def is_unknown(e: Explanation) -> bool:
     """Whether most of what inputs foretell of the nominal residual is still there after the effects, or what
-    hardly any of them explains is not just noise."""
+    hardly any of them explains is not just noise; unless a coarse converter explains it."""
+    if e.converter is not None and e.converter.explains(e.best):
+        return False
     if _stirred(e):
         return True
     if e.left.share < LEFT:
@@ -165,7 +167,8 @@ def _found(
     e: Explanation, cause: Cause, rigs: compose.Rigs, logs, squares, floor: float, total: Shrink | None
 ) -> Found:
     kept = tied(cause.rivals)
-    sure = confidences(cause.rivals, cause.share)[: len(kept)]
+    read = library()[kept[0].effect].forms[0].seen is not None  # off the signal itself: nothing else does
+    sure = confidences(kept, 1.0 if read else cause.share)
     lost = _share_lost(cause, rigs, logs, squares, floor, total or Shrink(0.0, (0.0, 0.0)))
     candidates = tuple(_candidate(r, float(p)) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)

@@ -1,0 +1,73 @@
+"""A second effect may show that the first one's form, or the first one itself, was the next best thing.
+
+The first is chosen while the second is still missing, and bends to make up for it. So before a second is
+judged, the first is tried again beside it: in its other forms, and as the families that came close to it;
+then the second in its other forms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from focgen.diagnosis.fit import Fit, Weighing, fit
+from focgen.diagnosis.problem import Clue
+from focgen.diagnosis.search import Ranking, best_start, evidence, family
+
+_CLOSE = 0.4  # of the first one's evidence: families that reach as much are tried in its place
+_MOST = 3
+
+
+def reconsidered(rankings: Sequence[Ranking], second: Fit, clues: Sequence[Clue]) -> Fit:
+    """``second``, with either effect exchanged where that does better; with more than one before it,
+    ``second`` as it is."""
+    if len(rankings[-1].base.problem.clues) != 1:
+        return second
+    found = _best(second, [*_other_forms(second, 0, clues), *_other_families(rankings[0], second)])
+    return _best(found, _other_forms(found, 1, clues))
+
+
+def _best(of: Fit, others: Sequence[Fit]) -> Fit:
+    """The likeliest, the noise taken as white: a filter that takes out the colour of what a wrong form
+    leaves would hide what the right one mends."""
+    fits = [fit(t.problem, t.vector, Weighing(np.ones(1)), 8, 0.05) for t in (of, *others)]
+    return max(fits, key=lambda f: evidence(f, fits[0]))
+
+
+def _other_forms(of: Fit, which: int, clues: Sequence[Clue]) -> list[Fit]:
+    """One of two effects in its other forms, each from its best start beside the other."""
+    own, other = of.problem.clues[which], of.problem.clues[1 - which]
+    alone, (head, *parts) = of.problem.with_clues([other]), _split(of)
+    vector, rough, found = np.r_[head, parts[1 - which]], Weighing(np.ones(1)), []
+    for clue in clues:
+        if clue.effect == own.effect and clue.stage == own.stage and clue != own:
+            start = best_start(alone, vector, clue, rough, None)
+            if start is not None:
+                found.append(_in_order(start) if which == 0 else start)
+    return found
+
+
+def _split(of: Fit) -> list[np.ndarray]:
+    """The vector: what precedes the two effects, and each of theirs."""
+    head, count = of.problem.head, len(of.problem.clues[0].form.parameters)
+    return np.split(of.vector, [head, head + count])
+
+
+def _in_order(of: Fit) -> Fit:
+    """The two effects the other way round."""
+    head, first, second = _split(of)
+    problem = of.problem.with_clues(of.problem.clues[::-1])
+    return fit(problem, np.r_[head, second, first], Weighing(np.ones(1)), 0)
+
+
+def _other_families(first: Ranking, second: Fit) -> list[Fit]:
+    """The families that came close to the first effect, as they were fitted alone, and the second."""
+    chosen, last = second.problem.clues
+    best, tail = max(first.gain.values()), _split(second)[-1]
+    near = [f for n, f in first.best.items() if first.gain[n] > _CLOSE * best]
+    near = [f for f in near if family(f) not in (chosen.effect, last.effect)][:_MOST]
+    return [
+        fit(f.problem.with_clues([*f.problem.clues, last]), np.r_[f.vector, tail], Weighing(np.ones(1)), 0)
+        for f in near
+    ]
