@@ -12,10 +12,8 @@ SET_WITHIN = 2.0  # separations below this leave a rival in the set
 CLOSE = 0.5  # and it must reach this part of the best one's evidence,
 NEAR = 8.0  # or fall short of it by no more than these nats
 FIRST, TEMPER = 1.7, 0.15  # weight of another than the best that stays in the set: exp(-FIRST - TEMPER z)
-ELSEWHERE = (
-    0.045,
-    0.35,
-)  # probability that the cause is none of the set; of a lesser cause, beside a larger one
+# probability that the cause is none of the set; of a lesser cause, beside a larger one
+ELSEWHERE = (0.045, 0.35)
 LESSER = 0.3  # of what the segment's causes explain: below it a cause is a lesser one
 
 

@@ -1,0 +1,118 @@
+"""Whether the family that helps a residual most is an effect, or only mends what noise, a coarse converter or
+the form of an effect found already leave.
+
+Pairs of numbers: for a family unlike those found already, and for one that is easily confused with them, or
+else as said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.diagnosis.converter import Converter
+from focgen.diagnosis.fit import Fit
+from focgen.diagnosis.leftover import foretold
+from focgen.diagnosis.problem import Clue
+from focgen.diagnosis.reconsider import reconsidered
+from focgen.diagnosis.search import Ranking, evidence
+from focgen.rig.effects import library
+
+# parts of the remaining mean square
+_VISIBLE = (0.015, 0.05)  # what the first effect, and any further, has to take away to be of use
+_NOISY = (0.15, 0.03)  # the same where the input is measured: its noise still in it, or freed of it
+_SURE = (0.4, 0.6)  # the first effect, and any further, that takes away as much takes no noise away
+# of what inputs foretell of a residual
+_KNOWN = 0.12  # an effect takes at least as much of what it takes away from there
+_WHOLE = 0.5  # a further family has to explain as much
+# of the gap: what a further family has to close
+_SHARE = (0.06, 0.15)
+_MERGED = (0.15, 0.25)  # where the stages are merged
+# where it takes away _CLEAN of what remains, for another family seldom makes just what a form lacks
+_CLEAN, _SMALL = (0.55, 0.75), (0.015, 0.04)
+# where it takes away _PURE of what remains, and no more than noise is left
+_PURE, _LITTLE = (0.2, 0.3), (0.015, 0.05)
+_WHITE = 0.01  # of a residual's mean square foretold by inputs: below it nothing is left but noise
+# of the best further family's evidence: from there another form of a family found already goes first
+_MENDING = 0.6
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What an effect has to show to be one. ``threshold``: nats of evidence that noise alone does not reach;
+    ``trusted``: whether the input could be freed of its noise; ``converter``: that hides small ones."""
+
+    threshold: float
+    trusted: bool
+    converter: Converter | None
+
+
+def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> Fit | None:
+    """The winner where it is beyond chance and of use. Another form of what was found already goes before a
+    further family, unless that explains clearly more: no form is quite what the rig does, and others mend
+    what it lacks."""
+    ranking = rankings[-1]
+    if ranking.winner is None or ranking.gain[ranking.winner] < asked.threshold:
+        return None
+    winner, again = ranking.best[ranking.winner], _again(ranking)
+    gained = evidence(again, ranking.base) if again is not None else 0.0
+    mends = gained > asked.threshold and _mends(ranking.base, again, _VISIBLE[1], 0.0, asked.converter)
+    mended = again if mends else None
+    if gained > _MENDING * ranking.gain[ranking.winner]:
+        return mended
+    if not ranking.base.problem.clues:
+        return winner if _useful(rankings, winner, asked) else mended
+    tried = (f for f in (reconsidered(rankings, winner, clues), winner))
+    return next((f for f in tried if _useful(rankings, f, asked) and not _marginal(rankings, f)), mended)
+
+
+def _again(ranking: Ranking) -> Fit | None:
+    """The best further form of a family found already."""
+    already = {c.effect for c in ranking.base.problem.clues}
+    known = [ranking.best[name] for name in already if name in ranking.best]
+    return max(known, key=lambda f: evidence(f, ranking.base), default=None)
+
+
+def _useful(rankings: Sequence[Ranking], winner: Fit, asked: Asked) -> bool:
+    """Whether a family mends what an effect has to; a further one most of what inputs foretell."""
+    base = rankings[-1].base
+    measured, further = base.problem.segment.entry != "command", len(base.problem.clues) > 0
+    visible = _NOISY[asked.trusted] if measured and not (further and asked.trusted) else _VISIBLE[further]
+    return _mends(base, winner, visible, _WHOLE * further, asked.converter)
+
+
+def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
+    """Whether a further family closes only a small part of the gap: what the first one's form lacks looks
+    like that, the more so to a family that is easily confused with it."""
+    first, now, then = (float(np.mean(f.weighed**2)) for f in (rankings[0].base, rankings[-1].base, winner))
+    response = winner.problem.references.clocks["response"]
+    segment = winner.problem.segment
+    noise = now * (1.0 - foretold(segment, rankings[-1].base.weighed, response))
+    *others, last = winner.problem.clues
+    name, close = last.effect, library()[last.effect].confused_with
+    near = [c for c in others if c.effect in close or name in library()[c.effect].confused_with]
+    alike = bool(near)
+    asked = _MERGED if len(winner.problem.segment.stages) > 1 else _SHARE
+    drawn = any(c.form.drawn for c in near)
+    if now - then > _CLEAN[alike] * now and not drawn:
+        asked = _SMALL
+    elif now - then > _PURE[alike] * now and not drawn:
+        asked = _LITTLE if foretold(segment, winner.weighed, response) < _WHITE else asked
+    return now - then < asked[alike] * (first - min(noise, then))
+
+
+def _mends(base: Fit, better: Fit, visible: float, whole: float, converter: Converter | None) -> bool:
+    """Whether the residual falls visibly, by the part ``whole`` of what inputs foretell of it, and mostly
+    so: what is not foretold is noise, and what takes that away no effect, unless it is most of all that is
+    left; and what a coarse ``converter`` hides is no effect either."""
+    before, after = (f.weighed for f in (base, better))
+    old, new = np.mean(before**2), np.mean(after**2)
+    if old - new < visible * new or (converter is not None and converter.hides(base, better)):
+        return False
+    response, segment = base.problem.references.clocks["response"], base.problem.segment
+    known, left = foretold(segment, before, response), foretold(segment, after, response)
+    sure = old - new > _SURE[bool(base.problem.clues)] * old
+    told = sure or known * old - left * new > _KNOWN * (old - new)
+    return told and old - new > whole * old * known
