@@ -14,6 +14,7 @@ import numpy as np
 from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.search import Ranking, best_start, evidence, family
+from focgen.rig.effects import library
 
 _CLOSE = 0.4  # of the first one's evidence: families that reach as much are tried in its place
 _MOST = 3
@@ -62,10 +63,13 @@ def _in_order(of: Fit) -> Fit:
 
 
 def _other_families(first: Ranking, second: Fit) -> list[Fit]:
-    """The families that came close to the first effect, as they were fitted alone, and the second."""
+    """The families that came close to the first effect, as they were fitted alone, and the second; without
+    those that these experiments are not made to show."""
     chosen, last = second.problem.clues
-    best, tail = max(first.gain.values()), _split(second)[-1]
-    near = [f for n, f in first.best.items() if first.gain[n] > _CLOSE * best]
+    best, tail, seen = max(first.gain.values()), _split(second)[-1], first.base.problem.excitation
+    near = [
+        f for n, f in first.best.items() if first.gain[n] > _CLOSE * best and not library()[n].needs(seen)
+    ]
     near = [f for f in near if family(f) not in (chosen.effect, last.effect)][:_MOST]
     return [
         fit(f.problem.with_clues([*f.problem.clues, last]), np.r_[f.vector, tail], Weighing(np.ones(1)), 0)

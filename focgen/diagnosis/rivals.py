@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from focgen.diagnosis.separation import separation
 from focgen.rig.effects import library
 
 _SWAPS = 3
+_LEVEL = 0.01  # standard deviations: as good as
 _MENDED = 3  # rivals that get a second form where the best has one
 
 
@@ -63,7 +64,8 @@ def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tup
             ranking = next(
                 (r for r in rankings if r.base.problem.clues == without.problem.clues), None
             ) or rank(without.problem, without.vector, others)
-            rivals += _rivals(best, without, ranking, clues, weighing, len(own) > 1)
+            found_here = _rivals(best, without, ranking, clues, weighing, len(own) > 1)
+            rivals += [_behind(r, name, best) for r in found_here]
         before, after = (np.mean(f.weighed**2) for f in (nominal, best))
         lost = np.mean(without.weighed**2) - after
         share = float(np.clip(lost / max(before - after, 1e-300), 0, 1))
@@ -87,6 +89,14 @@ def _rivals(
         apart = separation(best, again, without, other in open_)
         found.append(Rival(other, again.problem.clues[-1].stage, apart, evidence(again, without), again))
     return found
+
+
+def _behind(rival: Rival, name: str, best: Fit) -> Rival:
+    """The rival, not ahead of effect ``name`` where the experiments are made to show that one only."""
+    seen, known = best.problem.excitation, library()
+    if known[rival.effect].needs(seen) and not known[name].needs(seen):
+        return replace(rival, separation=max(rival.separation, _LEVEL))
+    return rival
 
 
 def _indistinct(best: Fit, ranking: Ranking) -> set[str]:
