@@ -13,7 +13,7 @@ import numpy as np
 
 from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue
-from focgen.diagnosis.search import Ranking, best_start, evidence, family
+from focgen.diagnosis.search import Ranking, best_start, evidence
 from focgen.rig.effects import library
 
 _CLOSE = 0.4  # of the first one's evidence: families that reach as much are tried in its place
@@ -43,7 +43,7 @@ def _other_forms(of: Fit, which: int, clues: Sequence[Clue]) -> list[Fit]:
     vector, rough, found = np.r_[head, parts[1 - which]], Weighing(np.ones(1)), []
     for clue in clues:
         if clue.effect == own.effect and clue.stage == own.stage and clue != own:
-            start = best_start(alone, vector, clue, rough, None)
+            start = best_start(alone, vector, clue, rough)
             if start is not None:
                 found.append(_in_order(start) if which == 0 else start)
     return found
@@ -67,10 +67,8 @@ def _other_families(first: Ranking, second: Fit) -> list[Fit]:
     those that these experiments are not made to show."""
     chosen, last = second.problem.clues
     best, tail, seen = max(first.gain.values()), _split(second)[-1], first.base.problem.excitation
-    near = [
-        f for n, f in first.best.items() if first.gain[n] > _CLOSE * best and not library()[n].needs(seen)
-    ]
-    near = [f for f in near if family(f) not in (chosen.effect, last.effect)][:_MOST]
+    near = [n for n in first.best if first.gain[n] > _CLOSE * best and not library()[n].needs(seen)]
+    near = [first.best[n] for n in near if n not in (chosen.effect, last.effect)][:_MOST]
     return [
         fit(f.problem.with_clues([*f.problem.clues, last]), np.r_[f.vector, tail], Weighing(np.ones(1)), 0)
         for f in near

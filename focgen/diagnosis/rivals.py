@@ -53,25 +53,26 @@ def doubted(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tup
 
 
 def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Cause, ...]:
-    found = []
-    for name in dict.fromkeys(c.effect for c in best.problem.clues):
-        own = [c for c in best.problem.clues if c.effect == name]
-        without = left_out(best, own, weighing)
-        rivals = [Rival(name, own[0].stage, 0.0, evidence(best, without), best)]
-        # what is read off the signal itself has no rival: nothing else makes such steps
-        if not own[0].form.seen:
-            others = [c for c in clues if c.effect != name and c.form.seen is None]
-            ranking = next(
-                (r for r in rankings if r.base.problem.clues == without.problem.clues), None
-            ) or rank(without.problem, without.vector, others)
-            found_here = _rivals(best, without, ranking, clues, weighing, len(own) > 1)
-            rivals += [_behind(r, name, best) for r in found_here]
-        before, after = (np.mean(f.weighed**2) for f in (nominal, best))
-        lost = np.mean(without.weighed**2) - after
-        share = float(np.clip(lost / max(before - after, 1e-300), 0, 1))
-        rivals.sort(key=lambda r: r.separation)
-        found.append(Cause(tuple(rivals), evidence(best, without), share))
+    names = dict.fromkeys(c.effect for c in best.problem.clues)
+    found = [_cause(name, best, nominal, rankings, clues, weighing) for name in names]
     return tuple(sorted(found, key=lambda c: -c.share))
+
+
+def _cause(name: str, best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> Cause:
+    """One effect of ``best`` and its rivals, the best first."""
+    own = [c for c in best.problem.clues if c.effect == name]
+    without = left_out(best, own, weighing)
+    gain = evidence(best, without)
+    same = (r for r in rankings if r.base.problem.clues == without.problem.clues)
+    ranking = next(same, None)
+    if ranking is None:
+        untried = [c for c in clues if c.effect != name and not c.form.seen]
+        ranking = rank(without.problem, without.vector, untried)
+    others = _rivals(best, without, ranking, clues, weighing, len(own) > 1)
+    rivals = [Rival(name, own[0].stage, 0.0, gain, best), *(_behind(r, name, best) for r in others)]
+    before, after, lost = (np.mean(f.weighed**2) for f in (nominal, best, without))
+    share = float(np.clip((lost - after) / max(before - after, 1e-300), 0, 1))
+    return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), gain, share)
 
 
 def _rivals(

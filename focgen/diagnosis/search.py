@@ -157,7 +157,7 @@ def family(of: Fit) -> str:
 
 
 def best_start(
-    problem: Problem, base: np.ndarray, clue: Clue, weighing: Weighing, known: np.ndarray
+    problem: Problem, base: np.ndarray, clue: Clue, weighing: Weighing, known: np.ndarray | None = None
 ) -> Fit | None:
     """The best of the fits from the clue's start values, a few iterations each."""
     extended = problem.with_clues([*problem.clues, clue])
