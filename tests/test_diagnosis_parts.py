@@ -16,6 +16,7 @@ from focgen.diagnosis.segments import make
 from focgen.diagnosis.shrink import predict
 from focgen.diagnosis.smooth import freed
 from focgen.rig import kernels
+from focgen.rig.effects import library
 from tests.diagnosis_rig import RIG, H, _noise, session
 
 
@@ -132,9 +133,11 @@ def test_confidences_favour_the_first_and_leave_room_for_none_of_them():
 
 def _open(x):
     """The families that input ``x`` is not made to tell from a contact."""
-    best = SimpleNamespace(
-        problem=SimpleNamespace(clues=[SimpleNamespace(effect="contact")], excitation=excitation([x], H, 1.0))
+    seen = excitation([x], H, 1.0)
+    problem = SimpleNamespace(
+        clues=[SimpleNamespace(effect="contact")], lacks=lambda name: library()[name].needs(seen)
     )
+    best = SimpleNamespace(problem=problem)
     return _indistinct(best, SimpleNamespace(best=dict.fromkeys(("softening", "gain_drift", "resonance"))))
 
 

@@ -14,11 +14,10 @@ import numpy as np
 
 from focgen.diagnosis.converter import Converter
 from focgen.diagnosis.fit import Fit
-from focgen.diagnosis.leftover import foretold
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.reconsider import reconsidered
 from focgen.diagnosis.search import Ranking, evidence
-from focgen.rig.effects import library
+from focgen.rig.effects import confused
 
 # parts of the remaining mean square
 _VISIBLE = (0.015, 0.05)  # what the first effect, and any further, has to take away to be of use
@@ -66,14 +65,14 @@ def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> 
         return mended
     if not ranking.base.problem.clues:
         return winner if _useful(rankings, winner, asked) else mended
-    tried = (f for f in (reconsidered(rankings, winner, clues), winner))
+    tried = dict.fromkeys((reconsidered(rankings, winner, clues), winner))
     return next((f for f in tried if _useful(rankings, f, asked) and not _marginal(rankings, f)), mended)
 
 
 def _leading(ranking: Ranking) -> str:
     """The likeliest family that these experiments are made to show, where it comes close to the winner."""
-    top, seen = ranking.gain[ranking.winner], ranking.base.problem.excitation
-    shown = [n for n in ranking.best if not library()[n].needs(seen) and ranking.gain[n] > _SHOWN * top]
+    top, lacks = ranking.gain[ranking.winner], ranking.base.problem.lacks
+    shown = [n for n in ranking.best if not lacks(n) and ranking.gain[n] > _SHOWN * top]
     return shown[0] if shown else ranking.winner
 
 
@@ -96,19 +95,16 @@ def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
     """Whether a further family closes only a small part of the gap: what the first one's form lacks looks
     like that, the more so to a family that is easily confused with it."""
     first, now, then = (float(np.mean(f.weighed**2)) for f in (rankings[0].base, rankings[-1].base, winner))
-    response = winner.problem.references.clocks["response"]
-    segment = winner.problem.segment
-    noise = now * (1.0 - foretold(segment, rankings[-1].base.weighed, response))
+    noise = now * (1.0 - rankings[-1].base.foretold)
     *others, last = winner.problem.clues
-    name, close = last.effect, library()[last.effect].confused_with
-    near = [c for c in others if c.effect in close or name in library()[c.effect].confused_with]
+    near = [c for c in others if c.effect in confused(last.effect)]
     alike = bool(near)
     asked = _MERGED if len(winner.problem.segment.stages) > 1 else _SHARE
     drawn = any(c.form.drawn for c in near)
     if now - then > _CLEAN[alike] * now and not drawn:
         asked = _SMALL
     elif now - then > _PURE[alike] * now and not drawn:
-        asked = _LITTLE if foretold(segment, winner.weighed, response) < _WHITE else asked
+        asked = _LITTLE if winner.foretold < _WHITE else asked
     return now - then < asked[alike] * (first - min(noise, then))
 
 
@@ -116,12 +112,9 @@ def _mends(base: Fit, better: Fit, visible: float, whole: float, converter: Conv
     """Whether the residual falls visibly, by the part ``whole`` of what inputs foretell of it, and mostly
     so: what is not foretold is noise, and what takes that away no effect, unless it is most of all that is
     left; and what a coarse ``converter`` hides is no effect either."""
-    before, after = (f.weighed for f in (base, better))
-    old, new = np.mean(before**2), np.mean(after**2)
+    old, new = (np.mean(f.weighed**2) for f in (base, better))
     if old - new < visible * new or (converter is not None and converter.hides(base, better)):
         return False
-    response, segment = base.problem.references.clocks["response"], base.problem.segment
-    known, left = foretold(segment, before, response), foretold(segment, after, response)
     sure = old - new > _SURE[bool(base.problem.clues)] * old
-    told = sure or known * old - left * new > _KNOWN * (old - new)
-    return told and old - new > whole * old * known
+    told = sure or base.foretold * old - better.foretold * new > _KNOWN * (old - new)
+    return told and old - new > whole * old * base.foretold

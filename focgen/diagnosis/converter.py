@@ -14,7 +14,7 @@ import numpy as np
 
 from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue, Problem
-from focgen.diagnosis.rivals import Cause, Rival
+from focgen.diagnosis.rivals import Cause, Rival, share_of
 from focgen.rig.engine import slot_in
 
 WITHIN = (0.25, 0.35)  # of a step: root mean square that the first effect has to change, and any further
@@ -45,10 +45,9 @@ class Converter:
         a part of it."""
         problem = best.problem.with_clues([*best.problem.clues, self.clue])
         both = fit(problem, np.r_[best.vector, self.entries], weighing, 0)
-        before, without, after = (rms(f.weighed) ** 2 for f in (nominal, best, both))
-        share = float(np.clip((without - after) / max(before - after, 1e-300), 0.0, 1.0))
         rival = Rival(self.clue.effect, self.clue.stage, 0.0, 0.0, both)
-        return both if after < without else best, (*causes, Cause((rival,), 0.0, share))
+        closer = rms(both.weighed) < rms(best.weighed)
+        return both if closer else best, (*causes, Cause((rival,), 0.0, share_of(nominal, best, both)))
 
 
 def rms(values: np.ndarray) -> float:

@@ -11,7 +11,7 @@ from focgen.diagnosis.accept import Asked, chosen
 from focgen.diagnosis.converter import Converter, converter_of
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import Fit, Weighing, fit
-from focgen.diagnosis.leftover import Leftover, foretold, leftover
+from focgen.diagnosis.leftover import Leftover, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.rivals import Cause, doubted, left_out
@@ -87,7 +87,7 @@ def guests_in(segment: Segment, rig: Rig) -> list[Clue]:
 
 def _much_left(base: Fit) -> bool:
     """Whether inputs foretell most of what is left."""
-    return foretold(base.problem.segment, base.weighed, base.problem.references.clocks["response"]) > _MUCH
+    return base.foretold > _MUCH
 
 
 def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
@@ -171,9 +171,9 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
     """All clues where inputs foretell something of the residual or it is slower than noise is, else none."""
     ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
-    left, segment, response = ground.weighed, base.segment, base.references.clocks["response"]
-    told = foretold(segment, left, response) > _TELLING
-    return clues if told or disturbance(segment.parts(left), segment.run.h, response).swings else []
+    left, response = ground.residual(), base.references.clocks["response"]
+    told = ground.foretold > _TELLING
+    return clues if told or disturbance(left, base.segment.run.h, response).swings else []
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from focgen.diagnosis.leftover import foretold
 from focgen.diagnosis.problem import Problem
 from focgen.rig.kernels import innovations as innovated
 from focgen.rig.kernels import products
@@ -41,6 +42,12 @@ class Fit:
     def weighed(self) -> np.ndarray:
         """The residual (n,) by trust, as a share of the output's level."""
         return self.problem.weighed(self.vector)
+
+    @cached_property
+    def foretold(self) -> float:
+        """The share of the residual's mean square that inputs foretell."""
+        problem = self.problem
+        return foretold(problem.segment, self.weighed, problem.references.clocks["response"])
 
     def residual(self) -> list[np.ndarray]:
         """Measured less simulated, by experiment, as a share of the output's level, each sample by its

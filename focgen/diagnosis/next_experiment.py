@@ -17,7 +17,7 @@ from focgen.diagnosis.model import Found, NextExperiment
 from focgen.diagnosis.noise import whiten
 from focgen.diagnosis.rivals import Rival
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import Run, library
+from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
 
 _ENOUGH = 3.0  # standard deviations
@@ -60,8 +60,7 @@ def _between(logs, e: Explanation, a: Rival, others: Sequence[Rival]) -> NextExp
 
 def _lacking(e: Explanation, names: Sequence[str]) -> str:
     """What the segment's experiments lack to show any of the effects."""
-    seen = e.nominal.problem.excitation
-    missing = dict.fromkeys(m for name in names if (m := library()[name].needs(seen)))
+    missing = dict.fromkeys(m for name in names if (m := e.nominal.problem.lacks(name)))
     return f" (so far, {'; '.join(missing)})" if missing else ""
 
 

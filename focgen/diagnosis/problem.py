@@ -11,7 +11,7 @@ import numpy as np
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.segments import Segment
-from focgen.rig.effects import Excitation, Form
+from focgen.rig.effects import Excitation, Form, library
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.model import Rig
 
@@ -68,6 +68,10 @@ class Problem:
         """What the experiments do to the segment."""
         segment = self.segment
         return excitation(segment.parts(segment.x), segment.run.h, self.references.clocks["response"])
+
+    def lacks(self, effect: str) -> str | None:
+        """What the experiments lack to show an effect."""
+        return library()[effect].needs(self.excitation)
 
     def with_clues(self, clues: Sequence[Clue]) -> Problem:
         """The same segment under other effects."""

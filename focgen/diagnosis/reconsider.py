@@ -14,7 +14,6 @@ import numpy as np
 from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.search import Ranking, best_start, evidence
-from focgen.rig.effects import library
 
 _CLOSE = 0.4  # of the first one's evidence: families that reach as much are tried in its place
 _MOST = 3
@@ -66,8 +65,8 @@ def _other_families(first: Ranking, second: Fit) -> list[Fit]:
     """The families that came close to the first effect, as they were fitted alone, and the second; without
     those that these experiments are not made to show."""
     chosen, last = second.problem.clues
-    best, tail, seen = max(first.gain.values()), _split(second)[-1], first.base.problem.excitation
-    near = [n for n in first.best if first.gain[n] > _CLOSE * best and not library()[n].needs(seen)]
+    best, tail, lacks = max(first.gain.values()), _split(second)[-1], first.base.problem.lacks
+    near = [n for n in first.best if first.gain[n] > _CLOSE * best and not lacks(n)]
     near = [first.best[n] for n in near if n not in (chosen.effect, last.effect)][:_MOST]
     return [
         fit(f.problem.with_clues([*f.problem.clues, last]), np.r_[f.vector, tail], Weighing(np.ones(1)), 0)

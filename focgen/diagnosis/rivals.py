@@ -11,7 +11,7 @@ from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.separation import separation
-from focgen.rig.effects import library
+from focgen.rig.effects import confused
 
 _SWAPS = 3
 _LEVEL = 0.01  # standard deviations: as good as
@@ -70,9 +70,13 @@ def _cause(name: str, best: Fit, nominal: Fit, rankings, clues, weighing: Weighi
         ranking = rank(without.problem, without.vector, untried)
     others = _rivals(best, without, ranking, clues, weighing, len(own) > 1)
     rivals = [Rival(name, own[0].stage, 0.0, gain, best), *(_behind(r, name, best) for r in others)]
-    before, after, lost = (np.mean(f.weighed**2) for f in (nominal, best, without))
-    share = float(np.clip((lost - after) / max(before - after, 1e-300), 0, 1))
-    return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), gain, share)
+    return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), gain, share_of(nominal, without, best))
+
+
+def share_of(nominal: Fit, without: Fit, best: Fit) -> float:
+    """The part of what ``best`` explains of the refitted gap, as mean square, that is lost ``without``."""
+    before, lost, after = (np.mean(f.weighed**2) for f in (nominal, without, best))
+    return float(np.clip((lost - after) / max(before - after, 1e-300), 0, 1))
 
 
 def _rivals(
@@ -94,8 +98,7 @@ def _rivals(
 
 def _behind(rival: Rival, name: str, best: Fit) -> Rival:
     """The rival, not ahead of effect ``name`` where the experiments are made to show that one only."""
-    seen, known = best.problem.excitation, library()
-    if known[rival.effect].needs(seen) and not known[name].needs(seen):
+    if best.problem.lacks(rival.effect) and not best.problem.lacks(name):
         return replace(rival, separation=max(rival.separation, _LEVEL))
     return rival
 
@@ -104,25 +107,14 @@ def _indistinct(best: Fit, ranking: Ranking) -> set[str]:
     """The families that these experiments are not made to tell from those of ``best``: easily confused with
     one of them, and one of the two lacking what would show it; or confused with what that one is confused
     with, and lacking it themselves."""
-    seen, known = best.problem.excitation, library()
-    found = set()
+    lacks, found = best.problem.lacks, set()
     for a in dict.fromkeys(c.effect for c in best.problem.clues):
-        near = _confused(a)
-        further = set().union(*map(_confused, near))
+        near = confused(a)
+        further = set().union(*map(confused, near))
         for b in ranking.best:
-            lacks = known[b].needs(seen)
-            if (b in near and (lacks or known[a].needs(seen))) or (b in further and lacks):
+            if (b in near and (lacks(b) or lacks(a))) or (b in further and lacks(b)):
                 found.add(b)
     return found
-
-
-def _confused(name: str) -> set[str]:
-    """The families that are easily confused with one, whichever of the two says so."""
-    return {
-        e.name
-        for e in library().values()
-        if name in e.confused_with or e.name in library()[name].confused_with
-    }
 
 
 def _second_form(of: Fit, clues, weighing: Weighing) -> Fit:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.diagnosis.fit import Fit, Weighing, fit, jacobian
-from focgen.diagnosis.leftover import foretold
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 
@@ -107,9 +106,7 @@ def _chosen(tried: Sequence[Fit]) -> list[Fit]:
 def _colour(leader: Fit) -> np.ndarray:
     """The whitening filter of what the best fit leaves. Where inputs foretell much of that it is no noise
     yet, and a filter that takes out its colour would hide what is missing: then there is none."""
-    problem = leader.problem
-    share = foretold(problem.segment, leader.weighed, problem.references.clocks["response"])
-    return np.ones(1) if share > _MISFIT else fit_ar(leader.residual())
+    return np.ones(1) if leader.foretold > _MISFIT else fit_ar(leader.residual())
 
 
 def _coloured(ground: Fit, leader: Fit, iterations: int) -> tuple[Weighing, Fit]:

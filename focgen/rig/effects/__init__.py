@@ -14,7 +14,18 @@ from typing import Mapping
 
 from focgen.rig.effects._effect import SLOTS, STAGES, Effect, Excitation, Form, Parameter, Run
 
-__all__ = ["SLOTS", "STAGES", "Effect", "Excitation", "Form", "Parameter", "Run", "form_of", "library"]
+__all__ = [
+    "SLOTS",
+    "STAGES",
+    "Effect",
+    "Excitation",
+    "Form",
+    "Parameter",
+    "Run",
+    "confused",
+    "form_of",
+    "library",
+]
 
 
 @cache
@@ -23,6 +34,13 @@ def library() -> Mapping[str, Effect]:
     names = sorted(m.name for m in iter_modules(__path__) if not m.name.startswith("_"))
     modules = (import_module(f"{__name__}.{name}") for name in names)
     return MappingProxyType({m.EFFECT.name: m.EFFECT for m in modules})
+
+
+@cache
+def confused(name: str) -> frozenset[str]:
+    """The families that are easily confused with one, whichever of the two says so."""
+    own = library()[name].confused_with
+    return frozenset(e.name for e in library().values() if name in e.confused_with or e.name in own)
 
 
 def form_of(effect: str, form: str) -> Form:
