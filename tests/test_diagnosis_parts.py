@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.confidence import confidences
+from focgen.diagnosis.converter import Converter
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
@@ -145,3 +146,11 @@ def test_rising_steps_do_not_tell_an_obstacle_from_what_a_bent_gain_is_confused_
     rising, mixed = (np.repeat(u, 200) for u in ([0.2, 0.4, 0.6, 0.8, 1.0], [0.4, 0.2, 0.4, 1.0, 0.2, 0.4]))
     assert _open(rising) == {"softening", "gain_drift"}
     assert _open(mixed) == set()
+
+
+@pytest.mark.parametrize("clues, part, hidden", [([], 0.2, True), ([], 0.3, False), (["first"], 0.3, True)])
+def test_a_converter_hides_what_is_small_beside_its_step(clues, part, hidden):
+    step, zero = 0.05, np.zeros(400)
+    base = SimpleNamespace(problem=SimpleNamespace(clues=clues), weighed=zero)
+    better = SimpleNamespace(weighed=zero + part * step * np.sign(np.sin(np.arange(400))))
+    assert Converter(None, (), step).hides(base, better) == hidden
