@@ -1,5 +1,7 @@
 """The compiled chain against independent truth: Laplace inversion, scipy, and hand-made loops."""
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from focgen.rig.effects import Run, form_of
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.model import Actuator, Rig, Signals
 from focgen.rig.modes import respond
+from focgen.rig.replay import effect_tables, placed_in
 
 
 def rest(*lengths):
@@ -87,6 +90,24 @@ def test_each_experiment_starts_at_rest_and_history_carries_on():
     y = Chain(rig, (soft,)).run(np.r_[u, 0.5 * u], "regulator", "sensor", both)
     fresh = Chain(rig, (soft,)).run(0.5 * u, "regulator", "sensor", one)
     assert y[-1] > 1.1 * fresh[-1]
+
+
+def test_two_forms_of_one_family_carry_on_each_its_own_history():
+    """A later session equals the second half of one long one, and one form's memory is not the other's."""
+    rig = Rig("r", 0.05, Signals("t", "y", "u"), Actuator(1.0, 0.7, (2.0,)))
+    u = np.r_[np.zeros(5), np.ones(100)]
+    both, one = Run.of([105, 105], [0.0, 50.0], 0.05), Run.of([105], [0.0], 0.05)
+    placed = tuple(
+        Placed("softening", form_of("softening", name), "actuator", (0.3, 2.0))
+        for name in ("work", "saturating")
+    )
+    whole = Chain(rig, placed).run(np.r_[u, 0.5 * u], "regulator", "sensor", both)
+    left = []
+    Chain(rig, placed).run(u, "regulator", "sensor", one, left=left)
+    assert [list(memory) for memory in left] == [["work"], ["largest"]]
+    rig = replace(rig, effects=effect_tables(placed, left, 50.0))
+    later = Chain(rig, placed_in(rig)).run(0.5 * u, "regulator", "sensor", one)
+    np.testing.assert_allclose(later, whole[105:], rtol=1e-12)
 
 
 def test_play_against_a_loop_in_python():

@@ -27,7 +27,7 @@ class Rigs:
 
     def augmented(self, logs: Sequence[Experiment]) -> Rig:
         """The rig that carries its effects, and what outlives this session."""
-        left: dict[str, dict] = {}
+        left: list[dict[str, float]] = []
         entry = "command" if all("command" in log for log in logs) else "pressure"
         x = np.concatenate([np.asarray(log[entry], float) for log in logs])
         first = "regulator" if entry == "command" else "actuator"

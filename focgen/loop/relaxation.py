@@ -23,7 +23,7 @@ from focgen.loop.stepper import Stepper
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.model import Rig
-from focgen.rig.replay import placed_in, session_state
+from focgen.rig.replay import placed_in, session_end
 
 _WINDOWS = 24  # that a run is cut into: the fewer, the more passes each
 _PASSES = 40  # after which a window is halved
@@ -34,7 +34,7 @@ _LEAST_PARTS = 4  # of a sample: edges and limits of an effect fall between samp
 class Plant:
     """A rig with its effects, sampled every ``sample_time`` s, simulated in ``parts`` of a sample.
 
-    ``clock`` (s) and ``carried``: the state of the session that every run continues from. ``lead`` samples
+    ``clock`` (s): when the session ended that every run continues from. ``lead`` samples
     of rest go before each run, where the rig's rest is not zero.
     """
 
@@ -43,7 +43,6 @@ class Plant:
     sample_time: float
     parts: int
     clock: float
-    carried: dict[str, float]
     lead: int
 
     @classmethod
@@ -51,10 +50,9 @@ class Plant:
         """The plant for runs of ``samples`` samples from rest at ``start``. Raises RigError for effects that
         are unknown.
         """
-        clock, carried = session_state(rig)
         parts = max(_LEAST_PARTS, substeps(rig, sample_time))
         lead = samples if start.command or start.output else 0
-        return cls(rig, placed_in(rig), sample_time, parts, clock, carried, lead)
+        return cls(rig, placed_in(rig), sample_time, parts, session_end(rig), lead)
 
     def signals(self, command: np.ndarray, idle: float) -> dict[str, np.ndarray]:
         """Pressure, curvature and output, shape (n · parts + 1,), of the held ``command`` (n,): at the
@@ -67,7 +65,7 @@ class Plant:
         place = np.arange(count + 1) - (0 if held else 1)
         x = ahead[np.clip(place // self.parts, 0, len(ahead) - 1)]
         x[0] = x[0] if held else idle
-        run = Run.of([count + 1], [self.clock], h, self.carried)
+        run = Run.of([count + 1], [self.clock], h)
         tap: dict[str, np.ndarray] = {}
         Chain(self.rig, self.placed).run(x, "regulator", "sensor", run, held, tap)
         names = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}

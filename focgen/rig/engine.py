@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,12 +17,25 @@ STAGES = ("regulator", "actuator", "sensor")
 
 @dataclass(frozen=True)
 class Placed:
-    """An effect in a chain: family ``effect``, its form, where, and its parameters in the log's units."""
+    """An effect in a chain: family ``effect``, its form, where, and its parameters in the log's units;
+    ``carried``: what outlived an earlier session."""
 
     effect: str
     form: Form
     stage: str
     values: tuple[float, ...]
+    carried: Mapping[str, float] = field(default_factory=dict)
+
+    def act(self, x: np.ndarray, run: Run) -> np.ndarray:
+        """What leaves it when ``x`` (n,) enters."""
+        return self.form.act(x, self.values, self._own(run))
+
+    def leaves(self, x: np.ndarray, run: Run) -> dict[str, float]:
+        """What of it outlives the session."""
+        return self.form.leaves(x, self.values, self._own(run)) if self.form.leaves else {}
+
+    def _own(self, run: Run) -> Run:
+        return replace(run, carried=self.carried) if self.carried else run
 
     @property
     def slot(self) -> str:
@@ -66,18 +79,20 @@ class Chain:
         run: Run,
         held: bool = False,
         tap: dict[str, np.ndarray] | None = None,
-        left: dict[str, dict] | None = None,
+        left: list[dict[str, float]] | None = None,
     ) -> np.ndarray:
         """What leaves stage ``last`` when ``x`` (n,) enters stage ``first``.
 
         ``held``: the input is a staircase. ``tap`` receives what leaves each stage, ``left`` what outlives
-        the session, by effect.
+        the session, one for each of ``placed``.
         """
+        if left is not None:
+            left[:] = [{} for _ in self.placed]
         begin, end = STAGES.index(first), STAGES.index(last)
         for stage in STAGES[begin : end + 1]:
             for number, (key, act, placed) in enumerate(self.steps(stage, held and stage == first)):
-                if left is not None and placed is not None and placed.form.leaves:
-                    left[placed.effect] = placed.form.leaves(x, placed.values, run)
+                if left is not None and placed is not None:
+                    left[_index(self.placed, placed)] = placed.leaves(x, run)
                 x = self._once((stage, number), key, x, act, run)
             if tap is not None:
                 tap[stage] = x
@@ -117,9 +132,14 @@ class Chain:
 def _effect(placed: Placed) -> Step:
     return (
         (placed.effect, placed.form.name, placed.values),
-        lambda x, run: placed.form.act(x, placed.values, run),
+        placed.act,
         placed,
     )
+
+
+def _index(placed: Sequence[Placed], one: Placed) -> int:
+    """Where the very one is: two of a chain may be equal."""
+    return next(i for i, p in enumerate(placed) if p is one)
 
 
 def _transfer(transfer, held: bool) -> Step:

@@ -75,15 +75,10 @@ def simulate_session(
         raise LogError(
             logs[0].name, "has neither command nor pressure throughout", "name an input in [signals]"
         )
-    clock = _clock(rig) if continues else 0.0
+    clock = session_end(rig) if continues else 0.0
     begin = min(log.start for log in logs)
     ahead = clock if begin < clock else 0.0
-    run = Run.of(
-        [len(log) for log in logs],
-        [log.start + ahead for log in logs],
-        logs[0].sample_time,
-        _carried(rig) if continues else {},
-    )
+    run = Run.of([len(log) for log in logs], [log.start + ahead for log in logs], logs[0].sample_time)
     tap: dict[str, np.ndarray] = {}
     x = np.concatenate([np.asarray(log[entry], float) for log in logs])
     first = "regulator" if entry == "command" else "actuator"
@@ -130,28 +125,23 @@ def _placed(rig: Rig, table) -> Placed:
             else f"has the unknown key {sorted(strange)[0]!r}"
         )
         raise RigError(f"{rig.name} [[effects]] {effect.name}", what, f"stages are {', '.join(STAGES)}")
-    return Placed(effect.name, form, stage, tuple(float(table[p.name]) for p in form.parameters))
+    values = tuple(float(table[p.name]) for p in form.parameters)
+    carried = {k: float(v) for k, v in table.get("carried", {}).items()}
+    return Placed(effect.name, form, stage, values, carried)
 
 
-def _clock(rig: Rig) -> float:
+def session_end(rig: Rig) -> float:
+    """Where the session that the rig's effects were found in ended, s on its clock."""
     return max((float(table.get("clock", 0.0)) for table in rig.effects), default=0.0)
 
 
-def _carried(rig: Rig) -> dict[str, float]:
-    return {k: float(v) for table in rig.effects for k, v in table.get("carried", {}).items()}
-
-
-def session_state(rig: Rig) -> tuple[float, dict[str, float]]:
-    """Where the session that the rig's effects were found in ended: its clock, s, and what outlives a
-    rest."""
-    return _clock(rig), _carried(rig)
-
-
-def effect_tables(placed: Sequence[Placed], left: dict[str, dict], clock: float) -> tuple[dict, ...]:
-    """Effects as ``[[effects]]`` tables, with what outlives the session: ``left`` by effect, its ``clock``
-    in s."""
+def effect_tables(
+    placed: Sequence[Placed], left: Sequence[dict[str, float]], clock: float
+) -> tuple[dict, ...]:
+    """Effects as ``[[effects]]`` tables, with what outlives the session: ``left``, one for each, and its
+    ``clock`` in s."""
     tables = []
-    for p in placed:
+    for p, carried in zip(placed, left, strict=True):
         table = {
             "name": p.effect,
             "form": p.form.name,
@@ -159,7 +149,7 @@ def effect_tables(placed: Sequence[Placed], left: dict[str, dict], clock: float)
             **{q.name: float(v) for q, v in zip(p.form.parameters, p.values)},
             "clock": float(clock),
         }
-        tables.append(table | ({"carried": left[p.effect]} if left.get(p.effect) else {}))
+        tables.append(table | ({"carried": carried} if carried else {}))
     return tuple(tables)
 
 

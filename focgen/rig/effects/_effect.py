@@ -55,7 +55,7 @@ class Run:
     """A session being simulated, its experiments one after the other in every array of shape (n,).
 
     ``h`` in s; ``rest`` (n,) is true at each experiment's first sample; ``clock`` (n,) is the session's time
-    in s; ``duration`` of the longest experiment in s; ``carried``: what outlived the rests before this
+    in s; ``duration`` of the longest experiment in s; ``carried``: what of an effect outlived an earlier
     session.
     """
 
@@ -72,18 +72,12 @@ class Run:
         return list(zip(firsts, [*firsts[1:], len(self.rest)]))
 
     @classmethod
-    def of(
-        cls,
-        lengths: Sequence[int],
-        starts: Sequence[float],
-        h: float,
-        carried: Mapping[str, float] | None = None,
-    ):
+    def of(cls, lengths: Sequence[int], starts: Sequence[float], h: float) -> Run:
         """The run of experiments of ``lengths`` samples beginning at ``starts`` s on the session's clock."""
         rest = np.zeros(sum(lengths), np.uint8)
         rest[np.cumsum([0, *lengths[:-1]])] = 1
         clock = np.concatenate([s + h * np.arange(n) for n, s in zip(lengths, starts)])
-        return cls(h, rest, clock, max(lengths) * h, dict(carried or {}))
+        return cls(h, rest, clock, max(lengths) * h)
 
 
 Act = Callable[[np.ndarray, tuple[float, ...], Run], Any]
