@@ -169,11 +169,13 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 
 
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
-    """All clues where inputs foretell something of the residual or it is slower than noise is, else none."""
+    """All clues where inputs foretell something of the residual, or it is slower or less steady than noise
+    is; else none."""
     ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
     left, response = ground.residual(), base.references.clocks["response"]
-    told = ground.foretold > _TELLING
-    return clues if told or disturbance(left, base.segment.run.h, response).swings else []
+    found = disturbance(left, base.segment.run.h, response)
+    restless = found.swings or found.hums or found.bursts
+    return clues if restless or ground.foretold > _TELLING else []
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:

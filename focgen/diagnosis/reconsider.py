@@ -13,7 +13,7 @@ import numpy as np
 
 from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue
-from focgen.diagnosis.search import Ranking, best_start, evidence
+from focgen.diagnosis.search import Ranking, best_start, coarseness, evidence, on_all
 
 _CLOSE = 0.4  # of the first one's evidence: families that reach as much are tried in its place
 _MOST = 3
@@ -24,8 +24,12 @@ def reconsidered(rankings: Sequence[Ranking], second: Fit, clues: Sequence[Clue]
     ``second`` as it is."""
     if len(rankings[-1].base.problem.clues) != 1:
         return second
-    found = _best(second, [*_other_forms(second, 0, clues), *_other_families(rankings[0], second)])
-    return _best(found, _other_forms(found, 1, clues))
+    whole, factor = second.problem, coarseness(second.problem)
+    thin = whole.thinned(factor)
+    found = fit(thin, whole.stretched(second.vector, 1.0 / factor), Weighing(np.ones(1)), 0)
+    found = _best(found, [*_other_forms(found, 0, clues), *_other_families(rankings[0], found, factor)])
+    found = on_all(_best(found, _other_forms(found, 1, clues)), whole, factor)
+    return fit(found.problem, found.vector, Weighing(np.ones(1)), 3, 0.05)
 
 
 def _best(of: Fit, others: Sequence[Fit]) -> Fit:
@@ -61,14 +65,15 @@ def _in_order(of: Fit) -> Fit:
     return fit(problem, np.r_[head, second, first], Weighing(np.ones(1)), 0)
 
 
-def _other_families(first: Ranking, second: Fit) -> list[Fit]:
-    """The families that came close to the first effect, as they were fitted alone, and the second; without
-    those that these experiments are not made to show."""
+def _other_families(first: Ranking, second: Fit, factor: int) -> list[Fit]:
+    """The families that came close to the first effect, as they were fitted alone to ``factor`` times as many
+    samples, and the second; without those that these experiments are not made to show."""
     chosen, last = second.problem.clues
     best, tail, lacks = max(first.gain.values()), _split(second)[-1], first.base.problem.lacks
     near = [n for n in first.best if first.gain[n] > _CLOSE * best and not lacks(n)]
     near = [first.best[n] for n in near if n not in (chosen.effect, last.effect)][:_MOST]
+    starts = [f.problem.stretched(f.vector, 1.0 / factor) for f in near]
     return [
-        fit(f.problem.with_clues([*f.problem.clues, last]), np.r_[f.vector, tail], Weighing(np.ones(1)), 0)
-        for f in near
+        fit(second.problem.with_clues([*f.problem.clues, last]), np.r_[start, tail], Weighing(np.ones(1)), 0)
+        for f, start in zip(near, starts, strict=True)
     ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.diagnosis.fit import Fit, Weighing, fit, jacobian
+from focgen.diagnosis.fit import Fit, Weighing, fit, innovations, jacobian
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 
@@ -19,6 +19,7 @@ _MISFIT = 0.15  # of a residual's mean square foretold by inputs: beyond it the 
 _ADRIFT = 1.15  # of a fit's mean square without a colour
 _NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
 _FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
+_TRIED = 3  # start values of a form that are fitted, where it has more
 _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
 
 
@@ -55,8 +56,7 @@ def evidence(of: Fit, against: Fit) -> float:
 def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
     """Fit every clue on top of ``base`` (a vector of ``problem``), first on means of neighbouring samples,
     then on every sample and with the colour of the noise."""
-    shortest = min(last - first for first, last in problem.segment.run.spans)
-    factor = max(1, min(len(problem.segment.y) // _COARSE, shortest // 20))
+    factor = coarseness(problem)
     thin, rough = problem.thinned(factor), Weighing(np.ones(1))
     ground = fit(thin, problem.stretched(base, 1.0 / factor), rough)
     known = jacobian(thin, ground.vector, ground.innovations, rough, *thin.bounds())
@@ -73,11 +73,17 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
         if top < _NOTHING
         else [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR]
     )
-    full = [_on_all(t, problem, factor) for t in (ground, *kept)]
+    full = [on_all(t, problem, factor) for t in (ground, *kept)]
     return finish(full[0], full[1:], errors)
 
 
-def _on_all(of: Fit, problem: Problem, factor: int) -> Fit:
+def coarseness(problem: Problem) -> int:
+    """How many neighbouring samples a coarse pass takes the mean of."""
+    shortest = min(last - first for first, last in problem.segment.run.spans)
+    return max(1, min(len(problem.segment.y) // _COARSE, shortest // 20))
+
+
+def on_all(of: Fit, problem: Problem, factor: int) -> Fit:
     """A fit to thinned samples as the start of one to all of them."""
     whole = problem.with_clues(of.problem.clues)
     return fit(whole, whole.stretched(of.vector, factor), Weighing(np.ones(1)), 0)
@@ -158,9 +164,23 @@ def best_start(
 ) -> Fit | None:
     """The best of the fits from the clue's start values, a few iterations each."""
     extended = problem.with_clues([*problem.clues, clue])
-    fits = []
-    for start in extended.starts(clue):
+    starts, fits = extended.starts(clue), []
+    if len(starts) > _TRIED:
+        starts = _likeliest(extended, base, starts, weighing)
+    for start in starts:
         found = fit(extended, np.r_[base, start], weighing, 5, tolerance=0.1, known=known)
         if np.isfinite(found.sse):
             fits.append(found)
     return min(fits, key=lambda f: f.sse, default=None)
+
+
+def _likeliest(problem: Problem, base: np.ndarray, starts: Sequence[np.ndarray], weighing: Weighing):
+    """Of many start values those whose direction, own parameters free to give way, goes furthest towards the
+    data."""
+    bare = problem.with_clues(problem.clues[:-1])
+    now = innovations(bare, base, weighing)
+    own, _ = np.linalg.qr(jacobian(bare, base, now, weighing, *bare.bounds()).T)
+    tried = np.stack([innovations(problem, np.r_[base, start], weighing) for start in starts]) - now
+    tried -= (tried @ own) @ own.T
+    reach = (tried @ now) ** 2 / np.maximum(np.sum(tried**2, axis=1), 1e-300)
+    return [starts[i] for i in np.argsort(-reach)[:_TRIED]]

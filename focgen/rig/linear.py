@@ -33,12 +33,14 @@ def run(
     return kernels.modes(x, rest, *tables, switching=False)
 
 
-def oscillator(x: np.ndarray, rest: np.ndarray, h: float, period: float, damping: float) -> np.ndarray:
+def oscillator(
+    x: np.ndarray, rest: np.ndarray, h: float, period: float, damping: float, speed: bool = False
+) -> np.ndarray:
     """The response of w²/(s² + 2 d w s + w²), w = 2π/``period`` (s), ``damping`` d < 1, input linear between
-    samples."""
+    samples; ``speed``: its rate of change over w instead."""
     w = 2.0 * np.pi / period
     pole = w * complex(-damping, np.sqrt(1.0 - damping**2))
-    scale = -2.0 * (w * w / (2j * pole.imag)) / pole
+    scale = -2.0 * (w * w / (2j * pole.imag)) * (1.0 / w if speed else 1.0 / pole)
     a, b0, b1 = hold(np.array([pole * h]))
     pair = np.array([[c.real, c.imag] for c in map(complex, (a[0], scale * b0[0], scale * b1[0]))]).ravel()
     none = np.zeros((2, 1))

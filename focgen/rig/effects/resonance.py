@@ -14,9 +14,11 @@ def _series(x, values, run):
     return _mode(x, *values, run)
 
 
-def _parallel(x, values, run):
-    share, period, damping = values
-    return x + share * (_mode(x, period, damping, run) - x)
+def _beside(x, values, run):
+    share, quarter, period, damping = values
+    place = oscillator(x, run.rest, run.h, period, damping)
+    speed = oscillator(x, run.rest, run.h, period, damping, speed=True)
+    return x + share * (place - x) + quarter * speed
 
 
 def _mode_response(period, damping, s):
@@ -24,13 +26,16 @@ def _mode_response(period, damping, s):
     return w * w / (s * s + 2.0 * damping * w * s + w * w)
 
 
-def _parallel_response(values, s):
-    share, period, damping = values
-    return 1.0 + share * (_mode_response(period, damping, s) - 1.0)
+def _beside_response(values, s):
+    share, quarter, period, damping = values
+    mode = _mode_response(period, damping, s)
+    return 1.0 + share * (mode - 1.0) + quarter * s * period / (2.0 * np.pi) * mode
 
 
-_PERIOD = Parameter("period", time=1, lower=0.002, upper=30.0, starts=(0.1, 0.5, 2.0), log=True)
-_DAMPING = Parameter("damping", lower=0.005, upper=0.5, starts=(0.2, 0.2, 0.2), log=True)
+# a sharp mode is found from close by only
+_STARTS = tuple(0.02 * 1.16**k for k in range(41))
+_PERIOD = Parameter("period", time=1, lower=0.002, upper=30.0, starts=_STARTS, log=True)
+_DAMPING = Parameter("damping", lower=0.005, upper=0.5, starts=(0.1,), log=True)
 
 EFFECT = Effect(
     name="resonance",
@@ -47,16 +52,18 @@ EFFECT = Effect(
             _series,
             response=lambda values, s: _mode_response(*values, s),
         ),
+        # driven by the pressure, not by the slower motion beside it: larger, and with a phase of its own
         Form(
-            "parallel",
+            "beside",
             "response",
             (
-                Parameter("share", lower=-1.0, upper=1.0, starts=(0.1, 0.1, 0.1), zero=0.0),
+                Parameter("share", lower=-30.0, upper=30.0, starts=(0.1,), zero=0.0),
+                Parameter("quarter", lower=-30.0, upper=30.0, starts=(0.0,), zero=0.0),
                 _PERIOD,
                 _DAMPING,
             ),
-            _parallel,
-            response=_parallel_response,
+            _beside,
+            response=_beside_response,
         ),
     ],
 )
