@@ -12,7 +12,7 @@ from focgen.errors import InputError
 from focgen.rig.files import write_rig
 from focgen.rig.model import Actuator, Rig, Signals
 from focgen.trials.achieved import shrink
-from focgen.trials.judging import judge
+from focgen.trials.judging import forgone, judge
 from focgen.trials.machine import Machine, simulate
 from focgen.trials.recording import as_csv
 from focgen.trials.rows import rows
@@ -110,6 +110,20 @@ def test_pairs():
     found = by_name(judged)
     assert found["pairs: both found"].value == pytest.approx(2 / 4)
     assert found["pairs: false extras per case"].value == pytest.approx(2 / 4)
+
+
+def test_missed_pairs_are_held_against_the_fit_of_the_true_ones():
+    """Mean squares above the floor: of a gap of 10, what was found leaves 4, the true pair 3.9, 0 or 4.5."""
+    gap = {"refitted": 11**0.5, "floor": 1.0, "explained": 5**0.5}
+    said_, told = {"gap": gap}, [{"gap": {**gap, "explained": x**0.5}} for x in (4.9, 1.0, 5.5)]
+    assert [forgone(said_, t) for t in told] == pytest.approx([0.01, 0.4, -0.05])
+    assert forgone(said_, None) is None and forgone(None, said_) is None
+    assert forgone({"gap": {**gap, "refitted": 1.0}}, said_) is None
+    pair, found = ["leak", "creep"], said("named", {"leak": 0.9})
+    judged = [one("pair", pair, found, forgone=f) for f in (0.01, 0.4, -0.05)]
+    judged.append(one("pair", pair, said("named", {"leak": 0.9}, {"creep": 0.9}), forgone=0.3))  # no miss
+    row = by_name(judged)["missed: the true pair closes < 0.02 more"]
+    assert row.value == pytest.approx(2 / 3) and row.cases == 3
 
 
 def test_promises():

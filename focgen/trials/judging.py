@@ -16,6 +16,7 @@ class Judged:
     ``causes``: for each entry its candidates (effect, confidence), most likely first. ``verdict`` is "failed"
     where there is no diagnosis. ``promise`` and ``promise_interval``: the shrink that was predicted;
     ``achieved`` and ``oracle``: what replay on the unseen logs gives, None where it cannot be measured.
+    ``forgone``: the part of the gap in the given logs that the oracle closes beyond what was closed.
     """
 
     number: str
@@ -35,6 +36,7 @@ class Judged:
     promise_interval: tuple[float, float] | None = None
     achieved: float | None = None
     oracle: float | None = None
+    forgone: float | None = None
     seconds: float | None = None
     baseline: str | None = None
     best_fit: str | None = None
@@ -153,3 +155,13 @@ def judge(number: str, label: dict, outcome: dict, diagnosis: dict | None, **mea
 
 def _proposal(proposed: dict | None) -> str:
     return f"{proposed.get('what', '')} {proposed.get('why', '')}" if proposed else ""
+
+
+def forgone(diagnosis: dict | None, told: dict | None) -> float | None:
+    """The part of the refitted gap, as mean square above the floor, that the fit of the true effects closes
+    beyond what was closed without being told."""
+    if not diagnosis or not told:
+        return None
+    gap = diagnosis["gap"]
+    could = gap["refitted"] ** 2 - gap["floor"] ** 2
+    return (gap["explained"] ** 2 - told["gap"]["explained"] ** 2) / could if could > 0 else None

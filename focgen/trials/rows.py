@@ -94,6 +94,10 @@ def _pair(j: Judged) -> bool:
     return j.kind == "pair" and j.visible
 
 
+def _missed(j: Judged) -> bool:
+    return _pair(j) and not j.found and j.forgone is not None
+
+
 ROWS = (
     _Measure("top-1 effect", _visible, lambda j: j.top_right, limits=(0.92, 0.80, 0.72), guessed=_hit),
     _Measure("  … high severity", _severe("high"), lambda j: j.top_right),
@@ -124,6 +128,7 @@ ROWS = (
     _Measure("pairs: both found", _pair, lambda j: j.found, limits=(0.88,)),
     _Measure("  … within one stage", lambda j: _pair(j) and _one_stage(j), lambda j: j.found),
     _Measure("  … across stages", lambda j: _pair(j) and not _one_stage(j), lambda j: j.found),
+    _Measure("  … missed: the true pair closes < 0.02 more", _missed, lambda j: j.forgone < 0.02),
     _Measure("pairs: false extras per case", _pair, lambda j: j.extras, _AT_MOST, (0.12,)),
     _Measure("singles: false extras per case", _visible, lambda j: j.extras, _AT_MOST),
     _Measure("promised shrink: median error", _promised, _error, _AT_MOST, (0.04,), np.median),

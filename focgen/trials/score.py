@@ -16,7 +16,7 @@ from focgen.errors import FocgenError, InputError
 from focgen.output import write_file
 from focgen.progress import say, track
 from focgen.trials import achieved, baselines
-from focgen.trials.judging import Judged, judge
+from focgen.trials.judging import Judged, forgone, judge
 from focgen.trials.rows import Row, rows, stated_in
 from focgen.trials.run import diagnose_case, facts_of, outcome_of, processes, ran
 from focgen.trials.sealing import unseal
@@ -147,7 +147,7 @@ def _ask_oracle(folder: Path, labels: dict[str, dict], jobs: int) -> None:
 
 
 def _judged(folder: Path, number: str, label: dict, baseline: bool) -> Judged:
-    run = folder / "runs" / number
+    run, told = folder / "runs" / number, folder / "oracle" / number
     outcome, diagnosis = outcome_of(run), _diagnosis_of(run)
     single = label["kind"] == "single" and label["suite"] != "closed"
     return judge(
@@ -158,7 +158,8 @@ def _judged(folder: Path, number: str, label: dict, baseline: bool) -> Judged:
         achieved=_kept(folder, run, number, label)
         if diagnosis and diagnosis.get("shrink") is not None
         else None,
-        oracle=_kept(folder, folder / "oracle" / number, number, label),
+        oracle=_kept(folder, told, number, label),
+        forgone=forgone(diagnosis, _diagnosis_of(told)),
         baseline=baselines.guess(folder / "cases" / number) if baseline and single else None,
         best_fit=_best_fit(diagnosis),
     )
