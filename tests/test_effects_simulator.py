@@ -5,6 +5,7 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.signal import lsim
 
@@ -127,6 +128,22 @@ def test_bouc_wen_loop_does_not_vanish_with_frequency():
         last = slice(2 * n // 3, n)
         areas.append(abs(np.trapezoid(z[last], x[last])))
     assert areas[0] > 2.0 and abs(areas[0] / areas[1] - 1) < 0.1
+
+
+@pytest.mark.parametrize("power", [1.05, 2.0, 5.0])
+def test_power_creep_against_an_integrator(power):
+    h, tau, scale = 0.05, 3.0, 1.7
+    x = np.interp(np.arange(600), [3, 13, 200, 220, 500, 510], [0.0, 1.5, 1.5, 0.2, 0.2, -0.8])
+    z = kernels.power_creep(x, rest(600), h, tau, scale, power)
+
+    def rate(t, z):
+        e = (np.interp(t, h * np.arange(600), x) - z) / scale
+        return np.sign(e) * scale / tau * np.abs(e) ** power
+
+    found = solve_ivp(rate, (0.0, 599 * h), [0.0], t_eval=h * np.arange(600), rtol=1e-9, max_step=h)
+    np.testing.assert_allclose(z, found.y[0], atol=2e-3)
+    again = kernels.power_creep(np.r_[x, x], rest(600, 600), h, tau, scale, power)
+    np.testing.assert_array_equal(again[600:], z)
 
 
 def test_unloading_speed_acts_only_when_unloading():

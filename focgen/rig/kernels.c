@@ -130,6 +130,22 @@ void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *res
     }
 }
 
+/* Power-law creep: dz/dt = sign(e) scale/tau |e/scale|^power, e = x - z, power > 1; exact for an input held at
+ * the mean of neighbouring samples. */
+void focgen_power_creep(int n, const double *x, double *y, const unsigned char *rest, double h, double tau, double scale,
+                        double power)
+{
+    double z = 0.0, past = 0.0, left = power - 1.0;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) z = past = 0.0;
+        double held = 0.5 * (past + x[k]), e = (held - z) / scale, size = fabs(e);
+        double slower = size > 0.0 ? pow(1.0 + left * h / tau * pow(size, left), -1.0 / left) : 1.0;
+        z = held - scale * e * slower;
+        past = x[k];
+        y[k] = z;
+    }
+}
+
 /* Rational filter of order `m` in direct form: y = sum b_i x[k-i] - sum a_i y[k-i], a_0 = 1; w holds the delays. */
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *a,
                    double *w)

@@ -32,6 +32,8 @@ void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, 
     left);
 void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width, double
     power, double beta);
+void focgen_power_creep(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
+    double scale, double power);
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
     const double *a, double *w);
 int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double
@@ -128,6 +130,11 @@ def bouc_wen(x, rest, width: float, power: float = 1.0, beta: float = 0.5) -> np
     """Bouc–Wen's hysteretic variable in [−1, 1]; ``width`` is the input's travel to reverse it, units of
     x."""
     return _call("focgen_bouc_wen", x, rest, float(width), float(power), float(beta))
+
+
+def power_creep(x, rest, h: float, tau: float, scale: float, power: float) -> np.ndarray:
+    """What creeps after ``x`` at the rate ``scale``/``tau`` · |distance/``scale``|^``power``, ``power`` > 1."""
+    return _call("focgen_power_creep", x, rest, float(h), float(tau), float(scale), float(power))
 
 
 def rational(x, rest, b, a) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
 from focgen.rig.effects._lags import lag_response
 
 _DECADES = np.geomspace(0.03, 30.0, 7)
@@ -32,6 +32,11 @@ def _two(x, values, run):
         + quick * kernels.lag(x, run.rest, run.h, tau / 5, tau / 5)
         + slow * kernels.lag(x, run.rest, run.h, tau, tau)
     )
+
+
+def _power(x, values, run):
+    share, tau, power, scale = values
+    return x + share * kernels.power_creep(x, run.rest, run.h, tau, scale, power)
 
 
 def _pole_response(values, s):
@@ -75,6 +80,17 @@ EFFECT = Effect(
             ),
             _two,
             response=_two_response,
+        ),
+        Form(  # quick at first, ever slower: Norton and Bailey's law
+            "power",
+            "response",
+            (
+                _SHARE,
+                _tau(6.0, 12.0, 40.0),
+                Parameter("power", lower=1.05, upper=8.0, starts=(2.0, 2.0)),
+                LARGEST,
+            ),
+            _power,
         ),
     ],
 )
