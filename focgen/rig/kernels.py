@@ -133,7 +133,7 @@ def bouc_wen(x, rest, width: float, power: float = 1.0, beta: float = 0.5) -> np
 
 
 def power_creep(x, rest, h: float, tau: float, scale: float, power: float) -> np.ndarray:
-    """What creeps after ``x`` at the rate ``scale``/``tau`` · |distance/``scale``|^``power``, ``power`` > 1."""
+    """What creeps after ``x`` at the rate ``scale``/``tau`` |distance/``scale``|^``power``; ``power`` > 1."""
     return _call("focgen_power_creep", x, rest, float(h), float(tau), float(scale), float(power))
 
 
