@@ -120,7 +120,8 @@ def test_levels_that_are_only_passed_are_not_repeated():
 def test_what_fits_lose_on_parts_they_did_not_see_is_not_promised():
     gap, left = np.full(5, 20.0), np.full(5, 1.1)
     sure, unsure = (predict(gap, left, blind, 1.0) for blind in (left, np.full(5, 3.0)))
-    assert sure.value - unsure.value == pytest.approx(0.5 * (3.0 - 1.1) / 19.0)
+    assert sure.value - unsure.value == pytest.approx((3.0 - 1.1) / 19.0)
+    assert sure.value == pytest.approx((20.0 - 1.1) / 19.0 - 0.04 / np.sqrt(20.0))
     assert unsure.interval[0] < sure.interval[0] - 0.05
 
 

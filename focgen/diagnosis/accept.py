@@ -27,12 +27,13 @@ _SURE = (0.4, 0.6)  # the first effect, and any further, that takes away as much
 _KNOWN = 0.12  # an effect takes at least as much of what it takes away from there
 _WHOLE = 0.5  # a further family has to explain as much
 # of the gap: what a further family has to close
-_SHARE = (0.06, 0.15)
+_SHARE = (0.08, 0.15)
 _MERGED = (0.15, 0.25)  # where the stages are merged
-# where it takes away _CLEAN of what remains, for another family seldom makes just what a form lacks
-_CLEAN, _SMALL = (0.55, 0.75), (0.015, 0.04)
-# where it takes away _PURE of what remains, and no more than noise is left
-_PURE, _LITTLE = (0.2, 0.3), (0.015, 0.05)
+# (of what remains, of the gap): where it takes away as much, for another family seldom makes just what a form
+# lacks, as little will do
+_CLEAN = (((0.55, 0.015), (0.4, 0.04)), ((0.75, 0.04),))
+# the same where no more than noise is left
+_PURE = (((0.2, 0.015), (0.1, 0.05)), ((0.3, 0.08),))
 _WHITE = 0.01  # of a residual's mean square foretold by inputs: below it nothing is left but noise
 # of the winner's evidence: from there a family that the experiments are made to show goes before one that not
 _SHOWN = 0.75
@@ -99,13 +100,11 @@ def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:
     *others, last = winner.problem.clues
     near = [c for c in others if c.effect in confused(last.effect)]
     alike = bool(near)
-    asked = _MERGED if len(winner.problem.segment.stages) > 1 else _SHARE
-    drawn = any(c.form.drawn for c in near)
-    if now - then > _CLEAN[alike] * now and not drawn:
-        asked = _SMALL
-    elif now - then > _PURE[alike] * now and not drawn:
-        asked = _LITTLE if winner.foretold < _WHITE else asked
-    return now - then < asked[alike] * (first - min(noise, then))
+    asked = [(_MERGED if len(winner.problem.segment.stages) > 1 else _SHARE)[alike]]
+    if not any(c.form.drawn for c in near):
+        enough = _CLEAN[alike] + (_PURE[alike] if winner.foretold < _WHITE else ())
+        asked += [share for fall, share in enough if now - then > fall * now]
+    return now - then < min(asked) * (first - min(noise, then))
 
 
 def _mends(base: Fit, better: Fit, visible: float, whole: float, converter: Converter | None) -> bool:

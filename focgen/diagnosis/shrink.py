@@ -8,11 +8,11 @@ import numpy as np
 
 _DRAWS = 400
 _FORM = 0.03  # share that a form a little wrong may lose on new experiments,
-_LOUD = 0.15  # what the noise adds to it, in root mean squares of the gap,
-_REST = 0.4  # and the part of what is left unexplained that may come or go
-_BLIND = 0.5  # of what fits lose on parts of the session they did not see: so much is not promised,
-_DOUBTED = 1.0  # so much more is doubted,
-_LOST = 0.15  # and a greater loss counts as this: a session's parts see less than the session
+_LOUD = 0.12  # what the noise adds to it, in root mean squares of the gap,
+_REST = 0.35  # and the part of what is left unexplained that may come or go
+_FITTED = 0.04  # share that fits of many forms take of the noise, the best being kept, for every root mean square
+_DOUBTED = 0.5  # part of what fits lose on parts of the session they did not see: not promised, and doubted again
+_LOST = (0.3, 0.15)  # a greater loss counts as this in either: a session's parts see less than the session
 _AHEAD = 0.1  # share that a drift may cost that goes on as no log can show
 _MOST = 1.02  # measured on few experiments, noise may make it more than all
 
@@ -39,12 +39,12 @@ def predict(
         return None
     rng = np.random.default_rng(0)
     value = _share(refitted, explained, floor)
-    lost = float(np.clip(value - _share(refitted, foreseen, floor), 0.0, _LOST))
+    lost, noise = max(value - _share(refitted, foreseen, floor), 0.0), float(np.sqrt(floor / np.mean(refitted)))
     picks = rng.integers(0, len(refitted), (_DRAWS, len(refitted)))
     draws = [_share(refitted[p], explained[p], floor) for p in picks]
     low, high = np.quantile([d for d in draws if np.isfinite(d)] or [value], [0.05, 0.95])
-    value -= _BLIND * lost
-    wide = _FORM + _LOUD * np.sqrt(floor / np.mean(refitted)) + _REST * (1.0 - value) + _DOUBTED * lost
+    value -= min(lost, _LOST[0]) + _FITTED * noise
+    wide = _FORM + _LOUD * noise + _REST * (1.0 - value) + _DOUBTED * min(lost, _LOST[1])
     low, high = min(low, value - wide - _AHEAD * drifts), max(high, value + 0.5 * wide)
     return Shrink(value, (float(max(low, -1.0)), float(min(high, _MOST))))
 
