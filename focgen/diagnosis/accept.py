@@ -29,8 +29,8 @@ _WHOLE = 0.5  # a further family has to explain as much
 # of the gap: what a further family has to close
 _SHARE = (0.08, 0.15)
 _MERGED = (0.15, 0.25)  # where the stages are merged
-# (of what remains, of the gap): where it takes away as much, for another family seldom makes just what a form
-# lacks, as little will do
+# (of what remains, of the gap): where it takes away so much of the one, so little of the other will do, for
+# another family seldom makes just what a form lacks
 _CLEAN = (((0.55, 0.015), (0.4, 0.04)), ((0.75, 0.04),))
 # the same where no more than noise is left
 _PURE = (((0.2, 0.015), (0.1, 0.05)), ((0.3, 0.08),))

@@ -10,8 +10,8 @@ _DRAWS = 400
 _FORM = 0.03  # share that a form a little wrong may lose on new experiments,
 _LOUD = 0.12  # what the noise adds to it, in root mean squares of the gap,
 _REST = 0.35  # and the part of what is left unexplained that may come or go
-_FITTED = 0.04  # share that fits of many forms take of the noise, the best being kept, for every root mean square
-_DOUBTED = 0.5  # part of what fits lose on parts of the session they did not see: not promised, and doubted again
+_FITTED = 0.04  # share of noise that the best of many fits has taken along, in root mean squares of the gap
+_DOUBTED = 0.5  # of what fits lose on parts of the session they did not see: not promised, and doubted, too;
 _LOST = (0.3, 0.15)  # a greater loss counts as this in either: a session's parts see less than the session
 _AHEAD = 0.1  # share that a drift may cost that goes on as no log can show
 _MOST = 1.02  # measured on few experiments, noise may make it more than all
@@ -39,7 +39,8 @@ def predict(
         return None
     rng = np.random.default_rng(0)
     value = _share(refitted, explained, floor)
-    lost, noise = max(value - _share(refitted, foreseen, floor), 0.0), float(np.sqrt(floor / np.mean(refitted)))
+    lost = max(value - _share(refitted, foreseen, floor), 0.0)
+    noise = float(np.sqrt(floor / np.mean(refitted)))
     picks = rng.integers(0, len(refitted), (_DRAWS, len(refitted)))
     draws = [_share(refitted[p], explained[p], floor) for p in picks]
     low, high = np.quantile([d for d in draws if np.isfinite(d)] or [value], [0.05, 0.95])
