@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import focgen
-from focgen.rig.effects import SLOTS, STAGES, Excitation, Run, library
+from focgen.rig.effects import SLOTS, STAGES, Excitation, Run, form_of, library
 from focgen.rig.engine import slot_in
 
 NAMES = sorted(library())
@@ -111,3 +111,15 @@ def test_a_form_changes_something_and_stays_finite(effect, form):
     found = [form.act(x.copy(), values, run) for values in rows]
     assert all(y.shape == x.shape and np.all(np.isfinite(y)) for y in found)
     assert max(np.max(np.abs(y - x)) for y in found) > 1e-6
+
+
+@pytest.mark.parametrize("levels", [2, 3, 5, 40])
+def test_the_steps_of_a_converter_are_read_off_its_levels(levels):
+    rng, step = np.random.default_rng(levels), 0.37
+    fine = step * np.interp(np.arange(4000), [0, 1500, 2500, 4000], [0.1, levels - 0.6, levels - 0.9, 0.2])
+    fine += 0.01 * step * rng.standard_normal(4000)
+    seen = form_of("sensor_quantization", "rounding").seen
+    found, phase = seen(step * np.floor(fine / step))
+    assert found == pytest.approx(step, rel=1e-3) and abs(phase) < 1e-2 * step
+    assert seen(fine) is None
+    assert seen(np.repeat(fine[::500], 500) + np.interp(np.arange(4000) % 500, [0, 60], [-step, 0.0])) is None

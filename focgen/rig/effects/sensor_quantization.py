@@ -5,6 +5,7 @@ import numpy as np
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 _COARSE = 0.006  # of the range: finer steps are the resolution of any converter
+_COVERED = (0.6, 0.999)  # of the samples lie on a few levels; on two, which may be rests of a finer reading
 
 
 def _round(x, values, run):
@@ -18,7 +19,7 @@ def _seen(y):
     values, counts = np.unique(np.round((y - y.min()) / max(span, 1e-300) * 20_000), return_counts=True)
     common = values[counts > 0.002 * len(y)] / 20_000 * span + y.min()
     covered = counts[counts > 0.002 * len(y)].sum() / len(y)
-    if len(common) < 3 or covered < 0.6:
+    if len(common) < 2 or covered < _COVERED[len(common) == 2]:
         return None
     gaps = np.diff(common)
     gaps = gaps[gaps > 0.25 * np.median(gaps)]
