@@ -24,7 +24,7 @@ from focgen.rig.model import Rig
 from focgen.rig.replay import experiments
 
 UNTRUSTED = 0.2  # of a segment's residual foretold by inputs: its output still carries noise into the next,
-# as it carries what the form of an effect found lacks
+# as it carries what the form of an effect found lacks, or a hum
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
@@ -107,12 +107,9 @@ def explain_all(
         found.append(e)
         best = found[-1].best
         response = best.problem.references.clocks["response"]
-        trusted = found[-1].left.share < UNTRUSTED and not found[-1].causes
+        unknown = verdict.is_unknown(found[-1])
+        trusted = found[-1].left.share < UNTRUSTED and not found[-1].causes and not unknown
         x = freed(
-            segment,
-            best.problem.simulate(best.vector),
-            response,
-            found[-1].left.share,
-            not verdict.is_unknown(found[-1]),
+            segment, best.problem.simulate(best.vector), response, found[-1].left.share, not unknown
         )
     return tuple(found)

@@ -29,7 +29,7 @@ from focgen.rig.replay import goodness
 
 UNEXPLAINED = 0.5  # of what could be explained: beyond it no effect of the library is the cause
 LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it something is there
-_HARDLY = 0.7  # of a mean square still there: its effects explain hardly anything
+_HARDLY = 0.6  # of a mean square still there: its effects explain hardly anything
 _PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
 
 
