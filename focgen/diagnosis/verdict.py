@@ -43,9 +43,10 @@ def reach(
     """The rigs that the verdict stands for, the diagnosis, and what its pictures need."""
     causes = [(e, c) for e in explanations for c in e.causes]
     unknown = [e for e in explanations if is_unknown(e)]
-    if unknown:
-        rigs = _without(rigs, causes, unknown)
-        causes = [(e, c) for e, c in causes if e not in unknown]
+    left_out = [*unknown, *_no_closer(rigs, logs, explanations[-1])]
+    if left_out:
+        rigs = _without(rigs, causes, left_out)
+        causes = [(e, c) for e, c in causes if e not in left_out]
     made = {
         "as given": compose.simulated(rig, (), logs),
         "refitted": compose.simulated(rigs.refitted, (), logs),
@@ -53,7 +54,7 @@ def reach(
     }
     squares = {name: compose.squares(logs, m) for name, m in made.items()}
     floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
-    total = _promised(rig, logs, explanations, unknown, squares, floor) if causes else None
+    total = _promised(rig, logs, explanations, left_out, squares, floor) if causes else None
     found = _ordered([_found(e, c, rigs, logs, squares, floor, total) for e, c in causes])
     found += _departures(controller)
     word = _word(found, unknown, explanations)
@@ -76,9 +77,20 @@ def reach(
     return rigs, diagnosis, Evidence(made, tuple(explanations))
 
 
-def _promised(rig: Rig, logs, explanations, unknown, squares, floor: float) -> Shrink | None:
+def _no_closer(rigs: compose.Rigs, logs, last: Explanation) -> list[Explanation]:
+    """The last segment, where its effects fit its measured input but bring the whole chain's output no
+    closer: what they mend is that input. A rounding leaves more, by nature."""
+    if not last.causes or any(library()[c.rivals[0].effect].noiselike for c in last.causes):
+        return []
+    without = _without(rigs, [(last, c) for c in last.causes], [last])
+    both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
+    found, bare = (compose.mean_square(logs, made) for made in both)
+    return [last] if found > bare else []
+
+
+def _promised(rig: Rig, logs, explanations, left_out, squares, floor: float) -> Shrink | None:
     """The shrink to expect of new experiments, from what those at hand foretell of each other."""
-    held = [replace(e, best=e.nominal) if e in unknown else e for e in explanations]
+    held = [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
     found = {c.effect for e in held for c in e.best.problem.clues}
     drifts = any(p.clock == "session" for name in found for f in library()[name].forms for p in f.parameters)
     return predict(squares["refitted"], squares["explained"], foreseen(rig, logs, held), floor, drifts)
