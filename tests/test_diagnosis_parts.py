@@ -11,7 +11,7 @@ from focgen.diagnosis.converter import Converter
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
-from focgen.diagnosis.fit import Weighing, fit
+from focgen.diagnosis.fit import WHITE, fit
 from focgen.diagnosis.rivals import Rival, _indistinct
 from focgen.diagnosis.segments import make
 from focgen.diagnosis.shrink import predict
@@ -62,8 +62,8 @@ def test_products_are_those_of_the_matrix():
 
 def test_thinned_samples_fit_the_same_parameters():
     problem = actuator(T=1.6)
-    whole = fit(problem, problem.nominal(), Weighing(np.ones(1)))
-    thin = fit(problem.thinned(3), problem.nominal(), Weighing(np.ones(1)))
+    whole = fit(problem, problem.nominal(), WHITE)
+    thin = fit(problem.thinned(3), problem.nominal(), WHITE)
     assert abs(np.exp(whole.vector[0]) - 1.6) < 0.03
     assert np.allclose(thin.vector[:2], whole.vector[:2], atol=0.01)
 
@@ -78,7 +78,7 @@ def test_parameters_far_from_those_given_are_doubted_but_not_without_end():
 
 def test_a_signal_is_freed_of_its_noise_where_its_model_holds():
     problem, clean = actuator(), actuator(noise=0.0).segment.y
-    found = fit(problem, problem.nominal(), Weighing(np.ones(1)))
+    found = fit(problem, problem.nominal(), WHITE)
     made = found.problem.simulate(found.vector)
     noisy = np.sqrt(np.mean((problem.segment.y - clean) ** 2))
     for left, noise, part in ((0.0, True, 0.5), (0.0, False, 0.9), (0.2, True, 1.0)):

@@ -10,7 +10,7 @@ import numpy as np
 from focgen.diagnosis.accept import Asked, chosen
 from focgen.diagnosis.converter import Converter, converter_of
 from focgen.diagnosis.disturbance import disturbance
-from focgen.diagnosis.fit import Fit, Weighing, fit
+from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.leftover import Leftover, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
@@ -164,7 +164,7 @@ def _grown(
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     """The problem with the command as a staircase or as a polygon, whichever the log was: loggers differ."""
     problems = [problem_of(rig, replace(segment, held=held), logs) for held in {segment.held, False}]
-    fits = [fit(p, p.nominal(), Weighing(np.ones(1)), 6) for p in problems]
+    fits = [fit(p, p.nominal(), WHITE, 6) for p in problems]
     return min(fits, key=lambda f: f.sse).problem
 
 

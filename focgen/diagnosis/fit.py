@@ -63,6 +63,10 @@ class Weighing:
     coarse: int = 1
 
 
+WHITE = Weighing(np.ones(1))
+"""Every sample by itself: noise without colour."""
+
+
 def means(part: np.ndarray, coarse: int) -> np.ndarray:
     """Means of ``coarse`` neighbours; what does not fill the last one is left out."""
     count = len(part) // coarse

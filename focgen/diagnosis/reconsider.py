@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.fit import Fit, Weighing, fit
+from focgen.diagnosis.fit import WHITE, Fit, fit
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.search import Ranking, best_start, coarseness, evidence, on_all
 
@@ -26,16 +26,16 @@ def reconsidered(rankings: Sequence[Ranking], second: Fit, clues: Sequence[Clue]
         return second
     whole, factor = second.problem, coarseness(second.problem)
     thin = whole.thinned(factor)
-    found = fit(thin, whole.stretched(second.vector, 1.0 / factor), Weighing(np.ones(1)), 0)
+    found = fit(thin, whole.stretched(second.vector, 1.0 / factor), WHITE, 0)
     found = _best(found, [*_other_forms(found, 0, clues), *_other_families(rankings[0], found, factor)])
     found = on_all(_best(found, _other_forms(found, 1, clues)), whole, factor)
-    return fit(found.problem, found.vector, Weighing(np.ones(1)), 3, 0.05)
+    return fit(found.problem, found.vector, WHITE, 3, 0.05)
 
 
 def _best(of: Fit, others: Sequence[Fit]) -> Fit:
     """The likeliest, the noise taken as white: a filter that takes out the colour of what a wrong form
     leaves would hide what the right one mends."""
-    fits = [fit(t.problem, t.vector, Weighing(np.ones(1)), 8, 0.05) for t in (of, *others)]
+    fits = [fit(t.problem, t.vector, WHITE, 8, 0.05) for t in (of, *others)]
     return max(fits, key=lambda f: evidence(f, fits[0]))
 
 
@@ -43,7 +43,7 @@ def _other_forms(of: Fit, which: int, clues: Sequence[Clue]) -> list[Fit]:
     """One of two effects in its other forms, each from its best start beside the other."""
     own, other = of.problem.clues[which], of.problem.clues[1 - which]
     alone, (head, *parts) = of.problem.with_clues([other]), _split(of)
-    vector, rough, found = np.r_[head, parts[1 - which]], Weighing(np.ones(1)), []
+    vector, rough, found = np.r_[head, parts[1 - which]], WHITE, []
     for clue in clues:
         if clue.effect == own.effect and clue.stage == own.stage and clue != own:
             start = best_start(alone, vector, clue, rough)
@@ -62,7 +62,7 @@ def _in_order(of: Fit) -> Fit:
     """The two effects the other way round."""
     head, first, second = _split(of)
     problem = of.problem.with_clues(of.problem.clues[::-1])
-    return fit(problem, np.r_[head, second, first], Weighing(np.ones(1)), 0)
+    return fit(problem, np.r_[head, second, first], WHITE, 0)
 
 
 def _other_families(first: Ranking, second: Fit, factor: int) -> list[Fit]:
@@ -74,6 +74,6 @@ def _other_families(first: Ranking, second: Fit, factor: int) -> list[Fit]:
     near = [first.best[n] for n in near if n not in (chosen.effect, last.effect)][:_MOST]
     starts = [f.problem.stretched(f.vector, 1.0 / factor) for f in near]
     return [
-        fit(second.problem.with_clues([*f.problem.clues, last]), np.r_[start, tail], Weighing(np.ones(1)), 0)
+        fit(second.problem.with_clues([*f.problem.clues, last]), np.r_[start, tail], WHITE, 0)
         for f, start in zip(near, starts, strict=True)
     ]

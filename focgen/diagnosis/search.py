@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.diagnosis.fit import Fit, Weighing, fit, innovations, jacobian
+from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit, innovations, jacobian
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 
@@ -57,7 +57,7 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
     """Fit every clue on top of ``base`` (a vector of ``problem``), first on means of neighbouring samples,
     then on every sample and with the colour of the noise."""
     factor = coarseness(problem)
-    thin, rough = problem.thinned(factor), Weighing(np.ones(1))
+    thin, rough = problem.thinned(factor), WHITE
     ground = fit(thin, problem.stretched(base, 1.0 / factor), rough)
     known = jacobian(thin, ground.vector, ground.innovations, rough, *thin.bounds())
     tried = [t for clue in clues if (t := best_start(thin, ground.vector, clue, rough, known)) is not None]
@@ -86,7 +86,7 @@ def coarseness(problem: Problem) -> int:
 def on_all(of: Fit, problem: Problem, factor: int) -> Fit:
     """A fit to thinned samples as the start of one to all of them."""
     whole = problem.with_clues(of.problem.clues)
-    return fit(whole, whole.stretched(of.vector, factor), Weighing(np.ones(1)), 0)
+    return fit(whole, whole.stretched(of.vector, factor), WHITE, 0)
 
 
 def _promising(tried: Sequence[Fit], ground: Fit) -> list[Fit]:
@@ -122,7 +122,7 @@ def _coloured(ground: Fit, leader: Fit, iterations: int) -> tuple[Weighing, Fit]
     moved = fit(ground.problem, ground.vector, weighing, iterations)
     if np.mean(moved.weighed**2) < _ADRIFT * np.mean(ground.weighed**2):
         return weighing, moved
-    weighing = Weighing(np.ones(1))
+    weighing = WHITE
     return weighing, fit(ground.problem, ground.vector, weighing, iterations)
 
 
