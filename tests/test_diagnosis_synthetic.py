@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.bootstrap import threshold
 from focgen.diagnosis.diagnose import THRESHOLD, diagnose, explain_all
-from focgen.diagnosis.explain import clues_for
+from focgen.diagnosis.explain import clues_for, explain
 from focgen.errors import FocgenError
 from focgen.rig.files import read_rig
 from focgen.rig.replay import replay
-from tests.diagnosis_rig import RIG, session
+from tests.diagnosis_rig import RIG, H, session
 
 
 def named(diagnosis):
@@ -109,6 +110,36 @@ def test_a_curve_that_stands_for_two_effects_is_told_apart():
     assert any("dead_zone" in names for names in found) and any(
         "sensor_saturation" in names for names in found
     )
+
+
+def test_what_brings_the_whole_output_no_closer_is_not_named():
+    """A bend that the sensor has is kept, the opposite one is not."""
+    logs = session(11, bend=20.0)
+    explanations = explain_all(RIG, logs, THRESHOLD, ["sensor_nonlinearity"])
+    rigs = compose.compose(RIG, explanations, logs)
+    (found,) = rigs.placed
+    turned = replace(found, values=(-found.values[0], *found.values[1:]))
+    assert found.values[0] > 0
+    assert verdict._no_closer(rigs, logs, explanations[-1]) == []
+    assert verdict._no_closer(replace(rigs, placed=(turned,)), logs, explanations[-1]) == [explanations[-1]]
+
+
+@pytest.mark.parametrize("hum, trusted", [(0.0, True), (0.01, False)])
+def test_behind_a_stage_that_hums_small_effects_are_not_believed(hum, trusted, monkeypatch):
+    tone = [hum * np.sin(2 * np.pi * 1.3 * H * np.arange(len(log))) for log in session()]
+    logs = tuple(
+        replace(log, signals={**log.signals, "pressure": log["pressure"] + t})
+        for log, t in zip(session(), tone, strict=True)
+    )
+    told = []
+
+    def explained(*given):
+        told.append(given[-1])
+        return explain(*given)
+
+    monkeypatch.setattr("focgen.diagnosis.diagnose.explain", explained)
+    explain_all(RIG, logs, THRESHOLD, ["transport_delay"])
+    assert told[:2] == [True, trusted]
 
 
 def test_told_the_effect_it_considers_nothing_else():
