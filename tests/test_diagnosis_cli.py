@@ -31,7 +31,9 @@ def test_diagnose_writes_what_it_says(made, capsys):
     folder, logs = made
     out = folder / "out"
     assert main(["diagnose", str(folder / "rig.toml"), *logs, "--out", str(out), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
+    printed = capsys.readouterr()
+    said = json.loads(printed.out)
+    assert "diagnose: the signals from command to pressure\n" in printed.err
     assert said == json.loads((out / "diagnosis.json").read_text())
     assert said["verdict"] == "named" and said["where"]["stage"] == "regulator"
     cause = said["causes"][0]

@@ -8,6 +8,7 @@ from focgen.cli.outcome import Outcome
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.model import Diagnosis
 from focgen.errors import FocgenError
+from focgen.progress import led_by
 
 HELP = "where the gap to the real rig lies, which effect causes it, and how far it shrinks"
 
@@ -57,7 +58,10 @@ def run(args: argparse.Namespace) -> Outcome:
         raise FocgenError("diagnose", "no log is given", "name at least one log")
     if args.out is None:
         raise FocgenError("diagnose", "--out is missing", "name the folder for the diagnosis")
-    found = diagnose(args.rig, args.logs, args.out, args.controller, args.first, args.last, args.bootstrap)
+    with led_by("diagnose: the signals from "):
+        found = diagnose(
+            args.rig, args.logs, args.out, args.controller, args.first, args.last, args.bootstrap
+        )
     return Outcome(found, in_words(found, args.out))
 
 
