@@ -44,11 +44,13 @@ _MENDING = 0.6
 @dataclass(frozen=True)
 class Asked:
     """What an effect has to show to be one. ``threshold``: nats of evidence that noise alone does not reach;
-    ``trusted``: whether the input could be freed of its noise; ``converter``: that hides small ones."""
+    ``trusted``: whether the input could be freed of its noise; ``converter``: that hides small ones.
+    ``granted``: it is there, and only its strength is asked."""
 
     threshold: float
     trusted: bool
     converter: Converter | None
+    granted: bool = False
 
 
 def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> Fit | None:
@@ -59,6 +61,8 @@ def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> 
     if ranking.winner is None or ranking.gain[ranking.winner] < asked.threshold:
         return None
     winner, again = ranking.best[_leading(ranking)], _again(ranking)
+    if asked.granted and (missing := _missing(ranking)) is not None:
+        return missing
     gained = evidence(again, ranking.base) if again is not None else 0.0
     mends = gained > asked.threshold and _mends(ranking.base, again, _VISIBLE[1], 0.0, asked.converter)
     mended = again if mends else None
@@ -68,6 +72,12 @@ def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> 
         return winner if _useful(rankings, winner, asked) else mended
     tried = dict.fromkeys((reconsidered(rankings, winner, clues), winner))
     return next((f for f in tried if _useful(rankings, f, asked) and not _marginal(rankings, f)), mended)
+
+
+def _missing(ranking: Ranking) -> Fit | None:
+    """The likeliest of the families not found yet that finds anything to mend."""
+    found = {c.effect for c in ranking.base.problem.clues}
+    return next((f for n, f in ranking.best.items() if n not in found and ranking.gain[n] > 0), None)
 
 
 def _leading(ranking: Ranking) -> str:

@@ -115,7 +115,7 @@ def explain(
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
     segment, given, converter = problem.segment, problem.nominal(), converter_of(problem, clues)
-    asked = Asked(threshold, trusted, converter)
+    asked = Asked(threshold, trusted, converter, only is not None)
     rankings, clues = _grown(problem, given, clues, guests, asked)
     weighing = Weighing(rankings[-1].ar)
     best = _dropped(rankings[-1].base, weighing, threshold)
