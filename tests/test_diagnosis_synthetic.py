@@ -151,6 +151,16 @@ def test_told_the_effect_it_considers_nothing_else():
         diagnose(RIG, session(11, vent=0.8), only=("valve_asymetry",))
 
 
+def test_told_two_effects_it_takes_the_small_one_too():
+    """A dead zone so small that it is not believed beside a loop."""
+    logs = session(11, slip=0.35, zone=0.006)
+    blind = explain_all(RIG, logs, THRESHOLD)[1]
+    told = explain_all(RIG, logs, THRESHOLD, ["hysteresis", "dead_zone"])[1]
+    assert [c.rivals[0].effect for c in blind.causes] == ["hysteresis"]
+    assert {c.effect for c in told.best.problem.clues} == {"hysteresis", "dead_zone"}
+    assert told.best.sse < blind.best.sse
+
+
 def test_the_plain_fits_rank_the_true_effect_first():
     found = diagnose(RIG, session(11, drift=6e-4))
     assert found.fits[0].effect == "gain_drift" and found.fits[0].error < 0.7
