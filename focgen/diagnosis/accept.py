@@ -60,9 +60,9 @@ def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> 
     ranking = rankings[-1]
     if ranking.winner is None or ranking.gain[ranking.winner] < asked.threshold:
         return None
-    winner, again = ranking.best[_leading(ranking)], _again(ranking)
     if asked.granted and (missing := _missing(ranking)) is not None:
         return missing
+    winner, again = ranking.best[_leading(ranking)], _again(ranking)
     gained = evidence(again, ranking.base) if again is not None else 0.0
     mends = gained > asked.threshold and _mends(ranking.base, again, _VISIBLE[1], 0.0, asked.converter)
     mended = again if mends else None

@@ -105,11 +105,8 @@ def explain_all(
             if min(c.gain for c in e.causes) < asked:
                 e = explain(rig, segment, logs, asked, only, trusted)
         found.append(e)
-        best = found[-1].best
-        response = best.problem.references.clocks["response"]
-        unknown = verdict.is_unknown(found[-1])
-        trusted = found[-1].left.share < UNTRUSTED and not found[-1].causes and not unknown
-        x = freed(
-            segment, best.problem.simulate(best.vector), response, found[-1].left.share, not unknown
-        )
+        problem, unknown = e.best.problem, verdict.is_unknown(e)
+        trusted = e.left.share < UNTRUSTED and not e.causes and not unknown
+        made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
+        x = freed(segment, made, response, e.left.share, not unknown)
     return tuple(found)

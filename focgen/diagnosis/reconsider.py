@@ -43,10 +43,10 @@ def _other_forms(of: Fit, which: int, clues: Sequence[Clue]) -> list[Fit]:
     """One of two effects in its other forms, each from its best start beside the other."""
     own, other = of.problem.clues[which], of.problem.clues[1 - which]
     alone, (head, *parts) = of.problem.with_clues([other]), _split(of)
-    vector, rough, found = np.r_[head, parts[1 - which]], WHITE, []
+    vector, found = np.r_[head, parts[1 - which]], []
     for clue in clues:
         if clue.effect == own.effect and clue.stage == own.stage and clue != own:
-            start = best_start(alone, vector, clue, rough)
+            start = best_start(alone, vector, clue)
             if start is not None:
                 found.append(_in_order(start) if which == 0 else start)
     return found

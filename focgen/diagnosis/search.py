@@ -57,10 +57,10 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
     """Fit every clue on top of ``base`` (a vector of ``problem``), first on means of neighbouring samples,
     then on every sample and with the colour of the noise."""
     factor = coarseness(problem)
-    thin, rough = problem.thinned(factor), WHITE
-    ground = fit(thin, problem.stretched(base, 1.0 / factor), rough)
-    known = jacobian(thin, ground.vector, ground.innovations, rough, *thin.bounds())
-    tried = [t for clue in clues if (t := best_start(thin, ground.vector, clue, rough, known)) is not None]
+    thin = problem.thinned(factor)
+    ground = fit(thin, problem.stretched(base, 1.0 / factor), WHITE)
+    known = jacobian(thin, ground.vector, ground.innovations, WHITE, *thin.bounds())
+    tried = [t for clue in clues if (t := best_start(thin, ground.vector, clue, known)) is not None]
     errors = _errors(tried, ground)
     tried = _promising(tried, ground)
     rough, ground = _coloured(ground, min([ground, *tried], key=lambda t: t.sse), 6)
@@ -122,8 +122,7 @@ def _coloured(ground: Fit, leader: Fit, iterations: int) -> tuple[Weighing, Fit]
     moved = fit(ground.problem, ground.vector, weighing, iterations)
     if np.mean(moved.weighed**2) < _ADRIFT * np.mean(ground.weighed**2):
         return weighing, moved
-    weighing = WHITE
-    return weighing, fit(ground.problem, ground.vector, weighing, iterations)
+    return WHITE, fit(ground.problem, ground.vector, WHITE, iterations)
 
 
 def _errors(tried: Sequence[Fit], ground: Fit) -> dict[str, float]:
@@ -159,28 +158,30 @@ def family(of: Fit) -> str:
     return of.problem.clues[-1].effect
 
 
-def best_start(
-    problem: Problem, base: np.ndarray, clue: Clue, weighing: Weighing, known: np.ndarray | None = None
-) -> Fit | None:
-    """The best of the fits from the clue's start values, a few iterations each."""
+def best_start(problem: Problem, base: np.ndarray, clue: Clue, known: np.ndarray | None = None) -> Fit | None:
+    """The best of the fits from the clue's start values, a few iterations each; ``known``: the rows of the
+    Jacobian at ``base``."""
     extended = problem.with_clues([*problem.clues, clue])
     starts, fits = extended.starts(clue), []
     if len(starts) > _TRIED:
-        starts = _likeliest(extended, base, starts, weighing)
+        starts = _likeliest(extended, base, starts, known)
     for start in starts:
-        found = fit(extended, np.r_[base, start], weighing, 5, tolerance=0.1, known=known)
+        found = fit(extended, np.r_[base, start], WHITE, 5, tolerance=0.1, known=known)
         if np.isfinite(found.sse):
             fits.append(found)
     return min(fits, key=lambda f: f.sse, default=None)
 
 
-def _likeliest(problem: Problem, base: np.ndarray, starts: Sequence[np.ndarray], weighing: Weighing):
-    """Of many start values those whose direction, own parameters free to give way, goes furthest towards the
-    data."""
+def _likeliest(
+    problem: Problem, base: np.ndarray, starts: Sequence[np.ndarray], known: np.ndarray | None
+) -> list[np.ndarray]:
+    """Of many start values those whose direction, the parameters of ``base`` free to give way, goes furthest
+    towards the data."""
     bare = problem.with_clues(problem.clues[:-1])
-    now = innovations(bare, base, weighing)
-    own, _ = np.linalg.qr(jacobian(bare, base, now, weighing, *bare.bounds()).T)
-    tried = np.stack([innovations(problem, np.r_[base, start], weighing) for start in starts]) - now
+    now = innovations(bare, base, WHITE)
+    rows = jacobian(bare, base, now, WHITE, *bare.bounds()) if known is None else known
+    own, _ = np.linalg.qr(rows.T)
+    tried = np.stack([innovations(problem, np.r_[base, start], WHITE) for start in starts]) - now
     tried -= (tried @ own) @ own.T
     reach = (tried @ now) ** 2 / np.maximum(np.sum(tried**2, axis=1), 1e-300)
     return [starts[i] for i in np.argsort(-reach)[:_TRIED]]

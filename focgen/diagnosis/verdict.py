@@ -80,7 +80,7 @@ def reach(
 def _no_closer(rigs: compose.Rigs, logs, last: Explanation) -> list[Explanation]:
     """The last segment, where its effects fit its measured input but bring the whole chain's output no
     closer: what they mend is that input. A rounding leaves more, by nature."""
-    if not last.causes or any(library()[c.rivals[0].effect].noiselike for c in last.causes):
+    if not last.causes or _rounded(last):
         return []
     without = _without(rigs, [(last, c) for c in last.causes], [last])
     both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
@@ -140,8 +140,12 @@ def _stirred(e: Explanation) -> bool:
     if not e.causes:
         return loud
     before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
-    rounded = any(library()[c.rivals[0].effect].noiselike for c in e.causes)
-    return after > _HARDLY * before and (loud or left.restless) and not rounded
+    return after > _HARDLY * before and (loud or left.restless) and not _rounded(e)
+
+
+def _rounded(e: Explanation) -> bool:
+    """Whether a rounding is among the effects found."""
+    return any(library()[c.rivals[0].effect].noiselike for c in e.causes)
 
 
 def disturbed(e: Explanation) -> Disturbance:

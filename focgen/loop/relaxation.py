@@ -34,8 +34,8 @@ _LEAST_PARTS = 4  # of a sample: edges and limits of an effect fall between samp
 class Plant:
     """A rig with its effects, sampled every ``sample_time`` s, simulated in ``parts`` of a sample.
 
-    ``clock`` (s): when the session ended that every run continues from. ``lead`` samples
-    of rest go before each run, where the rig's rest is not zero.
+    ``clock`` (s): when the session ended that every run continues from. ``lead`` samples of rest go before
+    each run, where the rig's rest is not zero.
     """
 
     rig: Rig

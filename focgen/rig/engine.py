@@ -130,11 +130,7 @@ class Chain:
 
 
 def _effect(placed: Placed) -> Step:
-    return (
-        (placed.effect, placed.form.name, placed.values),
-        placed.act,
-        placed,
-    )
+    return (placed.effect, placed.form.name, placed.values), placed.act, placed
 
 
 def _index(placed: Sequence[Placed], one: Placed) -> int:

@@ -6,12 +6,8 @@ from focgen.rig.effects._effect import Effect, Form, Parameter
 from focgen.rig.linear import oscillator
 
 
-def _mode(x, period, damping, run):
-    return oscillator(x, run.rest, run.h, period, damping)
-
-
 def _series(x, values, run):
-    return _mode(x, *values, run)
+    return oscillator(x, run.rest, run.h, *values)
 
 
 def _beside(x, values, run):
