@@ -1,8 +1,8 @@
 """The controller's stage: how the running one departs from the ideal one, from closed-loop logs.
 
 The controller is replayed on the logged reference and measurement. What it should have commanded is compared
-with the logged command, sample by sample in steps (an integrator would keep every small error for ever).
-Lost and late samples are read off the raw time stamps, which no resampling has touched.
+with the logged command; what a shorter memory, coarser arithmetic or an output limit would have commanded
+tells which of them it was. Lost and late samples show in the time stamps.
 """
 
 from __future__ import annotations
@@ -13,20 +13,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.control.controller import Controller
+from focgen.diagnosis.lattice import count_of
+from focgen.diagnosis.replayed import Replayed, replayed
+from focgen.diagnosis.stamps import LOST, UNSTEADY, lost, unsteadiness
+from focgen.diagnosis.words import Words, in_words
 from focgen.errors import ControllerError, PlanError
 from focgen.logs.experiment import Experiment
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
-from focgen.plan.ideal import ideal
-from focgen.plan.scenario import Scenario, physical_trace, to_raw
+from focgen.plan.scenario import physical_trace, to_raw
 
 CONTROLLER_EFFECTS = ("short_memory", "fixed_point", "sample_jitter", "missed_samples", "output_saturation")
 _LENGTHS = (10, 20, 35, 50, 75, 100, 150, 250, 400, 700, 1000, 2000)
+_SHORTEST = 0.5  # of the longest experiment: a longer memory forgets only at the end of it, if at all
+_HALVINGS = 3  # of the distance between two of the lengths
+_WORDS = tuple(Words(bits / 2, down) for bits in range(14, 33) for down in (False, True))
 _GOOD = 0.5  # of the command's mean square departure that a cause has to explain
+_NEARLY = 0.9  # of it: nothing is left for another
+_ROUNDED = 1.5  # counts: a departure that only the output's rounding makes stays within
+_TIED = 1.5  # times what the best cause leaves unexplained: who leaves less may be the cause as well
 _RESOLVED = 5e-5  # of the command's range: departures below are the log's resolution
 _STEADY = 0.2  # what a departure that stays counts beside one from sample to sample
-_JITTER = 0.03  # of a sample, standard deviation of the raw time stamps
-_FREE = 0.02  # of the samples at one end of the range make a limit
+_STAYS = 5  # samples at one end of what the command runs over: there may be a limit
 
 
 @dataclass(frozen=True)
@@ -42,106 +50,135 @@ class Departure:
 
 @dataclass(frozen=True)
 class Running:
-    """``departure``: root-mean-square of logged less ideal command, per sample, in its unit; ``causes`` best
-    first."""
+    """``departure``: root-mean-square of logged less ideal command, per sample, in its unit; ``causes``: for
+    each, those that may be it, the likeliest first."""
 
     departure: float
     resolved: bool
-    causes: tuple[Departure, ...]
+    causes: tuple[tuple[Departure, ...], ...]
+
+
+_Suspect = tuple[Departure, list[np.ndarray]]
+"""A cause, its share not known yet, and what it would have commanded (2, n) in every experiment."""
 
 
 def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
     """Compare the logged command with the ideal controller's.
 
-    Raises ControllerError where the logs lack reference or command, or a scheduling signal.
+    Raises ControllerError where the logs lack reference or command, a scheduling signal, or samples.
     """
     logged = [log for log in logs if "reference" in log and "command" in log]
     if not logged:
         raise ControllerError(
             controller.name, "the logs lack reference or command", "name both columns in [signals]"
         )
-    command = [np.asarray(log["command"], float) for log in logged]
-    best = _commands(logged, lambda s: ideal(controller, s).u, controller)
-    before = _departure(command, best)
-    span = max(float(np.ptp(np.concatenate(command))), 1e-300)
-    stamps = list(_stamps(logged))
-    away = max(float(np.sqrt(np.mean((a - b) ** 2))) for a, b in zip(command, best))
-    resolved = max(np.sqrt(before), _STEADY * away) >= _RESOLVED * span
-    if not resolved:
-        return Running(float(np.sqrt(before)), False, tuple(stamps))
-    found = []
-    for departure, made in _rivals(controller, logged, command):
-        after = _departure(command, made)
-        found.append(replace(departure, share=float(1.0 - after / before) if before > 0 else 0.0))
-    found = sorted((d for d in found if d.share > _GOOD), key=lambda d: -d.share)[:1]
-    return Running(float(np.sqrt(before)), True, (*stamps, *found))
+    stamps = tuple((d,) for d in _late_or_lost(logged, controller.sample_time))
+    replay = replayed(controller, logged)
+    before = replay.departure(replay.ideal)
+    steady = max(float(np.sqrt(np.mean(a**2))) for a in replay.away(replay.ideal))
+    resolved = max(np.sqrt(before), _STEADY * steady) >= _RESOLVED * replay.span
+    found = _explained(replay, before) if resolved else []
+    counted = _counted(replay, found)
+    tied = (counted,) if counted is not None else _tied(found)
+    return Running(float(np.sqrt(before)), bool(resolved), (*stamps, tied) if tied else stamps)
 
 
-def _scenario(controller: Controller, log: Experiment) -> Scenario:
-    sched = None
-    if controller.scheduled:
-        role = "pressure" if "pressure" in log else None
-        if role is None:
-            raise ControllerError(
-                controller.name, "is scheduled, and the logs lack the pressure", "log the pressure"
-            )
-        sched = np.asarray(log[role], float)[None]
-    return Scenario(np.asarray(log["reference"], float)[None], np.asarray(log["output"], float)[None], sched)
+def _late_or_lost(logs: Sequence[Experiment], step: float) -> Iterator[Departure]:
+    """What the raw time stamps show."""
+    missing, uneven = lost(logs, step), unsteadiness(logs, step)
+    if missing > LOST:
+        yield Departure("missed_samples", 1.0, "share", missing, "")
+    if uneven > UNSTEADY * step:
+        yield Departure("sample_jitter", 1.0, "deviation", uneven, "s")
 
 
-def _commands(logs, run, controller: Controller) -> list[np.ndarray]:
-    return [np.asarray(run(_scenario(controller, log)), float)[0] for log in logs]
+def _explained(replay: Replayed, before: float) -> list[Departure]:
+    """Every suspect with its share of the departure, whose mean square is ``before``."""
+    least = max(before, 1e-300)
+    return [replace(d, share=1.0 - replay.departure(made) / least) for d, made in _suspects(replay)]
 
 
-def _departure(command, made) -> float:
-    """Mean square difference of the steps from sample to sample."""
-    return float(np.mean(np.concatenate([np.diff(a - b) for a, b in zip(command, made)]) ** 2))
+def _tied(found: Sequence[Departure]) -> tuple[Departure, ...]:
+    """Of every effect the best, of those the ones that explain about as much as the best of all, if that is
+    enough."""
+    best: dict[str, Departure] = {}
+    for d in sorted(found, key=lambda d: -d.share):
+        best.setdefault(d.effect, d)
+    kept = [d for d in best.values() if d.share > _GOOD]
+    return tuple(d for d in kept if 1.0 - d.share <= _TIED * (1.0 - kept[0].share))
 
 
-def _rivals(controller: Controller, logs, command) -> Iterator[tuple[Departure, list[np.ndarray]]]:
-    for length in sorted({*_LENGTHS, controller.length}):
-        if length < max(map(len, logs)):
-            made = _commands(logs, lambda s, n=length: ideal(controller, s, n).u, controller)
-            yield Departure("short_memory", 0.0, "length", float(length), "samples"), made
-    for arithmetic in ("q31", "q15"):
-        try:
-            plan = build_plan(controller, arithmetic)
-            made = _commands(
-                logs, lambda s, p=plan: physical_trace(p, execute(p, to_raw(p, s))).u, controller
-            )
-        except PlanError:
-            continue
-        yield Departure("fixed_point", 0.0, "bits", float(arithmetic[1:]) + 1, "bit"), made
-    yield from _limits(controller, logs, command)
+def _counted(replay: Replayed, found: Sequence[Departure]) -> Departure | None:
+    """Integer arithmetic, of whatever design, where the command goes in whole counts and departs by more than
+    those, and no other cause explains that."""
+    count = count_of(replay.commands) if found else None
+    others = max((d.share for d in found if d.effect != "fixed_point"), default=0.0)
+    if count is None or others > _NEARLY:
+        return None
+    if max(float(np.ptp(a)) for a in replay.away(replay.ideal)) < _ROUNDED * count:
+        return None
+    words = max((d.share for d in found if d.effect == "fixed_point"), default=0.0)
+    low, high = replay.controller.ranges.output
+    return replace(_coarse(float(np.log2((high - low) / count))), share=max(words, 1.0 - max(others, 0.0)))
 
 
-def _limits(controller: Controller, logs, command) -> Iterator[tuple[Departure, list[np.ndarray]]]:
-    joined = np.concatenate(command)
-    low, high = controller.ranges.output
-    span = high - low
-    for end, own in ((float(joined.max()), high), (float(joined.min()), low)):
-        stays = np.mean(np.abs(joined - end) < 1e-4 * span)
-        if stays > _FREE and abs(end - own) > 2e-3 * span:
-            output = (low, end) if own == high else (end, high)
-            tight = replace(controller, ranges=replace(controller.ranges, output=output))
-            made = _commands(logs, lambda s, c=tight: ideal(c, s).u, controller)
-            yield Departure("output_saturation", 0.0, "limit", end, "command unit"), made
+def _suspects(replay: Replayed) -> Iterator[_Suspect]:
+    yield from _forgetful(replay)
+    yield from _generated(replay)
+    yield from _worded(replay)
+    yield from _limited(replay)
 
 
-def _stamps(logs: Sequence[Experiment]) -> Iterator[Departure]:
-    """What the raw time stamps show: samples left out, and samples early or late."""
-    steps = [
-        np.diff(log.raw_time) / log.sample_time
-        for log in logs
-        if log.raw_time is not None and len(log.raw_time) > 2
-    ]
-    if not steps:
+def _forgetful(replay: Replayed) -> Iterator[_Suspect]:
+    """Shorter memories: a few lengths, then ever closer ones about the best of them."""
+    made: dict[int, list[np.ndarray]] = {}
+    left: dict[int, float] = {}
+
+    def tried(lengths) -> list[int]:
+        for n in set(lengths) - set(left):
+            made[n] = replay.with_memory(n)
+            left[n] = replay.departure(made[n])
+        return sorted(left)
+
+    longest = max(map(len, replay.commands))
+    lengths = tried(n for n in (*_LENGTHS, replay.controller.length) if n < _SHORTEST * longest)
+    for _ in range(_HALVINGS if lengths else 0):
+        at = lengths.index(min(left, key=left.get))
+        beside = lengths[max(at - 1, 0) : at + 2]
+        lengths = tried(round((near * lengths[at]) ** 0.5) for near in beside)
+    for n in lengths:
+        yield Departure("short_memory", 0.0, "length", float(n), "samples"), made[n]
+
+
+def _generated(replay: Replayed) -> Iterator[_Suspect]:
+    """The C that would be generated for words of 16 bits; those of 32 depart less than logs resolve."""
+    try:
+        plan = build_plan(replay.controller, "q15")
+    except PlanError:
         return
-    joined = np.concatenate(steps)
-    missed = float(np.sum(np.maximum(np.round(joined) - 1, 0)) / len(joined))
-    if missed > 1e-3:
-        yield Departure("missed_samples", 1.0, "share", missed, "")
-    kept = joined[np.round(joined) == 1]
-    jitter = float(np.std(kept)) if len(kept) else 0.0
-    if jitter > _JITTER:
-        yield Departure("sample_jitter", 1.0, "deviation", jitter * logs[0].sample_time, "s")
+    made = [physical_trace(plan, execute(plan, to_raw(plan, s))).u for s in replay.scenarios]
+    yield _coarse(16.0), made
+
+
+def _worded(replay: Replayed) -> Iterator[_Suspect]:
+    """Other arithmetic in words of few bits."""
+    made = [in_words(replay.controller, s, _WORDS) for s in replay.scenarios]
+    for words, *parts in zip(_WORDS, *made):
+        yield _coarse(words.bits), parts
+
+
+def _coarse(bits: float) -> Departure:
+    return Departure("fixed_point", 0.0, "bits", bits, "bit")
+
+
+def _limited(replay: Replayed) -> Iterator[_Suspect]:
+    """Outputs that stop short of the controller's own limits, whether the integrator is told or winds up."""
+    controller, joined = replay.controller, np.concatenate(replay.commands)
+    low, high = controller.ranges.output
+    for end, own in ((float(joined.max()), high), (float(joined.min()), low)):
+        stays = np.sum(np.abs(joined - end) < 1e-4 * (high - low))
+        if stays >= _STAYS and abs(end - own) > 2e-3 * (high - low):
+            ends = (low, end) if own == high else (end, high)
+            told = replace(controller, ranges=replace(controller.ranges, output=ends))
+            for made in (replay.with_memory(replay.length, told), [np.clip(u, *ends) for u in replay.ideal]):
+                yield Departure("output_saturation", 0.0, "limit", end, "command unit"), made

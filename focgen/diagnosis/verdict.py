@@ -16,7 +16,7 @@ from focgen.diagnosis.floor import floor as noise_floor
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit
 from focgen.diagnosis.next_experiment import propose
 from focgen.diagnosis.rivals import Cause
-from focgen.diagnosis.running import Running
+from focgen.diagnosis.running import Departure, Running
 from focgen.diagnosis.search import evidence as nats
 from focgen.diagnosis.shrink import Shrink, predict
 from focgen.diagnosis.unseen import foreseen
@@ -30,6 +30,7 @@ from focgen.rig.replay import goodness
 UNEXPLAINED = 0.5  # of what could be explained: beyond it no effect of the library is the cause
 LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it something is there
 _HARDLY = 0.6  # of a mean square still there: its effects explain hardly anything
+_CONTROLLER = 0.95  # confidence that what comes closest to a controller's commands is what it does
 _PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
 
 
@@ -104,18 +105,20 @@ def _plain_fits(explanations: Sequence[Explanation]) -> tuple[PlainFit, ...]:
 
 def _departures(controller: Running | None) -> tuple[Found, ...]:
     """The running controller's causes as entries of the diagnosis."""
-    found = []
-    for d in controller.causes if controller else ():
-        parameters = {d.parameter: Estimate(d.value, (d.value, d.value), d.unit)}
-        found.append(
-            Found(
-                "controller",
-                (Candidate(d.effect, 0.9, "running", parameters, 0.0),),
-                d.share,
-                (max(d.share - 0.1, 0.0), min(d.share + 0.1, 1.0)),
-            )
-        )
-    return tuple(found)
+    return tuple(_departed(tied) for tied in controller.causes) if controller else ()
+
+
+def _departed(tied: Sequence[Departure]) -> Found:
+    """One of them: those that may be it, as sure as they are many."""
+    share = tied[0].share
+    interval = (max(share - 0.1, 0.0), min(share + 0.1, 1.0))
+    sure = [_CONTROLLER * 2.0**-k / sum(2.0**-i for i in range(len(tied))) for k in range(len(tied))]
+    return Found("controller", tuple(_suspected(d, p) for d, p in zip(tied, sure)), share, interval)
+
+
+def _suspected(d: Departure, confidence: float) -> Candidate:
+    parameters = {d.parameter: Estimate(d.value, (d.value, d.value), d.unit)}
+    return Candidate(d.effect, confidence, "running", parameters, 0.0)
 
 
 def is_unknown(e: Explanation) -> bool:

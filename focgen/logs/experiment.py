@@ -17,7 +17,8 @@ class Experiment:
 
     ``signals`` maps a role of :data:`ROLES` to an array of shape (n,) in the log's own units; sample k
     was taken ``k * sample_time`` seconds after ``start``. ``start`` is the session's time of sample 0 in s,
-    ``raw_time`` the logged time stamps (m,) in s before any resampling, ``notes`` what was done to the log.
+    ``raw_time`` the logged time stamps (m,) in s before any resampling, ``rows`` the signals (m,) at those
+    where they were resampled, ``notes`` what was done to the log.
     """
 
     name: str
@@ -26,9 +27,12 @@ class Experiment:
     start: float = 0.0
     raw_time: np.ndarray | None = None
     notes: tuple[str, ...] = ()
+    rows: Mapping[str, np.ndarray] | None = None
 
     def __post_init__(self):
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
+        if self.rows is not None:
+            object.__setattr__(self, "rows", MappingProxyType(dict(self.rows)))
 
     def __len__(self) -> int:
         return len(next(iter(self.signals.values())))
@@ -51,4 +55,15 @@ class Experiment:
         keep = (self.time >= lo) & (self.time <= hi)
         begin = int(np.argmax(keep)) if keep.any() else 0
         cut = {role: values[keep] for role, values in self.signals.items()}
-        return replace(self, signals=cut, start=self.start + begin * self.sample_time)
+        time, rows = self._rows_between(lo, hi)
+        start = self.start + begin * self.sample_time
+        return replace(self, signals=cut, start=start, raw_time=time, rows=rows)
+
+    def _rows_between(self, low: float, high: float):
+        """The raw time stamps and rows from ``low`` to ``high`` (s since the first)."""
+        if self.raw_time is None:
+            return None, None
+        since = self.raw_time - self.raw_time[0]
+        kept = (since >= low) & (since <= high)
+        rows = self.rows and {role: values[kept] for role, values in self.rows.items()}
+        return self.raw_time[kept], rows

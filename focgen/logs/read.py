@@ -106,8 +106,9 @@ def _experiment(table, columns, name, rows, time_column, sample_time, window, no
     kept = _windowed(time, window, where)
     time, rows = time[kept], rows[kept]
     values = _complete(table, columns, rows, where)
-    step, values, more = clock.on_grid(time, values, sample_time, where)
-    return Experiment(name, step, values, float(time[0]), time, notes + more)
+    step, even, more = clock.on_grid(time, values, sample_time, where)
+    resampled = any(even[role] is not values[role] for role in values)
+    return Experiment(name, step, even, float(time[0]), time, notes + more, values if resampled else None)
 
 
 def _windowed(time: np.ndarray, window: tuple[float | None, float | None], where: str) -> np.ndarray:
