@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.diagnosis.converter import Converter
+from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import Fit
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.reconsider import reconsidered
-from focgen.diagnosis.search import Ranking, evidence
-from focgen.rig.effects import confused
+from focgen.diagnosis.search import Ranking, evidence, family
+from focgen.rig.effects import confused, library
 
 # parts of the remaining mean square
 _VISIBLE = (0.015, 0.05)  # what the first effect, and any further, has to take away to be of use
@@ -99,7 +100,17 @@ def _useful(rankings: Sequence[Ranking], winner: Fit, asked: Asked) -> bool:
     base = rankings[-1].base
     measured, further = base.problem.segment.entry != "command", len(base.problem.clues) > 0
     visible = _NOISY[asked.trusted] if measured and not (further and asked.trusted) else _VISIBLE[further]
+    if _goes_round(base, winner):
+        return False
     return _mends(base, winner, visible, _WHOLE * further, asked.converter)
+
+
+def _goes_round(base: Fit, winner: Fit) -> bool:
+    """Whether a tone is to be explained by one in a closed loop: whatever hums there is in the input, too."""
+    segment, response = base.problem.segment, base.problem.references.clocks["response"]
+    if not segment.led or not library()[family(winner)].tonal:
+        return False
+    return disturbance(base.residual(), segment.run.h, response).hums
 
 
 def _marginal(rankings: Sequence[Ranking], winner: Fit) -> bool:

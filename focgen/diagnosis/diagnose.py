@@ -57,7 +57,7 @@ def diagnose(
     ran = running(read_controller(controller), logs) if controller is not None else None
     explanations = explain_all(rig, logs, THRESHOLD, only, bootstrap)
     rigs, diagnosis, evidence = verdict.reach(
-        rig, logs, compose.compose(rig, explanations, logs), explanations, ran
+        rig, logs, compose.compose(rig, explanations, logs), explanations, ran, only is not None
     )
     if out is not None:
         from focgen.diagnosis.write import write

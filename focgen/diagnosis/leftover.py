@@ -15,6 +15,7 @@ from focgen.rig import kernels
 
 _POINTS = 6000
 _FOLDS = 8
+_TIGHT = (1e-4, 1e-2)  # of the mean square of a regressor, added to it: ridges
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Leftover:
 
 def _groups(segment: Segment, response: float) -> dict[str, np.ndarray]:
     """Regressors (n, k) by what they stand for, of order one."""
-    x, run = segment.x / segment.level_in, segment.run
+    x, run = segment.asked, segment.run
     lags = [
         kernels.lag(x, run.rest, run.h, tau, tau) for tau in response * np.array([0.05, 0.2, 1.0, 4.0, 16.0])
     ]
@@ -84,15 +85,16 @@ def _thinned(values: np.ndarray, thin: int) -> np.ndarray:
 
 def _foretold(matrix: np.ndarray, target: np.ndarray) -> float:
     """1 − (error on stretches not fitted)/(mean square), stretches interleaved so that each fold sees the
-    whole session."""
+    whole session; the better of a loose and a tight regression."""
     stretch = max(8, len(target) // (12 * _FOLDS))
     fold = (np.arange(len(target)) // stretch) % _FOLDS
     scale = np.sqrt(np.mean(matrix**2, axis=0)) + 1e-12
-    matrix, error = matrix / scale, np.zeros(len(target))
+    matrix, error = matrix / scale, np.zeros((len(_TIGHT), len(target)))
     normal, slope = matrix.T @ matrix, matrix.T @ target
     for f in range(_FOLDS):
         out = fold == f
         part, right = matrix[out], target[out]
-        left = normal - part.T @ part + 1e-3 * len(target) * np.eye(len(slope)) * 0.1
-        error[out] = right - part @ np.linalg.solve(left, slope - part.T @ right)
-    return float(1.0 - np.mean(error**2) / max(np.mean(target**2), 1e-300))
+        left, rest = normal - part.T @ part, slope - part.T @ right
+        for row, tight in zip(error, _TIGHT):
+            row[out] = right - part @ np.linalg.solve(left + tight * len(target) * np.eye(len(rest)), rest)
+    return float(1.0 - np.min(np.mean(error**2, axis=1)) / max(np.mean(target**2), 1e-300))

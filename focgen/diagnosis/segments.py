@@ -15,6 +15,7 @@ from focgen.rig.model import UNITY, Rig
 _ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
 _LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
 _TIMING = 0.3  # of a sample: what loggers leave open
+_FOLLOWED = 0.6  # correlation of an output with the reference that leads it
 _ORDER = ("command", "pressure", "curvature", "output")
 
 
@@ -23,7 +24,8 @@ class Segment:
     """The stages between two logged signals: input ``x`` and output ``y`` (n,), experiments one after the
     other as in ``run``. ``held``: the input is a staircase (a command). ``names`` of the experiments.
     ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a difference
-    beyond the noise."""
+    beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has no part in:
+    the reference in a closed loop, else the input; ``led``: whether a loop was closed."""
 
     entry: str
     exit: str
@@ -34,6 +36,8 @@ class Segment:
     held: bool
     names: tuple[str, ...]
     trust: np.ndarray
+    asked: np.ndarray
+    led: bool
 
     @cached_property
     def level_in(self) -> float:
@@ -73,13 +77,14 @@ class Segment:
         kept = np.concatenate(
             [first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)]
         )
-        x, y, trust, clock = (
-            v[kept].reshape(-1, factor).mean(axis=1) for v in (self.x, self.y, self.trust, self.run.clock)
+        x, y, trust, asked, clock = (
+            v[kept].reshape(-1, factor).mean(axis=1)
+            for v in (self.x, self.y, self.trust, self.asked, self.run.clock)
         )
         rest = np.zeros(len(x), np.uint8)
         rest[np.cumsum([0, *counts[:-1]])] = 1
         run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
-        return replace(self, x=x, y=y, trust=trust, run=run, held=False)
+        return replace(self, x=x, y=y, trust=trust, asked=asked, run=run, held=False)
 
     def parts(self, signal: np.ndarray) -> list[np.ndarray]:
         """``signal`` (n, …) by experiment."""
@@ -127,6 +132,7 @@ def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None
     """The segment from ``entry`` to ``exit``, with the input as logged or as given."""
     x = joined(logs, entry) if x is None else x
     names = tuple(log.name for log in logs)
+    led = [exit == "output" and _is_led(log) for log in logs]
     trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
     return Segment(
         entry,
@@ -138,7 +144,29 @@ def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None
         entry == "command",
         names,
         trust,
+        _asked(logs, x, led),
+        any(led),
     )
+
+
+def _asked(logs: Sequence[Experiment], x: np.ndarray, led: Sequence[bool]) -> np.ndarray:
+    """In a closed loop the input carries the output's noise, and would foretell it."""
+    ends = np.cumsum([len(log) for log in logs])[:-1]
+    inputs = np.split(x / (float(np.max(np.abs(x))) or 1.0), ends)
+    top = max(
+        (float(np.max(np.abs(log["reference"]))) for log, is_led in zip(logs, led) if is_led), default=1
+    )
+    return np.concatenate(
+        [log["reference"] / top if is_led else i for log, i, is_led in zip(logs, inputs, led)]
+    )
+
+
+def _is_led(log: Experiment) -> bool:
+    """Whether the output follows a reference."""
+    reference = log["reference"] if "reference" in log else np.zeros(1)
+    if not np.all(np.isfinite(reference)) or min(np.ptp(reference), np.ptp(log["output"])) == 0.0:
+        return False
+    return bool(np.corrcoef(reference, log["output"])[0, 1] > _FOLLOWED)
 
 
 def _unsteadiness(log: Experiment) -> float:

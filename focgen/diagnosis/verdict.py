@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,8 @@ from focgen.rig.replay import goodness
 UNEXPLAINED = 0.5  # of what could be explained: beyond it no effect of the library is the cause
 LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it something is there
 _HARDLY = 0.6  # of a mean square still there: its effects explain hardly anything
+_VAIN = 0.2  # promised share of a gap: below it its effects are not what causes it,
+_ABOVE = 0.82  # unless the noise is more than this part of it, in root mean squares
 _CONTROLLER = 0.95  # confidence that what comes closest to a controller's commands is what it does
 _PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
 
@@ -40,23 +42,17 @@ def reach(
     rigs: compose.Rigs,
     explanations: Sequence[Explanation],
     controller: Running | None = None,
+    granted: bool = False,
 ) -> tuple[compose.Rigs, Diagnosis, Evidence]:
-    """The rigs that the verdict stands for, the diagnosis, and what its pictures need."""
-    causes = [(e, c) for e in explanations for c in e.causes]
+    """The rigs that the verdict stands for, the diagnosis, and what its pictures need. ``granted``: the
+    effects are there, however little they explain."""
     unknown = [e for e in explanations if is_unknown(e)]
-    left_out = [*unknown, *_no_closer(rigs, logs, explanations[-1])]
-    if left_out:
-        rigs = _without(rigs, causes, left_out)
-        causes = [(e, c) for e, c in causes if e not in left_out]
-    made = {
-        "as given": compose.simulated(rig, (), logs),
-        "refitted": compose.simulated(rigs.refitted, (), logs),
-        "explained": compose.simulated(rigs.fitted, rigs.placed, logs),
-    }
-    squares = {name: compose.squares(logs, m) for name, m in made.items()}
-    floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
-    total = _promised(rig, logs, explanations, left_out, squares, floor) if causes else None
-    found = _ordered([_found(e, c, rigs, logs, squares, floor, total) for e, c in causes])
+    told = _told(rig, logs, rigs, explanations, [*unknown, *_no_closer(rigs, logs, explanations[-1])])
+    if told.in_vain and not granted:
+        unknown += [e for e, _ in told.causes if e not in unknown]
+        told = _told(rig, logs, rigs, explanations, unknown)
+    made, squares, floor, total = told.made, told.squares, told.floor, told.total
+    found = _ordered([_found(e, c, told.rigs, logs, squares, floor, total) for e, c in told.causes])
     found += _departures(controller)
     word = _word(found, unknown, explanations)
     shares = stage_shares(found, unknown, explanations)
@@ -75,7 +71,46 @@ def reach(
         tuple(note for log in logs for note in log.notes),
         _plain_fits(explanations),
     )
-    return rigs, diagnosis, Evidence(made, tuple(explanations))
+    return told.rigs, diagnosis, Evidence(made, tuple(explanations))
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """What explanations amount to: ``made`` the simulated logs by rig, ``squares`` their mean square errors,
+    ``floor`` the noise's, ``total`` the promise."""
+
+    rigs: compose.Rigs
+    causes: list[tuple[Explanation, Cause]]
+    made: dict[str, list]
+    squares: dict[str, np.ndarray]
+    floor: float
+    total: Shrink | None
+
+    @property
+    def in_vain(self) -> bool:
+        """Whether effects that claim a gap well above the noise promise next to nothing: they mend what
+        something else does. Steps of a rounding do not come twice, whoever knows of them."""
+        return (
+            self.total is not None
+            and self.total.value < _VAIN
+            and self.floor < _ABOVE**2 * float(np.mean(self.squares["refitted"]))
+            and not any(_rounded(e) for e, _ in self.causes)
+        )
+
+
+def _told(rig: Rig, logs, rigs: compose.Rigs, explanations, left_out) -> _Told:
+    causes = [(e, c) for e in explanations for c in e.causes]
+    rigs = _without(rigs, causes, left_out) if left_out else rigs
+    causes = [(e, c) for e, c in causes if e not in left_out]
+    made = {
+        "as given": compose.simulated(rig, (), logs),
+        "refitted": compose.simulated(rigs.refitted, (), logs),
+        "explained": compose.simulated(rigs.fitted, rigs.placed, logs),
+    }
+    squares = {name: compose.squares(logs, m) for name, m in made.items()}
+    floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
+    total = _promised(rig, logs, explanations, left_out, squares, floor) if causes else None
+    return _Told(rigs, causes, made, squares, floor, total)
 
 
 def _no_closer(rigs: compose.Rigs, logs, last: Explanation) -> list[Explanation]:

@@ -142,7 +142,7 @@ class Effect:
     only.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
-    ``noiselike``: what it does cannot be foretold from the input, as rounding.
+    ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone.
     """
 
     name: str
@@ -155,3 +155,4 @@ class Effect:
     also: tuple[str, ...] = ()
     single: bool = False
     noiselike: bool = False
+    tonal: bool = False

@@ -40,6 +40,7 @@ EFFECT = Effect(
     reveals="fast steps, sines up to the mode: ringing of one frequency",
     confused_with=("sensor_lag", "transport_delay"),
     needs=lambda e: None if e.fastest < 1.0 else "no change of the input is fast beside the rig's response",
+    tonal=True,
     forms=[
         Form(
             "series",
