@@ -41,6 +41,14 @@ def test_a_slow_swing_is_seen():
     assert not disturbance(noise, H, 1.0).swings and disturbance(swing, H, 1.0).swings
 
 
+@pytest.mark.parametrize("away, sharp", [(2.0, False), (12.0, True)])
+def test_a_reading_that_falls_away_for_moments_is_heard(away, sharp):
+    rng = np.random.default_rng(1)
+    noise = [_noise(rng, 1500) for _ in range(3)]
+    falls = [p - away * (np.isin(np.arange(1500) // 6, rng.choice(250, 8))) for p in noise]
+    assert disturbance(falls, H, 1.0).bursts == sharp and not disturbance(noise, H, 1.0).bursts
+
+
 def test_innovations_are_those_of_the_formula():
     rng = np.random.default_rng(2)
     y, made, weight = rng.normal(size=(3, 50))

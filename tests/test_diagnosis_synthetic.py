@@ -9,6 +9,7 @@ from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.bootstrap import threshold
 from focgen.diagnosis.diagnose import THRESHOLD, diagnose, explain_all
 from focgen.diagnosis.explain import clues_for, explain
+from focgen.diagnosis.shrink import Shrink
 from focgen.errors import FocgenError
 from focgen.rig.files import read_rig
 from focgen.rig.replay import replay
@@ -140,6 +141,23 @@ def test_behind_a_stage_that_hums_small_effects_are_not_believed(hum, trusted, m
     monkeypatch.setattr("focgen.diagnosis.diagnose.explain", explained)
     explain_all(RIG, logs, THRESHOLD, ["transport_delay"])
     assert told[:2] == [True, trusted]
+
+
+@pytest.mark.parametrize("promised, verdict_is", [(0.15, "unknown"), (0.25, "named")])
+def test_effects_that_promise_next_to_nothing_are_not_the_cause(promised, verdict_is, monkeypatch):
+    monkeypatch.setattr(verdict, "predict", lambda *given: Shrink(promised, (0.0, 0.5)))
+    logs = session(11, slip=0.35)
+    found = diagnose(RIG, logs)
+    assert found.verdict == verdict_is and bool(found.causes) == (verdict_is == "named")
+    assert bool(found.unexplained) == (verdict_is == "unknown")
+    assert diagnose(RIG, logs, only=("hysteresis",)).verdict == "named"
+
+
+@pytest.mark.parametrize("noise, in_vain", [(0.8, True), (0.84, False)])
+def test_of_a_gap_little_above_the_noise_little_can_be_promised(noise, in_vain):
+    squares = {"refitted": np.array([1.0, 1.0])}
+    told = verdict._Told(None, [], {}, squares, noise**2, Shrink(0.1, (0.0, 0.5)))
+    assert told.in_vain == in_vain
 
 
 def test_told_the_effect_it_considers_nothing_else():
