@@ -15,7 +15,7 @@ from focgen.rig import kernels
 
 _POINTS = 6000
 _FOLDS = 8
-_TIGHT = (1e-4, 1e-2)  # of the mean square of a regressor, added to it: ridges
+_RIDGES = (1e-4, 1e-2)  # of the mean square of a regressor, added to it
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def foretold(segment: Segment, residual: np.ndarray, response: float) -> float:
     trust = segment.trust[:, None]
     columns = [_thinned(v * trust, thin) for v in _groups(segment, response).values()]
     target = _thinned(residual[:, None], thin)[:, 0]
-    return max(0.0, _foretold(np.hstack([np.ones((len(target), 1)), *columns]), target))
+    return max(0.0, _foretold(np.hstack([np.ones((len(target), 1)), *columns]), target, segment.led))
 
 
 def leftover(segment: Segment, residual: np.ndarray, response: float) -> Leftover:
@@ -73,8 +73,9 @@ def leftover(segment: Segment, residual: np.ndarray, response: float) -> Leftove
     groups = {k: _thinned(v * trust, thin) for k, v in _groups(segment, response).items()}
     target = _thinned(residual[:, None], thin)[:, 0]
     columns = [np.ones((len(target), 1)), *groups.values()]
-    share = _foretold(np.hstack(columns), target)
-    depends = {name: max(0.0, _foretold(np.hstack([columns[0], v]), target)) for name, v in groups.items()}
+    share = _foretold(np.hstack(columns), target, segment.led)
+    alone = {name: np.hstack([columns[0], v]) for name, v in groups.items()}
+    depends = {name: max(0.0, _foretold(v, target, segment.led)) for name, v in alone.items()}
     return Leftover(max(share, *depends.values(), 0.0), depends)
 
 
@@ -83,18 +84,19 @@ def _thinned(values: np.ndarray, thin: int) -> np.ndarray:
     return values[: count * thin].reshape(count, thin, -1).mean(axis=1)
 
 
-def _foretold(matrix: np.ndarray, target: np.ndarray) -> float:
+def _foretold(matrix: np.ndarray, target: np.ndarray, led: bool) -> float:
     """1 − (error on stretches not fitted)/(mean square), stretches interleaved so that each fold sees the
-    whole session; the better of a loose and a tight regression."""
+    whole session. Of references, which rest for long, a tighter regression may tell more."""
     stretch = max(8, len(target) // (12 * _FOLDS))
     fold = (np.arange(len(target)) // stretch) % _FOLDS
     scale = np.sqrt(np.mean(matrix**2, axis=0)) + 1e-12
-    matrix, error = matrix / scale, np.zeros((len(_TIGHT), len(target)))
+    ridges = _RIDGES if led else _RIDGES[:1]
+    matrix, error = matrix / scale, np.zeros((len(ridges), len(target)))
     normal, slope = matrix.T @ matrix, matrix.T @ target
     for f in range(_FOLDS):
         out = fold == f
         part, right = matrix[out], target[out]
         left, rest = normal - part.T @ part, slope - part.T @ right
-        for row, tight in zip(error, _TIGHT):
+        for row, tight in zip(error, ridges):
             row[out] = right - part @ np.linalg.solve(left + tight * len(target) * np.eye(len(rest)), rest)
     return float(1.0 - np.min(np.mean(error**2, axis=1)) / max(np.mean(target**2), 1e-300))

@@ -15,7 +15,7 @@ from focgen.rig.model import UNITY, Rig
 _ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
 _LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
 _TIMING = 0.3  # of a sample: what loggers leave open
-_FOLLOWED = 0.6  # correlation of an output with the reference that leads it
+_FOLLOWED = 0.3  # correlation of an output with the reference that leads it
 _ORDER = ("command", "pressure", "curvature", "output")
 
 
