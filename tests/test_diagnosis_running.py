@@ -174,6 +174,15 @@ def test_of_several_rows_a_sample_those_count_in_which_the_command_changes():
     assert effects(found) == [["short_memory"]] and found.causes[0][0].value == pytest.approx(50, abs=3)
 
 
+def test_open_loop_logs_are_left_out():
+    u, ref, meas = command(length=50)
+    gaps = np.where(np.arange(N) < 10, np.nan, ref)
+    found = running(CONTROLLER, [log_of(u, ref, meas), log_of(u, gaps, meas)])
+    assert effects(found) == [["short_memory"]]
+    with pytest.raises(ControllerError, match="the logs lack reference or command"):
+        running(CONTROLLER, [log_of(u, gaps, meas)])
+
+
 def test_a_log_without_all_samples_of_the_controller_is_refused():
     u, ref, meas = command()
     log = Experiment("loop", 0.04, {"reference": ref[::2], "output": meas[::2], "command": u[::2]})

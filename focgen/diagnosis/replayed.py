@@ -64,13 +64,13 @@ def replayed(controller: Controller, logs: Sequence[Experiment]) -> Replayed:
 
 
 def _ways(controller: Controller, logs: Sequence[Experiment]) -> Iterator[Replayed]:
-    longest = max(map(len, logs))
-    lengths = [None] + [controller.length] * (controller.length >= _LASTING * longest)
     for rows in [False] + [True] * any(log.rows is not None for log in logs):
         parts = [_samples(controller, log, rows) for log in logs]
         seen = tuple(_scenario(controller, log, p) for log, p in zip(logs, parts))
-        for length in lengths:
-            yield Replayed(controller, seen, tuple(p["command"] for p in parts), length)
+        commands = tuple(p["command"] for p in parts)
+        lasting = controller.length >= _LASTING * max(map(len, commands))
+        for length in [None] + [controller.length] * lasting:
+            yield Replayed(controller, seen, commands, length)
 
 
 def _samples(controller: Controller, log: Experiment, rows: bool) -> dict[str, np.ndarray]:

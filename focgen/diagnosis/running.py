@@ -67,7 +67,7 @@ def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
 
     Raises ControllerError where the logs lack reference or command, a scheduling signal, or samples.
     """
-    logged = [log for log in logs if "reference" in log and "command" in log]
+    logged = [log for log in logs if _closed(log)]
     if not logged:
         raise ControllerError(
             controller.name, "the logs lack reference or command", "name both columns in [signals]"
@@ -81,6 +81,11 @@ def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
     counted = _counted(replay, found)
     tied = (counted,) if counted is not None else _tied(found)
     return Running(float(np.sqrt(before)), bool(resolved), (*stamps, tied) if tied else stamps)
+
+
+def _closed(log: Experiment) -> bool:
+    """Whether the log has what a replay of the controller takes: open-loop ones may lack the reference."""
+    return "command" in log and "reference" in log and bool(np.all(np.isfinite(log["reference"])))
 
 
 def _late_or_lost(logs: Sequence[Experiment], step: float) -> Iterator[Departure]:

@@ -21,7 +21,7 @@ from focgen.trials.closed import (
 from focgen.trials.forms import Spans
 from focgen.trials.machine import Machine, Session
 from focgen.trials.plan import Assignment
-from focgen.trials.recording import MEASURED, draw_recorder, floor_of
+from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of
 from focgen.trials.rigs import draw_chain
 from focgen.trials.severity import Trial, rms
 
@@ -64,19 +64,24 @@ def make_closed_case(assignment: Assignment, signals: str, rng: np.random.Genera
         truth.append(
             _facts(fault, assignment.severity, Loop(session, controller, fault, stage.spans), logs[:count])
         )
-    label = {
+    label = _label(assignment, signals, truth, logs[count:], recorder)
+    rig = believed(assignment, stage.rig, rng)
+    if recorder.one_file:
+        rig = replace(rig, signals=replace(rig.signals, run="run"))
+    return Case(rig, logs[:count], logs[count:], recorder, label, file_of(controller, fault, rng))
+
+
+def _label(assignment: Assignment, signals: str, truth: list[dict], unseen: list, recorder: Recorder) -> dict:
+    """What is sealed."""
+    return {
         "kind": assignment.kind,
         "signals": signals,
         "suite": "closed",
         "truth": truth,
         "design": None,
-        "floor": floor_of(logs[count:]),
+        "floor": floor_of(unseen),
         "noise": recorder.noise,
     }
-    rig = believed(assignment, stage.rig, rng)
-    if recorder.one_file:
-        rig = replace(rig, signals=replace(rig.signals, run="run"))
-    return Case(rig, logs[:count], logs[count:], recorder, label, file_of(controller, fault, rng))
 
 
 def _set_up(signals: str, rng) -> tuple[Stage, list[np.ndarray]]:
