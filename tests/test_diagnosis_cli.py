@@ -8,6 +8,9 @@ import tomlkit
 
 from focgen.cli.main import main
 from focgen.rig.files import rig_table
+from focgen.trials.closed_cases import make_closed_case
+from focgen.trials.make import _write
+from focgen.trials.plan import Assignment
 from tests.diagnosis_rig import RIG, session
 
 
@@ -90,3 +93,25 @@ def test_plan_needs_no_data(made, capsys):
     effects = {e["effect"]: e for e in json.loads(capsys.readouterr().out)["effects"]}
     assert effects["hysteresis"]["survives"] > effects["creep"]["survives"]
     assert effects["creep"]["survives"] < 0.3
+
+
+@pytest.mark.parametrize("effect", ["fixed_point", "short_memory", "output_saturation"])
+def test_the_controller_departs_by_what_was_done_to_it(tmp_path, capsys, effect):
+    """A closed loop of the trials' generator: rig, logs with late stamps or none, and the ideal controller."""
+    rng = np.random.default_rng(7)
+    case = make_closed_case(Assignment("single", (effect,), "mid"), "B", rng)
+    _write(tmp_path, "0001", case, "")
+    folder = tmp_path / "cases" / "0001"
+    given = [str(folder / "rig.toml"), *map(str, sorted((folder / "logs").iterdir()))]
+    ending = ["--controller", str(folder / "controller.toml"), "--out", str(tmp_path / "out")]
+    assert main(["diagnose", *given, *ending]) == 0
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert said["verdict"] == "named"
+    assert said["where"] == {
+        "stage": "controller",
+        "inferred": False,
+        "share": {"regulator": 0.0, "actuator": 0.0, "sensor": 0.0, "controller": 1.0},
+        "regimes": {},
+    }
+    assert [c["effect"] for f in said["causes"] for c in f["candidates"]] == [effect]
+    assert "of its departure from the ideal one" in capsys.readouterr().out

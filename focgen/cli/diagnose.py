@@ -73,7 +73,8 @@ def in_words(found: Diagnosis, out: str) -> str:
     ]
     for cause in found.causes:
         names = ", ".join(f"{c.effect} {100 * c.confidence:.0f} %" for c in cause.candidates)
-        lines.append(f"  {cause.stage}: {names}; {100 * cause.shrink:.0f} % of the gap")
+        whole = "its departure from the ideal one" if cause.stage == "controller" else "the gap"
+        lines.append(f"  {cause.stage}: {names}; {100 * cause.shrink:.0f} % of {whole}")
     gap = found.gap
     lines.append(
         f"gap of {gap.unit}: {gap.as_given:.4g} as given, {gap.refitted:.4g} refitted, "

@@ -124,7 +124,8 @@ def _counted(replay: Replayed, found: Sequence[Departure]) -> Departure | None:
         return None
     words = max((d.share for d in found if d.effect == "fixed_point"), default=0.0)
     low, high = replay.controller.ranges.output
-    return replace(_coarse(float(np.log2((high - low) / count))), share=max(words, 1.0 - max(others, 0.0)))
+    bits = round(float(np.log2((high - low) / count)), 3)
+    return replace(_coarse(bits), share=max(words, 1.0 - max(others, 0.0)))
 
 
 def _suspects(replay: Replayed) -> Iterator[_Suspect]:

@@ -40,6 +40,8 @@ def locate(explanations: Sequence[Explanation], share: dict[str, float], found: 
     top = max(share, key=lambda k: share[k])
     if not share[top]:
         return Where(None, False, share, {})
+    if top == "controller":  # replayed itself; residuals are those of the stages behind it
+        return Where(top, False, share, {})
     segment = next((e for e in explanations if top in e.segment.stages), explanations[-1])
     merged = len(segment.segment.stages) > 1
     stage = None if merged and not found else top
