@@ -97,7 +97,7 @@ def test_plan_needs_no_data(made, capsys):
 
 @pytest.mark.parametrize("effect", ["fixed_point", "short_memory", "output_saturation"])
 def test_the_controller_departs_by_what_was_done_to_it(tmp_path, capsys, effect):
-    """A closed loop of the trials' generator: rig, logs with late stamps or none, and the ideal controller."""
+    """A closed loop of the trials' generator: rig, logs, and the ideal controller."""
     rng = np.random.default_rng(7)
     case = make_closed_case(Assignment("single", (effect,), "mid"), "B", rng)
     _write(tmp_path, "0001", case, "")
