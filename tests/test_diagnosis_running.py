@@ -75,6 +75,14 @@ def test_short_memory(length, begins):
     assert found.causes[0][0].value == pytest.approx(length, rel=0.05) and found.causes[0][0].share > 0.97
 
 
+def test_a_long_memory_is_found_in_a_long_log():
+    ref, meas = (np.tile(part, 10) for part in inputs())
+    u = ideal(CONTROLLER, Scenario(ref[None], meas[None]), 5000).u[0]
+    found = running(CONTROLLER, [log_of(u, ref, meas)])
+    assert effects(found) == [["short_memory"]]
+    assert found.causes[0][0].value == pytest.approx(5000, rel=0.05)
+
+
 def test_a_memory_that_outlasts_most_of_the_log_is_an_infinite_one():
     ref, meas = inputs()
     stated = replace(CONTROLLER, length=1300)

@@ -24,8 +24,8 @@ from focgen.plan.execute import execute
 from focgen.plan.scenario import physical_trace, to_raw
 
 CONTROLLER_EFFECTS = ("short_memory", "fixed_point", "sample_jitter", "missed_samples", "output_saturation")
-_LENGTHS = (10, 20, 35, 50, 75, 100, 150, 250, 400, 700, 1000, 2000)
-_SHORTEST = 0.5  # of the longest experiment: a longer memory forgets only at the end of it, if at all
+_LEAST, _LENGTHS = 10, 13  # samples of memory, and how many lengths are tried from there
+_LONGEST = 0.5  # of the longest experiment: a longer memory forgets only at the end of it, if at all
 _HALVINGS = 3  # of the distance between two of the lengths
 _WORDS = tuple(Words(bits / 2, down) for bits in range(14, 33) for down in (False, True))
 _GOOD = 0.5  # of the command's mean square departure that a cause has to explain
@@ -146,9 +146,10 @@ def _forgetful(replay: Replayed) -> Iterator[_Suspect]:
             left[n] = replay.departure(made[n])
         return sorted(left)
 
-    longest = max(map(len, replay.commands))
-    lengths = tried(n for n in (*_LENGTHS, replay.controller.length) if n < _SHORTEST * longest)
-    for _ in range(_HALVINGS if lengths else 0):
+    most = max(_LONGEST * max(map(len, replay.commands)), _LEAST)
+    even = map(int, np.geomspace(_LEAST, most, _LENGTHS))
+    lengths = tried(n for n in (*even, replay.controller.length) if n <= most)
+    for _ in range(_HALVINGS):
         at = lengths.index(min(left, key=left.get))
         beside = lengths[max(at - 1, 0) : at + 2]
         lengths = tried(round((near * lengths[at]) ** 0.5) for near in beside)
