@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from focgen.diagnosis.accept import _leading
 from focgen.diagnosis.confidence import confidences
 from focgen.diagnosis.converter import Converter
 from focgen.diagnosis.disturbance import disturbance
@@ -41,7 +42,7 @@ def test_a_slow_swing_is_seen():
     assert not disturbance(noise, H, 1.0).swings and disturbance(swing, H, 1.0).swings
 
 
-@pytest.mark.parametrize("away, sharp", [(2.0, False), (12.0, True)])
+@pytest.mark.parametrize("away, sharp", [(2.0, False), (12.0, True), (40.0, True)])
 def test_a_reading_that_falls_away_for_moments_is_heard(away, sharp):
     rng = np.random.default_rng(1)
     noise = [_noise(rng, 1500) for _ in range(3)]
@@ -157,9 +158,34 @@ def test_rising_steps_do_not_tell_an_obstacle_from_what_a_bent_gain_is_confused_
     assert _open(mixed) == set()
 
 
-@pytest.mark.parametrize("clues, part, hidden", [([], 0.2, True), ([], 0.3, False), (["first"], 0.3, True)])
-def test_a_converter_hides_what_is_small_beside_its_step(clues, part, hidden):
+@pytest.mark.parametrize(
+    "effect, part, hidden",
+    [
+        ("resonance", 0.1, True),
+        ("resonance", 0.2, False),
+        ("sensor_nonlinearity", 0.3, True),
+        ("contact", 0.3, True),
+        ("contact", 0.4, False),
+    ],
+)
+def test_a_converter_hides_what_is_small_beside_its_step(effect, part, hidden):
     step, zero = 0.05, np.zeros(400)
-    base = SimpleNamespace(problem=SimpleNamespace(clues=clues), weighed=zero)
-    better = SimpleNamespace(weighed=zero + part * step * np.sign(np.sin(np.arange(400))))
+    base = SimpleNamespace(weighed=zero)
+    better = SimpleNamespace(
+        problem=SimpleNamespace(clues=[SimpleNamespace(effect=effect)]),
+        weighed=zero + part * step * np.sign(np.sin(np.arange(400))),
+    )
     assert Converter(None, (), step).hides(base, better) == hidden
+
+
+def test_behind_a_hidden_curve_the_likeliest_that_is_not_hidden_leads():
+    def tried(effect, part):
+        clues = [SimpleNamespace(effect=effect)]
+        return SimpleNamespace(problem=SimpleNamespace(clues=clues), weighed=np.full(9, part))
+
+    base = SimpleNamespace(problem=SimpleNamespace(lacks=lambda effect: None), weighed=np.zeros(9))
+    best = {"sensor_nonlinearity": tried("sensor_nonlinearity", 0.3), "resonance": tried("resonance", 0.2)}
+    ranking = SimpleNamespace(base=base, best=best, gain={"sensor_nonlinearity": 900.0, "resonance": 400.0})
+    assert _leading(ranking, None) == "sensor_nonlinearity"
+    assert _leading(ranking, Converter(None, (), 1.0)) == "resonance"
+    assert _leading(ranking, Converter(None, (), 9.0)) == "sensor_nonlinearity"

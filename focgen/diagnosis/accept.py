@@ -63,7 +63,7 @@ def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> 
         return None
     if asked.granted and (missing := _missing(ranking)) is not None:
         return missing
-    winner, again = ranking.best[_leading(ranking)], _again(ranking)
+    winner, again = ranking.best[_leading(ranking, asked.converter)], _again(ranking)
     gained = evidence(again, ranking.base) if again is not None else 0.0
     mends = gained > asked.threshold and _mends(ranking.base, again, _VISIBLE[1], 0.0, asked.converter)
     mended = again if mends else None
@@ -81,11 +81,14 @@ def _missing(ranking: Ranking) -> Fit | None:
     return next((f for n, f in ranking.best.items() if n not in found and ranking.gain[n] > 0), None)
 
 
-def _leading(ranking: Ranking) -> str:
-    """The likeliest family that these experiments are made to show, where it comes close to the winner."""
-    top, lacks = ranking.gain[ranking.winner], ranking.base.problem.lacks
-    shown = [n for n in ranking.best if not lacks(n) and ranking.gain[n] > _SHOWN * top]
-    return shown[0] if shown else ranking.winner
+def _leading(ranking: Ranking, converter: Converter | None) -> str:
+    """The likeliest family that these experiments are made to show, where it comes close to the winner: of
+    those that no coarse converter hides, if there are any."""
+    clear = [n for n, f in ranking.best.items() if converter is None or not converter.hides(ranking.base, f)]
+    names = clear or list(ranking.best)
+    top, lacks = ranking.gain[names[0]], ranking.base.problem.lacks
+    shown = [n for n in names if not lacks(n) and ranking.gain[n] > _SHOWN * top]
+    return shown[0] if shown else names[0]
 
 
 def _again(ranking: Ranking) -> Fit | None:

@@ -15,9 +15,14 @@ import numpy as np
 from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.rivals import Cause, Rival, share_of
+from focgen.diagnosis.search import family
+from focgen.rig.effects import confused
 from focgen.rig.engine import slot_in
 
-WITHIN = (0.25, 0.35)  # of a step: root mean square that the first effect has to change, and any further
+# of a step: root mean square that an effect has to change; the second for a curve of the reading, which
+# uneven steps are, and what is confused with one
+WITHIN = (0.15, 0.35)
+_CURVE = "sensor_nonlinearity"
 EXPLAINED = 0.5  # of a step: a root mean square residual that uneven and sluggish steps still explain
 
 
@@ -32,7 +37,8 @@ class Converter:
 
     def hides(self, base: Fit, better: Fit) -> bool:
         """Whether the two differ by no more than a rounding does."""
-        return rms(better.weighed - base.weighed) < WITHIN[bool(base.problem.clues)] * self.step
+        bent = family(better) in (_CURVE, *confused(_CURVE))
+        return rms(better.weighed - base.weighed) < WITHIN[bent] * self.step
 
     def explains(self, of: Fit) -> bool:
         """Whether the residual is no larger than what a converter's steps leave."""
