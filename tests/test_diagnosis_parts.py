@@ -175,7 +175,7 @@ def test_a_converter_hides_what_is_small_beside_its_step(effect, part, hidden):
         problem=SimpleNamespace(clues=[SimpleNamespace(effect=effect)]),
         weighed=zero + part * step * np.sign(np.sin(np.arange(400))),
     )
-    assert Converter(None, (), step).hides(base, better) == hidden
+    assert Converter(SimpleNamespace(effect="sensor_quantization"), (), step).hides(base, better) == hidden
 
 
 def test_behind_a_hidden_curve_the_likeliest_that_is_not_hidden_leads():
@@ -187,5 +187,8 @@ def test_behind_a_hidden_curve_the_likeliest_that_is_not_hidden_leads():
     best = {"sensor_nonlinearity": tried("sensor_nonlinearity", 0.3), "resonance": tried("resonance", 0.2)}
     ranking = SimpleNamespace(base=base, best=best, gain={"sensor_nonlinearity": 900.0, "resonance": 400.0})
     assert _leading(ranking, None) == "sensor_nonlinearity"
-    assert _leading(ranking, Converter(None, (), 1.0)) == "resonance"
-    assert _leading(ranking, Converter(None, (), 9.0)) == "sensor_nonlinearity"
+    assert _leading(ranking, Converter(SimpleNamespace(effect="sensor_quantization"), (), 1.0)) == "resonance"
+    assert (
+        _leading(ranking, Converter(SimpleNamespace(effect="sensor_quantization"), (), 9.0))
+        == "sensor_nonlinearity"
+    )

@@ -16,13 +16,12 @@ from focgen.diagnosis.fit import Fit, Weighing, fit
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.rivals import Cause, Rival, share_of
 from focgen.diagnosis.search import family
-from focgen.rig.effects import confused
+from focgen.rig.effects import confused, library
 from focgen.rig.engine import slot_in
 
 # of a step: root mean square that an effect has to change; the second for a curve of the reading, which
 # uneven steps are, and what is confused with one
 WITHIN = (0.15, 0.35)
-_CURVE = "sensor_nonlinearity"
 EXPLAINED = 0.5  # of a step: a root mean square residual that uneven and sluggish steps still explain
 
 
@@ -37,7 +36,8 @@ class Converter:
 
     def hides(self, base: Fit, better: Fit) -> bool:
         """Whether the two differ by no more than a rounding does."""
-        bent = family(better) in (_CURVE, *confused(_CURVE))
+        curve = library()[self.clue.effect].uneven
+        bent = family(better) in (curve, *confused(curve))
         return rms(better.weighed - base.weighed) < WITHIN[bent] * self.step
 
     def explains(self, of: Fit) -> bool:

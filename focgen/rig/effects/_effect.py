@@ -142,7 +142,8 @@ class Effect:
     only.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
-    ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone.
+    ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone;
+    ``uneven``: the family that it is as well where it is uneven.
     """
 
     name: str
@@ -156,3 +157,4 @@ class Effect:
     single: bool = False
     noiselike: bool = False
     tonal: bool = False
+    uneven: str = ""

@@ -39,6 +39,7 @@ EFFECT = Effect(
     needs=lambda e: None,
     single=True,
     noiselike=True,
+    uneven="sensor_nonlinearity",
     forms=[
         Form(
             "rounding",
