@@ -48,9 +48,15 @@ def _longest(levels: np.ndarray) -> int:
 
 
 def _fastest(x: np.ndarray, h: float) -> float:
-    """Seconds that the fastest change by a tenth of the range takes."""
-    steepest = float(np.max(np.abs(np.diff(x)), initial=0.0))
-    return np.inf if steepest == 0 else h * max(1.0, 0.1 / steepest)
+    """Seconds that the fastest change by a tenth of the range takes, or by half of what ``x`` spans where
+    that is less. What one sample shows may be its noise, or the rounding of the log."""
+    change = min(0.1, 0.5 * float(np.ptp(x)))
+    lag = 1
+    while change and lag < len(x):
+        if np.max(np.abs(x[lag:] - x[:-lag])) >= change:
+            return lag * h
+        lag = max(lag + 1, lag * 9 // 8)
+    return np.inf
 
 
 def _held(x: np.ndarray, stays: int) -> np.ndarray:

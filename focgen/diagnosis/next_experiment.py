@@ -11,13 +11,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.menu import Choice, menu
 from focgen.diagnosis.model import Found, NextExperiment
 from focgen.diagnosis.noise import whiten
 from focgen.diagnosis.rivals import Rival
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import Run
+from focgen.rig.effects import Run, library
 from focgen.rig.engine import Chain
 
 _ENOUGH = 3.0  # standard deviations
@@ -43,7 +44,7 @@ def _between(logs, e: Explanation, a: Rival, others: Sequence[Rival]) -> NextExp
     """The experiment that tells ``a`` from the ``others``: what counts is the one that it tells least."""
     response = a.fit.problem.references.clocks["response"]
     entry, h = e.segment.entry, logs[0].sample_time
-    choices = menu(e.segment.level_in, response, h)
+    choices = _showing(menu(e.segment.level_in, response, h), [a, *others], response)
     asked = [(c, None) for c in choices] + [(c, s) for c in choices[:4] for s in e.segment.stages[:-1]]
     options = [(min(_separation(e, a, b, c, stage) for b in others), c, stage) for c, stage in asked]
     good = [o for o in options if o[0] >= _ENOUGH] or [max(options, key=lambda o: o[0])]
@@ -56,6 +57,14 @@ def _between(logs, e: Explanation, a: Rival, others: Sequence[Rival]) -> NextExp
         float(min(value, _MOST)),
         {"seconds": choice.seconds, "also_log": _ROLES.get(stage), "rivals": [a.effect, *rivals]},
     )
+
+
+def _showing(choices: Sequence[Choice], rivals: Sequence[Rival], response: float) -> list[Choice]:
+    """The experiments that are made to show most of the rivals."""
+    needs = [library()[r.effect].needs for r in rivals]
+    made = [excitation([c.command], c.h, response) for c in choices]
+    hidden = [sum(need(e) is not None for need in needs) for e in made]
+    return [c for c, count in zip(choices, hidden, strict=True) if count == min(hidden)]
 
 
 def _lacking(e: Explanation, names: Sequence[str]) -> str:

@@ -20,13 +20,16 @@ def references(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Refere
 
 
 def _levels(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> dict[str, float]:
-    """Measured where logged, else what the rig as given makes of the input."""
+    """Measured where logged, else what the rig as given makes of the input; what leaves the actuator, else
+    what the sensor must have read: a reading that stops stays below what the rig as given would reach."""
     taps: dict[str, np.ndarray] = {}
     Chain(rig).run(segment.x, segment.stages[0], segment.stages[-1], segment.run, tap=taps)
     made = {stage: _largest([part]) for stage, part in taps.items()}
     for stage, role in (("regulator", "pressure"), ("actuator", "curvature"), ("sensor", "output")):
         if all(role in log for log in logs):
             made[stage] = _largest([log[role] for log in logs])
+    if "sensor" in made and not all("curvature" in log for log in logs):
+        made["actuator"] = made["sensor"] / _gain(rig)
     entry, supply = segment.level_in, made.get("regulator", segment.level_in)
     response = made.get("actuator", segment.level_in)
     drive = _largest([rig.actuator.drive(np.linspace(0, supply, 50))]) if rig.actuator else supply
@@ -40,6 +43,12 @@ def _levels(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> dict[str,
         "strain": response,
         "reading": made.get("sensor", segment.level_out),
     }
+
+
+def _gain(rig: Rig) -> float:
+    """The sensor's, at rest; 1 where it has none."""
+    gain = abs(rig.sensor.dc_gain) if rig.sensor else 1.0
+    return gain if np.isfinite(gain) and gain > 0 else 1.0
 
 
 def _largest(parts) -> float:

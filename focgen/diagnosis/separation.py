@@ -21,6 +21,9 @@ _DRAWN = (
     0.03  # the same where the better one is a curve drawn through points: it describes, and explains little
 )
 _COUNTED = 8.0  # nats: what counting parameters may decide, where the experiments are not made to tell
+# of what the better one closes of the gap: where the experiments are not made to tell, what closes as much is
+_ALIKE = 0.95
+_AT_MOST = 1.0  # so many standard deviations behind, for what tells them then is the detail of their forms
 _ROUGH = 2.0  # nats: what is held against own parameters far from those given is known no better
 
 
@@ -45,4 +48,11 @@ def separation(better: Fit, other: Fit, nominal: Fit, indistinct: bool = False) 
     spread = float(np.hypot(max(spread, _COUNTED if indistinct else 1.0), part * gain))
     paid = 0.5 * (better.size - other.size) * np.log(n)
     likely = (other.doubt - better.doubt) / max(spread, _ROUGH)
-    return float((difference.sum() - paid) / spread + likely)
+    apart = float((difference.sum() - paid) / spread + likely)
+    return min(apart, _AT_MOST) if indistinct and _closes_alike(better, other, nominal) else apart
+
+
+def _closes_alike(better: Fit, other: Fit, nominal: Fit) -> bool:
+    """Whether ``other`` closes nearly as much of the gap, in mean square, whatever the noise's colour."""
+    closed, gap = (np.mean(nominal.weighed**2) - np.mean(f.weighed**2) for f in (other, better))
+    return closed > _ALIKE * gap
