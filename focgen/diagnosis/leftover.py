@@ -6,6 +6,7 @@ fitted on some stretches and scored on others, can foretell only what a model sh
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,24 +60,38 @@ def _jumps(x: np.ndarray, rest: np.ndarray) -> list[np.ndarray]:
 
 def foretold(segment: Segment, residual: np.ndarray, response: float) -> float:
     """Only the share of :func:`leftover`, from all regressors together."""
-    thin = max(1, len(residual) // _POINTS)
-    trust = segment.trust[:, None]
-    columns = [_thinned(v * trust, thin) for v in _groups(segment, response).values()]
-    target = _thinned(residual[:, None], thin)[:, 0]
-    return max(0.0, _foretold(np.hstack([np.ones((len(target), 1)), *columns]), target, segment.led))
+    regression = _Regression.of(segment, residual, response)
+    return max(0.0, regression.share(regression.groups))
 
 
 def leftover(segment: Segment, residual: np.ndarray, response: float) -> Leftover:
     """What of ``residual`` (n,), weighed by trust, the segment's input foretells; ``response`` in s."""
-    thin = max(1, len(residual) // _POINTS)
-    trust = segment.trust[:, None]
-    groups = {k: _thinned(v * trust, thin) for k, v in _groups(segment, response).items()}
-    target = _thinned(residual[:, None], thin)[:, 0]
-    columns = [np.ones((len(target), 1)), *groups.values()]
-    share = _foretold(np.hstack(columns), target, segment.led)
-    alone = {name: np.hstack([columns[0], v]) for name, v in groups.items()}
-    depends = {name: max(0.0, _foretold(v, target, segment.led)) for name, v in alone.items()}
-    return Leftover(max(share, *depends.values(), 0.0), depends)
+    regression = _Regression.of(segment, residual, response)
+    depends = {name: max(0.0, regression.share([name])) for name in regression.groups}
+    return Leftover(max(regression.share(regression.groups), *depends.values(), 0.0), depends)
+
+
+@dataclass(frozen=True, eq=False)
+class _Regression:
+    """``groups`` of regressors (n, k), the residual ``target`` (n,), both thinned, and the ``ridges`` to
+    try."""
+
+    groups: dict[str, np.ndarray]
+    target: np.ndarray
+    ridges: Sequence[float]
+
+    @classmethod
+    def of(cls, segment: Segment, residual: np.ndarray, response: float) -> _Regression:
+        """Of references, which rest for long, a tighter regression may tell more."""
+        thin, trust = max(1, len(residual) // _POINTS), segment.trust[:, None]
+        groups = {k: _thinned(v * trust, thin) for k, v in _groups(segment, response).items()}
+        target = _thinned(residual[:, None], thin)[:, 0]
+        return cls(groups, target, _RIDGES if segment.led else _RIDGES[:1])
+
+    def share(self, names: Iterable[str]) -> float:
+        """What the groups ``names`` foretell."""
+        columns = [np.ones((len(self.target), 1)), *(self.groups[name] for name in names)]
+        return _foretold(np.hstack(columns), self.target, self.ridges)
 
 
 def _thinned(values: np.ndarray, thin: int) -> np.ndarray:
@@ -84,13 +99,12 @@ def _thinned(values: np.ndarray, thin: int) -> np.ndarray:
     return values[: count * thin].reshape(count, thin, -1).mean(axis=1)
 
 
-def _foretold(matrix: np.ndarray, target: np.ndarray, led: bool) -> float:
-    """1 − (error on stretches not fitted)/(mean square), stretches interleaved so that each fold sees the
-    whole session. Of references, which rest for long, a tighter regression may tell more."""
+def _foretold(matrix: np.ndarray, target: np.ndarray, ridges: Sequence[float]) -> float:
+    """1 − (error on stretches not fitted)/(mean square) with the best of the ``ridges``; stretches
+    interleaved, so that each fold sees the whole session."""
     stretch = max(8, len(target) // (12 * _FOLDS))
     fold = (np.arange(len(target)) // stretch) % _FOLDS
     scale = np.sqrt(np.mean(matrix**2, axis=0)) + 1e-12
-    ridges = _RIDGES if led else _RIDGES[:1]
     matrix, error = matrix / scale, np.zeros((len(ridges), len(target)))
     normal, slope = matrix.T @ matrix, matrix.T @ target
     for f in range(_FOLDS):

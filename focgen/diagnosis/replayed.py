@@ -18,7 +18,7 @@ from focgen.logs.experiment import Experiment
 from focgen.plan.ideal import ideal
 from focgen.plan.scenario import Reset, Scenario
 
-_LASTING = 0.5  # of the longest experiment: a memory of that length is as good as an infinite one
+LASTING = 0.5  # of the longest experiment: a memory of that length is as good as an infinite one
 _SLOWER = 1.4  # times the controller's sample time: rows this far apart are not all of its samples
 
 
@@ -43,6 +43,16 @@ class Replayed:
         """The ideal controller's output (2, n) in every experiment."""
         return self.with_memory(self.length)
 
+    @cached_property
+    def apart(self) -> list[np.ndarray]:
+        """Logged less ideal command (n,), by experiment."""
+        return self.away(self.ideal)
+
+    @cached_property
+    def gap(self) -> float:
+        """Mean square departure of the logged command from the ideal one."""
+        return self.departure(self.ideal)
+
     def with_memory(self, length: int | None, controller: Controller | None = None) -> list[np.ndarray]:
         """The same with another memory length, or another controller's."""
         return [ideal(controller or self.controller, s, length).u for s in self.scenarios]
@@ -60,7 +70,7 @@ class Replayed:
 
 def replayed(controller: Controller, logs: Sequence[Experiment]) -> Replayed:
     """The replay that comes closest. Raises ControllerError where a controller cannot be run on the logs."""
-    return min(_ways(controller, logs), key=lambda r: r.departure(r.ideal))
+    return min(_ways(controller, logs), key=lambda r: r.gap)
 
 
 def _ways(controller: Controller, logs: Sequence[Experiment]) -> Iterator[Replayed]:
@@ -68,7 +78,7 @@ def _ways(controller: Controller, logs: Sequence[Experiment]) -> Iterator[Replay
         parts = [_samples(controller, log, rows) for log in logs]
         seen = tuple(_scenario(controller, log, p) for log, p in zip(logs, parts))
         commands = tuple(p["command"] for p in parts)
-        lasting = controller.length >= _LASTING * max(map(len, commands))
+        lasting = controller.length >= LASTING * max(map(len, commands))
         for length in [None] + [controller.length] * lasting:
             yield Replayed(controller, seen, commands, length)
 

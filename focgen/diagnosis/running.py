@@ -14,7 +14,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.diagnosis.lattice import count_of
-from focgen.diagnosis.replayed import Replayed, replayed
+from focgen.diagnosis.replayed import LASTING, Replayed, replayed
 from focgen.diagnosis.stamps import LOST, UNSTEADY, lost, unsteadiness
 from focgen.diagnosis.words import Words, in_words
 from focgen.errors import ControllerError, PlanError
@@ -25,7 +25,6 @@ from focgen.plan.scenario import physical_trace, to_raw
 
 CONTROLLER_EFFECTS = ("short_memory", "fixed_point", "sample_jitter", "missed_samples", "output_saturation")
 _LEAST, _LENGTHS = 10, 13  # samples of memory, and how many lengths are tried from there
-_LONGEST = 0.5  # of the longest experiment: a longer memory forgets only at the end of it, if at all
 _HALVINGS = 3  # of the distance between two of the lengths
 _WORDS = tuple(Words(bits / 2, down) for bits in range(14, 33) for down in (False, True))
 _GOOD = 0.5  # of the command's mean square departure that a cause has to explain
@@ -74,13 +73,13 @@ def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
         )
     stamps = tuple((d,) for d in _late_or_lost(logged, controller.sample_time))
     replay = replayed(controller, logged)
-    before = replay.departure(replay.ideal)
-    steady = max(float(np.sqrt(np.mean(a**2))) for a in replay.away(replay.ideal))
-    resolved = max(np.sqrt(before), _STEADY * steady) >= _RESOLVED * replay.span
-    found = _explained(replay, before) if resolved else []
+    departure = float(np.sqrt(replay.gap))
+    steady = max(float(np.sqrt(np.mean(a**2))) for a in replay.apart)
+    resolved = max(departure, _STEADY * steady) >= _RESOLVED * replay.span
+    found = _explained(replay) if resolved else []
     counted = _counted(replay, found)
     tied = (counted,) if counted is not None else _tied(found)
-    return Running(float(np.sqrt(before)), bool(resolved), (*stamps, tied) if tied else stamps)
+    return Running(departure, bool(resolved), (*stamps, tied) if tied else stamps)
 
 
 def _closed(log: Experiment) -> bool:
@@ -97,9 +96,9 @@ def _late_or_lost(logs: Sequence[Experiment], step: float) -> Iterator[Departure
         yield Departure("sample_jitter", 1.0, "deviation", uneven, "s")
 
 
-def _explained(replay: Replayed, before: float) -> list[Departure]:
-    """Every suspect with its share of the departure, whose mean square is ``before``."""
-    least = max(before, 1e-300)
+def _explained(replay: Replayed) -> list[Departure]:
+    """Every suspect with its share of the departure."""
+    least = max(replay.gap, 1e-300)
     return [replace(d, share=1.0 - replay.departure(made) / least) for d, made in _suspects(replay)]
 
 
@@ -120,7 +119,7 @@ def _counted(replay: Replayed, found: Sequence[Departure]) -> Departure | None:
     others = max((d.share for d in found if d.effect != "fixed_point"), default=0.0)
     if count is None or others > _NEARLY:
         return None
-    if max(float(np.ptp(a)) for a in replay.away(replay.ideal)) < _ROUNDED * count:
+    if max(float(np.ptp(a)) for a in replay.apart) < _ROUNDED * count:
         return None
     words = max((d.share for d in found if d.effect == "fixed_point"), default=0.0)
     low, high = replay.controller.ranges.output
@@ -146,7 +145,7 @@ def _forgetful(replay: Replayed) -> Iterator[_Suspect]:
             left[n] = replay.departure(made[n])
         return sorted(left)
 
-    most = max(_LONGEST * max(map(len, replay.commands)), _LEAST)
+    most = max(LASTING * max(map(len, replay.commands)), _LEAST)
     even = map(int, np.geomspace(_LEAST, most, _LENGTHS))
     lengths = tried(n for n in (*even, replay.controller.length) if n <= most)
     for _ in range(_HALVINGS):

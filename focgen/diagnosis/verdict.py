@@ -165,7 +165,7 @@ def is_unknown(e: Explanation) -> bool:
         return True
     if e.left.share < LEFT:
         return False
-    before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
+    before, after = _squares(e)
     noise = after * (1 - e.left.share)
     return bool(after - noise > UNEXPLAINED * (before - noise))
 
@@ -177,8 +177,14 @@ def _stirred(e: Explanation) -> bool:
     loud = left.bursts or left.swings or left.hums
     if not e.causes:
         return loud
-    before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
+    before, after = _squares(e)
     return after > _HARDLY * before and (loud or left.restless) and not _rounded(e)
+
+
+def _squares(e: Explanation) -> tuple[float, float]:
+    """The segment's mean squares without its effects and with them."""
+    before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
+    return before, after
 
 
 def _rounded(e: Explanation) -> bool:

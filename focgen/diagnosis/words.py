@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.control.controller import Controller
-from focgen.fractional.weights import gl_weights
+from focgen.plan.canonical import folded
 from focgen.plan.ideal import ideal
 from focgen.plan.scenario import Scenario
 
@@ -24,17 +24,30 @@ class Words:
     bits: float
     down: bool = False
 
+    def count(self, span: float) -> float:
+        """What one count is of ``span``."""
+        return span * 2.0**-self.bits
+
+    @property
+    def ahead(self) -> float:
+        """The part of a count that is added before the fraction is dropped."""
+        return 0.0 if self.down else 0.5
+
     def rounded(self, values, span: float):
         """``values`` in whole counts of ``span``."""
-        count = span * 2.0**-self.bits
-        return count * np.floor(np.asarray(values) / count + (0.0 if self.down else 0.5))
+        return _whole(np.asarray(values), self.count(span), self.ahead)
+
+
+def _whole(values, count, ahead):
+    return count * np.floor(values / count + ahead)
 
 
 def in_words(controller: Controller, scenario: Scenario, kinds: Sequence[Words]) -> list[np.ndarray]:
     """The output (lanes, samples) in each kind of words."""
     low, high = controller.ranges.output
     ahead = replace(controller, integrator=False)
-    d = [ideal(ahead, _counted(controller, scenario, w), _reach(controller, w)).d for w in kinds]
+    weights = folded(controller.transfer.num, controller.sample_time, controller.length).weights
+    d = [ideal(ahead, _counted(controller, scenario, w), _reach(weights, w)).d for w in kinds]
     if not controller.integrator:
         return [np.clip(w.rounded(v, high - low), low, high) for w, v in zip(kinds, d)]
     d = [w.rounded(v, (high - low) / controller.sample_time) for w, v in zip(kinds, d)]
@@ -47,13 +60,13 @@ def _integrated(
     """The clamped trapezoid of ``d`` (kinds, lanes, samples), in whole counts."""
     low, high = controller.ranges.output
     rises = 0.5 * controller.sample_time * (d + np.concatenate([d[..., :1], d[..., :-1]], axis=-1))
-    count = (high - low) * 2.0 ** -np.array([w.bits for w in kinds])[:, None]
-    ahead = np.array([0.0 if w.down else 0.5 for w in kinds])[:, None]
+    count = np.array([w.count(high - low) for w in kinds])[:, None]
+    ahead = np.array([w.ahead for w in kinds])[:, None]
     now, out = np.zeros(d.shape[:-1]), np.empty(d.shape)
     for r in scenario.resets:
         now[:, r.lane] = r.u0
     for k in range(d.shape[-1]):
-        now = count * np.floor(np.clip(now + rises[..., k], low, high) / count + ahead)
+        now = _whole(np.clip(now + rises[..., k], low, high), count, ahead)
         out[..., k] = now
     return out
 
@@ -66,11 +79,7 @@ def _counted(controller: Controller, scenario: Scenario, words: Words) -> Scenar
     return replace(scenario, ref=error, meas=np.zeros_like(error), resets=tuple(resets))
 
 
-def _reach(controller: Controller, words: Words) -> int:
+def _reach(weights: np.ndarray, words: Words) -> int:
     """The memory length: the last weight of at least half a count of the largest."""
-    total = np.zeros(controller.length + 1)
-    for term in controller.transfer.num:
-        weights = gl_weights(term.order, controller.length)
-        total += term.coefficient * controller.sample_time**-term.order * weights
-    kept = np.flatnonzero(np.abs(total) >= 0.5 * np.abs(total).max() * 2.0**-words.bits)
+    kept = np.flatnonzero(np.abs(weights) >= 0.5 * words.count(np.abs(weights).max()))
     return max(1, int(kept[-1]))

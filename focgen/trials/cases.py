@@ -72,15 +72,28 @@ def _draw_case(assignment: Assignment, signals: str, suite: str, rng: np.random.
     else:
         truth = [draw_effect(effect, assignment.severity, stage, rng) for effect in assignment.effects]
     settings = [setting for setting, _ in truth]
-    label = {
+    shown = visibility([facts for _, facts in truth], settings, stage, recorder)
+    label = label_of(assignment, signals, suite, shown, recorder, design)
+    return _play(stage, settings, recorder, believed(assignment, stage.rig, rng), label, rng)
+
+
+def label_of(
+    assignment: Assignment,
+    signals: str,
+    suite: str,
+    truth: list[dict],
+    recorder: Recorder,
+    design: Design | None = None,
+) -> dict:
+    """What is sealed, but for the noise floor, which the logs tell."""
+    return {
         "kind": assignment.kind,
         "signals": signals,
         "suite": suite,
-        "truth": visibility([facts for _, facts in truth], settings, stage, recorder),
+        "truth": truth,
         "design": design.facts() if design else None,
         "noise": recorder.noise,
     }
-    return _play(stage, settings, recorder, believed(assignment, stage.rig, rng), label, rng)
 
 
 def _set_up(assignment, signals, suite, design: Design | None, rng) -> Stage:

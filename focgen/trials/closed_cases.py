@@ -8,7 +8,7 @@ import numpy as np
 
 from focgen.rig.model import Ranges
 from focgen.trials import excitation
-from focgen.trials.cases import Case, Stage, believed, clocks_of, draw_effect, visibility
+from focgen.trials.cases import Case, Stage, believed, clocks_of, draw_effect, label_of, visibility
 from focgen.trials.closed import (
     CONTROLLER_EFFECTS,
     Fault,
@@ -21,7 +21,7 @@ from focgen.trials.closed import (
 from focgen.trials.forms import Spans
 from focgen.trials.machine import Machine, Session
 from focgen.trials.plan import Assignment
-from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of
+from focgen.trials.recording import MEASURED, draw_recorder, floor_of
 from focgen.trials.rigs import draw_chain
 from focgen.trials.severity import Trial, rms
 
@@ -64,24 +64,11 @@ def make_closed_case(assignment: Assignment, signals: str, rng: np.random.Genera
         truth.append(
             _facts(fault, assignment.severity, Loop(session, controller, fault, stage.spans), logs[:count])
         )
-    label = _label(assignment, signals, truth, logs[count:], recorder)
+    label = label_of(assignment, signals, "closed", truth, recorder) | {"floor": floor_of(logs[count:])}
     rig = believed(assignment, stage.rig, rng)
     if recorder.one_file:
         rig = replace(rig, signals=replace(rig.signals, run="run"))
     return Case(rig, logs[:count], logs[count:], recorder, label, file_of(controller, fault, rng))
-
-
-def _label(assignment: Assignment, signals: str, truth: list[dict], unseen: list, recorder: Recorder) -> dict:
-    """What is sealed."""
-    return {
-        "kind": assignment.kind,
-        "signals": signals,
-        "suite": "closed",
-        "truth": truth,
-        "design": None,
-        "floor": floor_of(unseen),
-        "noise": recorder.noise,
-    }
 
 
 def _set_up(signals: str, rng) -> tuple[Stage, list[np.ndarray]]:
