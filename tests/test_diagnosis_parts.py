@@ -7,16 +7,21 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.accept import _leading
-from focgen.diagnosis.confidence import confidences
+from focgen.diagnosis.confidence import SET_WITHIN, confidences
 from focgen.diagnosis.converter import Converter
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
 from focgen.diagnosis.fit import WHITE, fit
+from focgen.diagnosis.menu import menu
+from focgen.diagnosis.next_experiment import _showing
 from focgen.diagnosis.rivals import Rival, _indistinct
+from focgen.diagnosis.scales import references
 from focgen.diagnosis.segments import make
+from focgen.diagnosis.separation import separation
 from focgen.diagnosis.shrink import predict
 from focgen.diagnosis.smooth import freed
+from focgen.fractional.transfer import TransferFunction
 from focgen.rig import kernels
 from focgen.rig.effects import library
 from tests.diagnosis_rig import RIG, H, _noise, session
@@ -156,6 +161,66 @@ def test_rising_steps_do_not_tell_an_obstacle_from_what_a_bent_gain_is_confused_
     rising, mixed = (np.repeat(u, 200) for u in ([0.2, 0.4, 0.6, 0.8, 1.0], [0.4, 0.2, 0.4, 1.0, 0.2, 0.4]))
     assert _open(rising) == {"softening", "gain_drift"}
     assert _open(mixed) == set()
+
+
+def test_a_slow_sine_stays_slow_in_a_log_that_is_rounded_or_noisy():
+    t, rng = np.arange(3000) * 0.02, np.random.default_rng(0)
+    slow = 0.5 - 0.4 * np.cos(2 * np.pi * t / 30.0)
+    noisy = [slow, slow + 0.01 * rng.standard_normal(len(t)), np.round(slow * 25) / 25]
+    assert all(excitation([x], 0.02, 1.0).fastest > 0.5 for x in noisy)
+    steps, small = (0.5 + size * (t > 30.0) for size in (0.4, 0.04))
+    assert all(excitation([x], 0.02, 1.0).fastest == pytest.approx(0.02) for x in (steps, small))
+    assert excitation([np.full(50, 0.3)], 0.02, 1.0).fastest == np.inf
+
+
+def _fitted(left, innovations):
+    """A fit that leaves ``left`` of the gap in mean square."""
+    segment = SimpleNamespace(stages=("sensor",))
+    return SimpleNamespace(
+        innovations=innovations,
+        sse=float(innovations @ innovations),
+        weighed=np.full(4, np.sqrt(left)),
+        problem=SimpleNamespace(clues=(), segment=segment),
+        size=1,
+        doubt=0.0,
+    )
+
+
+@pytest.mark.parametrize("left, told", [(0.12, False), (0.2, True)])
+def test_what_closes_as_much_stays_where_the_experiments_do_not_tell(left, told):
+    noise = np.random.default_rng(0).standard_normal(4000)
+    nominal, best, other = _fitted(1.0, 2.0 * noise), _fitted(0.1, noise), _fitted(left, 1.2 * noise)
+    assert separation(best, other, nominal) > SET_WITHIN
+    assert (separation(best, other, nominal, indistinct=True) > SET_WITHIN) == told
+
+
+def test_a_reading_that_stops_tells_how_far_the_actuator_went():
+    logs = [
+        replace(log, signals=log.signals | {"output": log["output"].clip(max=0.004)}) for log in session()
+    ]
+    hidden = [
+        replace(log, signals={r: v for r, v in log.signals.items() if r != "curvature"}) for log in logs
+    ]
+    doubled = replace(RIG, sensor=TransferFunction([(12.0, 0.0)], [(1.0, 1.0), (6.0, 0.0)]))
+    levels = [references(rig, make(hidden, "pressure", "output"), hidden).levels for rig in (RIG, doubled)]
+    assert [found["response"] for found in levels] == pytest.approx([0.004, 0.002])
+    seen = references(RIG, make(logs, "pressure", "curvature"), logs).levels
+    assert seen["response"] == max(np.abs(log["curvature"]).max() for log in logs) > 0.008
+
+
+@pytest.mark.parametrize(
+    "rivals, left_out",
+    [
+        (("softening", "gain_drift"), ("staircase", "hold at", "small steps")),
+        (("creep", "sensor_relaxation"), ("mixed", "triangle", "staircase", "sines")),
+        (("slow_regulator", "transport_delay"), ("triangle",)),
+    ],
+)
+def test_only_experiments_that_show_the_rivals_are_proposed(rivals, left_out):
+    asked, choices = [SimpleNamespace(effect=name) for name in rivals], menu(1.0, 2.0, 0.02)
+    shown = [c.what for c in _showing(choices, asked, 2.0)]
+    assert len(shown) == len(choices) - len(left_out)
+    assert not [what for what in shown if any(word in what for word in left_out)]
 
 
 @pytest.mark.parametrize(
