@@ -13,9 +13,13 @@ import numpy as np
 
 from focgen.diagnosis.segments import Segment
 from focgen.rig import kernels
+from focgen.rig.linear import oscillator
 
 _POINTS = 6000
 _FOLDS = 8
+_PERIODS = np.geomspace(0.03, 2.0, 16)  # of the response: of modes that may ring,
+_DAMPING = 0.1  # so damped that each is heard as far as the next
+_SAMPLES = 6.0  # of a period: a shorter one does not show
 _RIDGES = (1e-4, 1e-2)  # of the mean square of a regressor, added to it
 
 
@@ -52,6 +56,14 @@ def _groups(segment: Segment, response: float) -> dict[str, np.ndarray]:
     }
 
 
+def _ringing(segment: Segment, response: float) -> list[np.ndarray]:
+    """What lightly damped modes would make of the input: their lag behind it and their speed, by period."""
+    x, run = segment.asked, segment.run
+    periods = [p for p in response * _PERIODS if p > _SAMPLES * run.h]
+    made = [[oscillator(x, run.rest, run.h, p, _DAMPING, speed=s) for s in (False, True)] for p in periods]
+    return [column for place, speed in made for column in (x - place, speed)]
+
+
 def _jumps(x: np.ndarray, rest: np.ndarray) -> list[np.ndarray]:
     """What changed in the last samples: regressors for what is faster than the rig."""
     now = np.where(rest, 0.0, np.diff(x, prepend=0.0)) * 3
@@ -60,23 +72,23 @@ def _jumps(x: np.ndarray, rest: np.ndarray) -> list[np.ndarray]:
 
 def foretold(segment: Segment, residual: np.ndarray, response: float) -> float:
     """Only the share of :func:`leftover`, from all regressors together."""
-    regression = _Regression.of(segment, residual, response)
-    return max(0.0, regression.share(regression.groups))
+    return max(0.0, _Regression.of(segment, residual, response).whole)
 
 
 def leftover(segment: Segment, residual: np.ndarray, response: float) -> Leftover:
     """What of ``residual`` (n,), weighed by trust, the segment's input foretells; ``response`` in s."""
     regression = _Regression.of(segment, residual, response)
     depends = {name: max(0.0, regression.share([name])) for name in regression.groups}
-    return Leftover(max(regression.share(regression.groups), *depends.values(), 0.0), depends)
+    return Leftover(max(regression.whole, *depends.values(), 0.0), depends)
 
 
 @dataclass(frozen=True, eq=False)
 class _Regression:
-    """``groups`` of regressors (n, k), the residual ``target`` (n,), both thinned, and the ``ridges`` to
-    try."""
+    """``groups`` of regressors (n, k), those that are ``ringing`` (n, k), the residual ``target`` (n,), all
+    thinned, and the ``ridges`` to try."""
 
     groups: dict[str, np.ndarray]
+    ringing: np.ndarray
     target: np.ndarray
     ridges: Sequence[float]
 
@@ -85,12 +97,18 @@ class _Regression:
         """Of references, which rest for long, a tighter regression may tell more."""
         thin, trust = max(1, len(residual) // _POINTS), segment.trust[:, None]
         groups = {k: _thinned(v * trust, thin) for k, v in _groups(segment, response).items()}
+        ringing = np.stack([np.zeros(len(trust)), *_ringing(segment, response)], axis=1)
         target = _thinned(residual[:, None], thin)[:, 0]
-        return cls(groups, target, _RIDGES if segment.led else _RIDGES[:1])
+        return cls(groups, _thinned(ringing * trust, thin), target, _RIDGES if segment.led else _RIDGES[:1])
 
-    def share(self, names: Iterable[str]) -> float:
+    @property
+    def whole(self) -> float:
+        """What all groups foretell, be it with or without those that ring: they are many."""
+        return max(self.share(self.groups), self.share(self.groups, self.ringing))
+
+    def share(self, names: Iterable[str], *more: np.ndarray) -> float:
         """What the groups ``names`` foretell."""
-        columns = [np.ones((len(self.target), 1)), *(self.groups[name] for name in names)]
+        columns = [np.ones((len(self.target), 1)), *(self.groups[name] for name in names), *more]
         return _foretold(np.hstack(columns), self.target, self.ridges)
 
 
