@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from focgen.diagnosis import accept
 from focgen.diagnosis.accept import _leading
 from focgen.diagnosis.confidence import SET_WITHIN, confidences
 from focgen.diagnosis.converter import Converter
@@ -13,6 +14,7 @@ from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
 from focgen.diagnosis.fit import WHITE, fit
+from focgen.diagnosis.leftover import foretold
 from focgen.diagnosis.menu import menu
 from focgen.diagnosis.next_experiment import _showing
 from focgen.diagnosis.rivals import Rival, _indistinct
@@ -38,6 +40,19 @@ def test_a_tone_in_the_noise_is_heard_and_noise_is_none():
     noise = [_noise(rng, 1500) for _ in range(4)]
     tone = [p + 1.2 * np.sin(2 * np.pi * 3.1 * H * np.arange(len(p)) + i) for i, p in enumerate(noise)]
     assert not disturbance(noise, H, 1.0).hums and disturbance(tone, H, 1.0).hums
+
+
+def test_ringing_is_foretold_and_noise_is_not():
+    logs, rng = session(3), np.random.default_rng(5)
+    segment = make(logs, "command", "output")
+    noise = rng.standard_normal(len(segment.y))
+    clock, rung = H * np.arange(400), np.zeros(len(segment.y))
+    for first, last in segment.run.spans:
+        steps = np.diff(segment.x[first:last], prepend=0.0) * (np.arange(last - first) > 0)
+        rung[first:last] = np.convolve(steps, np.exp(-0.7 * clock) * np.sin(7.0 * clock))[: last - first]
+    rung *= 0.5 / np.sqrt(np.mean(rung**2))
+    assert foretold(segment, noise, 2.0) < 0.01
+    assert foretold(segment, noise + rung, 2.0) > 0.6 * 0.2
 
 
 def test_a_slow_swing_is_seen():
@@ -221,6 +236,37 @@ def test_only_experiments_that_show_the_rivals_are_proposed(rivals, left_out):
     shown = [c.what for c in _showing(choices, asked, 2.0)]
     assert len(shown) == len(choices) - len(left_out)
     assert not [what for what in shown if any(word in what for word in left_out)]
+
+
+def _effect_fit(left, share, *effects):
+    """A fit with ``effects`` that leaves ``left``, of which inputs foretell ``share``."""
+    problem = SimpleNamespace(
+        clues=[SimpleNamespace(effect=name, form=SimpleNamespace(seen=None)) for name in effects],
+        lacks=lambda name: None,
+    )
+    return SimpleNamespace(weighed=np.full(4, np.sqrt(left)), foretold=share, problem=problem, vector=None)
+
+
+@pytest.mark.parametrize("share, left, taken", [(0.15, 0.05, True), (0.05, 0.05, False), (0.15, 0.45, False)])
+def test_where_one_effect_leaves_much_another_beginning_is_tried(monkeypatch, share, left, taken):
+    gains = {"hysteresis": 100.0, "sensor_hysteresis": 60.0, "leak": 30.0}
+    fits = {name: _effect_fit(0.6, 0.2, name) for name in gains}
+    first = SimpleNamespace(base=_effect_fit(1.0, 0.5), gain=gains, best=fits)
+    second = SimpleNamespace(base=_effect_fit(0.5, share, "hysteresis"))
+    tried = []
+
+    def ranked(problem, vector, clues):
+        tried.append(problem.clues[0].effect)
+        return problem
+
+    def both(rankings, asked, clues):
+        return _effect_fit(left, 0.0, rankings[-1].clues[0].effect, "resonance")
+
+    monkeypatch.setattr(accept, "rank", ranked)
+    monkeypatch.setattr(accept, "chosen", both)
+    found = accept.begun_anew([first, second], None, [])
+    assert (found is not None) == taken and tried == ["sensor_hysteresis"] * (share > 0.1)
+    assert not taken or [c.effect for c in found[1].problem.clues] == ["sensor_hysteresis", "resonance"]
 
 
 @pytest.mark.parametrize(

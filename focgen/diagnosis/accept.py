@@ -16,8 +16,8 @@ from focgen.diagnosis.converter import Converter
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import Fit
 from focgen.diagnosis.problem import Clue
-from focgen.diagnosis.reconsider import reconsidered
-from focgen.diagnosis.search import Ranking, evidence, family
+from focgen.diagnosis.reconsider import near_families, reconsidered
+from focgen.diagnosis.search import Ranking, evidence, family, rank
 from focgen.rig.effects import confused, library
 
 # parts of the remaining mean square
@@ -36,6 +36,9 @@ _CLEAN = (((0.55, 0.015), (0.4, 0.04)), ((0.75, 0.04),))
 # the same where no more than noise is left
 _PURE = (((0.2, 0.015), (0.1, 0.05)), ((0.3, 0.08),))
 _WHITE = 0.01  # of a residual's mean square foretold by inputs: below it nothing is left but noise
+# of the mean square that an effect leaves: where inputs foretell as much, another beginning is worth trying,
+_MUCH_LEFT = 0.07
+_ANEW = 0.7  # and taken if two effects leave less than this part of it
 # of the winner's evidence: from there a family that the experiments are made to show goes before one that not
 _SHOWN = 0.75
 # of the best further family's evidence: from there another form of a family found already goes first
@@ -73,6 +76,27 @@ def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> 
         return winner if _useful(rankings, winner, asked) else mended
     tried = dict.fromkeys((reconsidered(rankings, winner, clues), winner))
     return next((f for f in tried if _useful(rankings, f, asked) and not _marginal(rankings, f)), mended)
+
+
+def begun_anew(
+    rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]
+) -> tuple[Ranking, Fit] | None:
+    """Where one effect leaves much that no second one explains: begun with another of those that came close,
+    if two effects explain much more so; the second's ranking, and both."""
+    alone = rankings[-1].base
+    if alone.foretold < _MUCH_LEFT:
+        return None
+    found = []
+    for first in near_families(rankings[0], alone):
+        untried = [c for c in clues if c not in first.problem.clues and not c.form.seen]
+        ranking = rank(first.problem, first.vector, untried)
+        both = chosen([rankings[0], ranking], asked, clues)
+        if both is not None and len({c.effect for c in both.problem.clues}) == 2:
+            found.append((ranking, both))
+    better = min(found, key=lambda pair: np.mean(pair[1].weighed ** 2), default=None)
+    if better is None or np.mean(better[1].weighed ** 2) > _ANEW * np.mean(alone.weighed**2):
+        return None
+    return better
 
 
 def _missing(ranking: Ranking) -> Fit | None:

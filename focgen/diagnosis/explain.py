@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.diagnosis.accept import Asked, chosen
+from focgen.diagnosis.accept import Asked, begun_anew, chosen
 from focgen.diagnosis.converter import Converter, converter_of
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit
@@ -152,6 +152,8 @@ def _grown(
         untried = [c for c in clues if c not in base.clues and not c.form.seen]
         rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
         best = chosen(rankings, asked, clues)
+        if best is None and len(rankings) == 2 and (anew := begun_anew(rankings, asked, clues)):
+            rankings[-1], best = anew
         if best is None and guests and _much_left(rankings[-1].base):
             clues, guests = clues + guests, []
             continue

@@ -65,13 +65,19 @@ def _in_order(of: Fit) -> Fit:
     return fit(problem, np.r_[head, second, first], WHITE, 0)
 
 
+def near_families(first: Ranking, found: Fit) -> list[Fit]:
+    """The families that came close to the first effect and are not among those ``found``; without those that
+    these experiments are not made to show."""
+    best, lacks = max(first.gain.values()), first.base.problem.lacks
+    names = {c.effect for c in found.problem.clues}
+    near = [n for n in first.best if first.gain[n] > _CLOSE * best and not lacks(n) and n not in names]
+    return [first.best[n] for n in near[:_MOST]]
+
+
 def _other_families(first: Ranking, second: Fit, factor: int) -> list[Fit]:
     """The families that came close to the first effect, as they were fitted alone to ``factor`` times as many
     samples, and the second; without those that these experiments are not made to show."""
-    chosen, last = second.problem.clues
-    best, tail, lacks = max(first.gain.values()), _split(second)[-1], first.base.problem.lacks
-    near = [n for n in first.best if first.gain[n] > _CLOSE * best and not lacks(n)]
-    near = [first.best[n] for n in near if n not in (chosen.effect, last.effect)][:_MOST]
+    last, tail, near = second.problem.clues[-1], _split(second)[-1], near_families(first, second)
     starts = [f.problem.stretched(f.vector, 1.0 / factor) for f in near]
     return [
         fit(second.problem.with_clues([*f.problem.clues, last]), np.r_[start, tail], WHITE, 0)
