@@ -70,6 +70,16 @@ def test_a_reading_that_falls_away_for_moments_is_heard(away, sharp):
     assert disturbance(falls, H, 1.0).bursts == sharp and not disturbance(noise, H, 1.0).bursts
 
 
+@pytest.mark.parametrize("size, heard", [(7.0, False), (11.0, True)])
+def test_single_readings_far_off_are_heard_though_no_stretch_is_loud(size, heard):
+    rng = np.random.default_rng(4)
+    spikes = [rng.standard_normal(1500) for _ in range(3)]
+    for p in spikes:
+        p[90::180] += size
+    found = disturbance(spikes, H, 1.0)
+    assert found.loudest < 10.0 and found.bursts == heard
+
+
 def test_innovations_are_those_of_the_formula():
     rng = np.random.default_rng(2)
     y, made, weight = rng.normal(size=(3, 50))
