@@ -198,14 +198,14 @@ def test_a_slow_sine_stays_slow_in_a_log_that_is_rounded_or_noisy():
     assert excitation([np.full(50, 0.3)], 0.02, 1.0).fastest == np.inf
 
 
-def _fitted(left, innovations):
-    """A fit that leaves ``left`` of the gap in mean square."""
+def _fitted(left, innovations, *clues):
+    """A fit of ``clues`` that leaves ``left`` of the gap in mean square."""
     segment = SimpleNamespace(stages=("sensor",))
     return SimpleNamespace(
         innovations=innovations,
         sse=float(innovations @ innovations),
         weighed=np.full(4, np.sqrt(left)),
-        problem=SimpleNamespace(clues=(), segment=segment),
+        problem=SimpleNamespace(clues=clues, segment=segment),
         size=1,
         doubt=0.0,
     )
@@ -217,6 +217,25 @@ def test_what_closes_as_much_stays_where_the_experiments_do_not_tell(left, told)
     nominal, best, other = _fitted(1.0, 2.0 * noise), _fitted(0.1, noise), _fitted(left, 1.2 * noise)
     assert separation(best, other, nominal) > SET_WITHIN
     assert (separation(best, other, nominal, indistinct=True) > SET_WITHIN) == told
+
+
+def test_a_kinked_curve_stands_back_where_the_effects_own_are_smooth():
+    noise = np.random.default_rng(0).standard_normal(4000)
+
+    def best(effect, form):
+        found = next(f for f in library()[effect].forms if f.name == form)
+        return _fitted(0.1, noise, SimpleNamespace(effect=effect, form=found))
+
+    nominal, other = _fitted(1.0, 2.0 * noise), _fitted(0.1, noise)
+    reading, gain = best("sensor_nonlinearity", "spline"), best("gain_nonlinearity", "spline")
+    assert separation(reading, other, nominal) == pytest.approx(-1.0)
+    assert separation(other, reading, nominal) == pytest.approx(1.0)
+    assert separation(gain, reading, nominal) == pytest.approx(1.0)
+    assert (
+        separation(best("sensor_nonlinearity", "cubic"), other, nominal)
+        == separation(gain, other, nominal)
+        == 0.0
+    )
 
 
 def test_a_reading_that_stops_tells_how_far_the_actuator_went():

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from focgen.diagnosis.fit import Fit
+from focgen.rig.effects import library
 
 _BLOCKS = 80
 _FORM = (
@@ -24,6 +25,7 @@ _COUNTED = 8.0  # nats: what counting parameters may decide, where the experimen
 # of what the better one closes of the gap: where the experiments are not made to tell, what closes as much is
 _ALIKE = 0.95
 _AT_MOST = 1.0  # so many standard deviations behind, for what tells them then is the detail of their forms
+_KINKED = 1.0  # standard deviations that a curve with kinks stands back, where the effect's own have none
 _ROUGH = 2.0  # nats: what is held against own parameters far from those given is known no better
 
 
@@ -48,8 +50,13 @@ def separation(better: Fit, other: Fit, nominal: Fit, indistinct: bool = False) 
     spread = float(np.hypot(max(spread, _COUNTED if indistinct else 1.0), part * gain))
     paid = 0.5 * (better.size - other.size) * np.log(n)
     likely = (other.doubt - better.doubt) / max(spread, _ROUGH)
-    apart = float((difference.sum() - paid) / spread + likely)
+    apart = float((difference.sum() - paid) / spread + likely) + _KINKED * (_kinked(other) - _kinked(better))
     return min(apart, _AT_MOST) if indistinct and _closes_alike(better, other, nominal) else apart
+
+
+def _kinked(of: Fit) -> bool:
+    """Whether a curve drawn through points stands for an effect whose curves are smooth."""
+    return any(c.form.drawn and library()[c.effect].smooth for c in of.problem.clues)
 
 
 def _closes_alike(better: Fit, other: Fit, nominal: Fit) -> bool:

@@ -143,7 +143,7 @@ class Effect:
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
     ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone;
-    ``uneven``: the family that it is as well where it is uneven.
+    ``uneven``: the family that it is as well where it is uneven; ``smooth``: its curves have no kinks.
     """
 
     name: str
@@ -158,3 +158,4 @@ class Effect:
     noiselike: bool = False
     tonal: bool = False
     uneven: str = ""
+    smooth: bool = False

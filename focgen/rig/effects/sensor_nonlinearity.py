@@ -38,6 +38,7 @@ EFFECT = Effect(
     reveals="six or more levels with the curvature logged beside the reading",
     confused_with=("gain_nonlinearity", "contact", "sensor_saturation"),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
+    smooth=True,
     forms=[
         Form("quadratic", "strain", (_bend("bend", -1, 0.1),), _quadratic),
         Form("exponential", "strain", (_bend("bend", -1, 0.1, -0.3),), _exponential),
