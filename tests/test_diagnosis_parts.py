@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from focgen.diagnosis import accept
+from focgen.diagnosis import accept, verdict
 from focgen.diagnosis.accept import _leading
 from focgen.diagnosis.confidence import SET_WITHIN, confidences
 from focgen.diagnosis.converter import Converter
@@ -217,6 +217,17 @@ def test_what_closes_as_much_stays_where_the_experiments_do_not_tell(left, told)
     nominal, best, other = _fitted(1.0, 2.0 * noise), _fitted(0.1, noise), _fitted(left, 1.2 * noise)
     assert separation(best, other, nominal) > SET_WITHIN
     assert (separation(best, other, nominal, indistinct=True) > SET_WITHIN) == told
+
+
+@pytest.mark.parametrize(
+    "ratio, share, unknown", [(0.74, 0.19, True), (0.41, 0.37, False), (0.74, 0.05, False)]
+)
+def test_what_effects_explain_too_little_of_is_unknown(monkeypatch, ratio, share, unknown):
+    monkeypatch.setattr(verdict, "_stirred", lambda e: False)
+    nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
+    left = SimpleNamespace(share=share)
+    explained = SimpleNamespace(converter=None, left=left, nominal=nominal, best=best)
+    assert verdict.is_unknown(explained) == unknown
 
 
 def test_a_kinked_curve_stands_back_where_the_effects_own_are_smooth():

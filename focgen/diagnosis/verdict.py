@@ -27,7 +27,7 @@ from focgen.rig.engine import slot_in
 from focgen.rig.model import Rig
 from focgen.rig.replay import goodness
 
-UNEXPLAINED = 0.5  # of what could be explained: beyond it no effect of the library is the cause
+UNEXPLAINED = 0.25  # of what could be explained: beyond it no effect of the library is the cause
 LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it something is there
 _HARDLY = 0.6  # of a mean square still there: its effects explain hardly anything
 _VAIN = 0.2  # promised share of a gap: below it its effects are not what causes it,
