@@ -99,6 +99,16 @@ def test_products_are_those_of_the_matrix():
     assert np.allclose(kernels.products(rows), rows @ rows.T)
 
 
+def test_columns_are_out_of_step_by_a_sample_or_a_part_of_the_response():
+    logs, slow = session(2), replace(RIG.actuator, T=30.0)
+    fast = replace(RIG, actuator=replace(RIG.actuator, T=0.05))
+    slack = {
+        name: problem_of(rig, make(logs, "command", "output"), logs).slack
+        for name, rig in {"slow": replace(RIG, actuator=slow), "fast": fast}.items()
+    }
+    assert slack["slow"] == 1.0 and 0.05 < slack["fast"] < 0.5
+
+
 def test_thinned_samples_fit_the_same_parameters():
     problem = actuator(T=1.6)
     whole = fit(problem, problem.nominal(), WHITE)
@@ -287,12 +297,22 @@ def _effect_fit(left, share, *effects):
     return SimpleNamespace(weighed=np.full(4, np.sqrt(left)), foretold=share, problem=problem, vector=None)
 
 
-@pytest.mark.parametrize("share, left, taken", [(0.15, 0.05, True), (0.05, 0.05, False), (0.15, 0.45, False)])
-def test_where_one_effect_leaves_much_another_beginning_is_tried(monkeypatch, share, left, taken):
+@pytest.mark.parametrize(
+    "share, left, second, taken",
+    [
+        (0.15, 0.05, "resonance", True),
+        (0.05, 0.05, "resonance", False),
+        (0.15, 0.45, "resonance", False),
+        (0.15, 0.05, "valve_stiction", False),
+        (0.15, 0.05, "dead_zone", False),
+        (0.15, 0.05, "sensor_nonlinearity", False),
+    ],
+)
+def test_where_one_effect_leaves_much_another_beginning_is_tried(monkeypatch, share, left, second, taken):
     gains = {"hysteresis": 100.0, "sensor_hysteresis": 60.0, "leak": 30.0}
     fits = {name: _effect_fit(0.6, 0.2, name) for name in gains}
     first = SimpleNamespace(base=_effect_fit(1.0, 0.5), gain=gains, best=fits)
-    second = SimpleNamespace(base=_effect_fit(0.5, share, "hysteresis"))
+    alone = SimpleNamespace(base=_effect_fit(0.5, share, "hysteresis"))
     tried = []
 
     def ranked(problem, vector, clues):
@@ -300,11 +320,11 @@ def test_where_one_effect_leaves_much_another_beginning_is_tried(monkeypatch, sh
         return problem
 
     def both(rankings, asked, clues):
-        return _effect_fit(left, 0.0, rankings[-1].clues[0].effect, "resonance")
+        return _effect_fit(left, 0.0, rankings[-1].clues[0].effect, second)
 
     monkeypatch.setattr(accept, "rank", ranked)
     monkeypatch.setattr(accept, "chosen", both)
-    found = accept.begun_anew([first, second], None, [])
+    found = accept.begun_anew([first, alone], None, [])
     assert (found is not None) == taken and tried == ["sensor_hysteresis"] * (share > 0.1)
     assert not taken or [c.effect for c in found[1].problem.clues] == ["sensor_hysteresis", "resonance"]
 

@@ -82,7 +82,7 @@ def begun_anew(
     rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]
 ) -> tuple[Ranking, Fit] | None:
     """Where one effect leaves much that no second one explains: begun with another of those that came close,
-    if two effects explain much more so; the second's ranking, and both."""
+    if it and another effect, unlike either, explain much more; the other's ranking, and both."""
     alone = rankings[-1].base
     if alone.foretold < _MUCH_LEFT:
         return None
@@ -91,12 +91,22 @@ def begun_anew(
         untried = [c for c in clues if c not in first.problem.clues and not c.form.seen]
         ranking = rank(first.problem, first.vector, untried)
         both = chosen([rankings[0], ranking], asked, clues)
-        if both is not None and len({c.effect for c in both.problem.clues}) == 2:
+        if both is not None and _further(alone, both):
             found.append((ranking, both))
     better = min(found, key=lambda pair: np.mean(pair[1].weighed ** 2), default=None)
     if better is None or np.mean(better[1].weighed ** 2) > _ANEW * np.mean(alone.weighed**2):
         return None
     return better
+
+
+def _further(alone: Fit, both: Fit) -> bool:
+    """Whether one of the two stands for what was found ``alone`` and the other is easily confused with
+    neither: a bend upon a bend would only draw the curve that one leaves."""
+    found = {c.effect for c in alone.problem.clues}
+    near = found.union(*map(confused, found))
+    names = {c.effect for c in both.problem.clues}
+    others = names - near
+    return len(names) == 2 and len(others) == 1 and not names & set(confused(min(others)))
 
 
 def _missing(ranking: Ranking) -> Fit | None:

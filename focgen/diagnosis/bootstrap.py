@@ -40,6 +40,6 @@ def _largest(e: Explanation, clues: Sequence[Clue], rng: np.random.Generator) ->
     noise = np.concatenate([coloured(rng, last - first, e.ar, sigma) for first, last in segment.run.spans])
     nominal = e.nominal.problem
     y = nominal.simulate(e.nominal.vector) + noise
-    again = Problem(replace(segment, y=y), nominal.own, nominal.references)
+    again = Problem(replace(segment, y=y), nominal.own, nominal.references, slack=nominal.slack)
     ranking = rank(again, e.nominal.vector, clues)
     return max(ranking.gain.values(), default=0.0)

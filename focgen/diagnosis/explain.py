@@ -24,6 +24,8 @@ from focgen.rig.engine import fits_in
 from focgen.rig.model import Rig
 
 _DEPTH = 4
+# of the rig's response, and a sample at most: what columns may be out of step by; more is a delay
+_OUT_OF_STEP = 0.05
 _MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of other stages are tried too
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 
@@ -95,7 +97,8 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     scales = references(rig, segment, logs)
     stage = owner(rig) if owner(rig) in segment.stages else None
     load, response = (scales.levels["load"], scales.levels["response"])
-    return Problem(segment, Own(rig, stage, load, response), scales)
+    slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
+    return Problem(segment, Own(rig, stage, load, response), scales, slack=slack)
 
 
 def explain(
