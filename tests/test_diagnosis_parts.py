@@ -236,8 +236,31 @@ def test_what_effects_explain_too_little_of_is_unknown(monkeypatch, ratio, share
     monkeypatch.setattr(verdict, "_stirred", lambda e: False)
     nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
     left = SimpleNamespace(share=share)
-    explained = SimpleNamespace(converter=None, left=left, nominal=nominal, best=best)
+    explained = SimpleNamespace(converter=None, left=left, nominal=nominal, best=best, causes=())
     assert verdict.is_unknown(explained) == unknown
+
+
+@pytest.mark.parametrize(
+    "effect, led, restless, share, unknown",
+    [
+        ("resonance", True, True, 0.2, True),
+        ("resonance", True, True, 0.05, False),
+        ("resonance", True, False, 0.2, False),
+        ("resonance", False, True, 0.2, False),
+        ("hysteresis", True, True, 0.2, False),
+    ],
+)
+def test_what_knocks_in_a_closed_loop_is_no_mode(monkeypatch, effect, led, restless, share, unknown):
+    monkeypatch.setattr(verdict, "_stirred", lambda e: False)
+    monkeypatch.setattr(verdict, "disturbed", lambda e: SimpleNamespace(restless=restless))
+    explained = SimpleNamespace(
+        converter=None,
+        left=SimpleNamespace(share=share),
+        nominal=SimpleNamespace(weighed=np.ones(4)),
+        best=SimpleNamespace(weighed=np.full(4, 0.4)),
+        causes=[SimpleNamespace(rivals=[SimpleNamespace(effect=effect)])],
+    )
+    assert verdict.is_unknown(explained, led) == unknown
 
 
 def test_a_kinked_curve_stands_back_where_the_effects_own_are_smooth():

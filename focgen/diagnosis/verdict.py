@@ -46,7 +46,8 @@ def reach(
 ) -> tuple[compose.Rigs, Diagnosis, Evidence]:
     """The rigs that the verdict stands for, the diagnosis, and what its pictures need. ``granted``: the
     effects are there, however little they explain."""
-    unknown = [e for e in explanations if is_unknown(e)]
+    led = any(e.segment.led for e in explanations)
+    unknown = [e for e in explanations if is_unknown(e, led)]
     told = _told(rig, logs, rigs, explanations, [*unknown, *_no_closer(rigs, logs, explanations[-1])])
     if told.in_vain and not granted:
         unknown += [e for e, _ in told.causes if e not in unknown]
@@ -156,15 +157,18 @@ def _suspected(d: Departure, confidence: float) -> Candidate:
     return Candidate(d.effect, confidence, "running", parameters, 0.0)
 
 
-def is_unknown(e: Explanation) -> bool:
-    """Whether most of what inputs foretell of the nominal residual is still there after the effects, or what
-    hardly any of them explains is not just noise; unless a coarse converter explains it."""
+def is_unknown(e: Explanation, led: bool = False) -> bool:
+    """Whether much of what inputs foretell of the nominal residual is still there after the effects, or what
+    hardly any of them explains is not just noise; unless a coarse converter explains it. ``led``: in a
+    closed loop."""
     if e.converter is not None and e.converter.explains(e.best):
         return False
     if _stirred(e):
         return True
     if e.left.share < LEFT:
         return False
+    if led and _knocks(e):
+        return True
     before, after = _squares(e)
     noise = after * (1 - e.left.share)
     return bool(after - noise > UNEXPLAINED * (before - noise))
@@ -179,6 +183,13 @@ def _stirred(e: Explanation) -> bool:
         return loud
     before, after = _squares(e)
     return after > _HARDLY * before and (loud or left.restless) and not _rounded(e)
+
+
+def _knocks(e: Explanation) -> bool:
+    """Whether what rings leaves bouts: a mode rings evenly, what knocks about does not, and a loop makes a
+    tone of it."""
+    rings = any(library()[c.rivals[0].effect].tonal for c in e.causes)
+    return rings and disturbed(e).restless
 
 
 def _squares(e: Explanation) -> tuple[float, float]:
