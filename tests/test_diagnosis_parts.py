@@ -316,6 +316,7 @@ def _effect_fit(left, share, *effects):
     problem = SimpleNamespace(
         clues=[SimpleNamespace(effect=name, form=SimpleNamespace(seen=None)) for name in effects],
         lacks=lambda name: None,
+        untried=list,
     )
     return SimpleNamespace(weighed=np.full(4, np.sqrt(left)), foretold=share, problem=problem, vector=None)
 

@@ -15,6 +15,7 @@ import numpy as np
 from focgen.diagnosis.converter import Converter
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import Fit
+from focgen.diagnosis.leftover import LEFT
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.reconsider import near_families, reconsidered
 from focgen.diagnosis.search import Ranking, evidence, family, rank
@@ -36,9 +37,7 @@ _CLEAN = (((0.55, 0.015), (0.4, 0.04)), ((0.75, 0.04),))
 # the same where no more than noise is left
 _PURE = (((0.2, 0.015), (0.1, 0.05)), ((0.3, 0.08),))
 _WHITE = 0.01  # of a residual's mean square foretold by inputs: below it nothing is left but noise
-# of the mean square that an effect leaves: where inputs foretell as much, another beginning is worth trying,
-_MUCH_LEFT = 0.07
-_ANEW = 0.7  # and taken if two effects leave less than this part of it
+_ANEW = 0.7  # of the mean square that an effect leaves: another beginning is taken if two leave less
 # of the winner's evidence: from there a family that the experiments are made to show goes before one that not
 _SHOWN = 0.75
 # of the best further family's evidence: from there another form of a family found already goes first
@@ -84,12 +83,11 @@ def begun_anew(
     """Where one effect leaves much that no second one explains: begun with another of those that came close,
     if it and another effect, unlike either, explain much more; the other's ranking, and both."""
     alone = rankings[-1].base
-    if alone.foretold < _MUCH_LEFT:
+    if alone.foretold < LEFT:
         return None
     found = []
     for first in near_families(rankings[0], alone):
-        untried = [c for c in clues if c not in first.problem.clues and not c.form.seen]
-        ranking = rank(first.problem, first.vector, untried)
+        ranking = rank(first.problem, first.vector, first.problem.untried(clues))
         both = chosen([rankings[0], ranking], asked, clues)
         if both is not None and _further(alone, both):
             found.append((ranking, both))

@@ -152,8 +152,7 @@ def _grown(
     that were tried."""
     rankings: list[Ranking] = []
     while len(rankings) < _DEPTH:
-        untried = [c for c in clues if c not in base.clues and not c.form.seen]
-        rankings.append(rank(base, vector, _worth_trying(base, vector, untried)))
+        rankings.append(rank(base, vector, _worth_trying(base, vector, base.untried(clues))))
         best = chosen(rankings, asked, clues)
         if best is None and len(rankings) == 2 and (anew := begun_anew(rankings, asked, clues)):
             rankings[-1], best = anew

@@ -15,6 +15,7 @@ from focgen.diagnosis.segments import Segment
 from focgen.rig import kernels
 from focgen.rig.linear import oscillator
 
+LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it something is there
 _POINTS = 6000
 _FOLDS = 8
 _PERIODS = np.geomspace(0.03, 2.0, 16)  # of the response: of modes that may ring,

@@ -73,6 +73,10 @@ class Problem:
         """What the experiments lack to show an effect."""
         return library()[effect].needs(self.excitation)
 
+    def untried(self, clues: Sequence[Clue]) -> list[Clue]:
+        """Those of ``clues`` that may still be put to it: what is read off at sight is not fitted."""
+        return [c for c in clues if c not in self.clues and not c.form.seen]
+
     def with_clues(self, clues: Sequence[Clue]) -> Problem:
         """The same segment under other effects."""
         return Problem(self.segment, self.own, self.references, tuple(clues), self.memory, self.slack)

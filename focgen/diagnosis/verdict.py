@@ -13,6 +13,7 @@ from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import Weighing, fit
 from focgen.diagnosis.floor import floor as noise_floor
+from focgen.diagnosis.leftover import LEFT
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit
 from focgen.diagnosis.next_experiment import propose
 from focgen.diagnosis.rivals import Cause
@@ -28,7 +29,6 @@ from focgen.rig.model import Rig
 from focgen.rig.replay import goodness
 
 UNEXPLAINED = 0.25  # of what could be explained: beyond it no effect of the library is the cause
-LEFT = 0.07  # of a residual's mean square foretold by inputs: beyond it something is there
 _HARDLY = 0.6  # of a mean square still there: its effects explain hardly anything
 _VAIN = 0.2  # promised share of a gap: below it its effects are not what causes it,
 _ABOVE = 0.82  # unless the noise is more than this part of it, in root mean squares
