@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -96,11 +97,9 @@ class _Regression:
     @classmethod
     def of(cls, segment: Segment, residual: np.ndarray, response: float) -> _Regression:
         """Of references, which rest for long, a tighter regression may tell more."""
-        thin, trust = max(1, len(residual) // _POINTS), segment.trust[:, None]
-        groups = {k: _thinned(v * trust, thin) for k, v in _groups(segment, response).items()}
-        ringing = np.stack([np.zeros(len(trust)), *_ringing(segment, response)], axis=1)
-        target = _thinned(residual[:, None], thin)[:, 0]
-        return cls(groups, _thinned(ringing * trust, thin), target, _RIDGES if segment.led else _RIDGES[:1])
+        groups, ringing = _regressors(segment, response)
+        target = _thinned(residual[:, None], _thin(segment))[:, 0]
+        return cls(groups, ringing, target, _RIDGES if segment.led else _RIDGES[:1])
 
     @property
     def whole(self) -> float:
@@ -111,6 +110,19 @@ class _Regression:
         """What the groups ``names`` foretell."""
         columns = [np.ones((len(self.target), 1)), *(self.groups[name] for name in names), *more]
         return _foretold(np.hstack(columns), self.target, self.ridges)
+
+
+@lru_cache(maxsize=4)
+def _regressors(segment: Segment, response: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The groups and what rings, thinned: the same for every fit to a segment."""
+    thin, trust = _thin(segment), segment.trust[:, None]
+    groups = {k: _thinned(v * trust, thin) for k, v in _groups(segment, response).items()}
+    ringing = np.stack([np.zeros(len(trust)), *_ringing(segment, response)], axis=1)
+    return groups, _thinned(ringing * trust, thin)
+
+
+def _thin(segment: Segment) -> int:
+    return max(1, len(segment.y) // _POINTS)
 
 
 def _thinned(values: np.ndarray, thin: int) -> np.ndarray:
