@@ -28,6 +28,11 @@ def _bouc_wen(x, values, run):
     return x - size * kernels.bouc_wen(x, run.rest, width)
 
 
+def _loaded(x, values, run):
+    size, growing, width = values
+    return x - (size + growing * np.abs(x)) * kernels.bouc_wen(x, run.rest, width)
+
+
 def _wide(x, values, run):
     narrow, broad, width = values
     return (
@@ -62,6 +67,16 @@ def forms(slot):
                 _WIDTH,
             ),
             _bouc_wen,
+        ),
+        Form(
+            "loaded",  # friction between parts that the level presses together
+            slot,
+            (
+                Parameter("size", level=1, lower=-1.0, upper=1.0, starts=(0.05, 0.05), zero=0.0),
+                Parameter("growing", lower=-1.0, upper=1.0, starts=(0.05, 0.05), zero=0.0),
+                _WIDTH,
+            ),
+            _loaded,
         ),
         Form(
             "two_plays",

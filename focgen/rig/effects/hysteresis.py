@@ -1,4 +1,4 @@
-"""Rate-independent memory of the actuator: internal friction, Prandtl–Ishlinskii and Bouc–Wen."""
+"""Rate-independent memory of the actuator: Prandtl–Ishlinskii, Bouc–Wen, even or growing with the load."""
 
 from focgen.rig.effects import _loops
 from focgen.rig.effects._effect import Effect

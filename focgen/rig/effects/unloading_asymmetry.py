@@ -18,7 +18,7 @@ EFFECT = Effect(
     stage="actuator",
     meaning="the dynamics are faster or slower when unloading",
     reveals="steps up and down between the same pressures, sines: a mean shift that grows with frequency",
-    confused_with=("valve_asymmetry", "hysteresis", "gain_nonlinearity"),
+    confused_with=("valve_asymmetry", "hysteresis", "sensor_hysteresis", "gain_nonlinearity"),
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
         Form(
