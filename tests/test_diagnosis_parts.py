@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from focgen.diagnosis import accept, verdict
+from focgen.diagnosis import accept, unexplained
 from focgen.diagnosis.accept import _leading
 from focgen.diagnosis.confidence import SET_WITHIN, confidences
 from focgen.diagnosis.converter import Converter
-from focgen.diagnosis.disturbance import disturbance
+from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
 from focgen.diagnosis.fit import WHITE, fit
@@ -229,19 +229,33 @@ def test_what_closes_as_much_stays_where_the_experiments_do_not_tell(left, told)
     assert (separation(best, other, nominal, indistinct=True) > SET_WITHIN) == told
 
 
+_STEADY = Disturbance(kurtosis=3.0, loudest=1.5, slow=1.0, line=0.03)
+
+
+def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False):
+    """A segment of which effects leave ``ratio`` of the gap, as the disturbance ``left``, of which inputs
+    foretell ``share``."""
+    monkeypatch.setattr(unexplained, "disturbed", lambda e: left)
+    nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
+    return SimpleNamespace(
+        segment=SimpleNamespace(closed=closed),
+        converter=None,
+        left=SimpleNamespace(share=share),
+        nominal=nominal,
+        best=best,
+        causes=[SimpleNamespace(rivals=[SimpleNamespace(effect=effect)]) for effect in effects],
+    )
+
+
 @pytest.mark.parametrize(
     "ratio, share, unknown", [(0.74, 0.19, True), (0.41, 0.37, False), (0.74, 0.05, False)]
 )
 def test_what_effects_explain_too_little_of_is_unknown(monkeypatch, ratio, share, unknown):
-    monkeypatch.setattr(verdict, "_stirred", lambda e: False)
-    nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
-    left = SimpleNamespace(share=share)
-    explained = SimpleNamespace(converter=None, left=left, nominal=nominal, best=best, causes=())
-    assert verdict.is_unknown(explained) == unknown
+    assert unexplained.is_unknown(_explained(monkeypatch, ratio, share, effects=["leak"])) == unknown
 
 
 @pytest.mark.parametrize(
-    "effect, led, restless, share, unknown",
+    "effect, closed, restless, share, unknown",
     [
         ("resonance", True, True, 0.2, True),
         ("resonance", True, True, 0.05, False),
@@ -250,17 +264,30 @@ def test_what_effects_explain_too_little_of_is_unknown(monkeypatch, ratio, share
         ("hysteresis", True, True, 0.2, False),
     ],
 )
-def test_what_knocks_in_a_closed_loop_is_no_mode(monkeypatch, effect, led, restless, share, unknown):
-    monkeypatch.setattr(verdict, "_stirred", lambda e: False)
-    monkeypatch.setattr(verdict, "disturbed", lambda e: SimpleNamespace(restless=restless))
-    explained = SimpleNamespace(
-        converter=None,
-        left=SimpleNamespace(share=share),
-        nominal=SimpleNamespace(weighed=np.ones(4)),
-        best=SimpleNamespace(weighed=np.full(4, 0.4)),
-        causes=[SimpleNamespace(rivals=[SimpleNamespace(effect=effect)])],
-    )
-    assert verdict.is_unknown(explained, led) == unknown
+def test_what_knocks_in_a_closed_loop_is_no_mode(monkeypatch, effect, closed, restless, share, unknown):
+    left = replace(_STEADY, kurtosis=20.0, loudest=5.0) if restless else _STEADY
+    explained = _explained(monkeypatch, 0.4, share, left, [effect], closed)
+    assert unexplained.is_unknown(explained) == unknown
+
+
+@pytest.mark.parametrize(
+    "effects, closed, slow, kurtosis, ratio, unknown",
+    [
+        (["leak"], True, 9.0, 3.0, 0.5, True),
+        (["leak"], True, 9.0, 3.0, 0.4, False),
+        (["leak"], True, 5.0, 3.0, 0.5, False),
+        (["leak"], False, 9.0, 3.0, 0.5, False),
+        ([], True, 9.0, 3.0, 1.0, False),
+        (["leak"], True, 1.0, 10.0, 0.5, True),
+        (["leak"], True, 1.0, 10.0, 0.4, False),
+        (["sensor_quantization"], True, 9.0, 10.0, 0.9, False),
+    ],
+)
+def test_what_a_closed_loop_hides_from_inputs_is_unknown(
+    monkeypatch, effects, closed, slow, kurtosis, ratio, unknown
+):
+    left = replace(_STEADY, slow=slow, kurtosis=kurtosis, loudest=5.0)
+    assert unexplained.is_unknown(_explained(monkeypatch, ratio, 0.0, left, effects, closed)) == unknown
 
 
 def test_a_kinked_curve_stands_back_where_the_effects_own_are_smooth():

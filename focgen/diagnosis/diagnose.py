@@ -15,6 +15,7 @@ from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
 from focgen.diagnosis.segments import cuts, make
 from focgen.diagnosis.smooth import freed
+from focgen.diagnosis.unexplained import is_unknown
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.progress import say
@@ -105,7 +106,7 @@ def explain_all(
             if min(c.gain for c in e.causes) < asked:
                 e = explain(rig, segment, logs, asked, only, trusted)
         found.append(e)
-        problem, unknown = e.best.problem, verdict.is_unknown(e)
+        problem, unknown = e.best.problem, is_unknown(e)
         trusted = e.left.share < UNTRUSTED and not e.causes and not unknown
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
         x = freed(segment, made, response, e.left.share, not unknown)

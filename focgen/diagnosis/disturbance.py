@@ -14,7 +14,7 @@ from scipy.linalg import solve_toeplitz
 from focgen.diagnosis.noise import autocovariance, whiten
 
 # kurtosis of the innovations, 3 for noise, and loudest stretch of a response over the usual one
-BURSTS = ((15.0, 10.0), (30.0, 6.0))
+BURSTS = (12.0, 5.0)
 RESTLESS = (6.0, 4.0)  # kurtosis and loudest of what may be an effect that is a little wrong, but is no noise
 HUMS = 0.25  # of the power in one line, in the greater part of the long experiments; up to a tenth for noise
 _LONG = 400  # samples of an experiment in which a line stands out
@@ -39,7 +39,7 @@ class Disturbance:
     @property
     def bursts(self) -> bool:
         """Whether it comes and goes."""
-        return any(self.kurtosis > peaked and self.loudest > loud for peaked, loud in BURSTS)
+        return self.kurtosis > BURSTS[0] and self.loudest > BURSTS[1]
 
     @property
     def restless(self) -> bool:

@@ -25,7 +25,8 @@ class Segment:
     other as in ``run``. ``held``: the input is a staircase (a command). ``names`` of the experiments.
     ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a difference
     beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has no part in:
-    the reference in a closed loop, else the input; ``led``: whether a loop was closed."""
+    the reference in a closed loop, else the input; ``led``: whether it is a reference; ``closed``: whether a
+    loop was closed around the rig."""
 
     entry: str
     exit: str
@@ -38,6 +39,7 @@ class Segment:
     trust: np.ndarray
     asked: np.ndarray
     led: bool
+    closed: bool
 
     @cached_property
     def level_in(self) -> float:
@@ -132,7 +134,8 @@ def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None
     """The segment from ``entry`` to ``exit``, with the input as logged or as given."""
     x = joined(logs, entry) if x is None else x
     names = tuple(log.name for log in logs)
-    led = [exit == "output" and _is_led(log) for log in logs]
+    closed = [_is_led(log) for log in logs]
+    led = [exit == "output" and followed for followed in closed]
     trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
     return Segment(
         entry,
@@ -146,6 +149,7 @@ def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None
         trust,
         _asked(logs, x, led),
         any(led),
+        any(closed),
     )
 
 

@@ -9,17 +9,16 @@ import numpy as np
 
 from focgen.diagnosis import compose
 from focgen.diagnosis.confidence import confidences, tied
-from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import Weighing, fit
 from focgen.diagnosis.floor import floor as noise_floor
-from focgen.diagnosis.leftover import LEFT
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit
 from focgen.diagnosis.next_experiment import propose
 from focgen.diagnosis.rivals import Cause
 from focgen.diagnosis.running import Departure, Running
 from focgen.diagnosis.search import evidence as nats
 from focgen.diagnosis.shrink import Shrink, predict
+from focgen.diagnosis.unexplained import disturbed, is_rounded, is_unknown
 from focgen.diagnosis.unseen import foreseen
 from focgen.diagnosis.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
@@ -28,8 +27,6 @@ from focgen.rig.engine import slot_in
 from focgen.rig.model import Rig
 from focgen.rig.replay import goodness
 
-UNEXPLAINED = 0.25  # of what could be explained: beyond it no effect of the library is the cause
-_HARDLY = 0.6  # of a mean square still there: its effects explain hardly anything
 _VAIN = 0.2  # promised share of a gap: below it its effects are not what causes it,
 _ABOVE = 0.82  # unless the noise is more than this part of it, in root mean squares
 _CONTROLLER = 0.95  # confidence that what comes closest to a controller's commands is what it does
@@ -46,8 +43,7 @@ def reach(
 ) -> tuple[compose.Rigs, Diagnosis, Evidence]:
     """The rigs that the verdict stands for, the diagnosis, and what its pictures need. ``granted``: the
     effects are there, however little they explain."""
-    led = any(e.segment.led for e in explanations)
-    unknown = [e for e in explanations if is_unknown(e, led)]
+    unknown = [e for e in explanations if is_unknown(e)]
     told = _told(rig, logs, rigs, explanations, [*unknown, *_no_closer(rigs, logs, explanations[-1])])
     if told.in_vain and not granted:
         unknown += [e for e, _ in told.causes if e not in unknown]
@@ -95,7 +91,7 @@ class _Told:
             self.total is not None
             and self.total.value < _VAIN
             and self.floor < _ABOVE**2 * float(np.mean(self.squares["refitted"]))
-            and not any(_rounded(e) for e, _ in self.causes)
+            and not any(is_rounded(e) for e, _ in self.causes)
         )
 
 
@@ -117,7 +113,7 @@ def _told(rig: Rig, logs, rigs: compose.Rigs, explanations, left_out) -> _Told:
 def _no_closer(rigs: compose.Rigs, logs, last: Explanation) -> list[Explanation]:
     """The last segment, where its effects fit its measured input but bring the whole chain's output no
     closer: what they mend is that input. A rounding leaves more, by nature."""
-    if not last.causes or _rounded(last):
+    if not last.causes or is_rounded(last):
         return []
     without = _without(rigs, [(last, c) for c in last.causes], [last])
     both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
@@ -155,58 +151,6 @@ def _departed(tied: Sequence[Departure]) -> Found:
 def _suspected(d: Departure, confidence: float) -> Candidate:
     parameters = {d.parameter: Estimate(d.value, (d.value, d.value), d.unit)}
     return Candidate(d.effect, confidence, "running", parameters, 0.0)
-
-
-def is_unknown(e: Explanation, led: bool = False) -> bool:
-    """Whether much of what inputs foretell of the nominal residual is still there after the effects, or what
-    hardly any of them explains is not just noise; unless a coarse converter explains it. ``led``: in a
-    closed loop."""
-    if e.converter is not None and e.converter.explains(e.best):
-        return False
-    if _stirred(e):
-        return True
-    if e.left.share < LEFT:
-        return False
-    if led and _knocks(e):
-        return True
-    before, after = _squares(e)
-    noise = after * (1 - e.left.share)
-    return bool(after - noise > UNEXPLAINED * (before - noise))
-
-
-def _stirred(e: Explanation) -> bool:
-    """Whether bursts, slow swings or a hum are there, and the effects found, if any, take hardly any of the
-    residual away. What a rounding leaves comes in bursts by nature."""
-    left = disturbed(e)
-    loud = left.bursts or left.swings or left.hums
-    if not e.causes:
-        return loud
-    before, after = _squares(e)
-    return after > _HARDLY * before and (loud or left.restless) and not _rounded(e)
-
-
-def _knocks(e: Explanation) -> bool:
-    """Whether what rings leaves bouts: a mode rings evenly, what knocks about does not, and a loop makes a
-    tone of it."""
-    rings = any(library()[c.rivals[0].effect].tonal for c in e.causes)
-    return rings and disturbed(e).restless
-
-
-def _squares(e: Explanation) -> tuple[float, float]:
-    """The segment's mean squares without its effects and with them."""
-    before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
-    return before, after
-
-
-def _rounded(e: Explanation) -> bool:
-    """Whether a rounding is among the effects found."""
-    return any(library()[c.rivals[0].effect].noiselike for c in e.causes)
-
-
-def disturbed(e: Explanation) -> Disturbance:
-    """What is left of a segment, as a disturbance."""
-    response = e.nominal.problem.references.clocks["response"]
-    return disturbance(e.segment.parts(e.best.weighed), e.segment.run.h, response)
 
 
 def _without(rigs: compose.Rigs, causes, unknown) -> compose.Rigs:
