@@ -141,8 +141,9 @@ def rational(x, rest, b, a) -> np.ndarray:
     """A discrete filter with numerator ``b`` and denominator ``a`` (a[0] = 1), of any length."""
     ffi, _ = _library()
     order = max(len(a), len(b)) - 1
-    tables = [np.ascontiguousarray(np.pad(t, (0, order + 1 - len(t))), float) for t in (b, a)]
-    scratch = np.zeros(order + 1)
+    scratch, *tables = np.zeros((3, order + 1))
+    for table, values in zip(tables, (b, a)):
+        table[: len(values)] = values
     return _call(
         "focgen_filter", x, rest, order, *(ffi.from_buffer("double[]", t) for t in (*tables, scratch))
     )
