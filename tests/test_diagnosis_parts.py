@@ -29,6 +29,9 @@ from focgen.rig.effects import library
 from tests.diagnosis_rig import RIG, H, _noise, session
 
 
+_STEADY = Disturbance(kurtosis=3.0, loudest=1.5, slow=1.0, line=0.03)
+
+
 def actuator(**case):
     """The actuator's problem of a session."""
     logs = session(4, **case)
@@ -78,6 +81,13 @@ def test_single_readings_far_off_are_heard_though_no_stretch_is_loud(size, heard
         p[90::180] += size
     found = disturbance(spikes, H, 1.0)
     assert found.loudest < 10.0 and found.bursts == heard
+
+
+@pytest.mark.parametrize(
+    "kurtosis, loudest, heard", [(14.0, 5.7, True), (10.0, 5.7, False), (14.0, 4.0, False)]
+)
+def test_bursts_are_peaked_and_loud(kurtosis, loudest, heard):
+    assert replace(_STEADY, kurtosis=kurtosis, loudest=loudest).bursts == heard
 
 
 def test_innovations_are_those_of_the_formula():
@@ -227,9 +237,6 @@ def test_what_closes_as_much_stays_where_the_experiments_do_not_tell(left, told)
     nominal, best, other = _fitted(1.0, 2.0 * noise), _fitted(0.1, noise), _fitted(left, 1.2 * noise)
     assert separation(best, other, nominal) > SET_WITHIN
     assert (separation(best, other, nominal, indistinct=True) > SET_WITHIN) == told
-
-
-_STEADY = Disturbance(kurtosis=3.0, loudest=1.5, slow=1.0, line=0.03)
 
 
 def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False):
