@@ -28,7 +28,6 @@ from focgen.rig import kernels
 from focgen.rig.effects import library
 from tests.diagnosis_rig import RIG, H, _noise, session
 
-
 _STEADY = Disturbance(kurtosis=3.0, loudest=1.5, slow=1.0, line=0.03)
 
 
