@@ -9,6 +9,7 @@ import pytest
 import focgen
 from focgen.rig.effects import SLOTS, STAGES, Excitation, Run, form_of, library
 from focgen.rig.engine import slot_in
+from focgen.rig.modes import UNCHANGED, respond
 
 NAMES = sorted(library())
 RICH = Excitation(10, 0.1, 20, 20, 100.0, 0.01, 8, 5, 5, 500.0, 100.0)
@@ -84,11 +85,16 @@ def test_a_form_stands_where_it_may(effect, form):
         assert not p.log or p.lower > 0
 
 
+def _lag(x, run, dynamics):
+    return respond(x, run.rest, run.h, 0.3, 0.7, run.duration, dynamics)
+
+
 @pytest.mark.parametrize("effect, form", forms())
 def test_a_form_is_nested_in_the_nominal_chain(effect, form):
     if form.slot == "dynamics":
-        zero = tuple(p.zero for p in form.parameters)
-        assert form.act(None, zero, None) == 1.0
+        x, run = session()
+        zero = form.act(UNCHANGED, tuple(p.zero for p in form.parameters), None)
+        np.testing.assert_array_equal(_lag(x, run, zero), _lag(x, run, UNCHANGED))
         return
     assert any(p.zero is not None for p in form.parameters) or effect.name == "resonance"
     x, run = session()
@@ -101,6 +107,9 @@ def test_a_form_is_nested_in_the_nominal_chain(effect, form):
 @pytest.mark.parametrize("effect, form", forms())
 def test_a_form_changes_something_and_stays_finite(effect, form):
     if form.slot == "dynamics":
+        x, run = session(1)
+        moved = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None)
+        assert np.max(np.abs(_lag(x, run, moved) - _lag(x, run, UNCHANGED))) > 1e-3
         return
     x, run = session(1)
     x = np.where(np.arange(len(x)) > 550, -x, x)

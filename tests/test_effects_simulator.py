@@ -14,7 +14,7 @@ from focgen.rig import kernels, linear
 from focgen.rig.effects import Run, form_of
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.model import Actuator, Rig, Signals
-from focgen.rig.modes import respond
+from focgen.rig.modes import Dynamics, respond
 from focgen.rig.replay import effect_tables, placed_in
 
 
@@ -146,9 +146,32 @@ def test_power_creep_against_an_integrator(power):
     np.testing.assert_array_equal(again[600:], z)
 
 
+@pytest.mark.parametrize("alpha", [0.4, 0.7, 1.0, 1.3])
+def test_an_obstacle_at_rest_makes_a_stiffer_lag(alpha):
+    """T D^α y + (1 + s) y = x is a lag of T/(1 + s)."""
+    rng = np.random.default_rng(3)
+    x = np.convolve(np.abs(np.cumsum(rng.normal(0, 0.1, 800))), np.ones(9) / 9, "same") + 0.1
+    T, s = 1.3, 2.5
+    pushed = respond(x, rest(800), 0.02, T, alpha, 16.0, Dynamics(stiffness=s))
+    stiff = respond(x / (1 + s), rest(800), 0.02, T / (1 + s), alpha, 16.0)
+    assert np.all(stiff > 0)
+    np.testing.assert_allclose(pushed, stiff, atol=2e-3 * np.max(stiff))
+
+
+def test_an_obstacle_pushes_the_lag_itself():
+    h, n, T, place, s = 0.005, 3000, 0.8, 0.5, 3.0
+    t = h * np.arange(n)
+    load = lambda t: 0.9 - 0.9 * np.cos(2 * np.pi * t / 5.0)  # noqa: E731
+    slope = lambda t, y: (load(t) - y - s * max(y[0] - place, 0.0)) / T  # noqa: E731
+    exact = solve_ivp(slope, (0, t[-1]), [0.0], t_eval=t, rtol=1e-9, atol=1e-9, max_step=0.02).y[0]
+    made = respond(load(t), rest(n), h, T, 1.0, n * h, Dynamics(place=place, stiffness=s))
+    assert exact.max() > place + 0.1 and exact.min() < place
+    np.testing.assert_allclose(made, exact, atol=1e-3)
+
+
 def test_unloading_speed_acts_only_when_unloading():
     x = np.r_[0.0, np.ones(200), np.zeros(200)]
-    slow = respond(x, rest(401), 0.05, 1.0, 0.8, 20.0, unloading=0.5)
+    slow = respond(x, rest(401), 0.05, 1.0, 0.8, 20.0, Dynamics(unloading=0.5))
     plain = respond(x, rest(401), 0.05, 1.0, 0.8, 20.0)
     np.testing.assert_allclose(slow[:200], plain[:200], atol=1e-12)
     assert np.all(slow[205:300] > plain[205:300] + 0.01)

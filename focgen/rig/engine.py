@@ -10,7 +10,7 @@ import numpy as np
 from focgen.rig import linear
 from focgen.rig.effects import SLOTS, Form, Run
 from focgen.rig.model import UNITY, Actuator, LinearActuator, Rig
-from focgen.rig.modes import respond
+from focgen.rig.modes import UNCHANGED, Dynamics, respond
 
 STAGES = ("regulator", "actuator", "sensor")
 
@@ -150,36 +150,36 @@ def _actuator(actuator, here: Sequence[Placed], held: bool) -> list[Step]:
     drive = [_effect(p) for p in here if p.slot == "drive"]
     if actuator is None:
         return drive
-    speed = 1.0
+    dynamics = UNCHANGED
     for p in here:
         if p.slot == "dynamics":
-            speed *= p.form.act(None, p.values, None)
+            dynamics = p.form.act(dynamics, p.values, None)
     if isinstance(actuator, LinearActuator):
-        return [*drive, *_linear(actuator, speed, held)]
+        return [*drive, *_linear(actuator, dynamics, held)]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
     lag = (
-        (actuator.T, actuator.alpha, speed),
-        lambda x, run: respond(x, run.rest, run.h, actuator.T, actuator.alpha, run.duration, speed),
+        (actuator.T, actuator.alpha, dynamics),
+        lambda x, run: respond(x, run.rest, run.h, actuator.T, actuator.alpha, run.duration, dynamics),
         None,
     )
     return [line, *drive, lag]
 
 
-def _linear(actuator: LinearActuator, speed: float, held: bool) -> list[Step]:
-    if speed == 1.0:
+def _linear(actuator: LinearActuator, dynamics: Dynamics, held: bool) -> list[Step]:
+    if dynamics == UNCHANGED:
         return [_transfer(actuator.dynamics, held)]
     gain, T, alpha = linear.single_lag(actuator.dynamics)
     return [
         (
-            (actuator.dynamics, speed),
-            lambda x, run: respond(gain * x, run.rest, run.h, T, alpha, run.duration, speed),
+            (actuator.dynamics, dynamics),
+            lambda x, run: respond(gain * x, run.rest, run.h, T, alpha, run.duration, dynamics),
             None,
         )
     ]
 
 
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
-    """Whether a form can act in a stage of this rig: rates can be changed only of a single lag."""
+    """Whether a form can act in a stage of this rig: only a single lag has dynamics to change."""
     if form.slot != "dynamics":
         return True
     linear_one = isinstance(rig.actuator, LinearActuator) and linear.single_lag(rig.actuator.dynamics)

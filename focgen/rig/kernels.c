@@ -6,9 +6,10 @@
 /* Sum of first-order modes, input linear between samples (first-order hold), and one complex mode pair.
  * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
  * Coefficients come twice, for loading (first m) and unloading (next m): unloading is x[k] < y[k-1] where x > 0.
- * pair[s] = {a_re, a_im, b0_re, b0_im, b1_re, b1_im} for s = 0, 1. */
+ * pair[s] = {a_re, a_im, b0_re, b0_im, b1_re, b1_im} for s = 0, 1.
+ * Beyond y = `place` an obstacle takes `stiffness` (y - place) from x: y, linear in the present x, is solved for. */
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0, const double *b1,
-                  const double *pair, double through, int switching, double *z)
+                  const double *pair, double through, int switching, double place, double stiffness, double *z)
 {
     double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0;
     for (int k = 0; k < n; k++) {
@@ -19,6 +20,15 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
         double now = x[k], sum = 0.0;
         int down = switching && fabs(now) < fabs(last);
         const double *A = a + down * m, *B0 = b0 + down * m, *B1 = b1 + down * m, *P = pair + 6 * down;
+        if (stiffness > 0.0) {
+            double still = P[0] * zr - P[1] * zi + P[2] * past, gain = through + P[4];
+            for (int i = 0; i < m; i++) {
+                still += A[i] * z[i] + B0[i] * past;
+                gain += B1[i];
+            }
+            double beyond = (still + gain * now - place) / (1.0 + gain * stiffness);
+            if (beyond > 0.0) now -= stiffness * beyond;
+        }
         for (int i = 0; i < m; i++) {
             z[i] = A[i] * z[i] + B0[i] * past + B1[i] * now;
             sum += z[i];

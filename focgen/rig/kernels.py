@@ -19,7 +19,8 @@ from focgen.errors import BuildError
 _SOURCE = Path(__file__).with_name("kernels.c")
 _DECLARATIONS = """
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
-    const double *b0, const double *b1, const double *pair, double through, int switching, double *z);
+    const double *b0, const double *b1, const double *pair, double through, int switching, double place,
+    double stiffness, double *z);
 void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const
     double *down);
 void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
@@ -72,9 +73,11 @@ def _call(name: str, x: np.ndarray, rest: np.ndarray, *others) -> np.ndarray:
     return y
 
 
-def modes(x, rest, a, b0, b1, pair, through: float, switching: bool) -> np.ndarray:
+def modes(
+    x, rest, a, b0, b1, pair, through: float, switching: bool, place: float = 0.0, stiffness: float = 0.0
+) -> np.ndarray:
     """Sum of first-order modes; ``a``, ``b0``, ``b1`` (2, m) and ``pair`` (2, 6), rows loading and
-    unloading."""
+    unloading; beyond ``place`` an obstacle takes ``stiffness`` times how far from ``x``."""
     ffi, _ = _library()
     tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
     scratch = np.empty(tables[0].shape[1])
@@ -87,6 +90,8 @@ def modes(x, rest, a, b0, b1, pair, through: float, switching: bool) -> np.ndarr
         *pointers,
         float(through),
         int(switching),
+        float(place),
+        float(stiffness),
         ffi.from_buffer("double[]", scratch),
     )
 

@@ -31,6 +31,19 @@ class Modes:
     through: float
 
 
+@dataclass(frozen=True)
+class Dynamics:
+    """What effects change of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls
+    short of the response; beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place)."""
+
+    unloading: float = 1.0
+    place: float = 0.0
+    stiffness: float = 0.0
+
+
+UNCHANGED = Dynamics()
+
+
 @lru_cache(maxsize=256)
 def fractional_lag(T: float, alpha: float, h: float, duration: float) -> Modes:
     """The modes of 1/(T s^α + 1) for responses from ``h`` to ``duration`` seconds."""
@@ -57,14 +70,21 @@ def fractional_lag(T: float, alpha: float, h: float, duration: float) -> Modes:
 
 
 def respond(
-    x: np.ndarray, rest: np.ndarray, h: float, T: float, alpha: float, duration: float, unloading: float = 1.0
+    x: np.ndarray,
+    rest: np.ndarray,
+    h: float,
+    T: float,
+    alpha: float,
+    duration: float,
+    dynamics: Dynamics = UNCHANGED,
 ) -> np.ndarray:
     """The response of 1/(T s^alpha + 1) to ``x`` (n,), linear between samples of ``h`` s; ``rest`` (n,) is
-    true where an experiment begins, none longer than ``duration`` s. ``unloading`` multiplies every rate
-    while the load falls short of the response.
+    true where an experiment begins, none longer than ``duration`` s.
     """
+    unloading = dynamics.unloading
     a, b0, b1, pair, through = tables(T, alpha, h, 2.0 ** np.ceil(np.log2(duration)), unloading)
-    return kernels.modes(x, rest, a, b0, b1, pair, through, unloading != 1.0)
+    switching = unloading != 1.0
+    return kernels.modes(x, rest, a, b0, b1, pair, through, switching, dynamics.place, dynamics.stiffness)
 
 
 @lru_cache(maxsize=256)

@@ -20,7 +20,7 @@ SLOTS = {
     "sensor": ("strain", "reading"),
 }
 """Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the
-pressure entering the actuator; ``drive``: K(p) p; ``dynamics``: the rates of the actuator; ``response``:
+pressure entering the actuator; ``drive``: K(p) p; ``dynamics``: the actuator's own equation; ``response``:
 what leaves it; ``strain``: into the sensor; ``reading``: what leaves it."""
 
 
@@ -87,7 +87,8 @@ Act = Callable[[np.ndarray, tuple[float, ...], Run], Any]
 class Form:
     """One formula: ``act(x, values, run)`` maps what passes its ``slot``, shape (n,), to what leaves it.
 
-    In the slot ``dynamics`` it returns the factor by which all rates are multiplied when unloading.
+    In the slot ``dynamics`` it maps what is changed of the actuator's own equation,
+    :class:`~focgen.rig.modes.Dynamics`, and there is no ``run``.
     ``seen(y)`` reads the values off what was measured, (n,), where that can be done at sight; None where it
     is not there. ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is

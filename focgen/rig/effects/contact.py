@@ -1,10 +1,12 @@
 """Stiffer beyond a curvature: an obstacle, a wall, the finger's own other side."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
-_PLACE = Parameter("curvature", level=1, lower=0.1, upper=1.3, starts=(0.8, 0.5), zero=1.3)
+_PLACE = Parameter("curvature", level=1, lower=0.1, upper=1.3, starts=(0.8, 0.5, 0.95), zero=1.3)
 
 
 def _knee(x, values, run):
@@ -28,6 +30,11 @@ def _hertz(x, values, run):
     place, stiffness = values
     beyond = np.maximum(x - place, 0.0)
     return x - beyond + beyond / (1.0 + np.sqrt(stiffness * beyond))
+
+
+def _spring(x, values, run):
+    place, stiffness = values
+    return replace(x, place=place, stiffness=stiffness)
 
 
 _STIFFNESS = Parameter("stiffness", level=-1, lower=0.1, upper=1e3, starts=(5.0, 5.0), log=True)
@@ -67,6 +74,13 @@ EFFECT = Effect(
                 Parameter("slope", lower=0.0, upper=0.95, starts=(0.4, 0.4)),
             ),
             _knee,
+        ),
+        # it pushes the actuator itself, which comes to rest the sooner
+        Form(
+            "spring",
+            "dynamics",
+            (_PLACE, Parameter("stiffness", lower=0.0, upper=50.0, starts=(1.0, 1.0), zero=0.0)),
+            _spring,
         ),
         Form("gradual", "response", (_PLACE, _STIFFNESS), _gradual),
         Form("hertz", "response", (_PLACE, _STIFFNESS), _hertz),

@@ -1,11 +1,13 @@
 """Dynamics that are faster or slower when unloading."""
 
+from dataclasses import replace
+
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 
 def _speed(x, values, run):
-    return values[0]
+    return replace(x, unloading=x.unloading * values[0])
 
 
 def _lag(x, values, run):
