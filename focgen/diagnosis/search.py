@@ -20,6 +20,7 @@ _ADRIFT = 1.15  # of a fit's mean square without a colour
 _NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
 _FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
 _TRIED = 3  # start values of a form that are fitted, where it has more
+_BENT = 4.0  # nats against own parameters that make up for what is missing: then started as given, too
 _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
 
 
@@ -163,13 +164,19 @@ def best_start(problem: Problem, base: np.ndarray, clue: Clue, known: np.ndarray
     Jacobian at ``base``."""
     extended = problem.with_clues([*problem.clues, clue])
     starts, fits = extended.starts(clue), []
+    bent = problem.own.doubt(base) > _BENT
     if len(starts) > _TRIED:
         starts = _likeliest(extended, base, starts, known)
     for start in starts:
-        found = fit(extended, np.r_[base, start], WHITE, 5, tolerance=0.1, known=known)
-        if np.isfinite(found.sse):
-            fits.append(found)
-    return min(fits, key=lambda f: f.sse, default=None)
+        fits.append(fit(extended, np.r_[base, start], WHITE, 5, tolerance=0.1, known=known))
+        if bent:
+            fits.append(fit(extended, np.r_[_as_given(problem, base), start], WHITE, 5, tolerance=0.1))
+    return min((f for f in fits if np.isfinite(f.sse)), key=lambda f: f.sse, default=None)
+
+
+def _as_given(problem: Problem, base: np.ndarray) -> np.ndarray:
+    """The vector ``base`` with the own parameters of the rig as given."""
+    return np.r_[problem.own_start, base[len(problem.own_start) :]]
 
 
 def _likeliest(
