@@ -64,11 +64,12 @@ def session(
     slip=0.0,
     bend=0.0,
     drift=0.0,
+    cap=np.inf,
     roles=("pressure", "curvature"),
 ):
     """Experiments of a rig with one of these effects: ``delay`` samples, ``vent`` slower s, dead ``zone``,
     ``slip`` (a Maxwell element of dry friction, share), a ``bend`` of the sensor, a ``drift`` of the gain a
-    second.
+    second, a ``cap`` that the pressure's effect nears, bar.
     """
     rng, logs, start = np.random.default_rng(seed), [], 0.0
     for name, u in commands().items():
@@ -76,6 +77,7 @@ def session(
         if vent:
             p = _lag(p, 1e-2, vent)
         load = np.maximum(p - zone, 0.0)
+        load = load / np.cbrt(1 + (load / cap) ** 3)
         clock = start + H * np.arange(len(u))
         drive = (gain[0] + gain[1] * load) * load * (1 + drift * clock)
         kappa = _fractional(_friction(drive, slip), T, alpha)

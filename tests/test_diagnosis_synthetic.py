@@ -53,6 +53,12 @@ def test_one_effect_is_named_in_its_stage(effect, stage, case):
     assert found.shrink > 0.8
 
 
+def test_a_gain_that_ends_is_seen_though_own_parameters_bend_to_make_up_for_it():
+    """From parameters so bent a dead zone mends more than the gain's own forms do."""
+    found = diagnose(RIG, session(1, cap=0.1, roles=("pressure",)))
+    assert found.verdict == "named" and named(found) == [["gain_nonlinearity"]]
+
+
 def test_the_promise_holds_on_new_experiments(tmp_path):
     found = diagnose(RIG, session(3, slip=0.35)[:4], tmp_path / "out")
     unseen = session(3, slip=0.35)[4:]
