@@ -65,11 +65,12 @@ def session(
     bend=0.0,
     drift=0.0,
     cap=np.inf,
+    camera=1.0,
     roles=("pressure", "curvature"),
 ):
     """Experiments of a rig with one of these effects: ``delay`` samples, ``vent`` slower s, dead ``zone``,
     ``slip`` (a Maxwell element of dry friction, share), a ``bend`` of the sensor, a ``drift`` of the gain a
-    second, a ``cap`` that the pressure's effect nears, bar.
+    second, a ``cap`` that the pressure's effect nears, bar. ``camera``: how much noisier the curvature is.
     """
     rng, logs, start = np.random.default_rng(seed), [], 0.0
     for name, u in commands().items():
@@ -83,7 +84,7 @@ def session(
         kappa = _fractional(_friction(drive, slip), T, alpha)
         y = _lag(kappa + bend * kappa**2, 1 / 6.0)
         signals = {"command": u, "pressure": p, "curvature": kappa, "output": y}
-        for role, size in (("pressure", 0.18), ("curvature", 0.011), ("output", 0.011)):
+        for role, size in (("pressure", 0.18), ("curvature", 0.011 * camera), ("output", 0.011)):
             signals[role] = signals[role] + _noise(rng, len(u)) * noise * size
         logs.append(
             Experiment(

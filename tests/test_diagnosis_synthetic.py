@@ -59,6 +59,18 @@ def test_a_gain_that_ends_is_seen_though_own_parameters_bend_to_make_up_for_it()
     assert found.verdict == "named" and named(found) == [["gain_nonlinearity"]]
 
 
+@pytest.mark.parametrize("camera", [5.0, 12.0])
+def test_a_noisy_camera_makes_no_fault_of_the_sensor_behind_it(camera):
+    """What the actuator's refit leaves open of the curvature is no effect of the sensor that reads it."""
+    found = explain_all(RIG, session(1, camera=camera, noise=0.003), THRESHOLD)
+    assert not any(e.causes for e in found) and found[-1].left.share < 0.01
+
+
+def test_a_fault_of_the_sensor_behind_a_noisy_camera_is_found():
+    found = diagnose(RIG, session(1, camera=5.0, noise=0.003, bend=5.0))
+    assert named(found) == [["sensor_nonlinearity"]] and found.shrink > 0.8
+
+
 def test_the_promise_holds_on_new_experiments(tmp_path):
     found = diagnose(RIG, session(3, slip=0.35)[:4], tmp_path / "out")
     unseen = session(3, slip=0.35)[4:]

@@ -10,6 +10,7 @@ import numpy as np
 from focgen.control.files import read_controller
 from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.bootstrap import threshold as bootstrapped
+from focgen.diagnosis.carried import carried
 from focgen.diagnosis.explain import Explanation, clues_for, explain
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
@@ -97,7 +98,7 @@ def explain_all(
     is explained anew."""
     roles, x, found, trusted = cuts(logs), None, [], True
     for entry, exit in zip(roles, roles[1:]):
-        segment = make(logs, entry, exit, x)
+        segment = make(logs, entry, exit, x, carried(found[-1]) if found else None)
         say(f"{entry} to {exit}")
         e = explain(rig, segment, logs, threshold, only, trusted)
         if draws > 1 and e.causes and only is None:

@@ -12,7 +12,7 @@ from focgen.diagnosis.problem import Problem
 from focgen.rig.kernels import innovations as innovated
 from focgen.rig.kernels import products
 
-_STEP = 1e-4
+STEP = 1e-4
 _STALE = 2  # iterations that rows of the Jacobian are kept for
 
 
@@ -134,7 +134,7 @@ def jacobian(
     """Rows (k, n): the innovations' derivatives, by differences."""
     rows = [] if known is None else list(known)
     for i in range(len(rows), len(vector)):
-        step = _STEP if vector[i] + _STEP <= high[i] else -_STEP
+        step = STEP if vector[i] + STEP <= high[i] else -STEP
         moved = vector.copy()
         moved[i] += step
         rows.append((innovations(problem, moved, weighing) - now) / step)

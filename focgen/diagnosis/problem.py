@@ -15,6 +15,8 @@ from focgen.rig.effects import Excitation, Form, library
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.model import Rig
 
+_OFF = 3.0  # standard deviations that an input may be off in each way
+
 
 @dataclass(frozen=True)
 class Clue:
@@ -47,8 +49,8 @@ class Problem:
     """Residuals of a segment under the rig with ``clues``.
 
     The vector: the rig's own parameters, the nuisances (the alignment of input and output, at most ``slack``
-    samples, and where nothing of the segment has an offset of its own, one), then every clue's parameters,
-    all of order one.
+    samples; where nothing of the segment has an offset of its own, one; how far a simulated input is off in
+    each of the ways it may be, in standard deviations), then every clue's parameters, all of order one.
     """
 
     segment: Segment
@@ -61,7 +63,7 @@ class Problem:
     def __post_init__(self):
         self.own_start = self.own.start()
         self.has_offset = self.own.stage == "actuator" and len(self.own_start) > 0
-        self.nuisances = 1 if self.has_offset else 2
+        self.nuisances = (1 if self.has_offset else 2) + self.segment.unsure.shape[1]
 
     @cached_property
     def excitation(self) -> Excitation:
@@ -106,6 +108,7 @@ class Problem:
         """Lower and upper bounds."""
         low, high = self.own.bounds()
         nuisance = [self.slack] if self.has_offset else [self.slack, 0.03]
+        nuisance += [_OFF] * self.segment.unsure.shape[1]
         low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
         for clue in self.clues:
             for p in clue.form.parameters:
@@ -154,19 +157,21 @@ class Problem:
         chain = Chain(self.rig(vector), self.placed(vector), self.memory)
         own, segment = len(self.own_start), self.segment
         zero = 0.0 if self.has_offset else vector[own + 1] * segment.level_out
-        x = self._aligned(float(vector[own]))
+        x = self._entered(float(vector[own]), vector[self.head - segment.unsure.shape[1] : self.head])
         return chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held) + zero
 
-    def _aligned(self, shift: float) -> np.ndarray:
+    def _entered(self, shift: float, off: np.ndarray) -> np.ndarray:
+        """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where
+        nothing changed, by which a chain remembers what it made of it."""
         x = self.segment.bent
-        if shift == 0.0:
+        if shift == 0.0 and not np.any(off):
             return x
-        kept = self.memory.setdefault("shifted", [])
+        key, kept = (shift, *off), self.memory.setdefault("entered", [])
         for old, y in kept:
-            if old == shift:
+            if old == key:
                 return y
-        y = x + abs(shift) * (self.segment.neighbours[shift < 0] - x)
-        kept.insert(0, (shift, y))
+        y = x + abs(shift) * (self.segment.neighbours[shift < 0] - x) + self.segment.unsure @ off
+        kept.insert(0, (key, y))
         del kept[2:]
         return y
 

@@ -26,7 +26,8 @@ class Segment:
     ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a difference
     beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has no part in:
     the reference in a closed loop, else the input; ``led``: whether it is a reference; ``closed``: whether a
-    loop was closed around the rig."""
+    loop was closed around the rig. ``unsure`` (n, k): ways in which an input that was simulated may be off, a
+    standard deviation each."""
 
     entry: str
     exit: str
@@ -40,6 +41,7 @@ class Segment:
     asked: np.ndarray
     led: bool
     closed: bool
+    unsure: np.ndarray
 
     @cached_property
     def level_in(self) -> float:
@@ -79,14 +81,14 @@ class Segment:
         kept = np.concatenate(
             [first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)]
         )
-        x, y, trust, asked, clock = (
-            v[kept].reshape(-1, factor).mean(axis=1)
-            for v in (self.x, self.y, self.trust, self.asked, self.run.clock)
+        x, y, trust, asked, clock, unsure = (
+            v[kept].reshape(sum(counts), factor, *v.shape[1:]).mean(axis=1)
+            for v in (self.x, self.y, self.trust, self.asked, self.run.clock, self.unsure)
         )
         rest = np.zeros(len(x), np.uint8)
         rest[np.cumsum([0, *counts[:-1]])] = 1
         run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
-        return replace(self, x=x, y=y, trust=trust, asked=asked, run=run, held=False)
+        return replace(self, x=x, y=y, trust=trust, asked=asked, run=run, held=False, unsure=unsure)
 
     def parts(self, signal: np.ndarray) -> list[np.ndarray]:
         """``signal`` (n, …) by experiment."""
@@ -130,9 +132,17 @@ def joined(logs: Sequence[Experiment], role: str) -> np.ndarray:
     return np.concatenate([np.asarray(log[role], float) for log in logs])
 
 
-def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None = None) -> Segment:
-    """The segment from ``entry`` to ``exit``, with the input as logged or as given."""
-    x = joined(logs, entry) if x is None else x
+def make(
+    logs: Sequence[Experiment],
+    entry: str,
+    exit: str,
+    x: np.ndarray | None = None,
+    unsure: np.ndarray | None = None,
+) -> Segment:
+    """The segment from ``entry`` to ``exit``, with the input as logged or as given; of the ways ``unsure`` in
+    which that may be off, those that the output can show."""
+    x, y = joined(logs, entry) if x is None else x, joined(logs, exit)
+    unsure = np.zeros((len(x), 0)) if unsure is None else unsure
     names = tuple(log.name for log in logs)
     closed = [_is_led(log) for log in logs]
     led = [exit == "output" and followed for followed in closed]
@@ -142,7 +152,7 @@ def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None
         exit,
         between(entry, exit),
         x,
-        joined(logs, exit),
+        y,
         session(logs),
         entry == "command",
         names,
@@ -150,7 +160,15 @@ def make(logs: Sequence[Experiment], entry: str, exit: str, x: np.ndarray | None
         _asked(logs, x, led),
         any(led),
         any(closed),
+        unsure[:, _felt(unsure, x, y)],
     )
+
+
+def _felt(unsure: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Which ways of being off (k,) could gather a nat of evidence, were all of the noise white."""
+    off = np.mean(unsure**2, axis=0) / (np.max(x**2) or 1.0)
+    noise = _noise(y) ** 2 / (np.max(y**2) or 1.0)
+    return 0.5 * len(y) * off > noise
 
 
 def _asked(logs: Sequence[Experiment], x: np.ndarray, led: Sequence[bool]) -> np.ndarray:
@@ -185,11 +203,16 @@ def _trust(y: np.ndarray, timing: float) -> np.ndarray:
     """1/(the noise with that of timing, in units of the noise)."""
     if len(y) < 5:
         return np.ones(len(y))
-    noise = 1.4826 * np.median(np.abs(np.diff(y, 2))) / np.sqrt(6.0)
-    noise = max(float(noise), 2e-3 * float(np.ptp(y)), 1e-300)
+    noise = _noise(y)
     slope = np.maximum(np.abs(np.diff(y, prepend=y[0])), np.abs(np.diff(y, append=y[-1])))
     error = timing * np.maximum(slope - 3 * noise, 0.0) / noise
     return 1.0 / np.sqrt(1.0 + error**2)
+
+
+def _noise(y: np.ndarray) -> float:
+    """The root mean square of what is white of a signal (n,), or a little of its span."""
+    white = 1.4826 * np.median(np.abs(np.diff(y, 2))) / np.sqrt(6.0)
+    return max(float(white), 2e-3 * float(np.ptp(y)), 1e-300)
 
 
 def is_single(rig: Rig) -> bool:
