@@ -71,6 +71,14 @@ def test_a_fault_of_the_sensor_behind_a_noisy_camera_is_found():
     assert named(found) == [["sensor_nonlinearity"]] and found.shrink > 0.8
 
 
+@pytest.mark.parametrize("role", ["pressure", "curvature"])
+@pytest.mark.parametrize("off, fault", [(0.008, False), (0.03, True)])
+def test_gauges_that_disagree_by_a_little_are_no_fault(role, off, fault):
+    logs = [replace(log, signals={**log.signals, role: log[role] * (1 + off)}) for log in session(1, T=1.45)]
+    found = diagnose(RIG, logs)
+    assert (found.verdict != "parameters") == fault == bool(found.causes)
+
+
 def test_the_promise_holds_on_new_experiments(tmp_path):
     found = diagnose(RIG, session(3, slip=0.35)[:4], tmp_path / "out")
     unseen = session(3, slip=0.35)[4:]

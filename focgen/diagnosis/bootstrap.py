@@ -10,7 +10,7 @@ import numpy as np
 
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.noise import coloured
-from focgen.diagnosis.problem import Clue, Problem
+from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.search import rank
 from focgen.progress import say
 
@@ -38,8 +38,7 @@ def _largest(e: Explanation, clues: Sequence[Clue], rng: np.random.Generator) ->
     best, segment = e.best, e.segment
     sigma = float(np.sqrt(best.sse / len(best.innovations))) * segment.level_out
     noise = np.concatenate([coloured(rng, last - first, e.ar, sigma) for first, last in segment.run.spans])
-    nominal = e.nominal.problem
-    y = nominal.simulate(e.nominal.vector) + noise
-    again = Problem(replace(segment, y=y), nominal.own, nominal.references, slack=nominal.slack)
+    y = e.nominal.problem.simulate(e.nominal.vector) + noise
+    again = replace(e.nominal.problem, segment=replace(segment, y=y), memory={})
     ranking = rank(again, e.nominal.vector, clues)
     return max(ranking.gain.values(), default=0.0)

@@ -27,6 +27,7 @@ _DEPTH = 4
 # of the rig's response, and a sample at most: what columns may be out of step by; more is a delay
 _OUT_OF_STEP = 0.05
 _MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of other stages are tried too
+_GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 
 
@@ -114,7 +115,11 @@ def explain(
     ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``:
     whether the input could be freed of its noise.
     """
-    problem, clues, guests = _held(rig, segment, logs), clues_for(segment, rig), guests_in(segment, rig)
+    problem, clues, guests = (
+        _read(_held(rig, segment, logs)),
+        clues_for(segment, rig),
+        guests_in(segment, rig),
+    )
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
     segment, given, converter = problem.segment, problem.nominal(), converter_of(problem, clues)
@@ -172,14 +177,26 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     return min(fits, key=lambda f: f.sse).problem
 
 
+def _read(problem: Problem) -> Problem:
+    """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. A
+    stage with parameters of its own has a gain."""
+    gauged = replace(problem, gauge=_GAUGE)
+    if len(problem.own_start) or not _seems_more(problem, problem.nominal()):
+        return problem
+    return problem if _seems_more(gauged, gauged.nominal()) else gauged
+
+
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
-    """All clues where inputs foretell something of the residual, or it is slower or less steady than noise
-    is; else none."""
+    """All clues where there seems to be more than noise; else none."""
+    return clues if _seems_more(base, vector) else []
+
+
+def _seems_more(base: Problem, vector: np.ndarray) -> bool:
+    """Whether inputs foretell something of the residual, or it is slower or less steady than noise is."""
     ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
     left, response = ground.residual(), base.references.clocks["response"]
     found = disturbance(left, base.segment.run.h, response)
-    restless = found.swings or found.hums or found.bursts
-    return clues if restless or ground.foretold > _TELLING else []
+    return found.swings or found.hums or found.bursts or ground.foretold > _TELLING
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from focgen.rig.effects import Excitation, Form, library
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.model import Rig
 
+_ZERO = 0.03  # of the level: an offset that is no fault
 _OFF = 3.0  # standard deviations that an input may be off in each way
 
 
@@ -49,8 +50,9 @@ class Problem:
     """Residuals of a segment under the rig with ``clues``.
 
     The vector: the rig's own parameters, the nuisances (the alignment of input and output, at most ``slack``
-    samples; where nothing of the segment has an offset of its own, one; how far a simulated input is off in
-    each of the ways it may be, in standard deviations), then every clue's parameters, all of order one.
+    samples; where nothing of the segment has an offset of its own, one, and its gauge's error, at most
+    ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in standard deviations),
+    then every clue's parameters, all of order one.
     """
 
     segment: Segment
@@ -59,11 +61,13 @@ class Problem:
     clues: tuple[Clue, ...] = ()
     memory: dict = field(default_factory=dict)
     slack: float = 1.0
+    gauge: float = 0.0
 
     def __post_init__(self):
         self.own_start = self.own.start()
-        self.has_offset = self.own.stage == "actuator" and len(self.own_start) > 0
-        self.nuisances = (1 if self.has_offset else 2) + self.segment.unsure.shape[1]
+        has_offset = self.own.stage == "actuator" and len(self.own_start) > 0
+        self.gauges = [] if has_offset else [_ZERO, self.gauge] if self.gauge else [_ZERO]
+        self.nuisances = 1 + len(self.gauges) + self.segment.unsure.shape[1]
 
     @cached_property
     def excitation(self) -> Excitation:
@@ -81,13 +85,11 @@ class Problem:
 
     def with_clues(self, clues: Sequence[Clue]) -> Problem:
         """The same segment under other effects."""
-        return Problem(self.segment, self.own, self.references, tuple(clues), self.memory, self.slack)
+        return replace(self, clues=tuple(clues))
 
     def thinned(self, factor: int) -> Problem:
         """The same on means of ``factor`` samples at a time."""
-        return Problem(
-            self.segment.thinned(factor), self.own, self.references, self.clues, slack=self.slack / factor
-        )
+        return replace(self, segment=self.segment.thinned(factor), memory={}, slack=self.slack / factor)
 
     def stretched(self, vector: np.ndarray, factor: float) -> np.ndarray:
         """``vector`` with its alignment, which is in samples, times ``factor``."""
@@ -107,8 +109,7 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
         low, high = self.own.bounds()
-        nuisance = [self.slack] if self.has_offset else [self.slack, 0.03]
-        nuisance += [_OFF] * self.segment.unsure.shape[1]
+        nuisance = [self.slack, *self.gauges, *[_OFF] * self.segment.unsure.shape[1]]
         low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
         for clue in self.clues:
             for p in clue.form.parameters:
@@ -156,9 +157,14 @@ class Problem:
         """The segment's output (n,), in the log's units."""
         chain = Chain(self.rig(vector), self.placed(vector), self.memory)
         own, segment = len(self.own_start), self.segment
-        zero = 0.0 if self.has_offset else vector[own + 1] * segment.level_out
-        x = self._entered(float(vector[own]), vector[self.head - segment.unsure.shape[1] : self.head])
-        return chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held) + zero
+        gauges, off = np.split(vector[own + 1 : self.head], [len(self.gauges)])
+        x = self._entered(float(vector[own]), off)
+        made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held)
+        return self._read(made, *gauges)
+
+    def _read(self, made: np.ndarray, zero: float = 0.0, gauge: float = 0.0) -> np.ndarray:
+        """What is read of a signal by gauges off by so much."""
+        return made * (1.0 + gauge) + zero * self.segment.level_out
 
     def _entered(self, shift: float, off: np.ndarray) -> np.ndarray:
         """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where

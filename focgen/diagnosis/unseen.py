@@ -15,7 +15,6 @@ import numpy as np
 from focgen.diagnosis import compose
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import Fit, Weighing, fit
-from focgen.diagnosis.problem import Problem
 from focgen.logs.experiment import Experiment
 from focgen.rig.model import Rig
 
@@ -59,5 +58,4 @@ def _without(e: Explanation, seen: np.ndarray) -> Explanation:
 def _fitted(best: Fit, ar: np.ndarray, seen: np.ndarray) -> Fit:
     problem, segment = best.problem, best.problem.segment
     masked = replace(segment, trust=segment.trust * seen)
-    blind = Problem(masked, problem.own, problem.references, problem.clues, problem.memory, problem.slack)
-    return fit(blind, best.vector, Weighing(ar), _ITERATIONS)
+    return fit(replace(problem, segment=masked), best.vector, Weighing(ar), _ITERATIONS)
