@@ -23,6 +23,9 @@ $(VENV)/ready-test: $(VENV)/ready
 demo: $(VENV)/ready            ## the whole chain on the example logs, into build/demo/
 	$(RUN) -m focgen demo --out build/demo
 
+# Several processes share the cores: one that spreads its sums over all of them waits for the others.
+test test-long: export OMP_NUM_THREADS = 1
+
 test: $(VENV)/ready-test       ## what continuous integration runs
 	$(RUN) -m pytest -n $(JOBS) -q
 

@@ -1,7 +1,8 @@
 """What parameters fitted to noise leave open of a simulated signal, which is the next stage's input.
 
-A refit of one stage is as sure as its noise allows. Where the next stage's output is measured with less noise,
-what is left open shows there, and looks like a fault of that stage unless its input may move by as much.
+A refit of one stage is as sure as its noise allows. Where the next stage's output is measured with less
+noise, what is left open shows there, and looks like a fault of that stage unless its input may move by as
+much.
 """
 
 from __future__ import annotations
