@@ -41,14 +41,19 @@ def generated(form: str, out: Path) -> dict[str, bytes]:
     return {str(p.relative_to(out)): p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
 
 
-def alike(one, other) -> bool:
-    """Equal, but for the last digits of what Fourier transforms have summed."""
+# What fitted weights lose when they are rounded: a difference of all but equal numbers, of which libraries
+# that sum in another order leave three digits. The rounded weights are in the C, which is compared as text.
+ROUNDED_OFF = {"weights": 2e-3, "operator_per_sample": 2e-3}
+
+
+def alike(one, other, loose, name=None) -> bool:
+    """Equal, but for the last digits of sums of Fourier transforms; ``loose``: tolerances by name."""
     if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(alike(one[k], other[k]) for k in one)
+        return one.keys() == other.keys() and all(alike(one[k], other[k], loose, k) for k in one)
     if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(alike, one, other))
+        return len(one) == len(other) and all(alike(a, b, loose) for a, b in zip(one, other))
     if isinstance(one, (int, float)) and isinstance(other, (int, float)):
-        return math.isclose(one, other, rel_tol=1e-9)
+        return math.isclose(one, other, rel_tol=loose.get(name, 1e-9))
     return one == other
 
 
@@ -70,7 +75,8 @@ def test_the_text_is_the_golden_one(form, tmp_path, request):
     for name, content in golden.items():
         assert found[name].decode() == content.decode(), name
     digests = manifest.pop("inputs"), expected.pop("inputs")
-    assert alike(manifest, expected) and digests[0].keys() == digests[1].keys()
+    loose = ROUNDED_OFF if form.startswith("exp") else {}
+    assert alike(manifest, expected, loose) and digests[0].keys() == digests[1].keys()
 
 
 def test_the_text_for_a_core_is_the_golden_one(tmp_path, request):
