@@ -56,7 +56,8 @@ def folder(plans, tmp_path_factory) -> Path:
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_not_a_warning(name, plans, folder, tmp_path):
     sources = [folder / f"{plan.name}.c" for plan in plans]
-    run(*compiler(name), *STRICT, "-O2", "-c", *sources, cwd=tmp_path)
+    for source in sources:  # one at a time: not every driver takes several
+        run(*compiler(name), *STRICT, "-O2", "-c", source, cwd=tmp_path)
     assert len(list(tmp_path.glob("*.o"))) == len(plans)
 
 
