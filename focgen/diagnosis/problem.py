@@ -51,8 +51,8 @@ class Problem:
 
     The vector: the rig's own parameters, the nuisances (the alignment of input and output, at most ``slack``
     samples; where nothing of the segment has an offset of its own, one, and its gauge's error, at most
-    ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in standard deviations),
-    then every clue's parameters, all of order one.
+    ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in standard
+    deviations), then every clue's parameters, all of order one.
     """
 
     segment: Segment
