@@ -66,7 +66,8 @@ class Problem:
     def __post_init__(self):
         self.own_start = self.own.start()
         has_offset = self.own.stage == "actuator" and len(self.own_start) > 0
-        self.gauges = [] if has_offset else [_ZERO, self.gauge] if self.gauge else [_ZERO]
+        zero = [] if has_offset else [_ZERO]
+        self.gauges = [*zero, self.gauge] if self.gauge else zero
         self.nuisances = 1 + len(self.gauges) + self.segment.unsure.shape[1]
 
     @cached_property
