@@ -11,6 +11,7 @@ import numpy as np
 
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import STEP, Weighing, innovations, jacobian
+from focgen.rig.kernels import products
 
 _FLAT = 1e-10  # of the largest: what information on parameters is none
 
@@ -21,8 +22,8 @@ def carried(e: Explanation) -> np.ndarray:
     problem, vector, weighing = e.best.problem, e.best.vector, Weighing(e.ar)
     now = innovations(problem, vector, weighing)
     low, high = problem.bounds()
-    rows = jacobian(problem, vector, now, weighing, low, high)
-    spread = _spread(rows @ rows.T, float(np.mean(now**2)))
+    rows = jacobian(problem, vector, now, weighing, low, high)  # the fit's own are of an earlier vector
+    spread = _spread(products(rows), float(np.mean(now**2)))
     made = problem.simulate(vector)
     moved = [problem.simulate(vector + STEP * direction) - made for direction in spread.T]
     ways = np.stack(moved, axis=1) / STEP

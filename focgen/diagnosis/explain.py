@@ -115,11 +115,8 @@ def explain(
     ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``:
     whether the input could be freed of its noise.
     """
-    problem, clues, guests = (
-        _read(_held(rig, segment, logs)),
-        clues_for(segment, rig),
-        guests_in(segment, rig),
-    )
+    problem = _gauged(_held(rig, segment, logs))
+    clues, guests = clues_for(segment, rig), guests_in(segment, rig)
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
     segment, given, converter = problem.segment, problem.nominal(), converter_of(problem, clues)
@@ -177,12 +174,12 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     return min(fits, key=lambda f: f.sse).problem
 
 
-def _read(problem: Problem) -> Problem:
+def _gauged(problem: Problem) -> Problem:
     """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. A
     stage with parameters of its own has a gain."""
-    gauged = replace(problem, gauge=_GAUGE)
     if len(problem.own_start) or not _seems_more(problem, problem.nominal()):
         return problem
+    gauged = replace(problem, gauge=_GAUGE)
     return problem if _seems_more(gauged, gauged.nominal()) else gauged
 
 
