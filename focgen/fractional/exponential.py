@@ -74,7 +74,8 @@ class ExponentialMemory:
         """Return h_j at the whole numbers ``lags`` ≥ 0, shape of ``lags``."""
         lags = np.asarray(lags)
         powers = np.array(self.poles) ** np.maximum(lags[..., None] - 1.0, 0.0)
-        return np.where(lags == 0, 1.0, powers @ np.array(self.weights))
+        # not a matrix product, whose last bit depends on how many lags are asked for
+        return np.where(lags == 0, 1.0, np.einsum("...k,k->...", powers, np.array(self.weights)))
 
     def frequency_response(self, omega) -> np.ndarray:
         """Complex gain at ``omega`` in rad per sample, 0 … π, shape of ``omega``."""
