@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,17 +12,19 @@ from scipy import fft
 from focgen.errors import FitError, LogError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
+from focgen.identification.between import Course, course_of, jumps_of, noise_level
+from focgen.identification.kernel import Kernels
 from focgen.logs.experiment import Experiment
 from focgen.rig.model import UNITY, Rig
 
-_HELD = 0.1  # share of samples in which a held input changes at most
-_JUMPS = 0.5  # share of its way that a held input makes in jumps at least
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
 _AWAY = 0.1  # of a step: nearer to one of its ends the input is at it
 _SURELY = 0.8  # of the samples before it is away: the last ones may be its beginning
 _SEVERAL = 10  # samples whose mean is a better rest than the first of them
 _DRIFT = 3.0  # standard errors of a slope: what is steeper does not rest
 _FEWEST = 30  # samples
+LOOKED_BACK = 4  # lengths of an experiment: how far before it its past is looked for
+_FOLLOWED = 8  # first samples of a moving input that a line is drawn through where they are noisy
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,28 +32,33 @@ class Excitation:
     """One experiment made ready: the input's powers as the dynamics see them, and the fitted signal.
 
     ``pressure`` (n,) is the input of the actuator, measured or through the regulator; ``before`` its constant
-    value ahead of the first sample; ``level`` the value it is stepped to. ``drives`` (powers, n) are
-    pressure^m − before^m, m = 1, 2, …, through the sensor where its output is fitted. ``hold`` says what they
-    do between samples, ``sensor_gain`` is the sensor's at rest (1 where the curvature is fitted).
+    value ahead of the first sample; ``level`` the value it is stepped to. ``course`` holds pressure^m − before^m,
+    m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1 where the curvature is.
     ``rest_shown``: whether the log begins before the first step, so that it shows the output's zero.
+    ``reference`` (n,) where a loop was closed.
     """
 
     name: str
     step: float
     pressure: np.ndarray
     measured: np.ndarray
-    drives: np.ndarray
-    hold: str
+    course: Course
     before: float
     level: float
     input_role: str
     fitted_role: str
-    sensor_gain: float
+    sensor: TransferFunction
     notes: tuple[str, ...] = ()
     rest_shown: bool = True
+    reference: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.measured)
+
+    @property
+    def powers(self) -> int:
+        """How many powers of the pressure drive it."""
+        return len(self.course.values)
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -69,36 +75,70 @@ class Excitation:
         """Whether it is a step between two levels, neither of them 0."""
         return min(map(abs, self.ends)) > _AWAY * abs(self.loaded)
 
+    @cached_property
+    def spread(self) -> float:
+        """The measured signal's standard deviation, its units."""
+        return float(np.std(self.measured))
+
+    def first_power(self) -> Excitation:
+        """The same, driven by K times the pressure alone."""
+        return self if self.powers == 1 else replace(self, course=self.course.row(0))
+
+    def respond(self, kernels: Kernels, rows: int = 3) -> np.ndarray:
+        """Convolve each power with the first ``rows`` kernels; shape (rows, powers, n)."""
+        return self._driven.respond(kernels, rows, len(self))
+
+    @cached_property
+    def _driven(self) -> Driven:
+        return Driven(self.course)
+
+    @cached_property
+    def stepped(self) -> Driven:
+        """A drive that steps to 1 at the first sample and stays for as long as pasts are looked back to."""
+        ones = np.ones((1, (LOOKED_BACK + 1) * len(self)))
+        course = course_of(ones, np.zeros(ones.shape[1], bool), held=True)
+        return Driven(course if self.sensor == UNITY else through(self.sensor, course, self.step))
+
     @property
-    def jumps(self) -> bool:
-        """Whether the input jumps at the first sample."""
-        return bool(np.any(self.drives[:, 0] != 0.0))
+    def sensor_gain(self) -> float:
+        """The sensor's gain at rest."""
+        return self.sensor.dc_gain
 
-    @cached_property
-    def _size(self) -> int:
-        return fft.next_fast_len(2 * len(self), real=True)
 
-    @cached_property
-    def _changes(self) -> np.ndarray:
-        return fft.rfft(np.diff(self.drives, axis=1), self._size)
+class Driven:
+    """A course, transformed once, to be convolved with many kernels."""
 
-    def respond(self, steps: np.ndarray | None, means: np.ndarray | None) -> np.ndarray:
-        """Convolve each drive with each kernel; shape (kernels, powers, n).
+    def __init__(self, course: Course):
+        self.course, self.count = course, course.values.shape[1]
+        self.size = fft.next_fast_len(2 * self.count, real=True)
+        self._parts = {  # the kernel of each part, and how many samples ahead of it the part is made
+            "steps": self._transformed(course.jumps, 1),
+            "means": self._transformed(course.straight, 1),
+            "bends": self._transformed(course.bends, 1),
+            "twists": self._transformed(course.twists, 1),
+        }
 
-        ``steps`` (kernels, ≥ n) are step responses at 0, h, …; ``means`` their means over the sample before
-        h, 2h, …. A held input needs ``steps``, a linear one ``means``, and ``steps`` as well where it jumps
-        at first.
-        """
-        n = len(self)
-        kernels = (steps if self.hold == "zero" else means)[:, : n - 1]
-        moved = fft.irfft(fft.rfft(kernels, self._size)[:, None, :] * self._changes, self._size)[
-            :, :, : n - 1
-        ]
-        out = np.zeros((len(kernels), len(self.drives), n))
-        out[:, :, 1:] = moved
-        if self.jumps:
-            out += steps[:, None, :n] * self.drives[None, :, :1]
-        return out
+    def _transformed(self, part: np.ndarray | None, first: int) -> np.ndarray | None:
+        if part is None or not np.any(part[:, first:]):
+            return None
+        return fft.rfft(part[:, first:], self.size)
+
+    def respond(self, kernels: Kernels, rows: int, count: int) -> np.ndarray:
+        """The response of each power to each of the first ``rows`` kernels; shape (rows, powers, count)."""
+        n, late = self.count, kernels.late
+        total = np.zeros((rows, len(self.course.values), n))
+        spectrum = 0.0
+        for kind, part in self._parts.items():
+            if part is not None:
+                kernel = getattr(kernels, kind)[:rows, : n - 1]
+                spectrum = spectrum + fft.rfft(kernel, self.size)[:, None, :] * part
+        if np.ndim(spectrum):
+            total[:, :, 1:] = fft.irfft(spectrum, self.size)[:, :, : n - 1]
+        if self.course.jumps_at_first:
+            total += kernels.steps[:rows, None, :n] * self.course.jumps[None, :, :1]
+        if late:
+            total = np.concatenate([np.zeros_like(total[:, :, :late]), total[:, :, :-late]], axis=2)
+        return total[:, :, :count]
 
 
 def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | None = None) -> Excitation:
@@ -109,26 +149,29 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
     first sample (None: as at the first sample). Raises LogError where a signal is constant or too short.
     """
     _check(experiment)
-    pressure, level_before, hold, role = _input(experiment, rig, before)
-    drives = np.array([pressure**m - level_before**m for m in range(1, powers + 1)])
+    pressure, level_before, jumps, held, role = _input(experiment, rig, before)
+    course = course_of(
+        np.array([pressure**m - level_before**m for m in range(1, powers + 1)]), jumps, held
+    )
     fitted = "curvature" if "curvature" in experiment else "output"
-    gain = 1.0
-    if fitted == "output" and rig.sensor != UNITY:
-        gain, drives, hold = _through_sensor(rig.sensor, drives, experiment.sample_time, hold)
+    sensor = rig.sensor if fitted == "output" else UNITY
+    if sensor != UNITY:
+        _check_rest(sensor)
+        course = through(sensor, course, experiment.sample_time)
     return Excitation(
         experiment.name,
         experiment.sample_time,
         pressure,
         experiment[fitted],
-        drives,
-        hold,
+        course,
         level_before,
         _level(pressure, level_before),
         role,
         fitted,
-        gain,
+        sensor,
         experiment.notes,
         before is None,
+        _varying_reference(experiment),
     )
 
 
@@ -142,6 +185,12 @@ def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:
     if np.ptp(values) == 0.0:
         return (0.0,)
     return (None,) if abs(values[0]) <= _AT_REST * np.abs(values).max() else (None, 0.0)
+
+
+def _varying_reference(experiment: Experiment) -> np.ndarray | None:
+    if "reference" not in experiment or np.ptp(experiment["reference"]) == 0.0:
+        return None
+    return experiment["reference"]
 
 
 def _check(experiment: Experiment) -> None:
@@ -159,72 +208,84 @@ def _check(experiment: Experiment) -> None:
         )
 
 
-def _input(experiment: Experiment, rig: Rig, before: float | None) -> tuple[np.ndarray, float, str, str]:
-    """The actuator's input: (samples, value before them, hold, role it comes from)."""
+def _input(experiment: Experiment, rig: Rig, before: float | None):
+    """The actuator's input: (samples, value before them, where it jumps, whether it is held, its role)."""
     if "pressure" in experiment:
-        values, hold = experiment["pressure"], hold_of(experiment["pressure"])
+        values = experiment["pressure"]
+        rest = _rest_of(values) if before is None else before
         if before is None:
-            values = np.concatenate([[_rest_of(values)], values[1:]])  # the first sample's noise is no step
-        return values, _value_before(values, before), hold, "pressure"
+            values = np.concatenate([[rest], values[1:]])  # the first sample's noise is no step
+        return values, rest, jumps_of(values), False, "pressure"
     command = experiment["command"]
-    rest = _value_before(command, before)
+    rest = float(command[0]) if before is None else before
     if rig.regulator == UNITY:
-        return command, rest, "zero", "command"
+        return command, rest, np.ones(len(command), bool), True, "command"
     gain = rig.regulator.dc_gain
     if not np.isfinite(gain):
         raise FitError("regulator", "integrates, so it has no rest to start from", "log the pressure")
-    moved = _through("regulator", rig.regulator, experiment.sample_time, "zero")(command - rest)
-    return gain * rest + moved, gain * rest, "linear", "command"
+    moved = _run("regulator", rig.regulator, experiment.sample_time, "zero", command - rest)
+    return gain * rest + moved, gain * rest, np.zeros(len(command), bool), False, "command"
 
 
-def _through(name: str, stage: TransferFunction, step: float, hold: str) -> Callable:
-    """What a stage makes of its input, as a function."""
-    convolution = Convolution(stage, step, hold)
-
-    def run(signal: np.ndarray) -> np.ndarray:
-        try:
-            return convolution.run(signal)
-        except ArithmeticError as reason:
-            raise FitError(name, f"cannot be simulated ({reason})", "check its num and den") from None
-
-    return run
+def _run(name: str, stage: TransferFunction, step: float, hold: str, signal: np.ndarray) -> np.ndarray:
+    """What a stage makes of its input, from rest."""
+    try:
+        return Convolution(stage, step, hold).run(signal)
+    except ArithmeticError as reason:
+        raise FitError(name, f"cannot be simulated ({reason})", "check its num and den") from None
 
 
-def _value_before(values: np.ndarray, before: float | None) -> float:
-    return float(values[0]) if before is None else before
+def through(sensor: TransferFunction, course: Course, step: float) -> Course:
+    """The course of what the sensor makes of ``course``.
+
+    A bend of coefficient c holds c/6 of a sample less than the straight line; what lies at both its ends is
+    lowered by c/12 instead, which a stage that is slow against the samples answers alike.
+    """
+    less = np.zeros_like(course.values)
+    if course.bends is not None:
+        less += course.bends / 12.0
+        less[:, :-1] += course.bends[:, 1:] / 12.0
+    jumped = np.cumsum(course.jumps, axis=1)
+    rows = [
+        _run("sensor", sensor, step, "zero", up) + _run("sensor", sensor, step, "linear", rest)
+        for up, rest in zip(jumped, course.values - jumped - less)
+    ]
+    at_once = np.any(course.jumps != 0.0, axis=0) & _feeds_through(sensor)
+    return course_of(np.array(rows), at_once)
+
+
+def _feeds_through(stage: TransferFunction) -> bool:
+    return stage.num[0].order == stage.den[0].order
+
+
+def _check_rest(sensor: TransferFunction) -> None:
+    if not np.isfinite(sensor.dc_gain):
+        raise FitError("sensor", "integrates, so it has no rest to start from", "log the curvature")
 
 
 def _rest_of(values: np.ndarray) -> float:
-    """The mean of the samples before the input moves; the first sample where it moves at once."""
+    """The input at the first sample, without its noise.
+
+    The mean of the samples before the input moves; where it moves at once, the begin of a line through the
+    first few, if they are noise about one.
+    """
     away = np.abs(values - values[0]) >= _AWAY * np.ptp(values)
     resting = values[: int(_SURELY * np.argmax(away))]
     if len(resting) < _SEVERAL or np.ptp(resting) == 0.0:
-        return float(values[0])
+        return _line_at_first(values)
     place = np.arange(len(resting)) - 0.5 * (len(resting) - 1)
     slope = float(place @ resting) / float(place @ place)
     steepest = _DRIFT * float(np.std(resting)) / math.sqrt(float(place @ place))
-    return float(np.mean(resting)) if abs(slope) <= steepest else float(values[0])
+    return float(np.mean(resting)) if abs(slope) <= steepest else _line_at_first(values)
 
 
-def hold_of(values: np.ndarray) -> str:
-    """ "zero" for an input that is held, else "linear".
-
-    A held one changes in few of its samples, and in jumps: not in two samples in a row, as a pressure does on
-    its way up that then rests.
-    """
-    way = np.abs(np.diff(values))
-    moves = np.pad(way > 0.0, 1)
-    jumps = way[moves[1:-1] & ~moves[:-2] & ~moves[2:]].sum()
-    few = np.count_nonzero(way) <= _HELD * len(values)
-    return "zero" if few and jumps >= _JUMPS * way.sum() else "linear"
-
-
-def _through_sensor(sensor: TransferFunction, drives: np.ndarray, step: float, hold: str) -> tuple:
-    gain = sensor.dc_gain
-    if not np.isfinite(gain):
-        raise FitError("sensor", "integrates, so it has no rest to start from", "log the curvature")
-    run = _through("sensor", sensor, step, hold)
-    return gain, np.array([run(drive) for drive in drives]), "linear"
+def _line_at_first(values: np.ndarray) -> float:
+    noise, first = noise_level(values), values[:_FOLLOWED]
+    if noise == 0.0 or np.any(jumps_of(values)[:_FOLLOWED]):
+        return float(values[0])
+    slope, begin = np.polyfit(np.arange(len(first)), first, 1)
+    off = first - begin - slope * np.arange(len(first))
+    return float(begin) if np.abs(off).max() <= _DRIFT * noise else float(values[0])
 
 
 def _level(pressure: np.ndarray, before: float) -> float:

@@ -1,4 +1,9 @@
-"""Levenberg–Marquardt fit of K/(T s^α + 1), eq. (3), to one experiment, or of one T and α to several."""
+"""Levenberg–Marquardt fit of K(p) p through e^(−Ls)/(T s^α + 1), eq. (3), to one experiment or several at once.
+
+Only log τ, α and the dead time L are searched (T = τ^α): for each trial the coefficients of K(p), an offset an
+experiment and the amounts of an unknown past follow by linear least squares and are projected out (Golub and
+Pereyra, 1973). The search begins at the best points of a coarse grid.
+"""
 
 from __future__ import annotations
 
@@ -6,189 +11,235 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
-from focgen.identification.kernel import step_means, step_responses
+from focgen.identification.feedback import instruments_of
 from focgen.identification.noise import ResidualModel, covariance, half_width, residual_model
+from focgen.identification.past import MOST_STEPS, Past, asks_for_past, best_time, columns, times
+from focgen.identification.problem import Point, Problem, delay_reach, starts
 
-_ALPHAS = (0.05, 1.95)
-_LONGEST = 60.0  # |log τ|, τ in s
-_STARTS = (0.75, 0.95)  # of α; T starts at the experiment's own rise
-_DOUBTFUL = 0.6  # residual over spread (1 − GOF) from which on a fit is repeated from the other start
+_ROUNDS = 60  # of Levenberg–Marquardt
+_DAMPED, _STIFF, _FREE = 1e-3, 1e9, 1e-9  # damping: at first, at most, at least
+_STILL = 1e-10  # largest step, in units of log τ, α and samples, at which a fit has converged
+_FLAT = 1e-13  # relative fall of the cost, likewise
+_RECONSIDERED = 3  # times that the pasts are chosen anew
+_EXACT = 1e-4  # of the spread: what is left below shows no past
+_EDGE = 1e-6  # distance of α from its bounds
+_INSTRUMENTED = 12  # rounds of the instrumental-variable fit
 
 
 @dataclass(frozen=True, eq=False)
 class FractionalFit:
-    """A fit of one experiment or several, which share T and α.
+    """A fit of one experiment or several, which share T, α, the gain's coefficients and the dead time.
 
-    ``K`` and ``offset`` (experiments,), ``T`` in s^alpha. ``half`` maps "T", "alpha" to half a 95 % interval
-    and "K", "offset" to those of each experiment (experiments,). ``K_covariance`` (experiments, experiments).
-    ``simulated``: the model's outputs.
+    ``gain`` (powers,): K(p) = gain[0] + gain[1] p + …; ``T`` in s^alpha, ``delay`` in s. ``half`` maps "T",
+    "alpha", "delay", "gain" (powers,) to half a 95 % interval, and "offset" to that of a single experiment.
+    ``gain_covariance`` (powers, powers). ``offset`` (experiments,), ``simulated``: the model's outputs;
+    ``pasts``: for each experiment the unknown past that was estimated, None where it began at rest.
+    ``by_reference``: whether a closed loop's reference was the instrument.
     """
 
-    K: np.ndarray
+    gain: np.ndarray
     T: float
     alpha: float
+    delay: float
     offset: np.ndarray
     half: dict[str, float | np.ndarray]
-    K_covariance: np.ndarray
+    gain_covariance: np.ndarray
     residuals: list[ResidualModel]
     simulated: list[np.ndarray]
+    pasts: tuple[Past | None, ...]
+    by_reference: bool = False
+
+    @property
+    def K(self) -> float:
+        """The gain of a fit with one power."""
+        return float(self.gain[0])
 
 
-def fit_fractional(experiments: Sequence[Excitation]) -> FractionalFit:
-    """Fit K and an offset to each experiment, T and α to all. Raises FitError where the data do not determine
-    them.
+def fit_fractional(
+    experiments: Sequence[Excitation],
+    delay: bool | float = False,
+    pasts: Sequence[Past | None] | None = None,
+) -> FractionalFit:
+    """Fit one K(p), T and α to all experiments, with an offset each.
+
+    ``delay``: whether a dead time is fitted, or its fixed value in s. ``pasts``: which experiments have an unknown
+    past; None: those whose data ask for it. Raises FitError where the data do not determine the parameters.
     """
-    problem = _Problem(experiments)
-    best = _best(problem)
-    _check(experiments, best)
-    return _finished(experiments, problem, best.x)
-
-
-class _Problem:
-    """Residuals and their exact derivatives in (log τ, α, K₁, c₁, K₂, c₂, …); T = τ^α.
-
-    Each experiment is scaled by its own spread, so that all weigh alike.
-    """
-
-    def __init__(self, experiments: Sequence[Excitation]):
-        self.experiments = experiments
-        self.weights = [1.0 / np.std(e.measured) for e in experiments]
-        self._at: tuple | None = None
-
-    def responses(self, log_tau: float, alpha: float) -> list[np.ndarray]:
-        """The unit response and its derivatives in log τ and α, (3, n) each experiment."""
-        found = []
-        for e in self.experiments:
-            held = e.hold == "zero"
-            steps = step_responses(log_tau, alpha, e.step, len(e)) if held or e.jumps else None
-            means = None if held else step_means(log_tau, alpha, e.step, len(e))
-            found.append(e.respond(steps, means)[:, 0])
-        return found
-
-    def _kept(self, x: np.ndarray) -> list[np.ndarray]:
-        """The responses at ``x``; beyond the edges of what makes sense, those at the edge."""
-        key = (float(np.clip(x[0], -_LONGEST, _LONGEST)), float(np.clip(x[1], *_ALPHAS)))
-        if self._at is None or self._at[0] != key:
-            self._at = key, self.responses(*key)
-        return self._at[1]
-
-    def residual(self, x: np.ndarray) -> np.ndarray:
-        """Model − measured, scaled, of all experiments in a row."""
-        parts = [
-            (x[2 + 2 * i] * r[0] + x[3 + 2 * i] - e.measured) * w
-            for i, (e, r, w) in enumerate(zip(self.experiments, self._kept(x), self.weights))
-        ]
-        return np.concatenate(parts)
-
-    def cost(self, x: np.ndarray) -> float:
-        """Sum of squares of :meth:`residual`."""
-        return float(np.sum(self.residual(x) ** 2))
-
-    def explains(self, x: np.ndarray) -> bool:
-        """Whether ``x`` makes sense and leaves little, so that no other start is worth its time."""
-        return _ALPHAS[0] < x[1] < _ALPHAS[1] and self.cost(x) < _DOUBTFUL**2 * sum(
-            map(len, self.experiments)
-        )
-
-    def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Derivatives of :meth:`residual`, (samples, parameters)."""
-        blocks = []
-        for i, (r, w) in enumerate(zip(self._kept(x), self.weights)):
-            block = np.zeros((r.shape[1], len(x)))
-            block[:, 0], block[:, 1] = x[2 + 2 * i] * r[1], x[2 + 2 * i] * r[2]
-            block[:, 2 + 2 * i], block[:, 3 + 2 * i] = r[0], 1.0
-            blocks.append(block * w)
-        return np.vstack(blocks)
-
-
-def _best(problem: _Problem):
-    """The fit from the better start; from the other one as well where that one leaves doubt."""
-    starts = sorted((_start(problem, alpha) for alpha in _STARTS), key=problem.cost)
-    runs = []
-    for start in starts:
-        runs.append(_fit_from(problem, start))
-        if runs[-1].success and problem.explains(runs[-1].x):
+    free, fixed = (delay, 0.0) if isinstance(delay, bool) else (False, float(delay))
+    problem = Problem(experiments, (None,) * len(experiments), free, fixed)
+    best = _searched(problem)
+    if pasts is not None and any(pasts):
+        problem, best = _with_pasts(problem, best, pasts)
+    for _ in range(_RECONSIDERED if pasts is None else 0):
+        asked = _pasts_asked_for(problem, best)
+        if asked == problem.pasts:
             break
-    return min(runs, key=lambda run: run.cost)
+        problem, best = _with_pasts(problem, best, asked)
+    _check(experiments, best)
+    return _finished(problem, best)
 
 
-def _fit_from(problem: _Problem, start: np.ndarray):
-    try:
-        return least_squares(
-            problem.residual,
-            start,
-            problem.jacobian,
-            method="lm",
-            x_scale="jac",
-            xtol=1e-10,
-            ftol=1e-12,
-            max_nfev=200,
-        )
-    except (ValueError, FloatingPointError, np.linalg.LinAlgError) as reason:
-        name = problem.experiments[0].name
-        raise FitError(name, f"the fit does not converge ({reason})", "look at the log") from None
+def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) -> tuple[Problem, Point]:
+    """The fit with these pasts, begun at the times that explain most; their prior weighed by what is left."""
+    begun = [*point.x[: problem.core]]
+    for i, (x, past) in enumerate(zip(problem.experiments, pasts)):
+        known = point.x[problem.of_past[i]]
+        begun += [*known][: past.steps if past else 0]
+        if past and past.steps > len(known):
+            grid = times(len(x))
+            made = columns(x, problem.kernels(point.x, i, past=True), grid, 1)[0]
+            left = x.measured - problem.simulated(point)[i]
+            begun += [np.log(grid[best_time(left, made)] + 1.0)] * (past.steps - len(known))
+    penalties = _long_run(problem, point)
+    for _ in range(2):
+        problem = Problem(problem.experiments, pasts, problem.delay_free, problem.delay, penalties)
+        point = _descended(problem, problem.inside(np.array(begun)))
+        penalties, begun = _long_run(problem, point), point.x
+    return problem, point
 
 
-def _start(problem: _Problem, alpha: float) -> np.ndarray:
-    """τ such that the slope of the measured signal's rise is met roughly; K and offset by linear least
-    squares.
-    """
-    log_tau = float(np.median([np.log(_rise_time(e)) for e in problem.experiments]))
-    x = [log_tau, alpha]
-    for e, r in zip(problem.experiments, problem.responses(log_tau, alpha)):
-        x += list(np.linalg.lstsq(np.column_stack([r[0], np.ones(len(e))]), e.measured, rcond=None)[0])
-    return np.array(x)
+def _searched(problem: Problem) -> Point:
+    """The best of the fits from the better starts of the coarse grid."""
+    runs = [_descended(problem, start) for start in starts(problem)]
+    return min(runs, key=lambda point: point.cost)
 
 
-def _rise_time(e: Excitation) -> float:
-    """Seconds from the input's half-way crossing to the output's, at least one sample."""
-    drive, out = np.abs(e.drives[0]), np.abs(e.measured - e.measured[: max(3, len(e) // 200)].mean())
-    begin = int(np.argmax(drive >= 0.5 * drive.max()))
-    late = int(np.argmax(out[begin:] >= 0.5 * out[begin:].max()))
-    return max(late, 1) * e.step
+def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Point:
+    """Levenberg–Marquardt on the searched parameters, the linear ones projected out."""
+    point, damping = problem.at(start), _DAMPED
+    for _ in range(rounds):
+        slope, left = problem.projected_slope(point)
+        sizes = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
+        while True:
+            rows = np.vstack([slope / sizes, np.sqrt(damping) * np.eye(len(sizes))])
+            step = -np.linalg.lstsq(rows, np.concatenate([left, np.zeros(len(sizes))]), rcond=None)[0] / sizes
+            trial = problem.at(problem.inside(point.x + problem.short(step)))
+            if trial.cost <= point.cost or damping > _STIFF:
+                break
+            damping *= 8.0
+        moved = float(np.max(np.abs(trial.x - point.x)))
+        if trial.cost > point.cost:
+            return point
+        fallen = point.cost - trial.cost
+        point, damping = trial, max(damping / 10.0, _FREE)
+        if moved <= _STILL or fallen <= _FLAT * point.cost:
+            return point
+    return point
 
 
-def _check(experiments: Sequence[Excitation], best) -> None:
+def _pasts_asked_for(problem: Problem, point: Point) -> tuple[Past | None, ...]:
+    """The pasts with a step more where the data ask for it, and without where they do not."""
+    reach = max(float(np.ptp(x.measured)) for x in problem.experiments)
+    made = problem.simulated(point)
+    return tuple(
+        _past_asked_for(problem, point, i, x.measured - made[i], reach)
+        for i, x in enumerate(problem.experiments)
+    )
+
+
+def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, reach: float) -> Past | None:
+    x, known = problem.experiments[i], problem.pasts[i]
+    if known is None and np.std(left) <= _EXACT * x.spread:
+        return None
+    made = columns(x, problem.kernels(point.x, i, past=True), times(len(x)), 1)[0]
+    if known is not None and not asks_for_past(x.measured - problem.from_rest(point, i), made, reach):
+        return None
+    steps = known.steps if known else 0
+    more = steps < MOST_STEPS and np.std(left) > _EXACT * x.spread and asks_for_past(left, made, reach)
+    return Past(steps + 1, reach) if more else known
+
+
+def _long_run(problem: Problem, point: Point) -> list[float]:
+    """The spectral density of each experiment's residual at rest: what a slow column is weighed against."""
+    models = [residual_model(part) for part in problem.residuals(point)]
+    return [m.variance / float(np.sum(m.a)) ** 2 for m in models]
+
+
+def _check(experiments: Sequence[Excitation], best: Point) -> None:
     names = ", ".join(e.name for e in experiments)
-    if not np.all(np.isfinite(best.x)):
+    if not (np.all(np.isfinite(best.x)) and np.isfinite(best.cost)):
         raise FitError(names, "the fit does not converge", "look at the log")
-    if not _ALPHAS[0] < best.x[1] < _ALPHAS[1]:
+    if not Problem.ALPHAS[0] + _EDGE < best.x[1] < Problem.ALPHAS[1] - _EDGE:
         what = f"the best order is at the edge of (0, 2): {best.x[1]:.3g}"
         raise FitError(names, what, "the log does not show such dynamics; look at its columns and its time")
 
 
-def _finished(experiments, problem: _Problem, x: np.ndarray) -> FractionalFit:
-    residual, jacobian = problem.residual(x), problem.jacobian(x)
-    ends = np.cumsum([len(e) for e in experiments])
-    models = [residual_model(part) for part in np.split(residual, ends[:-1])]
+def _finished(problem: Problem, point: Point) -> FractionalFit:
+    models = [residual_model(part) for part in problem.residuals(point)]
+    instruments = instruments_of(problem.experiments)
+    if instruments is not None:
+        point = _by_instruments(problem, point, instruments)
+        models = [residual_model(part) for part in problem.residuals(point)]
+    jacobians = problem.jacobians(point)
+    by = None if instruments is None else problem.jacobians(point, instruments)
     try:
-        spread = covariance(jacobian, models)
+        spread = covariance(jacobians, models, problem.penalties, by)
     except np.linalg.LinAlgError:
+        names = ", ".join(e.name for e in problem.experiments)
         raise FitError(
-            experiments[0].name, "the log does not determine K, T and alpha", "hold the step longer"
+            names, "the logs do not determine K, T and alpha", "record longer holds at more levels"
         ) from None
-    return _with_intervals(problem, x, spread, models)
+    return _with_intervals(problem, point, spread, models, instruments is not None)
 
 
-def _with_intervals(problem, x, spread, models) -> FractionalFit:
-    log_tau, alpha, K = x[0], x[1], x[2::2]
+def _by_instruments(problem: Problem, point: Point, instruments) -> Point:
+    """Make the residual orthogonal to what the reference alone would have moved (Ljung, 1999, §7.6)."""
+    for _ in range(_INSTRUMENTED):
+        by = np.vstack(problem.jacobians(point, instruments))
+        own = np.vstack(problem.jacobians(point))
+        left = np.concatenate(problem.projected_residuals(point))
+        step = np.linalg.solve(by.T @ own, by.T @ left)
+        searched = len(point.x)
+        x = problem.inside(point.x - problem.short(step[:searched]))
+        point = problem.at(x, point.gain - step[searched:])
+        if float(np.max(np.abs(step[:searched]))) < 1e-8:
+            break
+    return point
+
+
+def _with_intervals(problem: Problem, point: Point, spread, models, by_reference: bool) -> FractionalFit:
+    log_tau, alpha = point.x[:2]
     T = float(np.exp(alpha * log_tau))
-    slope = np.zeros(len(x))
+    searched = len(point.x)
+    slope = np.zeros(len(spread))
     slope[:2] = T * alpha, T * log_tau  # of T = exp(α log τ)
     effective = sum(m.effective for m in models)
-    wide = lambda variance: half_width(variance, effective, len(x))  # noqa: E731
-    gains = slice(2, None, 2)
+    count = len(spread) + len(models)
+    wide = lambda variance: half_width(variance, effective, count)  # noqa: E731
+    gains = slice(searched, searched + len(point.gain))
     half = {
         "T": float(wide(slope @ spread @ slope)),
         "alpha": float(wide(spread[1, 1])),
-        "K": wide(np.diag(spread)[gains]),
-        "offset": wide(np.diag(spread)[3::2]),
+        "delay": float(wide(spread[2, 2])) if problem.delay_free else 0.0,
+        "gain": wide(np.diag(spread)[gains]),
     }
-    simulated = [K[i] * r[0] + x[3 + 2 * i] for i, r in enumerate(problem.responses(log_tau, alpha))]
+    if len(problem.experiments) == 1:
+        half["offset"] = float(wide(_offset_variance(problem, point, models)))
     return FractionalFit(
-        K.copy(), T, float(alpha), x[3::2].copy(), half, spread[gains, gains], models, simulated
+        point.gain.copy(),
+        T,
+        float(alpha),
+        problem.delay_at(point.x),
+        np.array(point.offsets),
+        half,
+        spread[gains, gains],
+        models,
+        problem.simulated(point),
+        problem.pasts,
+        by_reference,
     )
+
+
+def _offset_variance(problem: Problem, point: Point, models) -> float:
+    """Of the offset of a single experiment."""
+    rows = problem.jacobians(point, offset=True)
+    try:
+        return float(covariance(rows, models, problem.penalties)[-1, -1])
+    except np.linalg.LinAlgError:
+        return float("inf")
+
+
+__all__ = ["FractionalFit", "delay_reach", "fit_fractional"]

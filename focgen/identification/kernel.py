@@ -1,49 +1,131 @@
-"""Step responses of 1/((τ s)^α + 1), with their derivatives in log τ and α, at every sample at once.
+"""Responses of e^(−Ls)/((τ s)^α + 1) to a step, with their derivatives in log τ and α, at every sample at once.
 
 Each is inverted from its own Laplace transform, so the derivatives are as exact as the response. For α > 1
 the pair of poles p = e^{±iπ/α}/τ leaves the negative real axis and is taken out in closed form.
+
+With S the step response and h the sample time, an input that does this in the sample 0 … 1 answers m samples
+after its begin with
+
+    a jump at 0                      S(m)
+    a straight rise to 1             ∫₀¹ S(m − x) dx                  "means"
+    a bend x (x − 1)                 ∫₀¹ S(m − x) (2x − 1) dx         "bends"
+    a bend x (x − 1)(2x − 1)         ∫₀¹ S(m − x) (6x² − 6x + 1) dx   "twists"
+
+Far from their begin the last two are the first and second derivative of S, over 6 and 60.
 """
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from focgen.fractional.contour import TOLERATED, inverse_laplace
-from focgen.fractional.loggrid import log_grid
+from focgen.fractional.loggrid import DIRECT, log_grid
 
 _GAUSS = np.polynomial.legendre.leggauss(5)
+_WEIGHTS = {  # of S(m − x) over the sample, as functions of x
+    "means": lambda x: 1.0,
+    "bends": lambda x: 2.0 * x - 1.0,
+    "twists": lambda x: 6.0 * x * x - 6.0 * x + 1.0,
+}
+
+
+class Kernels:
+    """The kernels for ``count`` samples of ``step`` s and a ``delay`` ≥ 0 in s, each made when it is asked for.
+
+    Rows: the response, its derivatives in log τ and α. ``steps`` at 0, h, … and ``means``, ``bends``,
+    ``twists`` at h, 2h, …, each (3, count); ``late``: whole samples by which all of it is still to be delayed.
+    """
+
+    def __init__(self, log_tau: float, alpha: float, step: float, count: int, delay: float = 0.0):
+        self._at, self.count = (log_tau, alpha, step), count
+        self.late = math.floor(delay / step)
+        self._part = delay / step - self.late
+
+    @cached_property
+    def steps(self) -> np.ndarray:
+        return _steps(*self._at, self.count, self._part)
+
+    @cached_property
+    def means(self) -> np.ndarray:
+        return _means(*self._at, self.count, self._part)
+
+    @cached_property
+    def bends(self) -> np.ndarray:
+        return self._curved[0]
+
+    @cached_property
+    def twists(self) -> np.ndarray:
+        return self._curved[1]
+
+    @cached_property
+    def _curved(self) -> tuple[np.ndarray, np.ndarray]:
+        return _curved(*self._at, self.means, self._part)
 
 
 @lru_cache(maxsize=16)
+def kernels(log_tau: float, alpha: float, step: float, count: int, delay: float = 0.0) -> Kernels:
+    """The :class:`Kernels`, kept for the next call."""
+    return Kernels(log_tau, alpha, step, count, delay)
+
+
 def step_responses(log_tau: float, alpha: float, step: float, count: int) -> np.ndarray:
     """Return S, ∂S/∂log τ, ∂S/∂α at 0, h, … (count − 1) h, shape (3, count)."""
-    grid = log_grid(count)
-    places = np.concatenate([grid.head, grid.tail]) * step
-    values = _inverted(log_tau, alpha, places, lambda s: 1.0)
-    out = np.zeros((3, count))
-    for row, value in zip(out, values):
-        row[1:] = grid.spread(value[: len(grid.head)], value[len(grid.head) :])[:-1]
-    if _pole_counts(alpha):
-        out += _oscillation(log_tau, alpha, step * np.arange(count), 0.0)
-        out[:, 0] = 0.0
-    return out
+    return _steps(log_tau, alpha, step, count, 0.0)
 
 
-@lru_cache(maxsize=16)
 def step_means(log_tau: float, alpha: float, step: float, count: int) -> np.ndarray:
     """Return the means of S, ∂S/∂log τ, ∂S/∂α over [(j − 1) h, j h], j = 1 … count, shape (3, count)."""
+    return _means(log_tau, alpha, step, count, 0.0)
+
+
+def _steps(log_tau: float, alpha: float, step: float, count: int, part: float) -> np.ndarray:
+    """S at (j − part) h, j = 0 … count − 1; 0 ahead of 0."""
+    grid = log_grid(max(count - 1, 1))
+    values = _inverted(log_tau, alpha, (np.concatenate([grid.head, grid.tail]) - part) * step, lambda s: 1.0)
+    out = np.zeros((3, count))
+    for row, value in zip(out, values):
+        row[1:] = grid.spread(value[: len(grid.head)], value[len(grid.head) :])[: count - 1]
+    if _pole_counts(alpha):
+        out[:, 1:] += _oscillation(log_tau, alpha, step * (np.arange(1, count) - part))
+    return out
+
+
+def _means(log_tau: float, alpha: float, step: float, count: int, part: float) -> np.ndarray:
     grid = log_grid(count)
-    integrals = _inverted(log_tau, alpha, grid.head * step, lambda s: 1.0 / s)
+    integrals = _inverted(log_tau, alpha, (grid.head - part) * step, lambda s: 1.0 / s)
     heads = np.diff(integrals, prepend=0.0) / step
     # beyond the first samples the contour bears the growth of e^{-sh}
-    tails = _inverted(log_tau, alpha, grid.tail * step, lambda s: -np.expm1(-s * step) / (s * step))
+    tails = _inverted(log_tau, alpha, (grid.tail - part) * step, lambda s: -np.expm1(-s * step) / (s * step))
     out = np.array([grid.spread(head, tail) for head, tail in zip(heads, tails)])
     if _pole_counts(alpha):
-        out += _oscillation(log_tau, alpha, step * np.arange(1, count + 1), step)
+        out += _swung(log_tau, alpha, step, count, part, "means")
     return out
+
+
+def _curved(log_tau, alpha, step: float, means: np.ndarray, part: float) -> tuple[np.ndarray, np.ndarray]:
+    """Bends and twists: exact for the first samples, by differences of the means beyond."""
+    ahead = np.pad(means, ((0, 0), (1, 1)), mode="edge")
+    bends = (ahead[:, :-2] - ahead[:, 2:]) / 12.0
+    twists = (ahead[:, :-2] - 2.0 * means + ahead[:, 2:]) / 60.0
+    first = min(DIRECT, means.shape[1])
+    places = (np.arange(1, first + 1) - part) * step
+    once, twice, thrice = (
+        np.pad(_inverted(log_tau, alpha, places, lambda s, k=k: s**-k) / step**k, ((0, 0), (1, 0)))
+        for k in (1.0, 2.0, 3.0)
+    )  # repeated integrals of S, at the ends of each sample
+    bends[:, :first] = -_sum(once) + 2.0 * np.diff(twice)
+    twists[:, :first] = np.diff(once) - 6.0 * _sum(twice) + 12.0 * np.diff(thrice)
+    if _pole_counts(alpha):
+        bends[:, :first] += _swung(log_tau, alpha, step, first, part, "bends")
+        twists[:, :first] += _swung(log_tau, alpha, step, first, part, "twists")
+    return bends, twists
+
+
+def _sum(values: np.ndarray) -> np.ndarray:
+    return values[:, 1:] + values[:, :-1]
 
 
 def _pole_counts(alpha: float) -> bool:
@@ -97,14 +179,22 @@ def _polar_images(s: np.ndarray, log_tau: float, alpha: float) -> tuple:
     return tuple(total)
 
 
-def _oscillation(log_tau: float, alpha: float, t: np.ndarray, span: float) -> np.ndarray:
-    """The poles' share at ``t``, or its mean over the ``span`` before it; shape (3, n)."""
+def _swung(log_tau: float, alpha: float, step: float, count: int, part: float, kind: str) -> np.ndarray:
+    """The poles' share of a kind of kernel, (3, count): its weighted mean over each sample."""
+    ends = np.arange(1, count + 1) - part
+    begins = np.maximum(ends - 1.0, 0.0)
+    total = np.zeros((3, count))
+    for place, weight in zip(*_GAUSS):
+        at = begins + 0.5 * (ends - begins) * (place + 1.0)
+        share = 0.5 * weight * (ends - begins) * _WEIGHTS[kind](ends - at)
+        total += share * _oscillation(log_tau, alpha, step * at)
+    return total
+
+
+def _oscillation(log_tau: float, alpha: float, t: np.ndarray) -> np.ndarray:
+    """The poles' share at ``t``; shape (3, n)."""
     pole, by_log_tau, by_alpha = _pole(log_tau, alpha)
-    places, weights = _GAUSS if span else ([1.0], [1.0])
-    single, double = np.zeros(len(t), complex), np.zeros(len(t), complex)  # e^{pt} and t e^{pt}
-    for place, weight in zip(places, weights):
-        at = t + 0.5 * span * (place - 1.0)
-        decayed = weight / np.sum(weights) * np.exp(pole * at)
-        single, double = single + decayed, double + at * decayed
+    single = np.exp(pole * t)
+    double = t * single
     rows = (-single / alpha, -by_log_tau / alpha * double, single / alpha**2 - by_alpha / alpha * double)
     return 2.0 * np.array(rows).real

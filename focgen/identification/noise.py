@@ -63,21 +63,31 @@ def residual_model(residual: np.ndarray) -> ResidualModel:
     return best
 
 
-def covariance(jacobian: np.ndarray, models: list[ResidualModel]) -> np.ndarray:
-    """Covariance (k, k) of the k parameters of a fit; ``jacobian`` (n, k) has the rows of all ``models`` in
-    order.
+def covariance(
+    jacobians: list[np.ndarray],
+    models: list[ResidualModel],
+    priors: list[float],
+    instruments: list[np.ndarray] | None = None,
+) -> np.ndarray:
+    """Covariance (k, k) of the k parameters of a fit.
 
-    The parameters' own number is taken off the degrees of freedom. Raises numpy.linalg.LinAlgError where the
-    parameters cannot be told apart.
+    ``jacobians``: of each experiment, (n, k), whose residual ``models`` describe; rows beyond a model's count
+    stand for a prior, whose residual is white with the variance in ``priors``. ``instruments``, shaped alike,
+    where the residual was made orthogonal to these. The parameters' own number is taken off the degrees of
+    freedom. Raises numpy.linalg.LinAlgError where the parameters cannot be told apart.
     """
-    bread = np.linalg.inv(jacobian.T @ jacobian)
-    meat, begin = np.zeros_like(bread), 0
-    for model in models:
-        rows = jacobian[begin : begin + model.count]
-        begin += model.count
-        spread = lfilter([1.0], model.a, rows[::-1], axis=0)  # Γ = σ² H Hᵀ, H the filter 1/a
-        meat += model.variance * spread.T @ spread
-    return bread @ meat @ bread * begin / (begin - jacobian.shape[1])
+    by = jacobians if instruments is None else instruments
+    bread = np.linalg.inv(sum(z.T @ j for z, j in zip(by, jacobians)))
+    meat = sum(_carried(z, model, prior) for z, model, prior in zip(by, models, priors))
+    count = sum(model.count for model in models)
+    return bread @ meat @ bread.T * count / max(count - bread.shape[0], 1)
+
+
+def _carried(rows: np.ndarray, model: ResidualModel, prior: float) -> np.ndarray:
+    """Zᵀ Γ Z, Γ the autocovariance of a residual and of the prior below it."""
+    spread = lfilter([1.0], model.a, rows[: model.count][::-1], axis=0)  # Γ = σ² H Hᵀ, H the filter 1/a
+    below = rows[model.count :]
+    return model.variance * spread.T @ spread + prior * below.T @ below
 
 
 def half_width(variance: np.ndarray | float, effective: float, parameters: int) -> np.ndarray | float:

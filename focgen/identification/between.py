@@ -1,0 +1,142 @@
+"""What an input does between its samples: jumps, straight lines and bends, read off the samples.
+
+A step of a gauge's noisy pressure is a step: the change stands alone and is far above the noise. Everything
+else is joined by curves, each from the polynomial through those six samples around it whose fifth difference is
+least (Harten's essentially non-oscillatory choice, J. Comput. Phys. 71, 1987), so that the kink where a pressure
+begins to rise spoils no neighbour. Where bends drown in noise the line is straight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+_FAR = 8.0  # standard deviations of a difference: a jump is larger
+_NEAR = 4.0  # standard deviations: a neighbour of a jump moves less than this …
+_QUIET = 0.1  # … or less than this share of the jump
+_SMALL = 0.02  # of the reach: a smaller change is no jump
+_SEEN = 5.0  # standard deviations: a bend below is noise
+_POINTS = (6, 4)  # of a polynomial; the second where a jump or the log's end leaves no room for the first
+_OFF_MIDDLE = 3.0  # a polynomial off the middle has to have a highest difference so much smaller
+_OF_FOURTH = 70.0**0.5  # standard deviation of white noise's fourth difference
+_NORMAL = 0.6745  # median of |x| of the normal distribution
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """An input as the dynamics see it; each (powers, n).
+
+    ``values`` at the samples; ``jumps`` at a sample, the first one included; in the sample that ends at each
+    index (0 at the first): ``straight``, the change made in a line, and ``bends``, ``twists``, the coefficients
+    of x (x − 1) and x (x − 1)(2x − 1) beside it, None where there are none.
+    """
+
+    values: np.ndarray
+    jumps: np.ndarray
+    straight: np.ndarray
+    bends: np.ndarray | None = None
+    twists: np.ndarray | None = None
+
+    @property
+    def jumps_at_first(self) -> bool:
+        """Whether the input jumps at the first sample."""
+        return bool(np.any(self.jumps[:, 0] != 0.0))
+
+    def row(self, which: int) -> Course:
+        """One power alone."""
+        parts = (None if part is None else part[which : which + 1] for part in vars(self).values())
+        return Course(*parts)
+
+
+def noise_level(values: np.ndarray) -> float:
+    """The standard deviation of a signal's white noise (n,), from its fourth differences; robust to jumps."""
+    if len(values) < 5:
+        return 0.0
+    return float(np.median(np.abs(np.diff(values, 4)))) / _NORMAL / _OF_FOURTH
+
+
+def jumps_of(values: np.ndarray) -> np.ndarray:
+    """Where a signal (n,) jumps: (n,) bool, true at the first sample after a jump.
+
+    A jump is far above the noise, and stands alone: a pressure on its way up moves in two samples in a row.
+    """
+    way = np.abs(np.diff(values))
+    noise = noise_level(values) * 2.0**0.5
+    before, after = np.pad(way, 1)[:-2], np.pad(way, 1)[2:]
+    large = way > max(_FAR * noise, _SMALL * float(np.ptp(values)))
+    alone = np.maximum(before, after) <= np.maximum(_NEAR * noise, _QUIET * way)
+    return np.concatenate([[False], large & alone])
+
+
+def course_of(powers: np.ndarray, jumps: np.ndarray, held: bool = False) -> Course:
+    """The course of inputs ``powers`` (m, n), 0 before their first sample, with ``jumps`` (n,) by
+    :func:`jumps_of`; ``held``: it changes in jumps only.
+    """
+    changes = np.diff(powers, axis=1, prepend=0.0)
+    at_once = np.ones(len(jumps), bool) if held else jumps.copy()
+    at_once[0] = True
+    jumped = np.where(at_once, changes, 0.0)
+    course = Course(powers, jumped, changes - jumped)
+    if held or np.all(at_once):
+        return course
+    bends, twists = zip(*(_bent(row, at_once) for row in powers))
+    if not np.any(bends):
+        return course
+    return replace(course, bends=np.array(bends), twists=np.array(twists))
+
+
+def _bent(values: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The coefficients of both bends in the sample that ends at each index, (n,) each."""
+    noise = noise_level(values)
+    bends, twists = np.zeros(len(values)), np.zeros(len(values))
+    open_yet = np.concatenate([[False], ~jumps[1:]])
+    for points in _POINTS:
+        if len(values) < points:
+            continue
+        found, bend, twist = _smoothest(values, jumps, points, noise)
+        fits = found & open_yet
+        bends[fits], twists[fits] = bend[fits], twist[fits]
+        open_yet &= ~found
+    return bends, twists
+
+
+def _smoothest(values: np.ndarray, jumps: np.ndarray, points: int, noise: float):
+    """Where a polynomial through ``points`` samples crosses no jump, and both bends from the one whose highest
+    difference is least; (n,) each."""
+    n = len(values)
+    windows = np.lib.stride_tricks.sliding_window_view(values, points)
+    crossed = np.cumsum(jumps[1:])  # jumps up to each sample
+    jumped = np.concatenate([[0], crossed])
+    whole = jumped[points - 1 :] == jumped[: n - points + 1]
+    highest = np.abs(np.diff(windows, points - 1, axis=1)[:, 0])
+    least = np.full(n, np.inf)
+    bends, twists = np.zeros(n), np.zeros(n)
+    for ahead in range(points - 1):  # samples of the polynomial ahead of the one that begins
+        weights = _weights(points, ahead)
+        off = 1.0 if 2 * ahead == points - 2 else _OFF_MIDDLE
+        size = np.full(n, np.inf)
+        size[ahead + 1 : ahead + 1 + len(windows)] = np.where(whole, off * highest, np.inf)
+        better = size < least
+        made = np.zeros((2, n))
+        made[:, ahead + 1 : ahead + 1 + len(windows)] = weights @ windows.T
+        seen = np.abs(made) > _SEEN * noise * np.linalg.norm(weights, axis=1)[:, None]
+        least = np.where(better, size, least)
+        bends = np.where(better, made[0] * seen[0], bends)
+        twists = np.where(better, made[1] * seen[1], twists)
+    return np.isfinite(least), bends, twists
+
+
+@cache
+def _weights(points: int, ahead: int) -> np.ndarray:
+    """What the samples −ahead … points − 1 − ahead weigh in the bend and the twist between 0 and 1; (2, points).
+
+    The bend c (x² − x) has the area of what the polynomial is below the straight line, c/6; the twist the
+    difference of its second derivatives at both ends, 12 times its coefficient.
+    """
+    power = np.arange(points)
+    inverse = np.linalg.inv((power - ahead)[:, None].astype(float) ** power)  # coefficients from samples
+    area = 1.0 / (power + 1.0) - 0.5 * ((power > 0) + 2.0 * (power == 0))
+    curving = np.where(power > 2, power * (power - 1.0), 0.0)
+    return np.array([-6.0 * area, curving / 12.0]) @ inverse

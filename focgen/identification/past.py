@@ -1,0 +1,86 @@
+"""The initial state: what an input before the first sample still does after it.
+
+The state that a fractional system starts from is its whole past. Here the past is a drive K(p) p that stepped once,
+or a few times, at unknown times before the first sample by unknown amounts within the drive's range. A step by a
+that was θ ago still lacks a (1 − S(t + θ)) of its way. A held level is such a past with θ = 0, a rest one without
+any step. More than a few steps are never needed: what they leave is ever smoother, so a few stand for many.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from focgen.identification.excitation import LOOKED_BACK, Excitation
+from focgen.identification.kernel import Kernels
+from focgen.identification.noise import residual_model
+
+MOST_STEPS = 3
+_ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
+
+
+@dataclass(frozen=True)
+class Past:
+    """A number of ``steps`` at unknown times, whose sizes are normal with standard deviation ``reach``, output
+    units."""
+
+    steps: int
+    reach: float
+
+
+def latest(x: Excitation) -> float:
+    """The longest time before the first sample that a past is looked for, samples."""
+    return float(LOOKED_BACK * len(x) - 2)
+
+
+def times(count: int) -> np.ndarray:
+    """A coarse grid of times before the first of ``count`` samples, in samples."""
+    powers = 2 ** np.arange(int(np.log2(LOOKED_BACK * count)))
+    return np.concatenate([[0], powers]).astype(float)
+
+
+def columns(x: Excitation, kernels: Kernels, when: np.ndarray, rows: int = 3) -> np.ndarray:
+    """What is left of unit steps made ``when`` (steps,) samples before the first one: (rows + 1, steps, n).
+
+    The last row is the derivative by log(when + 1).
+    """
+    n, whole = len(x), np.floor(when).astype(int)
+    answer = x.stepped.respond(kernels, rows, n + int(whole.max()) + 1)[:, 0]
+    at, later = (np.stack([answer[:, k : k + n] for k in whole + one], axis=1) for one in (0, 1))
+    left = at + (when - whole)[:, None] * (later - at)
+    left[0] -= x.sensor_gain
+    return np.concatenate([left, ((later - at)[:1] * (when + 1.0)[:, None])])
+
+
+def best_time(residual: np.ndarray, made: np.ndarray) -> int:
+    """Which of the columns ``made`` (times, n) takes most off a residual (n,), beside an offset."""
+    centred = made - made.mean(axis=1, keepdims=True)
+    sizes = np.maximum(np.linalg.norm(centred, axis=1), 1e-300)
+    return int(np.argmax(np.abs(centred @ (residual - residual.mean())) / sizes))
+
+
+def asks_for_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
+    """Whether what a fit leaves, (n,), asks for a past with columns like ``made`` (times, n).
+
+    The χ² that such a past would take off the whitened residual is compared with the number of free values that
+    the data really determine (Akaike's criterion), and a margin.
+    """
+    gained, free = _gain(residual, made * reach)
+    return gained > 2.0 * free + _ASKED
+
+
+def _gain(residual: np.ndarray, made: np.ndarray) -> tuple[float, float]:
+    """The χ² that columns of unit prior take off a residual beside its mean, and their effective number."""
+    basis = np.vstack([np.ones(len(residual)), made]).T
+    left = residual - basis @ np.linalg.lstsq(basis, residual, rcond=1e-6)[0]
+    model = residual_model(left)
+    order = len(model.a) - 1
+    white = lfilter(model.a, [1.0], np.column_stack([residual, basis]), axis=0)[order:]
+    white /= np.sqrt(model.variance)
+    mean = white[:, 1] / np.linalg.norm(white[:, 1])
+    white -= np.outer(mean, mean @ white)
+    left_singular, sizes, _ = np.linalg.svd(white[:, 2:], full_matrices=False)
+    share = sizes**2 / (1.0 + sizes**2)
+    return float(share @ (left_singular.T @ white[:, 0]) ** 2), float(np.sum(share))

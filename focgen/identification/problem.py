@@ -1,0 +1,334 @@
+"""The least-squares problem of K(p) p through e^(−Ls)/(T s^α + 1), linear parameters projected out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.identification.excitation import Excitation
+from focgen.identification.kernel import Kernels, kernels
+from focgen.identification.past import Past, columns, latest
+
+_LONGEST = 60.0  # |log τ|, τ in s
+_DELAYS = 0.25  # of the shortest experiment: dead times are looked for up to here
+_NUDGE = 0.02  # of a sample: for the derivative by the dead time
+_GRID_ALPHAS, _GRID_TAUS = (0.5, 0.9, 1.4), 8
+_GRID_SAMPLES = 30_000  # samples that the coarse grid looks at
+_SECOND = 4.0  # times the best cost: a start of another order is tried up to here
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A trial ``x``, see :class:`Problem`, and what follows from it linearly.
+
+    ``gain`` (powers,); ``offsets``, and ``amounts`` of the past's steps, of each experiment; ``cost``: the sum of
+    squares, scaled.
+    """
+
+    x: np.ndarray
+    gain: np.ndarray
+    offsets: list[float]
+    amounts: list[np.ndarray]
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Local:
+    """What an experiment has for itself, an offset and a past: an orthonormal basis of it, prior rows below."""
+
+    basis: np.ndarray
+    triangle: np.ndarray
+    rows: int
+
+    def without(self, columns: np.ndarray) -> np.ndarray:
+        """Columns (k, n) with the local ones projected out, prior rows appended: (k, n + rows)."""
+        padded = np.hstack([columns, np.zeros((len(columns), self.rows))])
+        return padded - (padded @ self.basis) @ self.basis.T
+
+    def amounts(self, left: np.ndarray) -> np.ndarray:
+        """The local coefficients that explain ``left`` (n,) best."""
+        padded = np.concatenate([left, np.zeros(self.rows)])
+        return np.linalg.solve(self.triangle, self.basis.T @ padded)
+
+
+class Problem:
+    """Experiments that share T, α, K(p) and the dead time, each scaled by its own spread so that all weigh alike.
+
+    ``x`` is (log τ, α), then the dead time in samples where it is ``delay_free``, then log(θ + 1), θ in samples,
+    of every step of a past. ``pasts``: an unknown past for each experiment, or None for a begin at rest;
+    ``penalties``: the variance (scaled) that weighs a past's prior against the data.
+    """
+
+    ALPHAS = (0.05, 1.95)
+
+    def __init__(
+        self,
+        experiments: Sequence[Excitation],
+        pasts: Sequence[Past | None],
+        delay_free: bool,
+        delay: float = 0.0,
+        penalties: Sequence[float] | None = None,
+    ):
+        self.experiments, self.pasts = tuple(experiments), tuple(pasts)
+        self.delay_free, self.delay = delay_free, delay
+        self.step = experiments[0].step
+        self.weights = [1.0 / x.spread for x in experiments]
+        self.penalties = list(penalties) if penalties is not None else [1e-4] * len(experiments)
+        self.core = 2 + delay_free
+        ends = self.core + np.cumsum([0, *(p.steps if p else 0 for p in self.pasts)])
+        self.of_past = [slice(int(a), int(b)) for a, b in zip(ends, ends[1:])]
+        self._low, self._high, self._most = self._edges()
+        self._store: dict = {}
+
+    def _edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The least and the largest ``x`` that make sense, and the longest step in one round."""
+        late = delay_reach(self.experiments) / self.step
+        rows = [(-_LONGEST, _LONGEST, 2.0), (*self.ALPHAS, 0.3)]
+        rows += [(0.0, late, 0.1 * late + 2.0)] * self.delay_free
+        for x, past in zip(self.experiments, self.pasts):
+            rows += [(0.0, float(np.log(latest(x))), 1.0)] * (past.steps if past else 0)
+        low, high, most = np.array(rows).T
+        return low, high, most
+
+    @property
+    def latest(self) -> float:
+        """The longest dead time that is looked for, samples."""
+        return delay_reach(self.experiments) / self.step
+
+    def inside(self, x: np.ndarray) -> np.ndarray:
+        """``x`` within what makes sense."""
+        return np.clip(x, self._low, self._high)
+
+    def short(self, step: np.ndarray) -> np.ndarray:
+        """A step no longer than the linear model can be trusted."""
+        return step / max(1.0, float(np.max(np.abs(step) / self._most)))
+
+    def delay_at(self, x: np.ndarray) -> float:
+        """The dead time in s."""
+        return float(x[2]) * self.step if self.delay_free else self.delay
+
+    def kernels(self, x: np.ndarray, i: int, nudge: float = 0.0, past: bool | None = None) -> Kernels:
+        """The kernels of experiment ``i``; ``nudge``: samples added to the dead time; ``past``: long enough for
+        the columns of one."""
+        run = self.experiments[i]
+        past = self.pasts[i] is not None if past is None else past
+        count = run.stepped.count if past else len(run)
+        delay = max(self.delay_at(x) + nudge * self.step, 0.0)
+        return kernels(float(x[0]), float(x[1]), run.step, count, delay)
+
+    # -- the value at a trial -------------------------------------------------------------------------------
+
+    def at(self, x: np.ndarray, gain: np.ndarray | None = None) -> Point:
+        """The trial ``x`` with the best ``gain``, or the one given."""
+        parts = [self._value(x, i) for i in range(len(self.experiments))]
+        if gain is None:
+            stacked = np.vstack([_triangle(np.vstack([drives, [target]])) for drives, target, _ in parts])
+            gain = np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0]
+        cost, offsets, amounts = 0.0, [], []
+        for i, (drives, target, local) in enumerate(parts):
+            left = target - gain @ drives
+            cost += float(left @ left)
+            raw = self.weights[i] * (self.experiments[i].measured - gain @ self._responses(x, i)[0])
+            found = local.amounts(raw)
+            offsets.append(float(found[0]))
+            amounts.append(found[1:])
+        return Point(np.array(x, float), gain, offsets, amounts, cost)
+
+    def _value(self, x: np.ndarray, i: int) -> tuple[np.ndarray, np.ndarray, _Local]:
+        """Drives and target of an experiment, scaled, its local columns projected out."""
+        local, w = self._local(x, i), self.weights[i]
+        rows = local.without(w * np.vstack([self._responses(x, i)[0], self.experiments[i].measured]))
+        return rows[:-1], rows[-1], local
+
+    def _responses(self, x: np.ndarray, i: int) -> np.ndarray:
+        """Rows × powers × n."""
+        make = lambda: self.experiments[i].respond(self.kernels(x, i))  # noqa: E731
+        return self._kept("responses", i, x[: self.core], make)
+
+    def _columns(self, x: np.ndarray, i: int) -> np.ndarray:
+        """Rows × steps × n of the past, the last row by log(θ + 1)."""
+        when = np.exp(x[self.of_past[i]]) - 1.0
+        make = lambda: columns(self.experiments[i], self.kernels(x, i), when)  # noqa: E731
+        return self._kept("past", i, np.append(x[: self.core], when), make)
+
+    def _local(self, x: np.ndarray, i: int, offset: bool = True) -> _Local:
+        make = lambda: self._made_local(x, i, offset)  # noqa: E731
+        return self._kept(f"local {offset}", i, np.append(x[: self.core], x[self.of_past[i]]), make)
+
+    def _made_local(self, x: np.ndarray, i: int, offset: bool) -> _Local:
+        n, w, past = len(self.experiments[i]), self.weights[i], self.pasts[i]
+        made = [np.full(n, w)] if offset else []
+        if past is None:
+            basis = np.array(made).reshape(len(made), n).T
+            sizes = np.linalg.norm(basis, axis=0)
+            return _Local(basis / sizes, np.diag(sizes), 0)
+        made = np.vstack([*made, w * self._columns(x, i)[0]])
+        prior = np.zeros((past.steps, len(made)))
+        prior[:, int(offset) :] = np.sqrt(self.penalties[i]) / past.reach * np.eye(past.steps)
+        return _Local(*np.linalg.qr(np.vstack([made.T, prior])), past.steps)
+
+    def _kept(self, what: str, i: int, x: np.ndarray, make):
+        """What was made for the last two trials."""
+        kept = self._store.setdefault((what, i), {})
+        key = x.tobytes()
+        if key not in kept:
+            while len(kept) > 1:
+                del kept[next(iter(kept))]
+            kept[key] = make()
+        return kept[key]
+
+    # -- derivatives ----------------------------------------------------------------------------------------
+
+    def _slopes(self, point: Point, i: int, run: Excitation | None = None) -> np.ndarray:
+        """Derivatives of an experiment's scaled output by those of ``x`` that it depends on; see :meth:`_own`."""
+        x, w = point.x, self.weights[i]
+        made = self._responses(x, i) if run is None else run.respond(self.kernels(x, i))
+        slopes = np.einsum("rmn,m->rn", made[1:], point.gain)
+        if self.pasts[i] is not None:
+            slopes = slopes + np.einsum("rjn,j->rn", self._columns(x, i)[1:3], point.amounts[i])
+        if self.delay_free:
+            slopes = np.vstack([slopes, self._by_delay(point, i, run or self.experiments[i])])
+        if self.pasts[i] is not None:
+            slopes = np.vstack([slopes, self._columns(x, i)[3] * point.amounts[i][:, None]])
+        return w * slopes
+
+    def _own(self, i: int) -> np.ndarray:
+        """Which of ``x`` an experiment depends on."""
+        here = self.of_past[i]
+        return np.concatenate([np.arange(self.core), np.arange(here.start, here.stop)])
+
+    def _by_delay(self, point: Point, i: int, run: Excitation) -> np.ndarray:
+        """The derivative by the dead time, a sample."""
+        low = min(_NUDGE, float(point.x[2]))
+        ends = []
+        for nudge in (_NUDGE, -low):
+            made = self.kernels(point.x, i, nudge)
+            value = point.gain @ run.respond(made, 1)[0]
+            if self.pasts[i] is not None:
+                when = np.exp(point.x[self.of_past[i]]) - 1.0
+                value = value + point.amounts[i] @ columns(self.experiments[i], made, when, 1)[0]
+            ends.append(value)
+        return (ends[0] - ends[1]) / (_NUDGE + low)
+
+    def jacobians(
+        self, point: Point, instruments: Sequence[Excitation | None] | None = None, offset: bool = False
+    ) -> list[np.ndarray]:
+        """Derivatives of each experiment's scaled output by x and gain, (n + prior rows, parameters), its local
+        columns projected out.
+
+        ``instruments``: experiments that take the place of the measured ones, None for those that stay.
+        ``offset``: the offset is the last column instead of being projected out.
+        """
+        found = []
+        for i, x in enumerate(self.experiments):
+            other = instruments[i] if instruments else None
+            w, slopes = self.weights[i], np.zeros((len(point.x), len(x)))
+            drives = self._responses(point.x, i) if other is None else other.respond(self.kernels(point.x, i))
+            slopes[self._own(i)] = self._slopes(point, i, other)
+            rows = [slopes, w * drives[0]]
+            if offset:
+                rows.append(np.full((1, len(x)), w))
+            found.append(self._local(point.x, i, not offset).without(np.vstack(rows)).T)
+        return found
+
+    def projected_slope(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
+        """The derivative of the projected residual by ``x``, and that residual, compressed to a few rows."""
+        parts, powers = [], len(point.gain)
+        for i in range(len(self.experiments)):
+            drives, target, local = self._value(point.x, i)
+            slopes = local.without(self._slopes(point, i))
+            triangle = _triangle(np.vstack([drives, slopes, [target - point.gain @ drives]]))
+            whole = np.zeros((len(triangle), powers + len(point.x) + 1))
+            places = [*range(powers), *(powers + self._own(i)), whole.shape[1] - 1]
+            whole[:, places] = triangle
+            parts.append(whole)
+        triangle = _triangle(np.vstack(parts).T)
+        below = triangle[powers:, powers:]  # what the gain cannot make up for
+        return below[:, :-1], -below[:, -1]
+
+    # -- results --------------------------------------------------------------------------------------------
+
+    def projected_residuals(self, point: Point) -> list[np.ndarray]:
+        """Model − measured of each experiment, scaled, its local columns projected out, prior rows below."""
+        values = [self._value(point.x, i) for i in range(len(self.experiments))]
+        return [point.gain @ drives - target for drives, target, _ in values]
+
+    def from_rest(self, point: Point, i: int) -> np.ndarray:
+        """The output of experiment ``i`` without offset and past."""
+        return point.gain @ self._responses(point.x, i)[0]
+
+    def simulated(self, point: Point) -> list[np.ndarray]:
+        """The model's output in each experiment, offset and past included."""
+        found = []
+        for i in range(len(self.experiments)):
+            y = self.from_rest(point, i) + point.offsets[i]
+            if self.pasts[i] is not None:
+                y = y + point.amounts[i] @ self._columns(point.x, i)[0]
+            found.append(y)
+        return found
+
+    def residuals(self, point: Point) -> list[np.ndarray]:
+        """Model − measured of each experiment, scaled."""
+        made = self.simulated(point)
+        return [w * (y - x.measured) for w, y, x in zip(self.weights, made, self.experiments)]
+
+
+def delay_reach(experiments: Sequence[Excitation]) -> float:
+    """The longest dead time that is looked for, s."""
+    return _DELAYS * min(len(x) * x.step for x in experiments)
+
+
+def _triangle(columns: np.ndarray) -> np.ndarray:
+    """R of the QR decomposition of columns (k, n)."""
+    return np.linalg.qr(columns.T, mode="r")
+
+
+def starts(problem: Problem) -> list[np.ndarray]:
+    """The best point of a coarse grid, and the best of another order where it comes near."""
+    few = _fewer(problem)
+    found = sorted((_best_of_order(few, alpha) for alpha in _GRID_ALPHAS), key=lambda each: each[0])
+    return [x for cost, x in found[:2] if cost <= _SECOND * found[0][0]]
+
+
+def _fewer(problem: Problem) -> Problem:
+    """The problem with as many experiments as the grid looks at."""
+    chosen, total = [], 0
+    for x in problem.experiments:
+        if chosen and total + len(x) > _GRID_SAMPLES:
+            break
+        chosen.append(x)
+        total += len(x)
+    return Problem(chosen, (None,) * len(chosen), problem.delay_free, problem.delay)
+
+
+def _best_of_order(problem: Problem, alpha: float) -> tuple[float, np.ndarray]:
+    longest = max(len(x) * x.step for x in problem.experiments)
+    taus = np.geomspace(2.0 * problem.step, longest, _GRID_TAUS)
+    return min((_best_delay(problem, np.log(tau), alpha) for tau in taus), key=lambda each: each[0])
+
+
+def _best_delay(problem: Problem, log_tau: float, alpha: float) -> tuple[float, np.ndarray]:
+    """Cost and place of the best dead time on the grid, in whole samples."""
+    lags = [0]
+    if problem.delay_free:
+        lags += sorted({int(round(k)) for k in np.geomspace(1.0, max(problem.latest, 1.0), 12)})
+    x = np.array([log_tau, alpha, 0.0])[: 2 + problem.delay_free]
+    made = [run.respond(problem.kernels(x, i), 1)[0] for i, run in enumerate(problem.experiments)]
+    costs = [_cost_of(problem, made, lag) for lag in lags]
+    best = int(np.argmin(costs))
+    if problem.delay_free:
+        x[2] = lags[best]
+    return costs[best], x
+
+
+def _cost_of(problem: Problem, made: list[np.ndarray], lag: int) -> float:
+    """The sum of squares where each response comes ``lag`` samples later."""
+    parts = []
+    for run, response, w in zip(problem.experiments, made, problem.weights):
+        late = np.hstack([np.zeros((len(response), lag)), response])[:, : len(run)]
+        rows = w * np.vstack([late, run.measured])
+        parts.append(_triangle(rows - rows.mean(axis=1, keepdims=True)))
+    triangle = _triangle(np.vstack(parts).T)
+    return float(triangle[-1, -1] ** 2)
