@@ -84,6 +84,10 @@ class Excitation:
         """The same, driven by K times the pressure alone."""
         return self if self.powers == 1 else replace(self, course=self.course.row(0))
 
+    def bare(self) -> Excitation:
+        """A copy without what was made along the way, to be sent to another process."""
+        return replace(self)
+
     def respond(self, kernels: Kernels, rows: int = 3) -> np.ndarray:
         """Convolve each power with the first ``rows`` kernels; shape (rows, powers, n)."""
         return self._driven.respond(kernels, rows, len(self))

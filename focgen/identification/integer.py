@@ -26,6 +26,7 @@ SHAPES = tuple((poles, zeros) for poles in (1, 2, 3) for zeros in range(poles))
 _STARTS = {1: (0.1,), 2: (0.02, 0.12, 0.6), 3: (0.015, 0.08, 0.5)}  # time constants, times the length
 _FASTEST, _SLOWEST = 3.0, 30.0  # a pole's rate: per sample, and times the length
 _APART = 1e-6  # relative distance of two poles, nearer than which they are taken apart
+_SEARCHED = 2000  # samples that the search from every start looks at
 _FIRST_ROUNDS, _ROUNDS = 8, 25  # of Levenberg–Marquardt: from every start, and from the best
 
 
@@ -74,9 +75,10 @@ def fit_integer_models(experiment: Excitation, has_offset: bool = True) -> tuple
 
 def _best(problem: _Projected, starts: list[np.ndarray]) -> np.ndarray:
     """A few rounds from every start, then the best of them to its end."""
-    runs = [run for start in starts if (run := _run(problem, start, _FIRST_ROUNDS)) is not None]
+    stride = max(1, len(problem.experiment) // _SEARCHED)
+    runs = [run for start in starts if (run := _run(problem, start, _FIRST_ROUNDS, stride)) is not None]
     best = min(runs, key=lambda run: run.cost, default=None)
-    if best is not None and not best.success:
+    if best is not None and (stride > 1 or not best.success):
         best = _run(problem, best.x, _ROUNDS) or best
     if best is None:
         name = shape_name(problem.poles, problem.zeros)
@@ -84,10 +86,11 @@ def _best(problem: _Projected, starts: list[np.ndarray]) -> np.ndarray:
     return best.x
 
 
-def _run(problem: _Projected, start: np.ndarray, rounds: int):
+def _run(problem: _Projected, start: np.ndarray, rounds: int, stride: int = 1):
+    most = rounds * (len(start) + 1)
     try:
         return least_squares(
-            problem.residual, start, method="lm", xtol=1e-6, ftol=1e-8, max_nfev=rounds * (len(start) + 1)
+            problem.residual, start, method="lm", xtol=1e-6, ftol=1e-8, max_nfev=most, args=(stride,)
         )
     except (ValueError, np.linalg.LinAlgError):
         return None
@@ -143,29 +146,30 @@ class _Projected:
         """``x`` with every coefficient within what the record can tell."""
         return np.clip(x, *self.edges)
 
-    def basis(self, x: np.ndarray) -> np.ndarray:
-        """Responses to the input of s^zeros/den, …, 1/den, and 1 for an offset; (n, zeros + 1 or 2)."""
+    def basis(self, x: np.ndarray, stride: int = 1) -> np.ndarray:
+        """Responses to the input of s^zeros/den, …, 1/den, and 1 for an offset, at every ``stride``-th sample;
+        (samples, zeros + 1 or 2)."""
         poles = _apart(_poles(self.poles, self.inside(x)))
-        single = [_respond(p, self.experiment) for p in poles]
+        single = [_respond(p, self.experiment)[::stride] for p in poles]
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
         weights = poles ** np.arange(self.zeros, -1, -1)[:, None] / np.array(slopes)
         rows = np.einsum(
             "kp,pn->kn", weights, np.array(single)
         ).real  # too little for BLAS to share among threads
-        constant = [np.ones(len(self.experiment))] * self.has_offset
+        constant = [np.ones(rows.shape[1])] * self.has_offset
         return np.column_stack([*rows, *constant])
 
-    def best(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def best(self, x: np.ndarray, stride: int = 1) -> tuple[np.ndarray, np.ndarray]:
         """Basis and the linear coefficients that fit best."""
-        basis = self.basis(x)
+        basis = self.basis(x, stride)
         sizes = np.linalg.norm(basis, axis=0)
         q, r = np.linalg.qr(basis / sizes)
-        return basis, solve_triangular(r, q.T @ self.experiment.measured) / sizes
+        return basis, solve_triangular(r, q.T @ self.experiment.measured[::stride]) / sizes
 
-    def residual(self, x: np.ndarray) -> np.ndarray:
-        """Model − measured, in units of the measured signal's spread."""
-        basis, linear = self.best(x)
-        return (basis @ linear - self.experiment.measured) / self.spread
+    def residual(self, x: np.ndarray, stride: int = 1) -> np.ndarray:
+        """Model − measured at every ``stride``-th sample, in units of the measured signal's spread."""
+        basis, linear = self.best(x, stride)
+        return (basis @ linear - self.experiment.measured[::stride]) / self.spread
 
     def finished(self, x: np.ndarray) -> IntegerFit:
         """The fit in units of seconds."""
@@ -187,13 +191,13 @@ def _apart(poles: np.ndarray) -> np.ndarray:
 
 
 def _respond(pole: complex, experiment: Excitation) -> np.ndarray:
-    """1/(s − pole) at the samples, exactly for the input's hold; time in samples."""
+    """1/(s − pole) at the samples, exactly for jumps and straight lines; time in samples."""
     if pole.imag == 0.0:
         pole = pole.real  # half the work
-    drive, decay = experiment.drives[0], np.exp(pole)
-    mean = np.expm1(pole) / pole
-    if experiment.hold == "zero":
-        return lfilter([0.0, mean], [1.0, -decay], drive.astype(type(decay)))
-    late = (mean - 1.0) / pole if abs(pole) > 1e-4 else 0.5 + pole / 6.0  # weight of a sample's end
-    first = lfilter([late, mean - late], [1.0, -decay], drive.astype(type(decay)))
-    return first - late * drive[0] * decay ** np.arange(len(drive)) if drive[0] else first
+    course, decay = experiment.course, np.exp(pole)
+    mean = np.expm1(pole) / pole  # weight of what is there throughout a sample …
+    late = (mean - 1.0) / pole if abs(pole) > 1e-4 else 0.5 + pole / 6.0  # … and of a line that rises to 1
+    held = lfilter([0.0, mean], [1.0, -decay], course.values[0].astype(type(decay)))
+    if not np.any(course.straight[0]):
+        return held
+    return held + lfilter([late], [1.0, -decay], course.straight[0].astype(type(decay)))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from focgen.identification.integer import IntegerFit
+from focgen.identification.past import Past
+from focgen.identification.stages import StageFit
 from focgen.rig.model import Rig
 
 Span = tuple[float, float]
@@ -14,13 +17,13 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class ExperimentFit:
-    """K/(T s^alpha + 1) fitted to one experiment.
+    """K/(T s^alpha + 1) fitted to one experiment by itself.
 
     ``K`` in output per pressure units, ``T`` in s^alpha, ``level`` the pressure it was stepped to, or
     released from; ``ci95`` maps K, T and alpha to 95 % intervals. ``fitted`` and ``driven_by`` are the roles
     fitted and driving.
     ``time`` (n,) in s, ``pressure``, ``measured`` and ``simulated`` (n,). ``step`` says whether it is a step,
-    which K(p) is drawn through.
+    ``past`` whether an unknown past was estimated. ``integer``: the integer-order models, if asked for.
     """
 
     name: str
@@ -39,24 +42,28 @@ class ExperimentFit:
     simulated: np.ndarray
     integer: tuple[IntegerFit, ...]
     step: bool
+    past: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Pooled:
-    """One T and alpha for all steps, and the gain polynomial through their K.
+class Joint:
+    """One K(p), T, alpha and dead time for all experiments: the actuator that is written.
 
-    ``ci95`` maps T, alpha and gain to 95 % intervals, ``K`` (with intervals ``K_ci95``) belongs to the steps
-    in order.
+    ``delay`` in s. ``ci95`` maps T, alpha, delay and gain to 95 % intervals. ``gain_r2`` is that of the line
+    through the single fits' K, None with fewer than two of them. ``simulated``, by experiment: its output, offset
+    and initial state included. ``pasts``: the experiments that began with an unknown past. ``by_reference``:
+    whether a closed loop's reference was the instrument.
     """
 
     T: float
     alpha: float
+    delay: float
     gain: tuple[float, ...]
-    gain_r2: float
+    gain_r2: float | None
     ci95: dict[str, Span | tuple[Span, ...]]
-    K: tuple[float, ...]
-    K_ci95: tuple[Span, ...]
     simulated: dict[str, np.ndarray]
+    pasts: Mapping[str, Past]
+    by_reference: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,16 +82,18 @@ class Unseen:
 class Identification:
     """The identified ``rig``, what it rests on, and how it compares with integer-order models.
 
-    ``gof`` maps a model ("fom", "iom_1p", …, "rig" for the pooled one) to experiment → GOF, with "mean";
+    ``gof`` maps a model ("fom", "iom_1p", …, "rig" for the joint one) to experiment → GOF, with "mean";
     ``bic`` likewise for Schwarz's criterion (smaller is better). ``warnings``: what these logs cannot show.
-    ``unseen``: logs it was not fitted to.
+    ``unseen``: logs it was not fitted to. ``stages``: regulator and sensor, where asked for. ``joint`` is None
+    where the actuator was not.
     """
 
     experiments: tuple[ExperimentFit, ...]
-    pooled: Pooled
+    joint: Joint | None
     rig: Rig
     gof: dict[str, dict[str, float]]
     bic: dict[str, dict[str, float]]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     unseen: tuple[Unseen, ...] = ()
+    stages: dict[str, StageFit] = field(default_factory=dict)

@@ -64,23 +64,31 @@ def best_time(residual: np.ndarray, made: np.ndarray) -> int:
 def asks_for_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
     """Whether what a fit leaves, (n,), asks for a past with columns like ``made`` (times, n).
 
-    The χ² that such a past would take off the whitened residual is compared with the number of free values that
-    the data really determine (Akaike's criterion), and a margin.
+    The χ² that such a past takes off the whitened residual is compared with the number of free values that the
+    data really determine (Akaike's criterion), and a margin. What a model that is not quite true leaves is no
+    stationary noise, though. So the best single step has to take off enough of the residual itself, too, counted
+    in as many samples as its rest is worth.
     """
-    gained, free = _gain(residual, made * reach)
-    return gained > 2.0 * free + _ASKED
-
-
-def _gain(residual: np.ndarray, made: np.ndarray) -> tuple[float, float]:
-    """The χ² that columns of unit prior take off a residual beside its mean, and their effective number."""
     basis = np.vstack([np.ones(len(residual)), made]).T
-    left = residual - basis @ np.linalg.lstsq(basis, residual, rcond=1e-6)[0]
-    model = residual_model(left)
-    order = len(model.a) - 1
-    white = lfilter(model.a, [1.0], np.column_stack([residual, basis]), axis=0)[order:]
-    white /= np.sqrt(model.variance)
-    mean = white[:, 1] / np.linalg.norm(white[:, 1])
-    white -= np.outer(mean, mean @ white)
-    left_singular, sizes, _ = np.linalg.svd(white[:, 2:], full_matrices=False)
+    model = residual_model(residual - basis @ np.linalg.lstsq(basis, residual, rcond=1e-6)[0])
+    white = lfilter(model.a, [1.0], np.column_stack([residual, basis]), axis=0)[len(model.a) - 1 :]
+    gained, free = _gain(white / np.sqrt(model.variance), reach)
+    return gained > 2.0 * free + _ASKED and _worth(residual, made[best_time(residual, made)]) > _ASKED
+
+
+def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
+    """χ² that the columns take off and their effective number; ``rows``: residual, offset, columns, in units of
+    the noise."""
+    mean = rows[:, 1] / np.linalg.norm(rows[:, 1])
+    rows = rows - np.outer(mean, mean @ rows)
+    singular, sizes, _ = np.linalg.svd(reach * rows[:, 2:], full_matrices=False)
     share = sizes**2 / (1.0 + sizes**2)
-    return float(share @ (left_singular.T @ white[:, 0]) ** 2), float(np.sum(share))
+    return float(share @ (singular.T @ rows[:, 0]) ** 2), float(np.sum(share))
+
+
+def _worth(residual: np.ndarray, column: np.ndarray) -> float:
+    """What one column takes off a residual, over the variance of what is left, in effective samples."""
+    basis = np.column_stack([np.ones(len(residual)), column])
+    left = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
+    taken = float(np.var(residual)) / max(float(np.var(left)), 1e-300) - 1.0
+    return taken * residual_model(left).effective

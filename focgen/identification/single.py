@@ -1,0 +1,94 @@
+"""Every experiment fitted by itself, for Table I: K/(T s^α + 1) and integer-order models."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+
+from focgen.errors import FitError
+from focgen.identification.excitation import Excitation
+from focgen.identification.fractional import FractionalFit, fit_fractional
+from focgen.identification.integer import IntegerFit, fit_integer_models
+from focgen.identification.model import ExperimentFit
+from focgen.identification.past import Past
+from focgen.identification.quality import gof
+from focgen.progress import track
+
+_STEADY = 0.1  # of the step: nearer to its level than this, the input is at it
+_STAY = 0.15  # of the experiment: a step's input stays at its level at least so long
+_CLEAR = 1.5  # half 95 % intervals, beyond which an offset is there (one in 300 by chance)
+_NO_OFFSET = 1e-3  # of the measured reach: an offset below this is none
+_WORTH_PROCESSES = 20_000  # samples of all experiments: fewer are done before processes have started
+
+
+def fit_each(
+    excitations: Sequence[Excitation], pasts: Sequence[Past | None], delay: float, integer: bool
+) -> tuple[list[ExperimentFit], list[str]]:
+    """Fit each experiment; also the names of those that do not determine K, T and α by themselves.
+
+    ``pasts`` and ``delay`` (s) as found from all together; ``integer``: integer-order models, too.
+    """
+    fits, failed = [], []
+    singles = [x.first_power() for x in excitations]
+    for x, past in track(list(zip(singles, pasts)), "fitting experiment"):
+        try:
+            fits.append(fit_fractional([x], delay, [past]))
+        except FitError:
+            fits.append(None)
+            failed.append(x.name)
+    done = [(x, fit) for x, fit in zip(singles, fits) if fit is not None]
+    models = _integer_models(done) if integer else [()] * len(done)
+    return [_experiment_fit(x, fit, more) for (x, fit), more in zip(done, models)], failed
+
+
+def is_step(x: Excitation) -> bool:
+    """Whether the input stays at its level for a good part of the time without a break."""
+    there = np.abs(x.pressure - x.level) <= _STEADY * abs(x.level - x.before)
+    ends = np.flatnonzero(~np.concatenate([[False], there, [False]]))
+    return bool(np.diff(ends).max() - 1 >= _STAY * len(x))
+
+
+def _experiment_fit(x: Excitation, fit: FractionalFit, integer: tuple[IntegerFit, ...]) -> ExperimentFit:
+    half = {"K": float(fit.half["gain"][0]), "T": fit.half["T"], "alpha": fit.half["alpha"]}
+    found = {"K": fit.K, "T": fit.T, "alpha": fit.alpha}
+    return ExperimentFit(
+        name=x.name,
+        **found,
+        offset=float(fit.offset[0]),
+        level=x.loaded,
+        ci95={key: (found[key] - half[key], found[key] + half[key]) for key in found},
+        gof=gof(x.measured, fit.simulated[0]),
+        fitted=x.fitted_role,
+        driven_by=x.input_role,
+        time=np.arange(len(x)) * x.step,
+        pressure=x.pressure,
+        measured=x.measured,
+        simulated=fit.simulated[0],
+        integer=integer,
+        step=is_step(x),
+        past=fit.pasts[0] is not None,
+    )
+
+
+def _integer_models(done: list[tuple[Excitation, FractionalFit]]) -> list[tuple[IntegerFit, ...]]:
+    """The integer-order models of each experiment, on all cores where that is worth it."""
+    offsets = [_needs_offset(x, fit) for x, fit in done]
+    runs = [x for x, _ in done]
+    workers = min(len(runs), os.cpu_count() or 1)
+    if workers < 2 or sum(map(len, runs)) < _WORTH_PROCESSES:
+        return [fit_integer_models(x, o) for x, o in track(list(zip(runs, offsets)), "integer orders")]
+    with ProcessPoolExecutor(workers) as pool:
+        found = pool.map(fit_integer_models, [x.bare() for x in runs], offsets)
+        return list(track(found, "integer orders", len(runs)))
+
+
+def _needs_offset(x: Excitation, fit: FractionalFit) -> bool:
+    """Whether integer-order models are given an offset: not where no rest is on record and none is seen.
+
+    There it would only let a slow model jump at the step.
+    """
+    seen = _CLEAR * float(fit.half["offset"]) + _NO_OFFSET * np.ptp(x.measured)
+    return x.rest_shown or bool(abs(fit.offset[0]) > seen)
