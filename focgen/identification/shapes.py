@@ -1,0 +1,201 @@
+"""Every shape of a stage fitted to its records, with intervals, Schwarz's criterion, and whether it can be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.identification.noise import half_width, residual_model
+from focgen.identification.projected import Problem, Solved, mean_square, uncertainty
+from focgen.identification.rational import SHAPES, Record, Shape, delay_of
+from focgen.identification.starts import best_of, scan, starts_of
+
+_FIRST_ROUNDS = 6  # of Levenberg–Marquardt, from every start
+_NO_DELAY = 0.1  # samples: a dead time below it is none
+_MARGIN = 6.0  # of Schwarz's criterion: odds of e³ = 20 to 1 (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)
+
+
+@dataclass(frozen=True)
+class ShapeFit:
+    """One shape as fitted. ``parameters`` maps a name to (value, half 95 % interval), times in s.
+
+    ``bic`` is Schwarz's criterion (smaller is better); ``refused`` says why the shape cannot be taken, ""
+    where it can.
+    """
+
+    shape: str
+    parameters: dict[str, tuple[float, float]]
+    bic: float
+    gof: float
+    refused: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A shape's optimum: the ``problem``, its solution, what is reported, and the ``covariance`` of
+    (nonlinear parameters, shared weights), None where they cannot be told apart."""
+
+    shape: Shape
+    problem: Problem
+    solved: Solved
+    covariance: np.ndarray | None
+    effective: float
+    report: ShapeFit
+
+    @property
+    def half(self) -> dict[str, float]:
+        """Half intervals relative to the values."""
+        return {k: h / abs(v) if v else np.inf for k, (v, h) in self.report.parameters.items()}
+
+    @property
+    def gain_unknown(self) -> bool:
+        """Whether the gain's interval reaches 0."""
+        return not self.half["gain"] < 1.0
+
+
+def fit_shapes(records: Sequence[Record], step: float) -> list[Fitted]:
+    """Every shape of ``SHAPES`` that converges; ``step`` is the sample time in s."""
+    scans = {0: scan(records, 0), 1: scan(records, 1)}
+    optima: dict[Shape, np.ndarray] = {}
+    problems = {shape: Problem(shape, records) for shape in SHAPES}
+    for shape, problem in problems.items():
+        x = _optimum(problem, starts_of(problem, optima, scans[min(shape.poles, 1)]))
+        if x is not None:
+            optima[shape] = x
+    solved = {shape: problems[shape].solved(x) for shape, x in optima.items()}
+    effective = _independent(records, min(solved.values(), key=lambda s: float(np.sum(s.left**2))))
+    return [_fitted(problems[shape], s, step, effective) for shape, s in solved.items()]
+
+
+def refit(fitted: Fitted, records: Sequence[Record], step: float) -> Fitted:
+    """A shape fitted to other, longer records from where it was."""
+    problem = Problem(fitted.shape, records)
+    x = problem.fit(fitted.solved.x)
+    solved = problem.solved(fitted.solved.x if x is None else x)
+    return _fitted(problem, solved, step, _independent(records, solved))
+
+
+def choose(fits: Sequence[Fitted]) -> Fitted:
+    """The simplest shape that can be, of those within the margin of the best one's criterion."""
+    possible = [f for f in fits if not f.report.refused]
+    lowest = min(f.report.bic for f in possible)
+    near = [f for f in possible if f.report.bic <= lowest + _MARGIN]
+    return min(near, key=lambda f: (f.shape.parameters, f.report.bic))
+
+
+def clearly_better(one: Fitted, other: Fitted) -> bool:
+    """Whether the criterion of ``one`` is lower than that of ``other`` by more than the margin."""
+    return one.report.bic < other.report.bic - _MARGIN
+
+
+def _optimum(problem: Problem, starts: list[np.ndarray]) -> np.ndarray | None:
+    """A few rounds from every start, then the best of them to its end."""
+    if not problem.shape.poles:
+        return problem.inside(_static(problem, starts[0]))
+    tried = starts if len(starts) == 1 else [problem.fit(s, _FIRST_ROUNDS) for s in starts]
+    tried = [x for x in tried if x is not None]
+    return problem.fit(best_of(problem, tried, 1)[0]) if tried else None
+
+
+def _static(problem: Problem, start: np.ndarray) -> np.ndarray:
+    """A gain's dead time: by whole samples where the input is held, so that there is no slope to follow."""
+    if not len(start) or problem.records[0].hold == "zero":
+        return start
+    x = problem.fit(start)
+    return start if x is None else x
+
+
+def _independent(records: Sequence[Record], solved: Solved) -> float:
+    """How many independent samples the residual stands for."""
+    ends = np.cumsum([len(r) for r in records])[:-1]
+    return sum(max(residual_model(part).effective, 3.0) for part in np.split(solved.left, ends))
+
+
+def _fitted(problem: Problem, solved: Solved, step: float, effective: float) -> Fitted:
+    spread, samples = _uncertainty(problem, solved)
+    made = _parameters(problem, solved, spread, samples, step)
+    square = mean_square(problem, solved)
+    # A free initial state is known from a few samples however long the record: what it costs does not grow.
+    states = sum(own.shape[1] - 1 for own, _ in solved.columns)
+    bic = effective * np.log(square) + problem.shape.parameters * np.log(effective) + states
+    gof = 1.0 - float(np.sqrt(np.mean(solved.left**2))) / problem.spread
+    report = ShapeFit(problem.shape.name, made, float(bic), gof, _refusal(problem, made, step))
+    return Fitted(problem.shape, problem, solved, spread, samples, report)
+
+
+def _uncertainty(problem: Problem, solved: Solved) -> tuple[np.ndarray | None, float]:
+    stepped = problem.shape == Shape(0, 0, True) and problem.records[0].hold == "zero"
+    try:
+        spread, effective = uncertainty(problem, solved, linear_only=stepped)
+    except np.linalg.LinAlgError:
+        return None, 3.0
+    return spread, effective
+
+
+def _parameters(problem, solved: Solved, spread, effective: float, step: float) -> dict[str, tuple[float, float]]:
+    """Name → (value, half interval): the gradients of the named values carry the covariance over."""
+    shape, x = problem.shape, np.concatenate([solved.x, solved.shared])
+    names, values = _named(shape, x, step)
+    if spread is None:
+        return {name: (float(v), float("inf")) for name, v in zip(names, values)}
+    nudges = np.maximum(1e-6 * np.abs(x), 1e-9)
+    slopes = [
+        (_named(shape, x + d, step, names)[1] - _named(shape, x - d, step, names)[1]) / (2.0 * d.max())
+        for d in np.diag(nudges)
+    ]
+    slopes = np.array(slopes).T
+    half = half_width(np.einsum("ij,jk,ik->i", slopes, spread, slopes), effective, len(x))
+    made = {name: (float(v), float(h)) for name, v, h in zip(names, values, half)}
+    if shape == Shape(0, 0, True) and problem.records[0].hold == "zero":
+        made["delay"] = (made["delay"][0], step)  # a held input shows no part of a sample
+    return made
+
+
+def _named(shape: Shape, x: np.ndarray, step: float, names=None) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names and values in s; ``names`` given keeps two real poles real and a pair a pair."""
+    shared = x[len(x) - 1 - shape.zeros :]
+    found = {"gain": shared[0]}
+    if shape.poles == 1:
+        found["T"] = step * np.exp(x[0])
+    elif shape.poles == 2:
+        found |= _of_two(*np.exp(x[:2]), step, names)
+    if shape.zeros:
+        found["zero"] = step * shared[1] / shared[0]
+    if shape.delayed:
+        found["delay"] = step * x[shape.poles]
+    return tuple(found), np.array(list(found.values()))
+
+
+def _of_two(wn: float, damping: float, step: float, names) -> dict[str, float]:
+    real = damping > 1.0 if names is None else "T1" in names
+    if not real:
+        return {"wn": wn / step, "damping": damping}
+    apart = np.sqrt(max(damping**2 - 1.0, 0.0))
+    slow = (damping + apart) / wn
+    return {"T1": step * slow, "T2": step / (wn**2 * slow)}
+
+
+def _refusal(problem: Problem, made: dict[str, tuple[float, float]], step: float) -> str:
+    """Why a shape cannot be what the data show."""
+    held = problem.records[0].hold == "zero"
+    delay, half = made.get("delay", (np.inf, 0.0))
+    if delay < _NO_DELAY * step:
+        return "no dead time"
+    if delay - half <= 0.0 and (problem.shape.poles or not held):
+        return "the dead time's interval reaches 0"
+    zero, half = made.get("zero", (np.inf, 0.0))
+    if zero < 0.0:
+        return "the zero answers in the wrong direction first"
+    if zero - half <= 0.0:
+        return "the zero's interval reaches 0"
+    if not made["gain"][1] < abs(made["gain"][0]):
+        return ""  # nothing is known then: said by whoever takes it
+    vague = [name for name, (value, half) in made.items() if not half < abs(value)]
+    return f"{vague[0]} is not determined" if vague else ""
+
+
+def delay_seconds(fitted: Fitted, step: float) -> float:
+    """The dead time in s."""
+    return delay_of(fitted.shape, fitted.solved.x) * step
