@@ -34,25 +34,37 @@ class Problem:
         """``x`` within what makes sense."""
         return inside(self.shape, x, self.longest)
 
-    def columns(self, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Each record's own columns and its shared ones."""
-        return [responses(self.shape, self.inside(x), r) for r in self.records]
+    def rows(self, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Each record's own rows and its shared ones."""
+        return responses(self.shape, self.inside(x), self.records)
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """Measured − model of all records in a row, in units of the measured spread."""
         return self.solved(x).left / self.spread
 
+    def cost(self, x: np.ndarray) -> float:
+        """Sum of squares of :meth:`residual`."""
+        return float(np.sum(self.residual(x) ** 2))
+
     def solved(self, x: np.ndarray) -> Solved:
         """The best weights at ``x`` and what they leave."""
-        columns = self.columns(x)
-        rest = [_without(own, np.column_stack([both, r.measured])) for (own, both), r in zip(columns, self.records)]
-        rows = np.concatenate(rest)
-        shared = _weights(rows[:, :-1], rows[:, -1:])[:, 0]
-        left = rows[:, -1] - rows[:, :-1] @ shared
-        return Solved(self.inside(x), shared, left, rows[:, :-1], columns)
+        rows = self.rows(x)
+        stacks = [np.vstack([*pair, r.measured]) for pair, r in zip(rows, self.records)]
+        sums = [stack @ stack.T for stack in stacks]
+        cuts = [len(own) for own, _ in rows]
+        made = [_eliminated(m, cut) for m, cut in zip(sums, cuts)]
+        normal = sum(m[cut:, cut:] for m, cut in zip(made, cuts))
+        shared = _weights(normal[:-1, :-1], normal[:-1, -1:])[:, 0]
+        from_shared = np.append(-shared, 1.0)
+        own = [-m[:cut, cut:] @ from_shared for m, cut in zip(made, cuts)]
+        left = [np.concatenate([o, from_shared]) @ stack for o, stack in zip(own, stacks)]
+        return Solved(self.inside(x), shared, [-o for o in own], np.concatenate(left), rows)
 
-    def fit(self, start: np.ndarray, rounds: int = 30) -> np.ndarray | None:
-        """Levenberg–Marquardt from ``start``; None where it breaks down."""
+    def fit(self, start: np.ndarray, rounds: int, close: float) -> np.ndarray | None:
+        """Levenberg–Marquardt from ``start`` until the cost falls by less than the share ``close``.
+
+        None where it breaks down.
+        """
         if not len(start):
             return start
         try:
@@ -60,8 +72,8 @@ class Problem:
                 self.residual,
                 start,
                 method="lm",
-                xtol=1e-7,
-                ftol=1e-9,
+                xtol=1e-8,
+                ftol=close,
                 diff_step=1e-6,
                 max_nfev=rounds * (len(start) + 1),
             )
@@ -72,19 +84,18 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Weights at ``x``: ``shared`` by all records, what is ``left`` of the measured signals (samples,),
-    ``rows`` the shared columns without the records' own ones, ``columns`` those of every record."""
+    """Weights at ``x``: ``shared`` by all records and each record's ``own``, what is ``left`` of the measured
+    signals (samples,), and the ``rows`` that the weights belong to."""
 
     x: np.ndarray
     shared: np.ndarray
+    own: list[np.ndarray]
     left: np.ndarray
-    rows: np.ndarray
-    columns: list[tuple[np.ndarray, np.ndarray]]
+    rows: list[tuple[np.ndarray, np.ndarray]]
 
-    def own(self, records: Sequence[Record]) -> list[np.ndarray]:
-        """The weights of each record's own columns."""
-        rest = (r.measured - both @ self.shared for (_, both), r in zip(self.columns, records))
-        return [_weights(own, y[:, None])[:, 0] for (own, _), y in zip(self.columns, rest)]
+    def models(self, rows: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+        """These weights times ``rows``: the model of every record."""
+        return [w @ own + self.shared @ shared for w, (own, shared) in zip(self.own, rows)]
 
 
 def mean_square(problem: Problem, solved: Solved) -> float:
@@ -101,48 +112,57 @@ def uncertainty(problem: Problem, solved: Solved, linear_only: bool = False) -> 
     ends = np.cumsum([len(r) for r in records])[:-1]
     models = [residual_model(part) for part in np.split(solved.left, ends)]
     slopes = [] if linear_only else _slopes(problem, solved)
-    jacobian = np.column_stack([*slopes, solved.rows])
+    jacobian = _jacobian(problem, solved, slopes)
     sizes = np.linalg.norm(jacobian, axis=0)
-    if not np.all(sizes > 0.0):
-        raise np.linalg.LinAlgError("a parameter without effect")
-    spread = covariance(jacobian / sizes, models) / np.outer(sizes, sizes)
+    unit = jacobian / np.where(sizes > 0.0, sizes, 1.0)
+    alike = np.linalg.eigvalsh(unit.T @ unit)
+    if alike[0] <= _RANK * alike[-1]:
+        raise np.linalg.LinAlgError("parameters with the same effect, or none")
+    spread = covariance(unit, models) / np.outer(sizes, sizes)
     count, shared = len(solved.left), jacobian.shape[1]
-    every = shared + sum(own.shape[1] for own, _ in solved.columns)
+    every = shared + sum(len(own) for own in solved.own)
     freedom = (count - shared) / max(count - every, 1)
     known = len(solved.x) - len(slopes)
     return np.pad(spread * freedom, (known, 0)), sum(max(m.effective, 3.0) for m in models)
 
 
 def _slopes(problem: Problem, solved: Solved) -> list[np.ndarray]:
-    """Derivatives of the model in every nonlinear parameter, without the records' own columns."""
-    own = solved.own(problem.records)
-
-    def model(x):
-        made = problem.columns(x)
-        return [mine @ weights + both @ solved.shared for (mine, both), weights in zip(made, own)]
-
+    """Derivatives of the records' models in every nonlinear parameter, all records in a row."""
     slopes = []
     for step in _NUDGE * np.eye(len(solved.x)):
         ahead, behind = problem.inside(solved.x + step), problem.inside(solved.x - step)
-        width = float(np.sum(ahead - behind))
-        parts = [(a - b) / width for a, b in zip(model(ahead), model(behind))]
-        slopes.append(
-            np.concatenate([_without(mine, part[:, None])[:, 0] for (mine, _), part in zip(solved.columns, parts)])
-        )
+        pair = (solved.models(problem.rows(x)) for x in (ahead, behind))
+        slopes.append(np.concatenate([a - b for a, b in zip(*pair)]) / float(np.sum(ahead - behind)))
     return slopes
 
 
-def _weights(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Least squares by the normal equations of unit columns; what is one column twice shares its weight."""
-    sizes = np.linalg.norm(columns, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    unit = columns / sizes
-    values, vectors = np.linalg.eigh(unit.T @ unit)
+def _jacobian(problem: Problem, solved: Solved, slopes: list[np.ndarray]) -> np.ndarray:
+    """Slopes and shared rows as columns (samples, ·), without what each record's own rows explain."""
+    ends = np.cumsum([len(r) for r in problem.records])[:-1]
+    parts = zip(*(np.split(slope, ends) for slope in slopes)) if slopes else [()] * len(problem.records)
+    blocks = []
+    for mine, (own, shared) in zip(parts, solved.rows):
+        wanted = np.vstack([*mine, shared])
+        blocks.append(wanted - _weights(own @ own.T, own @ wanted.T).T @ own)
+    return np.hstack(blocks).T
+
+
+def _eliminated(sums: np.ndarray, cut: int) -> np.ndarray:
+    """Products of rows (k, k) after the first ``cut`` are regressed out of the others.
+
+    The upper right block holds the regression's weights, the lower right one the products that are left.
+    """
+    made = sums.copy()
+    made[:cut, cut:] = _weights(sums[:cut, :cut], sums[:cut, cut:])
+    made[cut:, cut:] -= sums[cut:, :cut] @ made[:cut, cut:]
+    return made
+
+
+def _weights(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Solve the normal equations, scaled to unit rows; rows that are one share its weight."""
+    sizes = np.sqrt(np.diag(products))
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    values, vectors = np.linalg.eigh(products / np.outer(sizes, sizes))
     kept = values > _RANK * max(values[-1], 1e-300)
     vectors = vectors[:, kept]
-    return (vectors / values[kept]) @ (vectors.T @ (unit.T @ wanted)) / sizes[:, None]
-
-
-def _without(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """``wanted`` (n, k) less what ``columns`` (n, ·) can explain of it."""
-    return wanted - columns @ _weights(columns, wanted)
+    return (vectors / values[kept]) @ (vectors.T @ (wanted / sizes[:, None])) / sizes[:, None]

@@ -10,6 +10,7 @@ scipy.signal.lfilter. Time is counted in samples here.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,8 @@ from scipy.signal import lfilter
 _FASTEST = 0.02  # samples: a shorter time constant has no effect between samples
 _SLOWEST = 30.0  # lengths of the longest record: a longer one is an integrator there
 _DAMPING = (0.01, 300.0)
+_PLACES = 13  # that are tried for a part of a record
+_FEWEST = 100  # samples of a part
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,22 @@ class Record:
 
     def __len__(self) -> int:
         return len(self.measured)
+
+    def part(self, count: int) -> Record:
+        """The ``count`` samples in a row over which the measured signal moves most."""
+        if count >= len(self):
+            return self
+        begins = np.unique(np.linspace(0, len(self) - count, _PLACES).astype(int))
+        begin = max(begins, key=lambda b: float(np.var(self.measured[b : b + count])))
+        drive, measured = (signal[begin : begin + count] for signal in (self.drive, self.measured))
+        rests = self.rests and begin == 0
+        return Record(self.name, drive if rests else drive - drive[0], measured, self.hold, rests)
+
+
+def parts(records: Sequence[Record], limit: int) -> list[Record]:
+    """A part of every record, so that they have at most ``limit`` samples together; each keeps ``_FEWEST``."""
+    total = sum(map(len, records))
+    return [r.part(max(len(r) * limit // total, _FEWEST)) for r in records] if total > limit else list(records)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,22 +164,29 @@ def shifted(signal: np.ndarray, late: int) -> np.ndarray:
     return np.concatenate([np.zeros(min(late, len(signal))), signal[: max(len(signal) - late, 0)]])
 
 
-def responses(shape: Shape, x: np.ndarray, record: Record) -> tuple[np.ndarray, np.ndarray]:
-    """What a record is a sum of: its own columns (n, ·), and those whose weights all records share (n, ·).
+def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """What every record is a sum of: its own rows (·, n), and those whose weights all records share (·, n).
 
     Shared are the response of unit gain and, with a zero, its derivative per sample. Its own are an offset,
     the free response of the state at the first sample, and that to another input before the first sample.
     """
-    delay, ones = delay_of(shape, x), np.ones((1, len(record)))
+    delay = delay_of(shape, x)
     if not shape.poles:
-        return ones.T, _static(record, delay)[:, None]
-    made = discretise(shape.poles, x, delay, record.hold)
-    den, drive = made.denominator, shifted(record.drive, made.late)
-    rows = [lfilter(made.numerator(state), den, drive) for state in range(1 + shape.zeros)]
-    own = [ones[0]] if record.rests else [ones[0], *_free(made, len(record))]
-    if shape.delayed and not record.rests:
-        own.append(_from_before(made, len(record)))
-    return np.array(own).T, np.array(rows).T
+        return [(np.ones((1, len(r))), _static(r, delay)[None]) for r in records]
+    made = discretise(shape.poles, x, delay, records[0].hold)
+    own = np.array(_own(shape, made, max(map(len, records))))
+    rows = [(own[: 1 if r.rests else None, : len(r)], _shared(shape, made, r)) for r in records]
+    return rows
+
+
+def _own(shape: Shape, made: Discrete, count: int) -> list[np.ndarray]:
+    before = [_from_before(made, count)] if shape.delayed else []
+    return [np.ones(count), *_free(made, count), *before]
+
+
+def _shared(shape: Shape, made: Discrete, record: Record) -> np.ndarray:
+    drive, den = shifted(record.drive, made.late), made.denominator
+    return np.array([lfilter(made.numerator(state), den, drive) for state in range(1 + shape.zeros)])
 
 
 def _static(record: Record, delay: float) -> np.ndarray:

@@ -9,10 +9,12 @@ import numpy as np
 
 from focgen.identification.noise import half_width, residual_model
 from focgen.identification.projected import Problem, Solved, mean_square, uncertainty
-from focgen.identification.rational import SHAPES, Record, Shape, delay_of
+from focgen.identification.rational import SHAPES, Record, Shape, delay_of, parts
 from focgen.identification.starts import best_of, scan, starts_of
 
-_FIRST_ROUNDS = 6  # of Levenberg–Marquardt, from every start
+_FIRST_ROUNDS, _ROUNDS, _LAST_ROUNDS = 4, 12, 8  # of Levenberg–Marquardt: every start, best one, all samples
+_ROUGHLY = 6000  # samples for all but the last rounds
+_SMALL = 0.1  # of a record: a longer dead time needs more than a part of it
 _NO_DELAY = 0.1  # samples: a dead time below it is none
 _MARGIN = 6.0  # of Schwarz's criterion: odds of e³ = 20 to 1 (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)
 
@@ -58,23 +60,30 @@ class Fitted:
 def fit_shapes(records: Sequence[Record], step: float) -> list[Fitted]:
     """Every shape of ``SHAPES`` that converges; ``step`` is the sample time in s."""
     scans = {0: scan(records, 0), 1: scan(records, 1)}
+    few = _few(records, max(float(starts[0][-1]) for starts in scans.values()))
     optima: dict[Shape, np.ndarray] = {}
-    problems = {shape: Problem(shape, records) for shape in SHAPES}
-    for shape, problem in problems.items():
-        x = _optimum(problem, starts_of(problem, optima, scans[min(shape.poles, 1)]))
+    solved: dict[Shape, Solved] = {}
+    for shape in SHAPES:
+        rough = Problem(shape, few)
+        x = _optimum(rough, starts_of(rough, optima, scans[min(shape.poles, 1)]))
         if x is not None:
             optima[shape] = x
-    solved = {shape: problems[shape].solved(x) for shape, x in optima.items()}
+            solved[shape] = _refined(Problem(shape, records), x)
     effective = _independent(records, min(solved.values(), key=lambda s: float(np.sum(s.left**2))))
-    return [_fitted(problems[shape], s, step, effective) for shape, s in solved.items()]
+    return [_fitted(Problem(shape, records), s, step, effective) for shape, s in solved.items()]
 
 
 def refit(fitted: Fitted, records: Sequence[Record], step: float) -> Fitted:
     """A shape fitted to other, longer records from where it was."""
     problem = Problem(fitted.shape, records)
-    x = problem.fit(fitted.solved.x)
-    solved = problem.solved(fitted.solved.x if x is None else x)
+    solved = _refined(problem, fitted.solved.x)
     return _fitted(problem, solved, step, _independent(records, solved))
+
+
+def _few(records: Sequence[Record], late: float) -> Sequence[Record]:
+    """Parts of the records that are enough to find an optimum roughly, with a dead time of ``late`` samples."""
+    few = parts(records, _ROUGHLY)
+    return few if late < _SMALL * min(map(len, few)) else records
 
 
 def choose(fits: Sequence[Fitted]) -> Fitted:
@@ -91,20 +100,26 @@ def clearly_better(one: Fitted, other: Fitted) -> bool:
 
 
 def _optimum(problem: Problem, starts: list[np.ndarray]) -> np.ndarray | None:
-    """A few rounds from every start, then the best of them to its end."""
-    if not problem.shape.poles:
-        return problem.inside(_static(problem, starts[0]))
-    tried = starts if len(starts) == 1 else [problem.fit(s, _FIRST_ROUNDS) for s in starts]
+    """A few rounds from every start, then the best of them further."""
+    if _has_no_slope(problem):
+        return starts[0]
+    tried = [problem.fit(s, _FIRST_ROUNDS, 1e-3) for s in starts]
     tried = [x for x in tried if x is not None]
-    return problem.fit(best_of(problem, tried, 1)[0]) if tried else None
+    return problem.fit(best_of(problem, tried, 1)[0], _ROUNDS, 1e-5) if tried else None
 
 
-def _static(problem: Problem, start: np.ndarray) -> np.ndarray:
-    """A gain's dead time: by whole samples where the input is held, so that there is no slope to follow."""
-    if not len(start) or problem.records[0].hold == "zero":
-        return start
-    x = problem.fit(start)
-    return start if x is None else x
+def _refined(problem: Problem, x: np.ndarray) -> Solved:
+    found = None if _has_no_slope(problem) else problem.fit(x, _LAST_ROUNDS, 1e-8)
+    return problem.solved(x if found is None else found)
+
+
+def _has_no_slope(problem: Problem) -> bool:
+    """Whether there is nothing to follow: a gain alone, or its dead time, whole samples for a held input."""
+    return problem.shape == Shape(0) or _by_whole_samples(problem)
+
+
+def _by_whole_samples(problem: Problem) -> bool:
+    return problem.shape == Shape(0, 0, True) and problem.records[0].hold == "zero"
 
 
 def _independent(records: Sequence[Record], solved: Solved) -> float:
@@ -118,7 +133,7 @@ def _fitted(problem: Problem, solved: Solved, step: float, effective: float) -> 
     made = _parameters(problem, solved, spread, samples, step)
     square = mean_square(problem, solved)
     # A free initial state is known from a few samples however long the record: what it costs does not grow.
-    states = sum(own.shape[1] - 1 for own, _ in solved.columns)
+    states = sum(len(own) - 1 for own in solved.own)
     bic = effective * np.log(square) + problem.shape.parameters * np.log(effective) + states
     gof = 1.0 - float(np.sqrt(np.mean(solved.left**2))) / problem.spread
     report = ShapeFit(problem.shape.name, made, float(bic), gof, _refusal(problem, made, step))
@@ -126,12 +141,10 @@ def _fitted(problem: Problem, solved: Solved, step: float, effective: float) -> 
 
 
 def _uncertainty(problem: Problem, solved: Solved) -> tuple[np.ndarray | None, float]:
-    stepped = problem.shape == Shape(0, 0, True) and problem.records[0].hold == "zero"
     try:
-        spread, effective = uncertainty(problem, solved, linear_only=stepped)
+        return uncertainty(problem, solved, linear_only=_by_whole_samples(problem))
     except np.linalg.LinAlgError:
         return None, 3.0
-    return spread, effective
 
 
 def _parameters(problem, solved: Solved, spread, effective: float, step: float) -> dict[str, tuple[float, float]]:
@@ -148,7 +161,7 @@ def _parameters(problem, solved: Solved, spread, effective: float, step: float) 
     slopes = np.array(slopes).T
     half = half_width(np.einsum("ij,jk,ik->i", slopes, spread, slopes), effective, len(x))
     made = {name: (float(v), float(h)) for name, v, h in zip(names, values, half)}
-    if shape == Shape(0, 0, True) and problem.records[0].hold == "zero":
+    if _by_whole_samples(problem):
         made["delay"] = (made["delay"][0], step)  # a held input shows no part of a sample
     return made
 
@@ -192,8 +205,14 @@ def _refusal(problem: Problem, made: dict[str, tuple[float, float]], step: float
         return "the zero's interval reaches 0"
     if not made["gain"][1] < abs(made["gain"][0]):
         return ""  # nothing is known then: said by whoever takes it
-    vague = [name for name, (value, half) in made.items() if not half < abs(value)]
+    vague = [name for name, spread in made.items() if name != "delay" and _is_vague(name, *spread, step)]
     return f"{vague[0]} is not determined" if vague else ""
+
+
+def _is_vague(name: str, value: float, half: float, step: float) -> bool:
+    """Whether the interval reaches 0; of a time constant, also whether e^(−step/T), which is seen, does."""
+    samples = {"T": value, "T1": value, "T2": value, "wn": 1.0 / value}.get(name, step) / step
+    return not half * max(1.0, 1.0 / samples) < abs(value)
 
 
 def delay_seconds(fitted: Fitted, step: float) -> float:

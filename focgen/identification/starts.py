@@ -79,7 +79,7 @@ def second_order(problem: Problem, T: float, delays: Sequence[float]) -> list[np
 
 def best_of(problem: Problem, starts: Sequence[np.ndarray], count: int) -> list[np.ndarray]:
     """The ``count`` starts from which least is left."""
-    return sorted(starts, key=lambda x: float(np.sum(problem.residual(x) ** 2)))[:count]
+    return sorted(starts, key=problem.cost)[:count]
 
 
 def _from_pair(slow: float, fast: float) -> np.ndarray:
