@@ -16,7 +16,7 @@ _FIRST_ROUNDS, _ROUNDS, _LAST_ROUNDS = 4, 12, 8  # of Levenberg–Marquardt: eve
 _ROUGHLY = 6000  # samples for all but the last rounds
 _SMALL = 0.1  # of a record: a longer dead time needs more than a part of it
 _NO_DELAY = 0.1  # samples: a dead time below it is none
-_MARGIN = 6.0  # of Schwarz's criterion: odds of e³ = 20 to 1 (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)
+MARGIN = 6.0  # of Schwarz's criterion: odds of e³ = 20 to 1 (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)
 
 
 @dataclass(frozen=True)
@@ -90,13 +90,13 @@ def choose(fits: Sequence[Fitted]) -> Fitted:
     """The simplest shape that can be, of those within the margin of the best one's criterion."""
     possible = [f for f in fits if not f.report.refused]
     lowest = min(f.report.bic for f in possible)
-    near = [f for f in possible if f.report.bic <= lowest + _MARGIN]
+    near = [f for f in possible if f.report.bic <= lowest + MARGIN]
     return min(near, key=lambda f: (f.shape.parameters, f.report.bic))
 
 
 def clearly_better(one: Fitted, other: Fitted) -> bool:
     """Whether the criterion of ``one`` is lower than that of ``other`` by more than the margin."""
-    return one.report.bic < other.report.bic - _MARGIN
+    return one.report.bic < other.report.bic - MARGIN
 
 
 def _optimum(problem: Problem, starts: list[np.ndarray]) -> np.ndarray | None:
