@@ -11,15 +11,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from focgen.identification.noise import half_width
 from focgen.identification.projected import Problem, Solved, mean_square, uncertainty
-from focgen.identification.rational import Discrete, Record, Shape, delay_of, discretise, inside, shifted
-from focgen.identification.shapes import Fitted
+from focgen.identification.rational import Discrete, Record, Shape, delay_of, discretise, shifted
+from focgen.identification.shapes import MARGIN, Fitted, criterion, fit_of, simplest
 
 _MATERIAL = 1.25  # ratio of the two time constants: a smaller one matters to no controller
 _SURE = 2.576  # standard errors of its logarithm, 99 %
 _SEEN = 0.9  # of the residual of one line: what two leave, where they fit visibly better
+_DONE, _STEPS, _SUMS = 1.0 - math.exp(-1.0), 200, 20  # of a step; samples a sum of time constants; such sums
 _WIDEST = 5.0  # logarithm of a factor
 _ROUNDS = 10  # of Levenberg–Marquardt
 
@@ -28,8 +30,8 @@ _ROUNDS = 10  # of Levenberg–Marquardt
 class UpDown:
     """Time constants (value, half 95 % interval) in s while ``rising`` and ``falling``, of the ``shape``.
 
-    Of two poles it is the sum of their time constants, 2 damping / wn. ``gof`` is that of the two, beside
-    the one line's in the stage's fit.
+    Of two poles it is the time after which a step is 63 % done. ``gof`` is that of the two, beside the one
+    line's in the stage's fit.
     """
 
     shape: str
@@ -49,8 +51,7 @@ class _Switched(Problem):
         self.owned = [own for own, _ in fitted.solved.rows]
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        late = inside(self.shape, np.append(self.stage[: self.shape.poles], x[2:]), self.longest)
-        return np.concatenate([np.clip(x[:2], -_WIDEST, _WIDEST), late[self.shape.poles :]])
+        return np.concatenate([np.clip(x[:2], -_WIDEST, _WIDEST), np.clip(x[2:], 0.0, self.latest)])
 
     def rows(self, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         x = self.inside(x)
@@ -60,53 +61,79 @@ class _Switched(Problem):
         return [(own, made[: 1 + self.shape.zeros]) for own, made in zip(self.owned, states)]
 
 
-def fit_directions(fits: Sequence[Fitted], chosen: Fitted, step: float) -> UpDown | None:
-    """Fit the chosen shape, and one pole, with two time scales; None where both directions are not seen.
+@dataclass(frozen=True, eq=False)
+class _TwoScales:
+    """A shape ``one`` fitted with two time scales; ``bic`` as for one, with one parameter more."""
 
-    ``step`` is the sample time in s.
+    one: Fitted
+    problem: _Switched
+    solved: Solved
+
+    @property
+    def bic(self) -> float:
+        return criterion(self.problem, self.solved, self.parameters, self.one.independent)
+
+    @property
+    def parameters(self) -> int:
+        return self.one.shape.parameters + 1
+
+
+def fit_directions(fits: Sequence[Fitted], chosen: Fitted, step: float) -> tuple[UpDown | None, Fitted]:
+    """Fit shapes without a zero with two time scales; ``step`` is the sample time in s.
+
+    Returns what the better one says, None where both directions are not seen, and the shape to be taken. That
+    is ``chosen`` where one line will do. Else it is the better one's own shape: further poles and zeros of
+    the chosen one only imitate two time constants.
     """
-    one = Shape(1, 0, chosen.shape.delayed)
-    tried = [f for f in fits if f is chosen or f.shape in (one, Shape(1))] if chosen.shape.poles else []
-    results = [made for f in tried if (made := _two_scales(f)) is not None]
-    if not results:
-        return None
-    problem, solved = min(results, key=lambda pair: float(np.mean(pair[1].left ** 2)))
+    alone = Shape(1)
+    tried = [f for f in fits if f.shape.poles and not f.shape.zeros and (not f.report.refused or f.shape == alone)]
+    made = [two for f in tried if (two := _two_scales(f)) is not None] if chosen.shape.poles else []
+    if not made:
+        return None, chosen
+    best = simplest([(two.bic, two.parameters, two) for two in made])
     try:
-        return _judged(problem, solved, chosen, step)
+        found = _judged(best, chosen, step)
     except np.linalg.LinAlgError:
-        return None
+        return None, chosen
+    return found, chosen if found is None or found.one_line_will_do else best.one
 
 
-def _two_scales(fitted: Fitted) -> tuple[_Switched, Solved] | None:
+def _two_scales(fitted: Fitted) -> _TwoScales | None:
     problem = _Switched(fitted)
     late = [delay_of(fitted.shape, fitted.solved.x)] * fitted.shape.delayed
     x = problem.fit(np.array([0.0, 0.0, *late]), _ROUNDS, 1e-6)
-    return None if x is None else (problem, problem.solved(x))
+    return None if x is None else _TwoScales(fitted, problem, problem.solved(x))
 
 
-def _judged(problem: _Switched, solved: Solved, chosen: Fitted, step: float) -> UpDown | None:
+def _judged(two: _TwoScales, chosen: Fitted, step: float) -> UpDown | None:
+    problem, solved = two.problem, two.solved
     spread, effective = uncertainty(problem, solved)
-    up_first = bool(solved.shared[0] > 0.0)  # a negative gain falls while its input rises
-    rising, falling = (0, 1) if up_first else (1, 0)
     half = half_width(np.diag(spread)[:2], effective, len(spread))
     if not np.all(half < 1.0):
         return None
-    times = step * _time(problem) * np.exp(solved.x[:2])
-    apart = abs(float(solved.x[0] - solved.x[1]))
+    times = [step * _time(problem, solved, scale) for scale in np.exp(solved.x[:2])]
+    pairs = [(float(t), float(t * h)) for t, h in zip(times, half)]
+    if solved.shared[0] < 0.0:  # a negative gain falls while its input rises
+        pairs.reverse()
     error = math.sqrt(max(spread[0, 0] + spread[1, 1] - 2.0 * spread[0, 1], 0.0))
-    one = mean_square(chosen.problem, chosen.solved)
-    better = mean_square(problem, solved) < _SEEN**2 * one
-    differ = apart > math.log(_MATERIAL) and apart > _SURE * error
-    pairs = [(float(times[i]), float(times[i] * half[i])) for i in (rising, falling)]
-    gof = 1.0 - float(np.sqrt(np.mean(solved.left**2))) / problem.spread
-    return UpDown(problem.shape.name, *pairs, gof, not (differ and better))
+    apart = abs(float(solved.x[0] - solved.x[1]))
+    differ = apart > max(math.log(_MATERIAL), _SURE * error)
+    one = mean_square(two.one.problem, two.one.solved)
+    better = mean_square(problem, solved) < _SEEN**2 * one and two.bic <= chosen.report.bic + MARGIN
+    return UpDown(problem.shape.name, *pairs, fit_of(problem, solved), not (differ and better))
 
 
-def _time(problem: _Switched) -> float:
-    """The stage's time constant, or the sum of both, in samples."""
-    if problem.shape.poles == 1:
-        return math.exp(problem.stage[0])
-    return 2.0 * math.exp(problem.stage[1] - problem.stage[0])
+def _time(problem: _Switched, solved: Solved, scale: float) -> float:
+    """Samples until a step of the stage, its time constants ``scale`` times as long, is 63 % done."""
+    poles, lag = problem.shape.poles, math.exp(problem.stage[0])
+    if poles == 1:
+        return scale * lag
+    span = scale * 2.0 * math.exp(problem.stage[1] - problem.stage[0]) / _STEPS  # of the time constants' sum
+    made = discretise(poles, problem.stage, 0.0, "zero", scale / span)
+    step = np.ones(_SUMS * _STEPS)
+    rows = [lfilter(made.numerator(i), made.denominator, step) / span**i for i in range(len(solved.shared))]
+    answer = np.maximum.accumulate(solved.shared @ np.array(rows) / solved.shared[0])
+    return span * float(np.interp(_DONE, answer, np.arange(len(answer))))
 
 
 def _beginning(fitted: Fitted, index: int) -> np.ndarray:

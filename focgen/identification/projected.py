@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from focgen.identification.noise import covariance, residual_model
-from focgen.identification.rational import Record, Shape, inside, responses
+from focgen.identification.rational import LATEST, Record, Shape, inside, responses
 
 _RANK = 1e-12  # of the largest eigenvalue of unit columns' products: below it they are one column
 _NUDGE = 1e-4  # of a parameter (logarithm or samples), for its derivative
@@ -27,12 +27,13 @@ class Problem:
     def __init__(self, shape: Shape, records: Sequence[Record]):
         self.shape, self.records = shape, records
         self.longest = max(map(len, records))
+        self.latest = LATEST * min(map(len, records))
         around = [r.measured - r.measured.mean() for r in records]
         self.spread = float(np.sqrt(np.mean(np.concatenate(around) ** 2)))
 
     def inside(self, x: np.ndarray) -> np.ndarray:
         """``x`` within what makes sense."""
-        return inside(self.shape, x, self.longest)
+        return inside(self.shape, x, self.longest, self.latest)
 
     def rows(self, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Each record's own rows and its shared ones."""

@@ -20,6 +20,7 @@ from scipy.signal import lfilter
 _FASTEST = 0.02  # samples: a shorter time constant has no effect between samples
 _SLOWEST = 30.0  # lengths of the longest record: a longer one is an integrator there
 _DAMPING = (0.01, 300.0)
+LATEST = 0.2  # of the shortest record: no longer dead time is looked for, it could shift one step to the next
 _PLACES = 13  # that are tried for a part of a record
 _FEWEST = 100  # samples of a part
 
@@ -53,7 +54,8 @@ class Record:
     """One experiment made ready: ``drive`` and ``measured`` (n,), ``hold`` "zero" or "linear".
 
     ``drive`` is the input from its first value on, and the stage's state there is free. Where ``rests`` it
-    is the whole input of a log that begins with its step: the stage was at rest at 0 before.
+    is the whole input of a log that begins with its step: the stage was at rest at 0 before. Where ``moves``
+    the input was another one shortly before the log.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Record:
     measured: np.ndarray
     hold: str
     rests: bool = False
+    moves: bool = False
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -73,7 +76,7 @@ class Record:
         begin = max(begins, key=lambda b: float(np.var(self.measured[b : b + count])))
         drive, measured = (signal[begin : begin + count] for signal in (self.drive, self.measured))
         rests = self.rests and begin == 0
-        return Record(self.name, drive if rests else drive - drive[0], measured, self.hold, rests)
+        return Record(self.name, drive if rests else drive - drive[0], measured, self.hold, rests, begin > 0)
 
 
 def parts(records: Sequence[Record], limit: int) -> list[Record]:
@@ -106,8 +109,8 @@ class Discrete:
         return now + np.append(0.0, before[:, state])
 
 
-def inside(shape: Shape, x: np.ndarray, longest: int) -> np.ndarray:
-    """``x`` with every parameter within what ``longest`` samples can tell.
+def inside(shape: Shape, x: np.ndarray, longest: int, latest: float) -> np.ndarray:
+    """``x`` with every parameter within what ``longest`` samples can tell, the dead time at most ``latest``.
 
     ``x`` is (log T) for one pole, (log wn, log damping) for two, none for a gain; then the dead time.
     """
@@ -117,7 +120,7 @@ def inside(shape: Shape, x: np.ndarray, longest: int) -> np.ndarray:
         1: [(math.log(_FASTEST), math.log(slowest))],
         2: [(-math.log(slowest), -math.log(_FASTEST)), tuple(map(math.log, _DAMPING))],
     }[shape.poles]
-    low, high = np.array(edges + [(0.0, 0.5 * longest)] * shape.delayed).reshape(-1, 2).T
+    low, high = np.array(edges + [(0.0, latest)] * shape.delayed).reshape(-1, 2).T
     return np.clip(x, low, high)
 
 
@@ -175,8 +178,9 @@ def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> list[tu
         return [(np.ones((1, len(r))), _static(r, delay)[None]) for r in records]
     made = discretise(shape.poles, x, delay, records[0].hold)
     own = np.array(_own(shape, made, max(map(len, records))))
-    rows = [(own[: 1 if r.rests else None, : len(r)], _shared(shape, made, r)) for r in records]
-    return rows
+    free = 1 + shape.poles
+    counts = [1 if r.rests else len(own) if r.moves and r.hold == "zero" else free for r in records]
+    return [(own[:count, : len(r)], _shared(shape, made, r)) for count, r in zip(counts, records)]
 
 
 def _own(shape: Shape, made: Discrete, count: int) -> list[np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from focgen.identification.noise import half_width, residual_model
 from focgen.identification.projected import Problem, Solved, mean_square, uncertainty
 from focgen.identification.rational import SHAPES, Record, Shape, delay_of, parts
 from focgen.identification.starts import best_of, scan, starts_of
+
+T = TypeVar("T")
 
 _FIRST_ROUNDS, _ROUNDS, _LAST_ROUNDS = 4, 12, 8  # of Levenberg–Marquardt: every start, best one, all samples
 _ROUGHLY = 6000  # samples for all but the last rounds
@@ -37,13 +40,14 @@ class ShapeFit:
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """A shape's optimum: the ``problem``, its solution, what is reported, and the ``covariance`` of
-    (nonlinear parameters, shared weights), None where they cannot be told apart."""
+    (nonlinear parameters, shared weights), None where they cannot be told apart; ``independent`` samples are
+    what the criterion counts."""
 
     shape: Shape
     problem: Problem
     solved: Solved
     covariance: np.ndarray | None
-    effective: float
+    independent: float
     report: ShapeFit
 
     @property
@@ -89,9 +93,14 @@ def _few(records: Sequence[Record], late: float) -> Sequence[Record]:
 def choose(fits: Sequence[Fitted]) -> Fitted:
     """The simplest shape that can be, of those within the margin of the best one's criterion."""
     possible = [f for f in fits if not f.report.refused]
-    lowest = min(f.report.bic for f in possible)
-    near = [f for f in possible if f.report.bic <= lowest + MARGIN]
-    return min(near, key=lambda f: (f.shape.parameters, f.report.bic))
+    return simplest([(f.report.bic, f.shape.parameters, f) for f in possible])
+
+
+def simplest(rated: Sequence[tuple[float, int, T]]) -> T:
+    """Of (criterion, parameters, fit), the fit of fewest parameters within the margin of the lowest."""
+    lowest = min(bic for bic, _, _ in rated)
+    near = [entry for entry in rated if entry[0] <= lowest + MARGIN]
+    return min(near, key=lambda entry: (entry[1], entry[0]))[2]
 
 
 def clearly_better(one: Fitted, other: Fitted) -> bool:
@@ -128,16 +137,26 @@ def _independent(records: Sequence[Record], solved: Solved) -> float:
     return sum(max(residual_model(part).effective, 3.0) for part in np.split(solved.left, ends))
 
 
-def _fitted(problem: Problem, solved: Solved, step: float, effective: float) -> Fitted:
+def _fitted(problem: Problem, solved: Solved, step: float, independent: float) -> Fitted:
     spread, samples = _uncertainty(problem, solved)
     made = _parameters(problem, solved, spread, samples, step)
-    square = mean_square(problem, solved)
-    # A free initial state is known from a few samples however long the record: what it costs does not grow.
+    bic = criterion(problem, solved, problem.shape.parameters, independent)
+    report = ShapeFit(problem.shape.name, made, bic, fit_of(problem, solved), _refusal(problem, made, step))
+    return Fitted(problem.shape, problem, solved, spread, independent, report)
+
+
+def criterion(problem: Problem, solved: Solved, parameters: int, independent: float) -> float:
+    """Schwarz's criterion of a stage with ``parameters``, for ``independent`` samples.
+
+    A free initial state is known from a few samples however long the record: what it costs does not grow.
+    """
     states = sum(len(own) - 1 for own in solved.own)
-    bic = effective * np.log(square) + problem.shape.parameters * np.log(effective) + states
-    gof = 1.0 - float(np.sqrt(np.mean(solved.left**2))) / problem.spread
-    report = ShapeFit(problem.shape.name, made, float(bic), gof, _refusal(problem, made, step))
-    return Fitted(problem.shape, problem, solved, spread, samples, report)
+    return float(independent * np.log(mean_square(problem, solved)) + parameters * np.log(independent) + states)
+
+
+def fit_of(problem: Problem, solved: Solved) -> float:
+    """GOF, eq. (4), of all records together, each about its own mean."""
+    return 1.0 - float(np.sqrt(np.mean(solved.left**2))) / problem.spread
 
 
 def _uncertainty(problem: Problem, solved: Solved) -> tuple[np.ndarray | None, float]:

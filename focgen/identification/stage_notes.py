@@ -45,7 +45,7 @@ def _directions(stage: str, chosen: Fitted, found: UpDown | None) -> list[str]:
     if found.one_line_will_do:
         return []
     named = f"; `focgen diagnose` names {effect}" if effect else ""
-    times = f"{rises} in {found.rising[0]:.3g} s and {falls} in {found.falling[0]:.3g} s"
+    times = f"{rises} in {found.rising[0]:.2g} s and {falls} in {found.falling[0]:.2g} s"
     return [f"{times}: one linear {stage} cannot do both; the one written lies between{named}"]
 
 

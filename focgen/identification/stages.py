@@ -23,6 +23,7 @@ from focgen.logs.experiment import Experiment
 _SIGNALS = {"regulator": ("command", "pressure", "zero"), "sensor": ("curvature", "output", "linear")}
 _FEWEST = 30  # samples
 _MOST = 50_000  # samples that the shapes are compared on
+_SHOWS = 4  # samples, twice as many of which show whether a log begins at rest
 _MOVES = 10.0  # times its noise: a signal that moves by more has answered to a step
 
 
@@ -65,7 +66,7 @@ def identify_stage(experiments: Sequence[Experiment], stage: str) -> StageFit:
     _check(records, stage)
     fits = fit_shapes(parts(records, _MOST), step)
     short = choose(fits)
-    up_down = fit_directions(fits, short, step)
+    up_down, short = fit_directions(fits, short, step)
     chosen = refit(short, records, step) if sum(map(len, records)) > _MOST else short
     _check_known(chosen, fits, stage)
     return StageFit(
@@ -123,7 +124,19 @@ def _record(experiment: Experiment, stage: str) -> Record:
     source, target, hold = _SIGNALS[stage]
     drive, measured = (np.asarray(experiment[role], float) for role in (source, target))
     rests = hold == "zero" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
-    return Record(experiment.name, drive if rests else drive - drive[0], measured, hold, bool(rests))
+    drive = drive if rests else drive - drive[0]
+    return Record(experiment.name, drive, measured, hold, bool(rests), not _still(drive, measured))
+
+
+def _still(drive: np.ndarray, measured: np.ndarray) -> bool:
+    """Whether a log begins at rest: the measured signal stays where it is until the input first changes."""
+    changed = int(np.argmax(drive != drive[0])) or len(drive)
+    half = changed // 2
+    if half < _SHOWS:
+        return False
+    noise = float(np.median(np.abs(np.diff(measured))))
+    moved = float(np.median(measured[half:changed])) - float(np.median(measured[:half]))
+    return abs(moved) <= noise + 1e-3 * float(np.ptp(measured))
 
 
 def _answers(measured: np.ndarray) -> bool:

@@ -14,11 +14,10 @@ from scipy import fft
 from scipy.signal import lfilter
 
 from focgen.identification.projected import Problem
-from focgen.identification.rational import Record, Shape, discretise
+from focgen.identification.rational import LATEST, Record, Shape, discretise
 
 _RATIO = 2.0  # between neighbouring time constants
 _SHORTEST = 0.3  # samples
-_LATEST = 0.25  # of the shortest record: no dead time beyond it is looked for
 _KEPT = 3  # minima
 _PAIRS = ((1.0, 0.1), (0.7, 0.4))  # time constants of two real poles, over that of one
 _SWINGS = tuple(itertools.product((0.6, 1.2, 2.4), (0.25, 0.7)))  # (wn times that time constant, damping)
@@ -48,7 +47,7 @@ def _time_constants(records: Sequence[Record]) -> np.ndarray:
 
 def _costs(records: Sequence[Record], T: float | None) -> np.ndarray:
     """Sum of squares left by gain and offsets for 0, 1, 2, … samples of dead time; initial states at rest."""
-    count = max(int(_LATEST * min(map(len, records))), 2)
+    count = max(int(LATEST * min(map(len, records))), 2)
     product, power, total = np.zeros(count), np.zeros(count), 0.0
     for record in records:
         lagged, wanted = _lagged(record, T), record.measured - record.measured.mean()
