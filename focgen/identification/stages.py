@@ -1,0 +1,177 @@
+"""Regulator and sensor identified from their own signals, as rational stages with a dead time.
+
+The regulator runs from ``command``, held between samples, to ``pressure``; the sensor from ``curvature``,
+straight between samples, to ``output``. One stage is fitted to all experiments, each with an offset and an
+initial state of its own. Of the shapes tried the simplest that explains the data is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.errors import FitError, check_choice
+from focgen.fractional.transfer import TransferFunction
+from focgen.identification.directions import UpDown, fit_directions
+from focgen.identification.rational import Record, parts
+from focgen.identification.shapes import Fitted, ShapeFit, choose, clearly_better, delay_seconds, fit_shapes, refit
+from focgen.identification.stage_notes import notes_of
+from focgen.logs.experiment import Experiment
+
+_SIGNALS = {"regulator": ("command", "pressure", "zero"), "sensor": ("curvature", "output", "linear")}
+_FEWEST = 30  # samples
+_MOST = 50_000  # samples that the shapes are compared on
+_SHOWS = 4  # samples, twice as many of which show whether a log begins at rest
+_MOVES = 10.0  # times its noise: a signal that moves by more has answered to a step
+
+
+@dataclass(frozen=True, eq=False)
+class StageFit:
+    """A stage as identified.
+
+    ``stage`` is "regulator" or "sensor", ``transfer`` and ``delay`` (s) what the rig takes. ``shape`` is one
+    of "gain", "1p", "2p", "2p1z", each with "+delay" where there is one. ``parameters`` maps gain, T or T1
+    and T2 or wn and damping, zero and delay to (value, half 95 % interval), times in s, wn in rad/s.
+    ``gain_relative`` and ``time_relative`` are half 95 % intervals relative to the values. ``fits``: every
+    shape that was tried. ``up_down``: time constants of the two directions, None where they are not both
+    seen. ``simulated`` (n,) of each of the experiments called ``names``.
+    """
+
+    stage: str
+    transfer: TransferFunction
+    delay: float
+    shape: str
+    parameters: dict[str, tuple[float, float]]
+    gain_relative: float
+    time_relative: float
+    gof: float
+    fits: tuple[ShapeFit, ...]
+    up_down: UpDown | None
+    names: tuple[str, ...]
+    simulated: tuple[np.ndarray, ...]
+    notes: tuple[str, ...]
+
+
+def identify_stage(experiments: Sequence[Experiment], stage: str) -> StageFit:
+    """Fit a regulator (command → pressure) or a sensor (curvature → output) to all experiments that log both.
+
+    Raises FitError where the logs do not determine it.
+    """
+    check_choice("--stages", stage, _SIGNALS, FitError)
+    used = _usable(experiments, stage)
+    step = used[0].sample_time
+    records = [_record(e, stage) for e in used]
+    _check(records, stage)
+    fits = fit_shapes(parts(records, _MOST), step)
+    short = choose(fits)
+    up_down, short = fit_directions(fits, short, step)
+    chosen = refit(short, records, step) if sum(map(len, records)) > _MOST else short
+    _check_known(chosen, fits, stage)
+    return StageFit(
+        stage=stage,
+        transfer=transfer_of(chosen.report.parameters),
+        delay=delay_seconds(chosen, step),
+        shape=chosen.report.shape,
+        parameters=chosen.report.parameters,
+        gain_relative=chosen.half["gain"],
+        time_relative=_time_relative(chosen),
+        gof=chosen.report.gof,
+        fits=tuple(f.report for f in fits),
+        up_down=up_down,
+        names=tuple(e.name for e in used),
+        simulated=tuple(chosen.solved.models(chosen.solved.rows)),
+        notes=notes_of(stage, [e.name for e in experiments], chosen, fits, up_down, step),
+    )
+
+
+def transfer_of(parameters: dict[str, tuple[float, float]]) -> TransferFunction:
+    """The transfer function of a shape's parameters, its denominator's leading coefficient 1."""
+    value = {name: pair[0] for name, pair in parameters.items()}
+    if "T" in value:
+        den = [(1.0, 1.0), (1.0 / value["T"], 0.0)]
+    elif "wn" in value:
+        den = [(1.0, 2.0), (2.0 * value["damping"] * value["wn"], 1.0), (value["wn"] ** 2, 0.0)]
+    elif "T1" in value:
+        rates = 1.0 / value["T1"], 1.0 / value["T2"]
+        den = [(1.0, 2.0), (sum(rates), 1.0), (rates[0] * rates[1], 0.0)]
+    else:
+        den = [(1.0, 0.0)]
+    scale = value["gain"] * den[-1][0]
+    zero = [(scale * value["zero"], 1.0)] if "zero" in value else []
+    return TransferFunction([*zero, (scale, 0.0)], den)
+
+
+def _usable(experiments: Sequence[Experiment], stage: str) -> list[Experiment]:
+    source, target, _ = _SIGNALS[stage]
+    both = [e for e in experiments if source in e and target in e]
+    if not both:
+        remedy = f"log them, and name their columns in [signals], or leave {stage} out of --stages"
+        raise FitError(stage, f"no log has both {source} and {target}", remedy)
+    long = [e for e in both if len(e) >= _FEWEST]
+    if not long:
+        longest = max(map(len, both))
+        raise FitError(stage, f"the longest log has {longest} samples", f"give at least {_FEWEST}")
+    steps = {e.sample_time for e in long}
+    if max(steps) > min(steps) * (1.0 + 1e-6):
+        what = f"the logs are sampled every {min(steps):g} and every {max(steps):g} s"
+        raise FitError(stage, what, "identify them one sample time at a time")
+    return long
+
+
+def _record(experiment: Experiment, stage: str) -> Record:
+    source, target, hold = _SIGNALS[stage]
+    drive, measured = (np.asarray(experiment[role], float) for role in (source, target))
+    rests = hold == "zero" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
+    drive = drive if rests else drive - drive[0]
+    return Record(experiment.name, drive, measured, hold, bool(rests), not _still(drive, measured))
+
+
+def _still(drive: np.ndarray, measured: np.ndarray) -> bool:
+    """Whether a log begins at rest: the measured signal stays where it is until the input first changes."""
+    changed = int(np.argmax(drive != drive[0])) or len(drive)
+    half = changed // 2
+    if half < _SHOWS:
+        return False
+    noise = float(np.median(np.abs(np.diff(measured))))
+    moved = float(np.median(measured[half:changed])) - float(np.median(measured[:half]))
+    return abs(moved) <= noise + 1e-3 * float(np.ptp(measured))
+
+
+def _answers(measured: np.ndarray) -> bool:
+    """Whether a signal ends elsewhere than it begins: it still answers to a step before its first sample."""
+    noise = float(np.median(np.abs(np.diff(measured)))) + 1e-9 * float(np.ptp(measured))
+    end = measured[-max(len(measured) // 4, 1) :]
+    return abs(float(np.median(end)) - float(np.median(measured[:3]))) > _MOVES * noise
+
+
+def _check(records: Sequence[Record], stage: str) -> None:
+    source, target, _ = _SIGNALS[stage]
+    if not any(np.any(r.drive) for r in records):
+        what = f"the {source} never changes, so neither gain nor dynamics can be seen"
+        raise FitError(stage, what, f"log steps of the {source}, up and down, each held until it settles")
+    if not any(np.ptp(r.measured) for r in records):
+        raise FitError(stage, f"the {target} never changes", f"check the column of the {target}")
+
+
+def _check_known(chosen: Fitted, fits: Sequence[Fitted], stage: str) -> None:
+    """Raise FitError where the gain's interval reaches 0, in the shape taken or in one that is far better."""
+    source, target, _ = _SIGNALS[stage]
+    better = [f for f in fits if f.gain_unknown and clearly_better(f, chosen)]
+    if not chosen.gain_unknown and not better:
+        return
+    gain, half = (better[0] if better else chosen).report.parameters["gain"]
+    wide = f"±{half / abs(gain):.0%}" if gain and np.isfinite(half) else "not at all"
+    what = f"the gain from {source} to {target} is known to {wide} only"
+    remedy = f"log larger steps of the {source}, up and down, each held until the {target} has settled"
+    raise FitError(stage, what, remedy)
+
+
+def _time_relative(chosen: Fitted) -> float:
+    """Of one factor of time: of the time constant, of wn, or of the sum of both time constants."""
+    found = chosen.report.parameters
+    if "T1" in found:
+        (slow, wide), (fast, narrow) = found["T1"], found["T2"]
+        return (wide + narrow) / (slow + fast)
+    return next((chosen.half[name] for name in ("T", "wn") if name in found), 0.0)
