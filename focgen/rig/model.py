@@ -75,6 +75,20 @@ class LinearActuator:
 
 
 @dataclass(frozen=True)
+class Delays:
+    """The nominal dead time of each stage, s: e^(−L s) behind its dynamics."""
+
+    regulator: float = 0.0
+    actuator: float = 0.0
+    sensor: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Of the whole chain, s."""
+        return self.regulator + self.actuator + self.sensor
+
+
+@dataclass(frozen=True)
 class Ranges:
     """What each signal can reach, (low, high) in the log's units; ``None`` where not stated."""
 
@@ -95,3 +109,4 @@ class Rig:
     sensor: TransferFunction = UNITY
     ranges: Ranges = Ranges()
     effects: tuple[Mapping[str, Any], ...] = field(default=())
+    delays: Delays = Delays()
