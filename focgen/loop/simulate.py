@@ -218,7 +218,8 @@ class _Trial:
                 raise DesignError("--duration", f"is {duration:g} s", f"give {2 * h:g} … {_MOST * h:g} s")
             return math.ceil(duration / h)
         speeds = [m.crossover_rad_s for m in self.margins if math.isfinite(m.crossover_rad_s)]
-        return min(max(math.ceil(_SETTLINGS / min(speeds) / h), _FEWEST), _MOST) if speeds else _UNKNOWN
+        late = math.ceil(self.rig.delays.total / h)
+        return min(max(math.ceil(_SETTLINGS / min(speeds) / h) + late, _FEWEST), _MOST) if speeds else _UNKNOWN
 
     def result(self, duration: float | None, notes: tuple[str, ...]) -> Simulation:
         count = self.samples(duration)
