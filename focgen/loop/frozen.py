@@ -8,7 +8,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import actuator_of
-from focgen.control.margins import Margins, curve, margins
+from focgen.control.margins import DELAYED, Margins, curve, margins
 from focgen.fractional.delay import Delayed
 from focgen.fractional.responses import step_response
 from focgen.fractional.simulation import Convolution, divided
@@ -22,8 +22,8 @@ _FINEST = 64  # parts of a sample
 
 
 def frozen_loop(rig: Rig, controller: Controller, pressure: float) -> Delayed:
-    """Return the open loop C(s) R(s) G(s) H(s) with K = K(p) and the controller's gain at ``pressure``, behind
-    the rig's delays.
+    """Return the open loop C(s) R(s) G(s) H(s) with K = K(p) and the controller's gain at ``pressure``,
+    behind the rig's delays.
 
     Factors that cancel exactly, as the inverse and the model do, are gone.
     """
@@ -47,7 +47,7 @@ def frozen_step(loop: Delayed, t) -> np.ndarray:
 
 def _delayed_step(loop: Delayed, t: np.ndarray) -> np.ndarray:
     """The error as straight between ever more samples, until that no longer shows."""
-    last, count, parts = float(t.max()), max(2, t.size), 1
+    last, count, parts = float(t.max()), max(2, t.size - 1), 1
     found = _sampled_step(loop, t, last, count)
     while parts < _FINEST:
         parts *= 2
@@ -69,7 +69,8 @@ def _sampled_step(loop: Delayed, t: np.ndarray, last: float, count: int) -> np.n
 def frozen_margins(loop: Delayed, sample_time: float) -> Margins:
     """Return the margins of the open loop, looked at from 1e-6 to 1e3 times the sampling frequency."""
     unit = 2.0 * math.pi / sample_time
-    return margins(curve(loop.frequency_response, 1e-6 * unit, 1e3 * unit))
+    small = {"small": DELAYED} if loop.delay else {}
+    return margins(curve(loop.frequency_response, 1e-6 * unit, 1e3 * unit, **small))
 
 
 def _series(parts: list[TransferFunction]) -> TransferFunction:

@@ -12,7 +12,7 @@ from scipy.special import gamma, zeta
 
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import actuator_of
-from focgen.control.margins import Curve, Margins, curve, margins
+from focgen.control.margins import DELAYED, Curve, Margins, curve, margins
 from focgen.fractional.delay import Delayed, split_delay
 from focgen.fractional.transfer import TransferFunction
 from focgen.loop.linear_effects import Response, linear_part
@@ -77,8 +77,8 @@ def _split(transfer: TransferFunction) -> tuple[float, TransferFunction]:
 
 
 def _far_bands(rest: TransferFunction, h: float, omega: np.ndarray, part: float = 0.0) -> np.ndarray:
-    """Σ P(jω_n)/(jω_n) over the bands beyond those summed one by one, where P is its leading power, delayed by
-    the ``part`` of a sample.
+    """Σ P(jω_n)/(jω_n) over the bands beyond those summed one by one, where P is its leading power, delayed
+    by the ``part`` of a sample.
     """
     fall = rest.den[0].order - rest.num[0].order + 1.0
     size = rest.num[0].coefficient / rest.den[0].coefficient * (2.0 * math.pi / h) ** -fall
@@ -176,7 +176,7 @@ def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
         return running_response(plan, omega, any_schedule(controller)) / unit * held(omega)
 
     return Shapes(
-        curve(ideal, low, _HIGH * nyquist),
+        curve(ideal, low, _HIGH * nyquist, **({"small": DELAYED} if chain.delay else {})),
         sampled(None),
         sampled(controller.length),
         curve(running, low, nyquist),
