@@ -9,7 +9,17 @@ import tomlkit
 
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import UNITY, Actuator, Delays, LinearActuator, Ranges, Rig, Signals
+from focgen.rig.model import (
+    UNITY,
+    Actuator,
+    Delays,
+    LinearActuator,
+    Ranges,
+    Relative,
+    Rig,
+    Signals,
+    Uncertainty,
+)
 from focgen.tomlfile import Table, terms_of
 
 _STAGES = ("regulator", "actuator", "sensor")
@@ -32,6 +42,7 @@ def read_rig(path: str | Path) -> Rig:
         ranges=_ranges(top.table("ranges")),
         effects=_effects(top),
         delays=delays,
+        uncertainty=_uncertainty(top.table("uncertainty")),
     )
     top.done()
     return rig
@@ -124,6 +135,28 @@ def _ranges(table: Table | None) -> Ranges:
     return ranges
 
 
+def _uncertainty(table: Table | None) -> Uncertainty:
+    if table is None:
+        return Uncertainty()
+    usual = vars(Uncertainty())
+    found = {stage: _relative(table.table(stage), usual[stage]) for stage in _STAGES}
+    table.done()
+    return Uncertainty(**found)
+
+
+def _relative(table: Table | None, usual: Relative) -> Relative:
+    """What is given of a stage's uncertainty, the default for the rest."""
+    if table is None:
+        return usual
+    keys = [key for key, value in vars(usual).items() if value]
+    found = Relative(**{key: table.number(key, getattr(usual, key)) for key in keys})
+    table.done()
+    for key, value in vars(found).items():
+        if not 0.0 <= value < 1.0:
+            raise table.fail(key, f"is {value:g}", "give a part of the whole: 0 or more, and below 1")
+    return found
+
+
 def _effects(top: Table) -> tuple:
     effects = top.raw("effects", [])
     if not isinstance(effects, list) or not all(isinstance(e, dict) and "name" in e for e in effects):
@@ -157,9 +190,17 @@ def rig_table(rig: Rig) -> dict:
     ranges = {key: list(span) for key, span in vars(rig.ranges).items() if span is not None}
     if ranges:
         table["ranges"] = ranges
+    usual = vars(Uncertainty())
+    uncertain = {key: part for key, part in vars(rig.uncertainty).items() if part != usual[key]}
+    if uncertain:
+        table["uncertainty"] = {key: _relative_table(part, usual[key]) for key, part in uncertain.items()}
     if rig.effects:
         table["effects"] = [dict(effect) for effect in rig.effects]
     return table
+
+
+def _relative_table(part: Relative, usual: Relative) -> dict:
+    return {key: value for key, value in vars(part).items() if vars(usual)[key]}
 
 
 def _actuator_table(actuator: Actuator | LinearActuator) -> dict:
