@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,6 +124,22 @@ def holding(rig: Rig, output: float, ranges: Ranges) -> Equilibrium:
     if not ranges.command[0] - slack <= command <= ranges.command[1] + slack:
         raise _unreachable(rig, output, f"needs the command {command:.4g}", f"[{_span(ranges.command)}]")
     return Equilibrium(command, pressure, output)
+
+
+def within_reach(rig: Rig, outputs: Sequence[float], command: tuple[float, float]) -> list[bool]:
+    """Whether the rig, which rests elsewhere, is held at each of the ``outputs`` by a ``command`` in that
+    range.
+    """
+    start = rest(rig, command).output
+    return [output != start and _is_held(rig, output, Ranges(command=command)) for output in outputs]
+
+
+def _is_held(rig: Rig, output: float, ranges: Ranges) -> bool:
+    try:
+        holding(rig, output, ranges)
+    except DesignError:
+        return False
+    return True
 
 
 def _pressure_for(rig: Rig, drive: float, output: float, ranges: Ranges) -> float:

@@ -11,6 +11,8 @@ import numpy as np
 _PER_DECADE = 40
 _STEP = 0.03  # largest turn (rad) and largest change of log|L| between neighbours of the refined grid
 _ROUNDS = 14
+_SMALL = 1e-4  # |L| below which nothing is refined
+DELAYED = 1e-2  # the same where a nominal delay turns it without end
 
 
 @dataclass(frozen=True)
@@ -46,13 +48,17 @@ class Curve:
         return replace(self, values=self.values * factor)
 
 
-def curve(response: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> Curve:
-    """Sample ``response(omega)`` from ``low`` to ``high`` rad/s, refined where it turns or changes fast."""
+def curve(
+    response: Callable[[np.ndarray], np.ndarray], low: float, high: float, small: float = _SMALL
+) -> Curve:
+    """Sample ``response(omega)`` from ``low`` to ``high`` rad/s, refined where it turns or changes fast and
+    is not ``small``.
+    """
     count = max(2, math.ceil(_PER_DECADE * math.log10(high / low)))
     omega = np.geomspace(low, high, count)
     values = response(omega)
     for _ in range(_ROUNDS):
-        coarse = _coarse(values) & (np.diff(omega) > 1e-12 * omega[1:])
+        coarse = _coarse(values, small) & (np.diff(omega) > 1e-12 * omega[1:])
         if not coarse.any():
             break
         middle = np.sqrt(omega[:-1][coarse] * omega[1:][coarse])
@@ -62,9 +68,9 @@ def curve(response: Callable[[np.ndarray], np.ndarray], low: float, high: float)
     return Curve(omega, values)
 
 
-def _coarse(values: np.ndarray) -> np.ndarray:
-    """Where neighbours differ by too much to interpolate; what is small matters no more."""
-    small = np.maximum(np.abs(values[1:]), np.abs(values[:-1])) < 1e-4
+def _coarse(values: np.ndarray, least: float) -> np.ndarray:
+    """Where neighbours differ by too much to interpolate; what is below ``least`` matters no more."""
+    small = np.maximum(np.abs(values[1:]), np.abs(values[:-1])) < least
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.log(values[1:] / values[:-1])
     return (np.abs(ratio) > _STEP) & ~small & np.isfinite(ratio)

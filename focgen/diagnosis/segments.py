@@ -108,7 +108,7 @@ def stages_of(rig: Rig) -> tuple[str, ...]:
         "actuator": rig.actuator is not None,
         "sensor": rig.sensor != UNITY,
     }
-    return tuple(stage for stage, there in given.items() if there)
+    return tuple(stage for stage, there in given.items() if there or getattr(rig.delays, stage))
 
 
 def cuts(logs: Sequence[Experiment]) -> tuple[str, ...]:

@@ -36,19 +36,28 @@ class Chain:
             total = total + _chain_image(self.poles.conj(), self.gammas.conj(), s)
         return total
 
-    def samples(self, step: float, count: int) -> np.ndarray:
-        """Return the time function at 0, ``step``, …, shape (count,)."""
-        return self._follow(self._start(), step, count)
+    def samples(self, step: float, count: int, begin: float = 0.0) -> np.ndarray:
+        """Return the time function at ``begin``, ``begin`` + ``step``, …, shape (count,)."""
+        return self._follow(self._later(self._start(), begin), step, count)
 
-    def means(self, step: float, count: int) -> np.ndarray:
-        """Return its mean over each [(j−1) step, j step], j = 1 … count, shape (count,)."""
-        return self._follow(self._mean_state(step), step, count)
+    def means(self, step: float, count: int, begin: float = 0.0) -> np.ndarray:
+        """Return its mean over each step that begins at ``begin`` + j ``step``, j = 0 … count − 1, shape
+        (count,).
+        """
+        return self._follow(self._later(self._mean_state(step), begin), step, count)
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """Return the time function at the times ``t`` ≥ 0 (s), shape of ``t``."""
         if len(self.poles) == 1:
             return self.weight * (self.gammas[0] * np.exp(self.poles[0] * t)).real
         return self.weight * (self._propagators(t)[:, :, -1] @ self.gammas).real
+
+    def _later(self, state: np.ndarray, time: float) -> np.ndarray:
+        if time == 0.0:
+            return state
+        if len(self.poles) == 1:
+            return np.exp(self.poles[0] * time) * state
+        return self._propagators(np.array([time]))[0] @ state
 
     def _start(self) -> np.ndarray:
         return np.eye(len(self.poles), dtype=complex)[-1]

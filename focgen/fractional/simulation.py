@@ -9,6 +9,7 @@ from scipy import fft, signal
 
 from focgen.fractional.contour import inverse_laplace
 from focgen.fractional.decomposition import StepImage, step_image
+from focgen.fractional.delay import split_delay
 from focgen.fractional.loggrid import log_grid
 from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.fractional.weights import gl_weights
@@ -26,17 +27,23 @@ class Convolution:
 
     ``hold`` says what the input does between its samples: "zero" keeps the last one (zero-order hold),
     "linear" joins them by straight lines. Before the first sample everything rests at 0; the input then
-    jumps to it. ``step`` is the sampling interval in s.
+    jumps to it. ``step`` is the sampling interval in s; the response comes later by any ``delay`` ≥ 0 s.
     Raises ValueError for an improper transfer function (from ``run``), a step that is not positive, or an
     unknown hold.
     """
 
-    def __init__(self, transfer: TransferFunction, step: float, hold: Literal["zero", "linear"] = "zero"):
+    def __init__(
+        self,
+        transfer: TransferFunction,
+        step: float,
+        hold: Literal["zero", "linear"] = "zero",
+        delay: float = 0.0,
+    ):
         if not 0.0 < step < np.inf:
             raise ValueError(f"the step is {step} s, it must be positive")
         if hold not in ("zero", "linear"):
             raise ValueError(f"the hold is {hold!r}, it must be 'zero' or 'linear'")
-        self.transfer, self.step, self.hold = transfer, step, hold
+        self.transfer, self.step, self.hold, self.delay = transfer, step, hold, delay
         self._kernel = self._first = np.empty(0)
 
     def run(self, u) -> np.ndarray:
@@ -50,13 +57,19 @@ class Convolution:
 
     def _prepare(self, count: int) -> None:
         image = step_image(self.transfer, self.step * count)
+        whole, part = split_delay(self.delay, self.step)
+        # the instants fall on ``begin`` behind those of the undelayed response, ``whole`` samples earlier
+        whole, begin = (whole + 1, (1.0 - part) * self.step) if part else (whole, 0.0)
+        steps = _later(_steps(image, self.step, count, begin), whole)
         if self.hold == "zero":
-            self._kernel = np.diff(_steps(image, self.step, count), prepend=0.0)
+            self._kernel = np.diff(steps, prepend=0.0)
             return
         # means over [(j−1)h, jh]: a line between samples is a stack of ramps, which these differentiate
-        means = _means(image, self.step, count)
-        self._kernel = np.diff(means, prepend=0.0)
-        self._first = _steps(image, self.step, count) - means
+        means = _means(image, self.step, count, begin)
+        first = _first_mean(image, self.step, begin) if begin else 0.0
+        means = _later(np.concatenate([[first], means]), whole)
+        self._kernel = np.diff(means)
+        self._first = steps - means[1:]
 
 
 def _signal(u) -> np.ndarray:
@@ -66,45 +79,67 @@ def _signal(u) -> np.ndarray:
     return u
 
 
-def _steps(image: StepImage, step: float, count: int) -> np.ndarray:
-    """Return the step response at 0, h, …, shape (count,)."""
+def _later(values: np.ndarray, whole: int) -> np.ndarray:
+    """Return ``values`` (n,) moved back by ``whole`` places, zeros before them."""
+    whole = min(whole, len(values))
+    return np.concatenate([np.zeros(whole), values[: len(values) - whole]])
+
+
+def _steps(image: StepImage, step: float, count: int, begin: float = 0.0) -> np.ndarray:
+    """Return the step response at ``begin``, ``begin`` + h, …, shape (count,)."""
     out = np.zeros(count)
     for chain in image.chains:
-        out += chain.samples(step, count)
+        out += chain.samples(step, count, begin)
     if image.remainder is not None and count > 1:
         grid = log_grid(count - 1)
         places = np.concatenate([grid.head, grid.tail])
-        values = inverse_laplace(image.remainder, places * step, image.poles)
+        values = inverse_laplace(image.remainder, places * step + begin, image.poles)
         out[1:] += grid.spread(values[: len(grid.head)], values[len(grid.head) :])
-    out[0] = image.feedthrough
+    if begin == 0.0:
+        out[0] = image.feedthrough
+    elif image.remainder is not None:
+        out[0] += inverse_laplace(image.remainder, np.array([begin]), image.poles)[0]
     return out
 
 
-def _means(image: StepImage, step: float, count: int) -> np.ndarray:
-    """Return the step response's means over [(j−1)h, jh], j = 1 … count, shape (count,)."""
+def _means(image: StepImage, step: float, count: int, begin: float = 0.0) -> np.ndarray:
+    """Return the step response's means over ``begin`` + [(j−1)h, jh], j = 1 … count, shape (count,)."""
     out = np.zeros(count)
     for chain in image.chains:
-        out += chain.means(step, count)
+        out += chain.means(step, count, begin)
     if image.remainder is not None:
         grid = log_grid(count)
-        head = _head_means(image, step, len(grid.head))
-        out += grid.spread(head, _tail_means(image, step, grid.tail))
+        head = _head_means(image, step, len(grid.head), begin)
+        out += grid.spread(head, _tail_means(image, step, grid.tail * step + begin))
     return out
 
 
-def _head_means(image: StepImage, step: float, count: int) -> np.ndarray:
+def _first_mean(image: StepImage, step: float, end: float) -> float:
+    """Return the step response's integral over [0, ``end``], by h."""
+    polar = sum(float(chain.means(end, 1)[0]) for chain in image.chains) * end / step
+    return polar + (0.0 if image.remainder is None else float(_integrals(image, np.array([end]))[0]) / step)
+
+
+def _integrals(image: StepImage, t: np.ndarray) -> np.ndarray:
+    """Return the integral of what no pole makes, from 0 to the times ``t`` (s)."""
+
     def integral(s):
         return image.remainder(s) / s
 
-    integrals = inverse_laplace(integral, step * np.arange(1.0, count + 1.0), image.poles)
-    return np.diff(integrals, prepend=0.0) / step
+    return inverse_laplace(integral, t, image.poles)
 
 
-def _tail_means(image: StepImage, step: float, places: np.ndarray) -> np.ndarray:
+def _head_means(image: StepImage, step: float, count: int, begin: float) -> np.ndarray:
+    ends = step * np.arange(1.0, count + 1.0) + begin
+    before = _integrals(image, np.array([begin]))[0] if begin else 0.0
+    return np.diff(_integrals(image, ends), prepend=before) / step
+
+
+def _tail_means(image: StepImage, step: float, times: np.ndarray) -> np.ndarray:
     def mean(s):  # (1 − e^{−sh})/(sh): beyond the first samples the contour bears its growth
         return image.remainder(s) * -np.expm1(-s * step) / (s * step)
 
-    return inverse_laplace(mean, places * step, image.poles)
+    return inverse_laplace(mean, times, image.poles)
 
 
 def _product(kernel: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -152,7 +187,7 @@ class GrunwaldLetnikov:
             return signal.lfilter(num, den, u)
         padded = np.zeros((2, len(u)))
         padded[0, : len(num)], padded[1, : len(den)] = num, den
-        return _divided(_product(padded[0], u), padded[1])
+        return divided(_product(padded[0], u), padded[1])
 
 
 def gl_operator(terms: Polynomial, step: float, length: int) -> np.ndarray:
@@ -163,8 +198,8 @@ def gl_operator(terms: Polynomial, step: float, length: int) -> np.ndarray:
     return total
 
 
-def _divided(right: np.ndarray, den: np.ndarray) -> np.ndarray:
-    """Solve Σ_j den_j y_{k−j} = right_k, the past entering by blocks of doubling size.
+def divided(right: np.ndarray, den: np.ndarray) -> np.ndarray:
+    """Solve Σ_j den_j y_{k−j} = right_k, both of shape (n,), the past entering by blocks of doubling size.
 
     Unlike a power series inverse it amplifies rounding no more than the plain recursion does.
     """

@@ -4,7 +4,8 @@ between.
 The command is held over a sample; the regulator answers exactly. Its pressure goes through K(p)p at every
 substep, the result is taken as straight within a substep, and actuator and sensor answer that exactly,
 however fractional they are. So the only error is that of the straight lines, O(substep²);
-:func:`substeps` bounds it.
+:func:`substeps` bounds it. Dead times pass through K(p)p unchanged, so all of them act at the end of the chain,
+where they are exact: the pressure that enters K(p)p is never late, the one that is measured is.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from focgen.control.equilibrium import actuator_of
 from focgen.errors import RigError
+from focgen.fractional.delay import split_delay
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.model import Rig
@@ -30,7 +32,8 @@ class Chain:
     """Responses sampled for a loop of ``samples`` samples of ``sample_time`` s, each in ``substeps`` parts.
 
     ``pressure`` (samples, substeps + 1, 1): from the held command to the pressure at the substeps of the
-    sample, both ends included. ``output`` and ``curvature`` (samples, 1, substeps + 1): from K(p)p there
+    sample, both ends included, without the regulator's delay; where it has one, a last row more is the pressure
+    with it at the sample's end. ``output`` and ``curvature`` (samples, 1, substeps + 1): from K(p)p there
     to the sensor's output and the curvature at the sample's end.
     """
 
@@ -50,15 +53,15 @@ def chain(rig: Rig, sample_time: float, samples: int, parts: int | None = None) 
     Raises RigError where a stage cannot be simulated.
     """
     parts = parts or substeps(rig, sample_time)
-    actuator = actuator_of(rig)
+    actuator, delays = actuator_of(rig), rig.delays
     return Chain(
         rig,
         sample_time,
         samples,
         parts,
-        _held(rig.regulator, sample_time, samples, parts),
-        _straight(actuator.dynamics * rig.sensor, sample_time, samples, parts),
-        _straight(actuator.dynamics, sample_time, samples, parts),
+        _pressure(rig.regulator, sample_time, samples, parts, delays.regulator),
+        _straight(actuator.dynamics * rig.sensor, sample_time, samples, parts, delays.total),
+        _straight(actuator.dynamics, sample_time, samples, parts, delays.regulator + delays.actuator),
     )
 
 
@@ -99,22 +102,46 @@ def _held(stage: TransferFunction, sample_time: float, samples: int, parts: int)
     return kernel[: _settled(kernel), :, None]
 
 
+def _pressure(
+    stage: TransferFunction, sample_time: float, samples: int, parts: int, delay: float
+) -> np.ndarray:
+    """Return :func:`_held`, and with a ``delay`` (s) one more row: the output that much later, at the sample's
+    end.
+    """
+    inside = _held(stage, sample_time, samples, parts)
+    if not delay:
+        return inside
+    late = Convolution(stage, sample_time, "zero", delay).run(np.ones(samples + 1))
+    whole, part = split_delay(delay, sample_time)
+    if not part and whole <= samples:
+        late[whole] = 0.0  # the sample's end is the left limit, before the command that arrives there
+    kernel = np.zeros((samples, parts + 2, 1))
+    kernel[: len(inside), :-1] = inside
+    kernel[:, -1, 0] = np.diff(late)
+    return kernel[: _settled(kernel)]
+
+
 def _settled(kernel: np.ndarray) -> int:
     """Return how many lags say all: what follows adds up to less than rounding."""
-    left = np.cumsum(np.abs(kernel).sum(axis=1)[::-1])[::-1]
+    left = np.cumsum(np.abs(kernel).reshape(len(kernel), -1).sum(axis=1)[::-1])[::-1]
     return max(1, int(np.count_nonzero(left > 1e-15 * left[0])))
 
 
-def _straight(stage: TransferFunction, sample_time: float, samples: int, parts: int) -> np.ndarray:
+def _straight(
+    stage: TransferFunction, sample_time: float, samples: int, parts: int, delay: float = 0.0
+) -> np.ndarray:
     """Return the kernel from values at the substeps, joined by straight lines, to the output at the sample's
-    end.
+    end, ``delay`` s later.
     """
     count, step = samples * parts, sample_time / parts
     pulse = np.eye(1, count + 1)[0]
-    falling = Convolution(stage, step, "linear").run(pulse)
-    block = Convolution(stage, step, "zero").run(pulse)
+    falling = Convolution(stage, step, "linear", delay).run(pulse)
+    block = Convolution(stage, step, "zero", delay).run(pulse)
     rising = block - falling
-    rising[1] += block[0]  # the end of the block is seen from its left
+    whole, part = split_delay(delay, step)
+    if not part and whole < count:  # what arrives at the sample's end is seen from its left
+        rising[whole + 1] += block[whole]
+        falling[whole] = 0.0
     ends = parts * np.arange(1, samples + 1)[:, None]  # distance of the sample's end from the sample's start
     places = ends - np.arange(parts + 1)
     kernel = np.where(np.arange(parts + 1) < parts, falling[places], 0.0)

@@ -21,8 +21,9 @@ from focgen.errors import DesignError, check_choice
 from focgen.loop.bench import Bench, prepare
 from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
-from focgen.loop.trial import Steps, run_steps
+from focgen.loop.trial import Steps, run_corner, run_steps
 from focgen.loop.tuning import HORIZON, OVERSHOOT, Tuned, Wish, fastest, meeting, tune
+from focgen.loop.worst import Worst, worst_case
 from focgen.output import write_file
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST
@@ -87,7 +88,8 @@ class Design:
 
     ``settling_s`` (mean over the operating points) and ``overshoot_pct`` (largest) are of the controller
     as it will run, on the rig with its effects; ``holds`` says whether they keep the wish and every loop is
-    stable.
+    stable. ``worst``: what becomes of margins and steps within the rig's uncertainty, which the wish is not
+    judged by.
     """
 
     controller: Controller
@@ -100,6 +102,7 @@ class Design:
     settling_s: float
     overshoot_pct: float
     holds: bool
+    worst: Worst
     notes: tuple[str, ...] = field(default=())
 
 
@@ -269,9 +272,32 @@ def _judged(
     over = max(point.proof.overshoot_pct for point in points)
     notes = [*notes, *tuned.inversion.notes, *_remarks(bench, points)]
     kept = settling <= _SLACK * (wish.settling or math.inf) and over <= wish.overshoot + 0.5
-    holds = kept and all(m.running.stable for m in found)
     return Design(
-        controller, wish, schedule, points, found, memory, bench.delay, settling, over, holds, tuple(notes)
+        controller,
+        wish,
+        schedule,
+        points,
+        found,
+        memory,
+        bench.delay,
+        settling,
+        over,
+        kept and all(m.running.stable for m in found),
+        _worst(bench, controller, plan, points, _horizon(tuned, wish)),
+        tuple(notes),
+    )
+
+
+def _worst(bench: Bench, controller: Controller, plan: Plan, points, seconds: float) -> Worst:
+    return worst_case(
+        bench.rig,
+        controller,
+        plan,
+        bench.delay,
+        bench.pressures.tolist(),
+        bench.references.tolist(),
+        [point.proof for point in points],
+        lambda rig: run_corner(bench, rig, controller, plan, seconds),
     )
 
 

@@ -8,17 +8,22 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import actuator_of
-from focgen.control.margins import Margins, curve, margins
+from focgen.control.margins import DELAYED, Margins, curve, margins
+from focgen.fractional.delay import Delayed
 from focgen.fractional.responses import step_response
+from focgen.fractional.simulation import Convolution, divided
 from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.rig.model import Actuator, Rig
 
 _INTEGRATOR = TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])
 _SAME = 1e-12  # relative difference of coefficients that cancel
+_CLOSE = 1e-5  # between a delayed step response and that on a grid twice as fine
+_FINEST = 64  # parts of a sample
 
 
-def frozen_loop(rig: Rig, controller: Controller, pressure: float) -> TransferFunction:
-    """Return the open loop C(s) R(s) G(s) H(s) with K = K(p) and the controller's gain at ``pressure``.
+def frozen_loop(rig: Rig, controller: Controller, pressure: float) -> Delayed:
+    """Return the open loop C(s) R(s) G(s) H(s) with K = K(p) and the controller's gain at ``pressure``,
+    behind the rig's delays.
 
     Factors that cancel exactly, as the inverse and the model do, are gone.
     """
@@ -26,19 +31,46 @@ def frozen_loop(rig: Rig, controller: Controller, pressure: float) -> TransferFu
     still = float(actuator.K(pressure)) if isinstance(actuator, Actuator) else 1.0
     gain = float(controller.gain_at(pressure)) * still
     parts = [controller.transfer, rig.regulator, actuator.dynamics, rig.sensor]
-    return _series(parts + [_INTEGRATOR] * controller.integrator) * gain
+    return Delayed(_series(parts + [_INTEGRATOR] * controller.integrator) * gain, rig.delays.total)
 
 
-def frozen_step(loop: TransferFunction, t) -> np.ndarray:
-    """Return the closed loop's unit step response at the times ``t`` (s), shape of ``t``."""
-    closed = TransferFunction(loop.num, loop.den + loop.num)
+def frozen_step(loop: Delayed, t) -> np.ndarray:
+    """Return the closed loop's unit step response at the times ``t`` (s), shape of ``t``: exact without a
+    delay, else to about 1e-5.
+    """
+    if loop.delay:
+        return _delayed_step(loop, np.asarray(t, dtype=float))
+    open_loop = loop.transfer
+    closed = TransferFunction(open_loop.num, open_loop.den + open_loop.num)
     return step_response(closed, t)
 
 
-def frozen_margins(loop: TransferFunction, sample_time: float) -> Margins:
+def _delayed_step(loop: Delayed, t: np.ndarray) -> np.ndarray:
+    """The error as straight between ever more samples, until that no longer shows."""
+    last, count, parts = float(t.max()), max(2, t.size - 1), 1
+    found = _sampled_step(loop, t, last, count)
+    while parts < _FINEST:
+        parts *= 2
+        before, found = found, _sampled_step(loop, t, last, count * parts)
+        if np.abs(found - before).max() <= _CLOSE * np.abs(found).max():
+            break
+    return found
+
+
+def _sampled_step(loop: Delayed, t: np.ndarray, last: float, count: int) -> np.ndarray:
+    """y = L e with e = 1 − y straight between ``count`` + 1 samples up to ``last`` s, solved for y."""
+    open_loop = Convolution(loop.transfer, last / count, "linear", loop.delay)
+    unclosed = open_loop.run(np.ones(count + 1))
+    weights = open_loop.run(np.eye(1, count + 2, 1)[0])[1:]
+    weights[0] += 1.0
+    return np.interp(t, np.arange(count + 1) * (last / count), divided(unclosed, weights))
+
+
+def frozen_margins(loop: Delayed, sample_time: float) -> Margins:
     """Return the margins of the open loop, looked at from 1e-6 to 1e3 times the sampling frequency."""
     unit = 2.0 * math.pi / sample_time
-    return margins(curve(loop.frequency_response, 1e-6 * unit, 1e3 * unit))
+    small = {"small": DELAYED} if loop.delay else {}
+    return margins(curve(loop.frequency_response, 1e-6 * unit, 1e3 * unit, **small))
 
 
 def _series(parts: list[TransferFunction]) -> TransferFunction:

@@ -8,11 +8,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import zeta
+from scipy.special import gamma, zeta
 
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import actuator_of
-from focgen.control.margins import Curve, Margins, curve, margins
+from focgen.control.margins import DELAYED, Curve, Margins, curve, margins
+from focgen.fractional.delay import Delayed, split_delay
 from focgen.fractional.transfer import TransferFunction
 from focgen.loop.linear_effects import Response, linear_part
 from focgen.plan.canonical import realise, tables
@@ -22,11 +23,12 @@ from focgen.rig.model import Actuator, Rig
 
 _ALIASES = 40  # pairs of side bands summed one by one
 _LOW = 1e-5  # of the sampling frequency: where the curves begin
+_LERCH = 0.2  # spacing in ln t: the rule's own error is about exp(−π²/spacing)
 _HIGH = 1e3  # of the same: where the continuous ones end
 
 
 def chain_transfer(rig: Rig) -> TransferFunction:
-    """Regulator, actuator (its dynamics only) and sensor in series."""
+    """Regulator, actuator (its dynamics only) and sensor in series, without their delays."""
     return rig.regulator * actuator_of(rig).dynamics * rig.sensor
 
 
@@ -40,24 +42,29 @@ def slope_at(rig: Rig, pressure: float) -> float:
 
 
 def held_response(
-    transfer: TransferFunction, sample_time: float, omega, more: Response | None = None
+    transfer: TransferFunction, sample_time: float, omega, more: Response | None = None, delay: float = 0.0
 ) -> np.ndarray:
-    """The response of hold, ``transfer`` and sampling, at ``omega`` ≤ π/h rad/s: all side bands added up.
+    """The response of hold, ``transfer``, a ``delay`` (s) and sampling, at ``omega`` ≤ π/h rad/s: all side
+    bands added up.
 
     The sample is taken before the hold moves on, so what passes at once arrives one sample late. ``more``: a
-    factor of the response that is no transfer function, as a delay; beyond 40 bands it adds nothing.
+    factor of the response that is no transfer function, as an effect's; beyond 40 bands it adds nothing.
     """
     h, omega = sample_time, np.asarray(omega, dtype=float)
+    whole, part = split_delay(delay, h)
     back = np.exp(-1j * omega * h)
     at_once, rest = _split(transfer)
     if more is not None:
         at_once = at_once * more(omega)
     if not rest.num:
-        return at_once * back
+        return at_once * back ** (whole + 1)
     bands = omega + 2.0 * math.pi / h * np.arange(-_ALIASES, _ALIASES + 1)[:, None]
     near = rest.frequency_response(bands) * (1.0 if more is None else more(bands))
-    total = (near / (1j * bands)).sum(axis=0) + (_far_bands(rest, h, omega) if more is None else 0.0)
-    return (1.0 - back) * total / h + at_once * back
+    if part:
+        near = near * np.exp(-1j * bands * part * h)
+    total = (near / (1j * bands)).sum(axis=0) + (_far_bands(rest, h, omega, part) if more is None else 0.0)
+    held = (1.0 - back) * total / h + at_once * back
+    return held * back**whole if whole else held
 
 
 def _split(transfer: TransferFunction) -> tuple[float, TransferFunction]:
@@ -69,12 +76,30 @@ def _split(transfer: TransferFunction) -> tuple[float, TransferFunction]:
     return at_once, TransferFunction([*transfer.num[1:], *lower], transfer.den)
 
 
-def _far_bands(rest: TransferFunction, h: float, omega: np.ndarray) -> np.ndarray:
-    """Σ P(jω_n)/(jω_n) over the bands beyond those summed one by one, where P is its leading power."""
+def _far_bands(rest: TransferFunction, h: float, omega: np.ndarray, part: float = 0.0) -> np.ndarray:
+    """Σ P(jω_n)/(jω_n) over the bands beyond those summed one by one, where P is its leading power, delayed
+    by the ``part`` of a sample.
+    """
     fall = rest.den[0].order - rest.num[0].order + 1.0
     size = rest.num[0].coefficient / rest.den[0].coefficient * (2.0 * math.pi / h) ** -fall
     place, first = omega * h / (2.0 * math.pi), _ALIASES + 1.0
-    return size * (1j**-fall * zeta(fall, first + place) + (-1j) ** -fall * zeta(fall, first - place))
+    if not part:
+        return size * (1j**-fall * zeta(fall, first + place) + (-1j) ** -fall * zeta(fall, first - place))
+    turn = np.exp(-2j * math.pi * part)
+    above = turn**first * _lerch(turn, fall, first + place)
+    below = turn**-first * _lerch(1.0 / turn, fall, first - place)
+    return size * np.exp(-1j * omega * part * h) * (1j**-fall * above + (-1j) ** -fall * below)
+
+
+def _lerch(turn: complex, power: float, first: np.ndarray) -> np.ndarray:
+    """Lerch's Σ turn^n (n + ``first``)^−``power`` over n ≥ 0, ``first`` (n,) > 1, from its integral over
+    t^(power−1) e^(−first t)/(1 − turn e^−t) by the trapezoidal rule in ln t, which converges geometrically
+    (DLMF 25.14.5).
+    """
+    log_t = np.arange(-60.0, 3.0, _LERCH)
+    t = np.exp(log_t)
+    share = np.exp(power * log_t) / (1.0 - turn * np.exp(-t)) * (_LERCH / gamma(power))
+    return np.exp(-first[..., None] * t) @ share
 
 
 def sampled_response(controller: Controller, omega, length: int | None = None) -> np.ndarray:
@@ -127,17 +152,20 @@ class Shapes:
 
 
 def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
-    """Sample the four loops, from 1e-5 of the sampling frequency up; the rig's linear effects are in them."""
-    h, transfer = controller.sample_time, chain_transfer(rig)
+    """Sample the four loops, from 1e-5 of the sampling frequency up; the rig's delays and its linear effects
+    are in them.
+    """
+    h, chain = controller.sample_time, Delayed(chain_transfer(rig), rig.delays.total)
     effects, _, _ = linear_part(rig)
     low, nyquist = _LOW * 2.0 * math.pi / h, math.pi / h
     unit = running_gain(plan, any_schedule(controller))
 
     def held(omega):
-        return held_response(transfer, h, omega, effects) * np.exp(-1j * omega * h * delay)
+        rig_held = held_response(chain.transfer, h, omega, effects, chain.delay)
+        return rig_held * np.exp(-1j * omega * h * delay)
 
     def ideal(omega):
-        part = controller.transfer.frequency_response(omega) * transfer.frequency_response(omega)
+        part = controller.transfer.frequency_response(omega) * chain.frequency_response(omega)
         part = part if effects is None else part * effects(omega)
         return part / (1j * omega) if controller.integrator else part
 
@@ -148,7 +176,7 @@ def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
         return running_response(plan, omega, any_schedule(controller)) / unit * held(omega)
 
     return Shapes(
-        curve(ideal, low, _HIGH * nyquist),
+        curve(ideal, low, _HIGH * nyquist, **({"small": DELAYED} if chain.delay else {})),
         sampled(None),
         sampled(controller.length),
         curve(running, low, nyquist),

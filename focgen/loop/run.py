@@ -88,7 +88,8 @@ class _Loop:
         """Hold ``command`` over sample k; return pressure and output at its end."""
         pressure = self.start.pressure + self.regulator.step(command[None] - self.start.command)
         self.peak = np.maximum(self.peak, pressure.max(axis=0))
-        self.drive[k] = self.actuator.drive(pressure) - self.rest_drive
+        inside = pressure[: self.chain.substeps + 1]  # the last row may be one of what is measured, late
+        self.drive[k] = self.actuator.drive(inside) - self.rest_drive
         return pressure[-1], self.start.output + self.plant.step(self.drive[k])[0]
 
     def _curvature(self) -> np.ndarray:

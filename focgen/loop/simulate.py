@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from focgen.control.controller import Controller
-from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest
+from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest, within_reach
 from focgen.control.files import read_controller
 from focgen.control.measures import StepMeasures, measure_step
 from focgen.control.setpoints import default_setpoints
@@ -22,6 +23,7 @@ from focgen.loop.plan_stepper import PlanStepper
 from focgen.loop.relaxation import Plant, run_with_effects
 from focgen.loop.run import LoopRun, run_loop
 from focgen.loop.stepper import FloatStepper
+from focgen.loop.worst import Worst, worst_case
 from focgen.plan.build import build_plan
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
@@ -65,6 +67,7 @@ class Simulation:
     ``running`` and ``ideal``: one column a set point, or one column in all where they are
     ``consecutive``; each set point lasts ``duration`` s. ``frozen`` (n, set points), None where unstable.
     ``nominal``: as ``running``, without the rig's ``effects``; None where it has none. ``holds``: all settle.
+    ``worst``: what becomes of margins and steps within the rig's uncertainty, which ``holds`` does not ask.
     ``states``: how many exponentials the memory has, 0 where it is short and ``length`` counts.
     """
 
@@ -82,6 +85,7 @@ class Simulation:
     nominal: LoopRun | None
     effects: tuple[str, ...]
     holds: bool
+    worst: Worst
     notes: tuple[str, ...]
     states: int = 0
 
@@ -218,7 +222,8 @@ class _Trial:
                 raise DesignError("--duration", f"is {duration:g} s", f"give {2 * h:g} … {_MOST * h:g} s")
             return math.ceil(duration / h)
         speeds = [m.crossover_rad_s for m in self.margins if math.isfinite(m.crossover_rad_s)]
-        return min(max(math.ceil(_SETTLINGS / min(speeds) / h), _FEWEST), _MOST) if speeds else _UNKNOWN
+        late = math.ceil(self.rig.delays.total / h)
+        return min(max(math.ceil(_SETTLINGS / min(speeds) / h) + late, _FEWEST), _MOST) if speeds else _UNKNOWN
 
     def result(self, duration: float | None, notes: tuple[str, ...]) -> Simulation:
         count = self.samples(duration)
@@ -246,9 +251,35 @@ class _Trial:
             nominal,
             tuple(str(effect["name"]) for effect in self.rig.effects),
             all(r.verdict == "settles" for r in results),
+            self._worst(count, reference, results),
             notes,
             self.plan.states,
         )
+
+    def _worst(self, count: int, reference: np.ndarray, results: Sequence[SetpointResult]) -> Worst:
+        return worst_case(
+            self.rig,
+            self.controller,
+            self.plan,
+            self.delay,
+            [point.pressure for point in self.points],
+            [point.output for point in self.points],
+            [StepMeasures(r.settling_s, r.overshoot_pct, r.steady_error) for r in results],
+            lambda rig: self._corner(rig, count, reference),
+        )
+
+    def _corner(self, rig: Rig, count: int, reference: np.ndarray) -> list[StepMeasures | None]:
+        """The steps on another rig; None at a set point that no command holds there."""
+        there = copy(self)
+        there.rig, there.start = rig, rest(rig, self.controller.ranges.output)
+        run = there._run(there._planned(reference.shape[1]), reference)
+        targets = [point.output for point in self.points]
+        reached = within_reach(rig, targets, self.controller.ranges.output)
+        return [there._measured(run, i, count) if reached[i] else None for i in range(len(targets))]
+
+    def _measured(self, run: LoopRun, index: int, count: int) -> StepMeasures:
+        begin, target = self._from(index), self.points[index].output
+        return measure_step(self._part(run, index, count), self.controller.sample_time, begin, target)
 
     def _planned(self, columns: int) -> PlanStepper:
         return PlanStepper(self.plan, columns, self.start.command)
@@ -289,8 +320,7 @@ class _Trial:
         self, index: int, count: int, running: LoopRun, ideal: LoopRun, frozen, nominal: LoopRun | None
     ) -> SetpointResult:
         begin, target, h = self._from(index), self.points[index].output, self.controller.sample_time
-        part = self._part(running, index, count)
-        found = measure_step(part, h, begin, target)
+        found, part = self._measured(running, index, count), self._part(running, index, count)
         peak = running.peak_pressure[0 if self.consecutive else index]
         return SetpointResult(
             target,
@@ -301,9 +331,9 @@ class _Trial:
             found.steady_error,
             float(peak),
             _verdict(found, part, target - begin),
-            measure_step(self._part(ideal, index, count), h, begin, target),
+            self._measured(ideal, index, count),
             None if frozen is None else measure_step(frozen, h, begin, target),
-            None if nominal is None else measure_step(self._part(nominal, index, count), h, begin, target),
+            None if nominal is None else self._measured(nominal, index, count),
         )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from focgen.control.controller import Controller
+from focgen.control.equilibrium import rest, within_reach
 from focgen.control.measures import StepMeasures, measure_step
 from focgen.loop.bench import Bench
 from focgen.loop.chain import chain
@@ -16,6 +17,7 @@ from focgen.loop.relaxation import Plant, run_with_effects
 from focgen.loop.run import LoopRun, run_loop
 from focgen.loop.stepper import FloatStepper
 from focgen.plan.model import Plan
+from focgen.rig.model import Rig
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,26 @@ def run_steps(bench: Bench, controller: Controller, plan: Plan, seconds: float) 
         _with_effects(bench, controller, plan, reference),
     )
     return [Steps(*step) for step in zip(*found, running.peak_pressure.tolist())]
+
+
+def run_corner(
+    bench: Bench, rig: Rig, controller: Controller, plan: Plan, seconds: float
+) -> list[StepMeasures | None]:
+    """The steps of the running controller on another ``rig``, its effects included; None at a set point that
+    no command holds there.
+    """
+    there = replace(bench, rig=rig, start=rest(rig, bench.ranges.output))
+    samples = max(20, math.ceil(seconds / controller.sample_time))
+    reference = np.tile(bench.references, (samples, 1))
+    if rig.effects:
+        found = _with_effects(there, controller, plan, reference)
+    else:
+        prepared = chain(rig, controller.sample_time, samples)
+        stepper = PlanStepper(plan, len(bench.points), there.start.command)
+        run = run_loop(prepared, stepper, reference, there.start, bench.delay, bench.pressure_known, False)
+        found = _measures(run, there)
+    reached = within_reach(rig, bench.references, bench.ranges.output)
+    return [one if there_too else None for one, there_too in zip(found, reached)]
 
 
 def _with_effects(bench: Bench, controller: Controller, plan: Plan, reference) -> list[StepMeasures | None]:

@@ -243,7 +243,7 @@ def _quickest(trials: _Trials, overshoot: float) -> tuple[float, float, float] |
 
 
 def _guess(bench: Bench) -> float:
-    """Return a settling time (s) that regulator, sensor, sampling and delay should allow: 45° of lag at
+    """Return a settling time (s) that regulator, sensor, sampling and delays should allow: 45° of lag at
     crossover.
     """
     h = bench.rig.sample_time
@@ -252,6 +252,7 @@ def _guess(bench: Bench) -> float:
     lag = -np.unwrap(np.angle(around.frequency_response(omega) / around.dc_gain)) + omega * h * (
         0.5 + bench.delay
     )
+    lag += omega * bench.rig.delays.total
     late = np.flatnonzero(lag > 0.25 * math.pi)
     return 3.0 / float(omega[late[0] if len(late) else -1])
 

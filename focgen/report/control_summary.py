@@ -10,6 +10,7 @@ from focgen.loop.design import Design, ScheduleReport
 from focgen.loop.response import PointMargins
 from focgen.loop.simulate import SetpointResult, Simulation
 from focgen.report.page import TableOf, text_table
+from focgen.report.worst_summary import worst_payload, worst_text
 
 _LOOPS = ("frozen", "ideal", "sampled", "truncated", "running")
 
@@ -33,6 +34,7 @@ def design_payload(design: Design) -> dict:
         "max_overshoot_pct": design.overshoot_pct,
         "operating_points": [asdict(point) for point in design.points],
         "margins": {loop: _worst(design.margins, loop) for loop in _LOOPS},
+        "worst": worst_payload(design.worst),
         "memory": asdict(design.memory) | {"rest_gain": design.memory.rest_gain},
         "delay_samples": design.delay,
         "transfer": str(design.controller.transfer),
@@ -68,7 +70,7 @@ def _line_text(schedule: ScheduleReport) -> str:
 
 def design_text(design: Design) -> str:
     """The design for people."""
-    tables = text_table(points_table(design)), text_table(margins_table(design))
+    tables = text_table(points_table(design)), text_table(margins_table(design)), worst_text(design.worst)
     notes = "\n".join([memory_line(design), *(f"note: {note}" for note in design.notes)])
     return "\n\n".join(["\n".join(schedule_lines(design)), *tables, notes, _wish_line(design)])
 
@@ -208,6 +210,7 @@ def simulation_payload(simulation: Simulation) -> dict:
         "setpoints": [asdict(result) for result in simulation.setpoints],
         "mean_settling_s": mean_settling(simulation),
         "holds": simulation.holds,
+        "worst": worst_payload(simulation.worst),
         "consecutive": simulation.consecutive,
         "duration_s": simulation.duration,
         "arithmetic": simulation.arithmetic,
@@ -227,7 +230,7 @@ def mean_settling(simulation: Simulation) -> float:
 
 def simulation_text(simulation: Simulation) -> str:
     """The simulation for people."""
-    lines = [text_table(setpoints_table(simulation)), ""]
+    lines = [text_table(setpoints_table(simulation)), "", worst_text(simulation.worst), ""]
     lines += [f"note: {note}" for note in simulation.notes]
     bad = [r for r in simulation.setpoints if r.verdict != "settles"]
     if bad:

@@ -123,10 +123,11 @@ class Chain:
         return steps
 
     def _core(self, stage: str, here: Sequence[Placed], held: bool) -> list[Step]:
+        delay = getattr(self.rig.delays, stage)
         if stage == "actuator":
-            return _actuator(self.rig.actuator, here, held)
+            return _actuator(self.rig.actuator, here, held, delay)
         transfer = getattr(self.rig, stage)
-        return [] if transfer == UNITY else [_transfer(transfer, held)]
+        return [] if transfer == UNITY and not delay else [_transfer(transfer, held, delay)]
 
 
 def _effect(placed: Placed) -> Step:
@@ -138,44 +139,40 @@ def _index(placed: Sequence[Placed], one: Placed) -> int:
     return next(i for i, p in enumerate(placed) if p is one)
 
 
-def _transfer(transfer, held: bool) -> Step:
+def _transfer(transfer, held: bool, delay: float) -> Step:
     return (
-        (transfer, held),
-        lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, held),
+        (transfer, held, delay),
+        lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, held, delay),
         None,
     )
 
 
-def _actuator(actuator, here: Sequence[Placed], held: bool) -> list[Step]:
+def _actuator(actuator, here: Sequence[Placed], held: bool, delay: float) -> list[Step]:
     drive = [_effect(p) for p in here if p.slot == "drive"]
     if actuator is None:
-        return drive
+        return [*drive, _transfer(UNITY, held, delay)] if delay else drive
     dynamics = UNCHANGED
     for p in here:
         if p.slot == "dynamics":
             dynamics = p.form.act(dynamics, p.values, None)
     if isinstance(actuator, LinearActuator):
-        return [*drive, *_linear(actuator, dynamics, held)]
+        return [*drive, *_linear(actuator, dynamics, held, delay)]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
-    lag = (
-        (actuator.T, actuator.alpha, dynamics),
-        lambda x, run: respond(x, run.rest, run.h, actuator.T, actuator.alpha, run.duration, dynamics),
+    return [line, *drive, _lag(1.0, actuator.T, actuator.alpha, dynamics, delay)]
+
+
+def _linear(actuator: LinearActuator, dynamics: Dynamics, held: bool, delay: float) -> list[Step]:
+    if dynamics == UNCHANGED:
+        return [_transfer(actuator.dynamics, held, delay)]
+    return [_lag(*linear.single_lag(actuator.dynamics), dynamics, delay)]
+
+
+def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) -> Step:
+    return (
+        (gain, T, alpha, dynamics, delay),
+        lambda x, run: respond(gain * x, run.rest, run.h, T, alpha, run.duration, dynamics, delay),
         None,
     )
-    return [line, *drive, lag]
-
-
-def _linear(actuator: LinearActuator, dynamics: Dynamics, held: bool) -> list[Step]:
-    if dynamics == UNCHANGED:
-        return [_transfer(actuator.dynamics, held)]
-    gain, T, alpha = linear.single_lag(actuator.dynamics)
-    return [
-        (
-            (actuator.dynamics, dynamics),
-            lambda x, run: respond(gain * x, run.rest, run.h, T, alpha, run.duration, dynamics),
-            None,
-        )
-    ]
 
 
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:

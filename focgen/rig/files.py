@@ -9,22 +9,40 @@ import tomlkit
 
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import UNITY, Actuator, LinearActuator, Ranges, Rig, Signals
+from focgen.rig.model import (
+    UNITY,
+    Actuator,
+    Delays,
+    LinearActuator,
+    Ranges,
+    Relative,
+    Rig,
+    Signals,
+    Uncertainty,
+)
 from focgen.tomlfile import Table, terms_of
+
+_STAGES = ("regulator", "actuator", "sensor")
+_LONGEST = 1e6  # samples that a nominal delay may have
 
 
 def read_rig(path: str | Path) -> Rig:
     """Read a rig. Raises RigError naming file, table, key and remedy."""
     top = Table.read(path, RigError)
+    sample_time = top.number("sample_time", above=0.0)
+    stages = {stage: top.table(stage) for stage in _STAGES}
+    delays = Delays(**{stage: _delay(table, sample_time) for stage, table in stages.items()})
     rig = Rig(
         name=top.text("name", Path(path).stem),
-        sample_time=top.number("sample_time", above=0.0),
+        sample_time=sample_time,
         signals=_signals(top),
-        actuator=_actuator(top.table("actuator")),
-        regulator=_stage(top.table("regulator")),
-        sensor=_stage(top.table("sensor")),
+        actuator=_actuator(stages["actuator"]),
+        regulator=_stage(stages["regulator"]),
+        sensor=_stage(stages["sensor"]),
         ranges=_ranges(top.table("ranges")),
         effects=_effects(top),
+        delays=delays,
+        uncertainty=_uncertainty(top.table("uncertainty")),
     )
     top.done()
     return rig
@@ -58,10 +76,25 @@ def _check_columns(table: Table, signals: Signals) -> None:
         roles[column] = role
 
 
+def _delay(table: Table | None, sample_time: float) -> float:
+    """The stage's dead time, s; 0 where it has none."""
+    delay = 0.0 if table is None else table.number("delay", 0.0)
+    if delay < 0.0:
+        raise table.fail("delay", f"is {delay:g}", "give a time of 0 s or more")
+    if delay > _LONGEST * sample_time:
+        raise table.fail("delay", f"is {delay:g} s, over a million samples", "give it in seconds")
+    return delay
+
+
+def _delays_only(table: Table) -> bool:
+    """Whether the stage is a pure delay: it has one, and no dynamics."""
+    return "delay" in table and not any(key in table for key in ("num", "den", "T", "alpha", "gain"))
+
+
 def _stage(table: Table | None) -> TransferFunction:
     if table is None:
         return UNITY
-    transfer = _proper(table)
+    transfer = UNITY if _delays_only(table) else _proper(table)
     table.done()
     return transfer
 
@@ -70,8 +103,8 @@ def _actuator(table: Table | None) -> Actuator | LinearActuator | None:
     if table is None:
         return None
     offset = table.number("offset", 0.0)
-    if "num" in table:
-        actuator = LinearActuator(_proper(table), offset)
+    if "num" in table or _delays_only(table):
+        actuator = LinearActuator(UNITY if _delays_only(table) else _proper(table), offset)
     else:
         actuator = Actuator(table.number("T", above=0.0), _alpha(table), table.numbers("gain"), offset)
     table.done()
@@ -102,6 +135,28 @@ def _ranges(table: Table | None) -> Ranges:
     return ranges
 
 
+def _uncertainty(table: Table | None) -> Uncertainty:
+    if table is None:
+        return Uncertainty()
+    usual = vars(Uncertainty())
+    found = {stage: _relative(table.table(stage), usual[stage]) for stage in _STAGES}
+    table.done()
+    return Uncertainty(**found)
+
+
+def _relative(table: Table | None, usual: Relative) -> Relative:
+    """What is given of a stage's uncertainty, the default for the rest."""
+    if table is None:
+        return usual
+    keys = [key for key, value in vars(usual).items() if value]
+    found = Relative(**{key: table.number(key, getattr(usual, key)) for key in keys})
+    table.done()
+    for key, value in vars(found).items():
+        if not 0.0 <= value < 1.0:
+            raise table.fail(key, f"is {value:g}", "give a part of the whole: 0 or more, and below 1")
+    return found
+
+
 def _effects(top: Table) -> tuple:
     effects = top.raw("effects", [])
     if not isinstance(effects, list) or not all(isinstance(e, dict) and "name" in e for e in effects):
@@ -129,12 +184,23 @@ def rig_table(rig: Rig) -> dict:
             table[key] = {"num": terms_of(stage.num), "den": terms_of(stage.den)}
     if rig.actuator is not None:
         table["actuator"] = _actuator_table(rig.actuator)
+    for key, delay in vars(rig.delays).items():
+        if delay:
+            table.setdefault(key, {})["delay"] = delay
     ranges = {key: list(span) for key, span in vars(rig.ranges).items() if span is not None}
     if ranges:
         table["ranges"] = ranges
+    usual = vars(Uncertainty())
+    uncertain = {key: part for key, part in vars(rig.uncertainty).items() if part != usual[key]}
+    if uncertain:
+        table["uncertainty"] = {key: _relative_table(part, usual[key]) for key, part in uncertain.items()}
     if rig.effects:
         table["effects"] = [dict(effect) for effect in rig.effects]
     return table
+
+
+def _relative_table(part: Relative, usual: Relative) -> dict:
+    return {key: value for key, value in vars(part).items() if vars(usual)[key]}
 
 
 def _actuator_table(actuator: Actuator | LinearActuator) -> dict:

@@ -6,31 +6,66 @@ from functools import lru_cache
 
 import numpy as np
 
+from focgen.fractional.delay import split_delay
+from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import kernels
-from focgen.rig.modes import hold, respond
+from focgen.rig.delay import delayed, shifted
+from focgen.rig.modes import Modes, between, fractional_lag, hold, respond
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
 
 
 def run(
-    transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: float, duration: float, held: bool = False
+    transfer: TransferFunction,
+    x: np.ndarray,
+    rest: np.ndarray,
+    h: float,
+    duration: float,
+    held: bool = False,
+    delay: float = 0.0,
 ) -> np.ndarray:
-    """The response to ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is true, every
-    ``duration`` s or sooner.
+    """The response to ``x`` (n,) sampled every ``h`` s, later by ``delay`` s, at rest wherever ``rest`` (n,)
+    is true, every ``duration`` s or sooner.
 
     ``held``: the input is a staircase, not linear between samples.
     """
+    whole, part = split_delay(delay, h)
     if transfer.den == ((1.0, 0.0),) and transfer.num == ((1.0, 0.0),):
-        return x
+        return x if delay == 0.0 else _passed(x, rest, h, delay, held)
+    if part:
+        found = _between(transfer, x, rest, h, duration, held, 1.0 - part)
+    else:
+        found = _at_samples(transfer, x, rest, h, duration, held)
+    return shifted(found, rest, whole) if whole else found
+
+
+def _passed(x: np.ndarray, rest: np.ndarray, h: float, delay: float, held: bool) -> np.ndarray:
+    """A pure delay: between its samples a staircase is what it was at the one before."""
+    whole, part = split_delay(delay, h)
+    return shifted(x, rest, whole + (part > 0.0)) if held else delayed(x, rest, h, delay)
+
+
+def _at_samples(transfer, x, rest, h: float, duration: float, held: bool) -> np.ndarray:
     if transfer.is_integer:
         return kernels.rational(x, rest, *_discrete(transfer, h, held))
     lag = single_lag(transfer)
     if lag:
         gain, T, alpha = lag
         return gain * respond(x, rest, h, T, alpha, duration)
-    tables = _fractional(transfer, h, 2.0 ** np.ceil(np.log2(duration)))
-    return kernels.modes(x, rest, *tables, switching=False)
+    rows, pair, through = _tables(transfer, h, 2.0 ** np.ceil(np.log2(duration)))
+    return kernels.modes(x, rest, *rows, pair, through, switching=False)
+
+
+def _between(transfer, x, rest, h: float, duration: float, held: bool, share: float) -> np.ndarray:
+    """The response at the ``share`` of the way from the sample before to each."""
+    if transfer.is_integer:
+        return kernels.rational(x, rest, *_discrete_between(transfer, h, held, share))
+    lag, longest = single_lag(transfer), 2.0 ** np.ceil(np.log2(duration))
+    if lag:
+        gain, T, alpha = lag
+        return gain * between(x, rest, h, fractional_lag(T, alpha, h, longest), share)
+    return between(x, rest, h, _fractional(transfer, h, longest), share)
 
 
 def oscillator(
@@ -69,13 +104,7 @@ def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndar
     poles = np.roots(den).astype(complex)
     if _coincide(poles):
         return _by_exponential(num, den, h, held)
-    residues = np.polyval(num, poles) / (
-        den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)])
-    )
-    a = np.exp(poles * h)
-    gain = np.where(poles == 0, h, (a - 1) / np.where(poles == 0, 1, poles))  # of a step over one sample
-    past = residues * gain if held else residues * h * _ramp(poles * h, a)
-    now = np.zeros_like(past) if held else residues * gain - past
+    a, past, now = _held(poles, _residues(num, den, poles), h, held)
     whole = np.poly(a)
     b = through * whole.astype(complex)
     for i in range(len(poles)):
@@ -83,6 +112,49 @@ def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndar
         b[: len(rest)] += now[i] * rest
         b[1 : len(rest) + 1] += past[i] * rest
     return b.real, whole.real
+
+
+def _residues(num: np.ndarray, den: np.ndarray, poles: np.ndarray) -> np.ndarray:
+    return np.polyval(num, poles) / (
+        den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)])
+    )
+
+
+def _held(poles: np.ndarray, residues: np.ndarray, h: float, held: bool):
+    """What is left of each mode after ``h`` s, and what the past and the present input count."""
+    a = np.exp(poles * h)
+    gain = np.where(poles == 0, h, (a - 1) / np.where(poles == 0, 1, poles))  # of a step over one sample
+    past = residues * gain if held else residues * h * _ramp(poles * h, a)
+    return a, past, np.zeros_like(past) if held else residues * gain - past
+
+
+@lru_cache(maxsize=512)
+def _discrete_between(
+    transfer: TransferFunction, h: float, held: bool, share: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """As :func:`_discrete`, but the response at the ``share`` of the way from the sample before to each."""
+    num, den = _coefficients(transfer.num), _coefficients(transfer.den)
+    through = num[0] / den[0] if len(num) == len(den) else 0.0
+    poles = np.roots(den).astype(complex)
+    if _coincide(poles):
+        return _by_pulse(transfer, _by_exponential(num, den, h, held)[1], h, held, share)
+    residues = _residues(num, den, poles) if len(poles) else np.zeros(0)
+    a, past, now = _held(poles, residues, h, held)
+    decay, before, after = _held(poles, residues, share * h, held)
+    whole, line = np.atleast_1d(np.poly(a)), after.sum() + through
+    # the input on the way from the last sample: what it was there, or a share of the line to this one
+    recent = [0.0, before.sum() + through] if held else [share * line, before.sum() + (1.0 - share) * line]
+    b = np.convolve(whole, recent)
+    for i in range(len(poles)):
+        b[1:] += decay[i] * np.convolve([now[i], past[i]], np.atleast_1d(np.poly(np.delete(a, i))))
+    return b.real, whole.real
+
+
+def _by_pulse(transfer: TransferFunction, a: np.ndarray, h: float, held: bool, share: float):
+    """The same from the first samples of the exact response to a pulse, which repeated poles do not trouble."""
+    late = Convolution(transfer, h, "zero" if held else "linear", (1.0 - share) * h)
+    pulse = late.run(np.eye(1, len(a) + 2, 1)[0])[1:]
+    return np.convolve(a, pulse)[: len(a) + 1], a
 
 
 def _ramp(q: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -117,8 +189,8 @@ def _coefficients(terms) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _fractional(transfer: TransferFunction, h: float, duration: float):
-    """Mode tables: the branch cut by the trapezoidal rule in ln ξ, the poles of the principal sheet by
+def _fractional(transfer: TransferFunction, h: float, duration: float) -> Modes:
+    """Its modes: the branch cut by the trapezoidal rule in ln ξ, the poles of the principal sheet by
     residues."""
     x = np.arange(np.log(1e-3 / duration), np.log(30.0 / h), _SPACING)
     xi = np.exp(x)
@@ -126,28 +198,30 @@ def _fractional(transfer: TransferFunction, h: float, duration: float):
     weights = -np.imag(cut) / np.pi * xi * _SPACING
     poles = _poles(transfer, 1e-3 / duration, 30.0 / h)
     residues = np.array([_residue(transfer, p) for p in poles])
-    a = np.exp(-xi * h)
-    mean = -np.expm1(-xi * h) / (xi * h)
-    gain = weights / xi
-    rows = [np.r_[a], np.r_[gain * (mean - a)], np.r_[gain * (1 - mean)]]
     fast = float(np.real(transfer(np.array([30.0 / h * np.exp(0.0)]))[0]))
     through = fast - float(np.sum(weights / (xi + 30.0 / h)))
-    pair = np.zeros(6)
+    rates, pair = xi, (-1.0 + 0j, 0j)
     for pole, residue in zip(poles, residues):
         through -= float(np.real(residue / (30.0 / h - pole))) * (1 if pole.imag == 0 else 2)
         if pole.imag == 0:
-            q = pole.real * h
-            m = np.expm1(q) / q
-            scale = -residue.real / pole.real
-            new = [np.exp(q), scale * (m - np.exp(q)), scale * (1 - m)]
-            rows = [np.r_[row, value] for row, value in zip(rows, new)]
+            rates, weights = np.append(rates, -pole.real), np.append(weights, residue.real)
         else:
-            q = pole * h
-            m, scale = (np.exp(q) - 1) / q, -2 * residue / pole
-            pair = np.array(
-                [[c.real, c.imag] for c in (np.exp(q), scale * (m - np.exp(q)), scale * (1 - m))]
-            ).ravel()
-    return *(np.stack([row, row]) for row in rows), np.stack([pair, pair]), through
+            pair = complex(pole), complex(2 * residue)
+    return Modes(rates, weights, *pair, through)
+
+
+@lru_cache(maxsize=64)
+def _tables(transfer: TransferFunction, h: float, duration: float):
+    """What the compiled loop needs of them: rows of the modes, the pair, and what passes at once."""
+    modes = _fractional(transfer, h, duration)
+    a = np.exp(-modes.rates * h)
+    mean = -np.expm1(-modes.rates * h) / (modes.rates * h)
+    gain = modes.weights / modes.rates
+    q = modes.pole * h
+    m, scale = (np.exp(q) - 1) / q, -modes.residue / modes.pole
+    pair = np.array([[c.real, c.imag] for c in (np.exp(q), scale * (m - np.exp(q)), scale * (1 - m))]).ravel()
+    rows = tuple(np.stack([row, row]) for row in (a, gain * (mean - a), gain * (1 - mean)))
+    return rows, np.stack([pair, pair]), modes.through
 
 
 def _residue(transfer: TransferFunction, pole: complex) -> complex:

@@ -75,6 +75,40 @@ class LinearActuator:
 
 
 @dataclass(frozen=True)
+class Delays:
+    """The nominal dead time of each stage, s: e^(−L s) behind its dynamics."""
+
+    regulator: float = 0.0
+    actuator: float = 0.0
+    sensor: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Of the whole chain, s."""
+        return self.regulator + self.actuator + self.sensor
+
+
+@dataclass(frozen=True)
+class Relative:
+    """By how much of themselves a stage's ``gain``, its ``time`` (every time constant and the delay) and its
+    ``alpha`` (an actuator's only) are, or may be, off.
+    """
+
+    gain: float
+    time: float
+    alpha: float = 0.0
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How well each stage is known; with signs: one way in which the rig may be off."""
+
+    regulator: Relative = Relative(0.02, 0.1)
+    actuator: Relative = Relative(0.2, 0.2, 0.1)
+    sensor: Relative = Relative(0.02, 0.1)
+
+
+@dataclass(frozen=True)
 class Ranges:
     """What each signal can reach, (low, high) in the log's units; ``None`` where not stated."""
 
@@ -95,3 +129,5 @@ class Rig:
     sensor: TransferFunction = UNITY
     ranges: Ranges = Ranges()
     effects: tuple[Mapping[str, Any], ...] = field(default=())
+    delays: Delays = Delays()
+    uncertainty: Uncertainty = Uncertainty()

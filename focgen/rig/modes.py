@@ -14,7 +14,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from focgen.fractional.delay import split_delay
 from focgen.rig import kernels
+from focgen.rig.delay import delayed, shifted
 
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
 
@@ -77,14 +79,45 @@ def respond(
     alpha: float,
     duration: float,
     dynamics: Dynamics = UNCHANGED,
+    delay: float = 0.0,
 ) -> np.ndarray:
-    """The response of 1/(T s^alpha + 1) to ``x`` (n,), linear between samples of ``h`` s; ``rest`` (n,) is
-    true where an experiment begins, none longer than ``duration`` s.
+    """The response of 1/(T s^alpha + 1) to ``x`` (n,), linear between samples of ``h`` s, later by ``delay``
+    s; ``rest`` (n,) is true where an experiment begins, none longer than ``duration`` s.
+
+    With changed ``dynamics`` the response, too, counts as linear between samples: the delay is exact there in
+    whole samples only.
     """
+    if delay and dynamics == UNCHANGED:
+        whole, part = split_delay(delay, h)
+        if part:
+            modes = fractional_lag(T, alpha, h, 2.0 ** np.ceil(np.log2(duration)))
+            return shifted(between(x, rest, h, modes, 1.0 - part), rest, whole)
+    if delay:
+        return delayed(respond(x, rest, h, T, alpha, duration, dynamics), rest, h, delay)
     unloading = dynamics.unloading
     a, b0, b1, pair, through = tables(T, alpha, h, 2.0 ** np.ceil(np.log2(duration)), unloading)
     switching = unloading != 1.0
     return kernels.modes(x, rest, a, b0, b1, pair, through, switching, dynamics.place, dynamics.stiffness)
+
+
+def between(x: np.ndarray, rest: np.ndarray, h: float, modes: Modes, share: float) -> np.ndarray:
+    """The response to ``x`` (n,) not at the samples but at the ``share`` 0 … 1 of the way from the one before.
+
+    What a mode was a sample ago decays over that share, which is one more factor of its input; the rest is
+    the answer to the straight line since.
+    """
+    rates, pole = np.append(-modes.rates, modes.pole), modes.pole
+    gains = np.append(modes.weights / modes.rates, -modes.residue / pole)
+    decay, past, now = hold(share * h * rates)
+    before, after = ((gains * c).sum().real for c in (past, now))
+    before, after = before + (1.0 - share) * (after + modes.through), share * (after + modes.through)
+    _, b0, b1 = hold(h * rates)
+    weight = gains * decay
+    rows = [np.exp(h * rates[:-1].real), (weight * b0)[:-1].real, (weight * b1)[:-1].real]
+    pair = [np.exp(h * pole), (weight * b0)[-1], (weight * b1)[-1]]
+    doubled = [np.stack([row, row]) for row in (*rows, np.array([[c.real, c.imag] for c in pair]).ravel())]
+    kept = kernels.modes(x, rest, *doubled, 0.0, switching=False)
+    return shifted(kept + before * x, rest, 1) + after * x
 
 
 @lru_cache(maxsize=256)

@@ -69,7 +69,8 @@ def _samples(rig: Rig, controller: Controller, points: tuple[Equilibrium, ...]) 
     slowest = min((w for w in found if math.isfinite(w)), default=None)
     if slowest is None:
         return _UNKNOWN
-    return min(max(math.ceil(_SETTLINGS / slowest / h), _FEWEST), _MOST)
+    late = math.ceil(rig.delays.total / h)
+    return min(max(math.ceil(_SETTLINGS / slowest / h) + late, _FEWEST), _MOST)
 
 
 def running_loop(base: Controller, rig: Rig, setpoints: tuple[float, ...], plan: Plan) -> Steps:
@@ -100,11 +101,12 @@ def _pressures(bench: Bench) -> list[float]:
 
 
 def _curve(rig: Rig, controller: Controller, response) -> Curve:
-    """The open loop but for controller gain and slope: hold and delay in it."""
+    """The open loop but for controller gain and slope: hold and delays in it."""
     h, transfer = controller.sample_time, chain_transfer(rig)
 
     def loop(omega):
-        return response(omega) * held_response(transfer, h, omega) * np.exp(-1j * omega * h * _DELAY)
+        held = held_response(transfer, h, omega, delay=rig.delays.total)
+        return response(omega) * held * np.exp(-1j * omega * h * _DELAY)
 
     return curve(loop, _LOW * 2.0 * math.pi / h, math.pi / h)
 

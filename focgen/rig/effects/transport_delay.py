@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from focgen.rig.effects._delay import delayed
+from focgen.rig.delay import delayed
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
 
 def _shift(x, values, run):
-    return delayed(x, values[0], run)
+    return delayed(x, run.rest, run.h, values[0])
 
 
 EFFECT = Effect(

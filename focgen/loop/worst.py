@@ -1,0 +1,146 @@
+"""The worst that a controller, as designed, meets within what is not known of its rig.
+
+The margins are looked at in every corner of the rig's uncertainty, at the operating points' pressures. Steps
+are simulated in those few corners only where the margins are smallest or the loop is slowest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.control.controller import Controller
+from focgen.control.margins import Curve, Margins, margins
+from focgen.control.measures import StepMeasures
+from focgen.loop.linear_effects import linear_part
+from focgen.loop.response import any_schedule, chain_transfer, held_response, shapes, slope_at
+from focgen.plan.model import Plan
+from focgen.plan.response import running_gain, running_response
+from focgen.rig.corners import EXACT, corners, moved, without_gain
+from focgen.rig.model import Rig, Uncertainty
+
+Simulated = Callable[[Rig], Sequence[StepMeasures | None]]
+"""The steps to the set points on a rig, None for those that are left out."""
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """The worst ``value`` of something, what it is on the rig as given (``nominal``), by how much the rig is
+    ``off`` there, and ``at`` which pressure (a margin) or set point (a step).
+    """
+
+    value: float
+    nominal: float
+    off: Uncertainty
+    at: float
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The smallest margins of the loop as it will run, and the largest overshoot and settling time of a step.
+
+    ``phase_deg``, ``gain_db``, ``delay_s``: over all ``corners`` and the rig as given. ``overshoot_pct``,
+    ``settling_s`` (NaN where a step does not settle): over the rig as given and the corners ``simulated``.
+    ``stable``: in every corner. ``beyond``: set points left out in a corner, which the command cannot hold
+    there.
+    """
+
+    phase_deg: Extreme
+    gain_db: Extreme
+    delay_s: Extreme
+    overshoot_pct: Extreme
+    settling_s: Extreme
+    stable: bool
+    corners: int
+    simulated: tuple[Uncertainty, ...]
+    beyond: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Margins at one corner and pressure."""
+
+    off: Uncertainty
+    pressure: float
+    margins: Margins
+
+
+def worst_case(
+    rig: Rig,
+    controller: Controller,
+    plan: Plan,
+    delay: int,
+    pressures: Sequence[float],
+    references: Sequence[float],
+    nominal: Sequence[StepMeasures],
+    simulated: Simulated,
+) -> Worst:
+    """Look at every corner of ``rig.uncertainty`` with the controller as it is.
+
+    ``delay``: of the computation, samples; ``pressures``: of the operating points; ``references``: the set
+    points, with their ``nominal`` steps; ``simulated``: what simulates them in a corner.
+    """
+    seen = _margins(rig, controller, plan, delay, pressures)
+    least = {name: min(seen, key=lambda s: _order(s, name)) for name in ("phase_deg", "gain_db", "delay_s")}
+    crossing = [s for s in seen if math.isfinite(s.margins.crossover_rad_s)]
+    slowest = min(crossing or seen, key=lambda s: s.margins.crossover_rad_s)
+    chosen = tuple(dict.fromkeys(s.off for s in (*least.values(), slowest) if s.off != EXACT))
+    steps = [(EXACT, nominal), *((off, simulated(moved(rig, off))) for off in chosen)]
+    flat = [(off, at, m) for off, each in steps for at, m in zip(references, each, strict=True)]
+    over = {name: _largest(flat, name) for name in ("overshoot_pct", "settling_s")}
+    return Worst(
+        **{name: _smallest(seen, name) for name in least},
+        **over,
+        stable=all(s.margins.stable for s in seen),
+        corners=len({s.off for s in seen} - {EXACT}),
+        simulated=chosen,
+        beyond=tuple(dict.fromkeys(at for _, at, measured in flat if measured is None)),
+    )
+
+
+def _margins(rig: Rig, controller: Controller, plan: Plan, delay: int, pressures) -> list[_Seen]:
+    """The margins of the running loop in every corner, at every pressure."""
+    h, unit = controller.sample_time, running_gain(plan, any_schedule(controller))
+    omega = shapes(rig, controller, plan, delay).running.omega
+    effects, _, _ = linear_part(rig)
+    ahead = running_response(plan, omega, any_schedule(controller)) / unit * np.exp(-1j * omega * h * delay)
+    seen, known = [], {}
+    for off in corners(rig):
+        factor, dynamics = without_gain(off)
+        if dynamics not in known:  # gains only multiply
+            one = moved(rig, dynamics)
+            found = held_response(chain_transfer(one), h, omega, effects, one.delays.total)
+            known[dynamics] = Curve(omega, ahead * found)
+        for pressure in dict.fromkeys(pressures):
+            gain = running_gain(plan, pressure if controller.scheduled else None) * slope_at(rig, pressure)
+            seen.append(_Seen(off, pressure, margins(known[dynamics].times(factor * gain))))
+    return seen
+
+
+def _order(seen: _Seen, name: str) -> float:
+    """What a margin counts: where the loop is unstable its gain may not grow at all, but has to fall."""
+    if name == "gain_db" and not seen.margins.stable:
+        return -seen.margins.gain_reduction_db
+    return getattr(seen.margins, name)
+
+
+def _smallest(seen: list[_Seen], name: str) -> Extreme:
+    worst = min(seen, key=lambda s: _order(s, name))
+    nominal = min(_order(s, name) for s in seen if s.off == EXACT)
+    return Extreme(_order(worst, name), nominal, worst.off, worst.pressure)
+
+
+def _largest(flat, name: str) -> Extreme:
+    """The largest of all steps; one that does not settle is beyond all others."""
+
+    def size(found) -> float:
+        value = getattr(found[2], name)
+        return math.inf if math.isnan(value) else value
+
+    measured = [one for one in flat if one[2] is not None]
+    off, at, worst = max(measured, key=size)
+    nominal = max((one for one in measured if one[0] == EXACT), key=size)[2]
+    return Extreme(getattr(worst, name), getattr(nominal, name), off, at)

@@ -1,0 +1,22 @@
+"""Signals that come later, by whole samples and by parts of one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.fractional.delay import split_delay
+
+
+def shifted(x: np.ndarray, rest: np.ndarray, whole: int) -> np.ndarray:
+    """``x`` (n,) later by ``whole`` samples; zero before, wherever ``rest`` (n,) is true anew."""
+    y = np.zeros_like(x)
+    firsts = np.flatnonzero(rest).tolist()
+    for first, last in zip(firsts, [*firsts[1:], len(x)]):
+        y[first + whole : last] = x[first : max(last - whole, first)]
+    return y
+
+
+def delayed(x: np.ndarray, rest: np.ndarray, h: float, delay: float) -> np.ndarray:
+    """``x`` (n,), linear between samples of ``h`` s, later by ``delay`` s, each experiment from zero."""
+    whole, part = split_delay(delay, h)
+    return (1.0 - part) * shifted(x, rest, whole) + part * shifted(x, rest, whole + 1)
