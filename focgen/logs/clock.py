@@ -176,10 +176,7 @@ def _resampled(time, signals, sample_time: float, where: str):
     _check_length(count, sample_time, where)
     grid = time[0] + sample_time * np.arange(count)
     resampled = {role: between(role, grid, time, values) for role, values in signals.items()}
-    steps = np.diff(time)
-    apart = f"{steps.min():.3g} to {steps.max():.3g} s apart"
-    note = Note(f"time stamps not uniform: resampled every {sample_time:g} s", 1, apart)
-    return sample_time, resampled, (note,)
+    return sample_time, resampled, (f"time stamps not uniform: resampled every {sample_time:g} s",)
 
 
 def _check_length(count: int, step: float, where: str) -> None:

@@ -10,6 +10,7 @@ _SIDE = 3  # readings on either side that have to agree
 _FAR = 5.7  # robust standard deviations of a reading from the line through its neighbours
 _CLEAR = 2.5  # times the worst departure of the neighbours from that line
 _LEVEL = 3.0  # times what the two sides differ by
+_EVEN = 0.6  # of the farthest of several in a row is the nearest: they come and go at once
 _BLOCK = 64  # readings over which the noise is taken as even
 _RARE = 0.01  # of the readings: more of them are the signal's own
 _FEWEST = 20  # readings
@@ -63,8 +64,8 @@ def _pulses(y: np.ndarray, barred: np.ndarray, width: int, least: float) -> np.n
     hit = (np.abs(np.sign(inside).sum(axis=1)) == width) & (size > _CLEAR * rough) & (size > _LEVEL * differ)
     hit &= size > _FAR * np.maximum(_noise(np.abs(inside[:, 0])), least)
     hit &= ~sliding_window_view(barred, whole).any(axis=1)
-    if width > 1:  # pulses as high as the jumps of the signal itself are its own
-        hit &= size > 2.0 * _jumps(y)
+    if width > 1:  # pulses that swell, or are as high as the jumps of the signal itself, are its own
+        hit &= (size > _EVEN * np.abs(inside).max(axis=1)) & (size > 2.0 * _jumps(y))
     return np.flatnonzero(hit) + _SIDE
 
 

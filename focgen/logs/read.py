@@ -12,10 +12,11 @@ import numpy as np
 from focgen.errors import LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.parts import Raw, experiments_of
+from focgen.logs.plausibility import hint
 from focgen.logs.table import LogTable, read_table, stem
 
-_TOO_LARGE = 10.0  # times the range
-_TOO_SMALL = 0.02  # of the range, in a whole session
+_TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; what is less so is for ``plausibility`` to warn of
+_TOO_SMALL = 0.002  # of the range, in a whole session
 
 Limits = Mapping[str, tuple[float, float]]
 
@@ -48,7 +49,7 @@ def read_logs(
     if not paths:
         raise LogError("logs", "none is given", "name at least one log")
     found = [part for path in paths for part in _experiments(path, signals, sample_time, (first, last))]
-    _check_limits(found, dict(limits or {}))
+    _check_limits(found, dict(limits or {}), signals.columns())
     return in_session_order(_with_own_names(found))
 
 
@@ -99,9 +100,9 @@ def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, np.ndarray]]:
         yield str(names[code]), np.flatnonzero(codes == code)
 
 
-def _check_limits(found: list[tuple[str, Experiment]], limits: Limits) -> None:
-    """Raise LogError where a signal leaves its range by an order of magnitude, or uses next to
-    nothing of it.
+def _check_limits(found: list[tuple[str, Experiment]], limits: Limits, columns: Mapping[str, str]) -> None:
+    """Raise LogError where a signal leaves its range so far, or uses so little of it, that its unit must be
+    wrong.
     """
     for role, (low, high) in limits.items():
         largest = max(abs(low), abs(high))
@@ -113,7 +114,8 @@ def _check_limits(found: list[tuple[str, Experiment]], limits: Limits) -> None:
             what = (
                 f"{role} reaches {peak:.3g} in {experiment.name} where the rig's range is {low:g} to {high:g}"
             )
-            raise LogError(path, what, "log it in the rig's unit, or correct [ranges]")
+            unit = hint(role, columns[role], peak / largest)
+            raise LogError(path, what, f"{unit and unit + ' '}log it in the rig's unit, or correct [ranges]")
 
 
 def _with_own_names(found: list[tuple[str, Experiment]]) -> list[Experiment]:
