@@ -17,7 +17,8 @@ EXCESS = 1.5  # times its range: a signal beyond is implausible
 _GAIN = 2.5  # times the nominal gain, or less than 1/2.5: implausible
 _LIKELY = 1.9  # times the nominal gain: what a slip may leave
 _UNUSED = 0.02  # of its range: a signal that never leaves it is implausible
-_USED = 0.1  # of its range: by how much a likely slip leaves it used
+_USED = 0.2  # of its range: so much of it a slip leaves used, where only the ranges tell
+_TWO = 0.2  # nats: what a slip of two columns, or a factor e of an unused range, has to explain better
 _FLIPPED = 0.3  # of its range: so far on the wrong side
 _SEEN = 0.7  # correlation: below, a response tells no gain
 _ATMOSPHERE = 1.01325  # bar
@@ -39,20 +40,22 @@ Signals = dict[str, list[np.ndarray]]
 
 @dataclass(frozen=True)
 class Slip:
-    """``role`` holds ``factor`` times what it should plus ``shift``, or what ``other`` should; ``words`` say
-    so."""
+    """``roles`` hold ``factor`` times what they should plus ``shift``; or, ``exchanged``, two of them each
+    other's signal. ``words`` say so; of slips that explain alike the one of less ``price`` is the likelier."""
 
     words: str
-    role: str
+    roles: tuple[str, ...]
     factor: float = 1.0
     shift: float = 0.0
-    other: str | None = None
+    exchanged: bool = False
+    price: float = 0.0
 
     def undone(self, signals: Signals) -> Signals:
         """The signals without it."""
-        if self.other:
-            return {**signals, self.role: signals[self.other], self.other: signals[self.role]}
-        return {**signals, self.role: [(y - self.shift) / self.factor for y in signals[self.role]]}
+        if self.exchanged:
+            a, b = self.roles
+            return {**signals, a: signals[b], b: signals[a]}
+        return signals | {r: [(y - self.shift) / self.factor for y in signals[r]] for r in self.roles}
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ def doubts(
 
 def hint(role: str, column: str, factor: float) -> str:
     """The unit that makes values larger by about ``factor``, in words, or nothing."""
-    slips = [s for s in _unit_slips(role, column, None) if _USED <= factor / s.factor <= 1.1]
+    slips = [s for s in _unit_slips((role,), column, None) if _USED <= factor / s.factor <= 1.1]
     return f"{max(slips, key=lambda s: factor / s.factor).words}?" if slips else ""
 
 
@@ -139,39 +142,42 @@ def unit_of(text: str) -> tuple[str, str] | None:
     return None
 
 
-def _unit_slips(role: str, column: str, span: tuple[float, float] | None) -> list[Slip]:
-    known = unit_of(column)
-    if known is None and role == "pressure":
+def _unit_slips(roles: tuple[str, ...], column: str, span: tuple[float, float] | None) -> list[Slip]:
+    """Every other unit that ``roles`` may have been logged in; ``column`` names the right one."""
+    known, named = unit_of(column), " and ".join(roles)
+    if known is None and "pressure" in roles:
         known = "pressure", "bar"
+    unit = known[1] if known else "its unit"
     slips = []
+    if roles == ("command",) and span and span[1] > 0 and abs(span[1] - 100.0) > 1.0:
+        slips.append(Slip(f"command in per cent instead of {unit}", roles, 100.0 / span[1]))
     if known:
-        kind, unit = known
-        sizes = _SIZES[kind]
-        slips += [
-            Slip(f"{role} in {other} instead of {unit}", role, sizes[unit] / size)
-            for other, size in sizes.items()
-            if other != unit
-        ]
-    elif role != "command":
-        slips += [Slip(f"{role} in a unit {f:g} times smaller", role, f) for f in (10.0, 100.0, 1000.0)]
-        slips += [Slip(f"{role} in a unit {f:g} times larger", role, 1 / f) for f in (10.0, 100.0, 1000.0)]
-    if role == "command" and span and span[1] > 0 and abs(span[1] - 100.0) > 1.0:
-        unit = known[1] if known else "its unit"
-        slips.insert(0, Slip(f"command in per cent instead of {unit}", role, 100.0 / span[1]))
+        sizes = _SIZES[known[0]]
+        others = {other: sizes[unit] / size for other, size in sizes.items() if other != unit}
+        return slips + [Slip(f"{named} in {u} instead of {unit}", roles, f) for u, f in others.items()]
+    if roles != ("command",):
+        for factor in (10.0, 100.0, 1000.0):
+            slips.append(Slip(f"{named} in a unit {factor:g} times smaller", roles, factor))
+            slips.append(Slip(f"{named} in a unit {factor:g} times larger", roles, 1.0 / factor))
     return slips
 
 
 def _candidates(signals: Signals, limits: Limits, columns: Mapping[str, str]) -> list[Slip]:
-    """Every slip that might have been made."""
+    """Every slip that might have been made: of one signal, of camera and sensor alike, or of two columns."""
+    groups = [(role,) for role in signals]
+    if {"curvature", "output"} <= set(signals):
+        groups.append(("curvature", "output"))
+    slips = []
+    for roles in groups:
+        price = _TWO * (len(roles) - 1)
+        of_unit = _unit_slips(roles, columns.get(roles[-1], ""), limits.get(roles[-1]))
+        flipped = Slip(f"the sign of {' and '.join(roles)} flipped", roles, -1.0)
+        slips += [replace(slip, price=price) for slip in [flipped, *of_unit]]
     measured = [role for role in signals if role != "command"]
-    slips = [Slip(f"the sign of {role} flipped", role, -1.0) for role in signals]
-    for role in signals:
-        slips += _unit_slips(role, columns.get(role, ""), limits.get(role))
-    slips += [
-        Slip(f"the columns of {a} and {b} exchanged", a, other=b)
-        for i, a in enumerate(measured)
-        for b in measured[i + 1 :]
-    ]
+    for i, a in enumerate(measured):
+        for b in measured[i + 1 :]:
+            words = f"the columns of {a} and {b} exchanged"
+            slips.append(Slip(words, (a, b), exchanged=True, price=_TWO))
     return slips
 
 
@@ -180,20 +186,18 @@ def _most_likely(slips: list[Slip], signals: Signals, limits: Limits, response: 
     costs = []
     for slip in slips:
         without = slip.undone(signals)
-        if _out_of_range(without, limits) or not all(u >= _USED for u in _usage(without, limits, slip)):
+        if _out_of_range(without, limits):
             continue
         links = response(without)
+        used = [_peak(without[role]) / _largest(limits[role]) for role in limits if role in without]
+        least = min([_peak(without[r]) / _largest(limits[r]) for r in slip.roles if r in limits], default=1.0)
+        if least < (_UNUSED if any(link.known for link in links) else _USED):
+            continue
         if all(link.within(_LIKELY) for link in links):
-            gains = sum(abs(np.log(link.ratio)) for link in links if link.known)
-            unused = sum(abs(np.log(min(u, 1.0))) for u in _usage(without, limits, slip))
-            costs.append((gains + 0.2 * unused, slip))
+            gains = sum(abs(np.log(link.ratio)) if link.known else 1.0 for link in links)
+            unused = sum(abs(np.log(min(share, 1.0))) for share in used)
+            costs.append((gains + _TWO * unused + slip.price, slip))
     return min(costs, key=lambda cost: cost[0])[1] if costs else None
-
-
-def _usage(signals: Signals, limits: Limits, slip: Slip) -> list[float]:
-    """What share of its range each role of a slip uses."""
-    roles = [role for role in (slip.role, slip.other) if role in limits]
-    return [_peak(signals[role]) / _largest(limits[role]) for role in roles]
 
 
 def _out_of_range(signals: Signals, limits: Limits) -> list[str]:
@@ -226,7 +230,7 @@ def _absolute(signals: Signals, limits: Limits, columns: Mapping[str, str]) -> S
     at_rest = rest > EXCESS * high or ("command" in limits and _commanded_rest(signals, limits["command"]))
     if abs(low) > _REST * high or not _WEATHER[0] <= rest / air <= _WEATHER[1] or not at_rest:
         return None
-    slip = Slip("absolute instead of gauge pressure", "pressure", shift=rest)
+    slip = Slip("absolute instead of gauge pressure", ("pressure",), shift=rest)
     return None if _peak(slip.undone(signals)["pressure"]) > EXCESS * high else slip
 
 
