@@ -39,6 +39,15 @@ def test_short_holes_in_time_are_bridged_and_said_once(tmp_path, lost):
     assert np.array_equal(log.raw_time, STEP * rows) and len(log.rows["output"]) == len(rows)
 
 
+@pytest.mark.parametrize("digits", [2, 3])
+def test_a_lost_sample_is_not_taken_for_a_slower_clock(tmp_path, digits):
+    """Stamps of two digits, 0.02 s apart: half a percent is lost, the clock is not half a percent slow."""
+    rows = np.setdiff1d(np.arange(COUNT), [500])
+    columns = ramp(t_s=np.round(0.02 * np.arange(COUNT), digits))
+    (log,) = read_columns(tmp_path, rows_of(columns, rows), sample_time=0.02)
+    assert log.sample_time == 0.02 and len(log) == COUNT and noted(log, "samples missing", "at 10 s")
+
+
 def test_a_command_is_held_over_a_hole(tmp_path):
     columns = table(COUNT, u_V=np.where(np.arange(COUNT) < 203, 0.0, 1.5))
     (log,) = read_columns(tmp_path, rows_of(columns, np.setdiff1d(np.arange(COUNT), range(200, 205))))

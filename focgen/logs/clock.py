@@ -15,6 +15,7 @@ SHORT = 5  # samples: a longer hole is never bridged. On a response whose fastes
 FEWEST = 8  # samples: less shows neither a rate nor a response
 _JITTER = 0.1  # of a sample: time stamps this close to a uniform grid are rounding, not jitter
 _COARSE = 0.2  # of a sample: a resolution of the stamps that hides a uniform clock
+_FEW = 0.1  # of the samples are lost: more are taken for a clock that ticks otherwise, if there is one
 _TICKING = 0.75  # of the steps within half of their median: holes are told from an irregular clock
 _IRREGULAR = 0.95  # quantile of the steps that stands for the pace of an irregular clock
 _SAME_RATE = 1e-4  # relative
@@ -66,10 +67,11 @@ def counted(time: np.ndarray) -> np.ndarray | None:
     """The stamps (m,) of the uniform clock behind rounded ones, or None where it is not evident.
 
     Stamps rounded to 10 ms repeat when samples are 5 ms apart, and alternate between steps of 10 and 20 ms
-    when those are 15 ms apart. The clock is evident where no stamp is off it by more than its resolution.
+    when those are 15 ms apart. The clock is evident where no stamp is off it by more than its resolution, and
+    where the stamps are not those of a clock with a few samples lost.
     """
     steps = np.diff(time)
-    if (steps < 0).any() or not (steps > 0).any() or uniform_step(time) is not None:
+    if (steps < 0).any() or not (steps > 0).any() or (steps.min() > 0 and _few_lost(time)):
         return None
     rows = np.arange(len(time))
     step, begin = np.polyfit(rows, time, 1)
@@ -79,6 +81,11 @@ def counted(time: np.ndarray) -> np.ndarray | None:
     if not whole or resolution < _COARSE * step or np.ptp(off) > 1.01 * resolution:
         return None
     return time[0] + step * rows
+
+
+def _few_lost(time: np.ndarray) -> bool:
+    ticks, _ = _ticks(time)
+    return ticks is not None and ticks[-1] + 1 <= (1.0 + _FEW) * len(ticks)
 
 
 def uniform_step(time: np.ndarray) -> float | None:
