@@ -7,11 +7,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 WIDEST = 3  # readings in a row
 _SIDE = 3  # readings on either side that have to agree
-_FAR = 5.7  # robust standard deviations of a reading from the line through its neighbours
-_CLEAR = 3.0  # times the worst departure of the neighbours from that line
+_FAR = 5.2  # robust standard deviations of a reading from the line through its neighbours
+_CLEAR = 2.75  # times the worst departure of the neighbours from that line
 _LEVEL = 3.0  # times what the two sides differ by
 _EVEN = 0.6  # of the farthest of several in a row is the nearest: they come and go at once
-_BLOCK = 64  # readings over which the noise is taken as even
+_BLOCK = 128  # readings over which the noise is taken as even
 _RARE = 0.01  # of the readings: more of them are the signal's own
 _FEWEST = 20  # readings
 _FINE = 1e-3  # of the span: what noise there is at least

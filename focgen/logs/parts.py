@@ -131,7 +131,8 @@ def _uncut(run: Raw, sample_time: float) -> Iterator[tuple[Raw, bool]]:
     for rows in long:
         part = run.part(rows)
         part = replace(part, values={role: y for role, y in part.values.items() if role in kept.roles})
-        yield (part.with_notes(*notes) if rows is long[0] else part), bool(rows[0] > clock.SHORT)
+        after = rows[0] > clock.SHORT or rows[0] in holes
+        yield (part.with_notes(*notes) if rows is long[0] else part), bool(after)
 
 
 def _check_present(run: Raw, kept: missing.Kept) -> None:
