@@ -221,8 +221,6 @@ def _only_output(path):
 
 
 MALFORMED = {
-    "NaN": (_with("p_bar", 7, np.nan), "pressure is empty or not a number in line 9"),
-    "empty cell": (_with("kappa_per_mm", 3, ""), "output is empty or not a number in line 5"),
     "infinite": (_with("p_bar", 3, np.inf), "infinite in line 5"),
     "no output": (
         _without("kappa_per_mm", "kappa_permm"),

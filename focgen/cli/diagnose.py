@@ -94,4 +94,5 @@ def in_words(found: Diagnosis, out: str) -> str:
         lines.append(f"unexplained, {place}: depends on {', '.join(what['depends_on'])}")
     if found.next_experiment:
         lines.append(f"next experiment: {found.next_experiment.what}, for {found.next_experiment.why}")
+    lines += [f"warning: {w}" for w in found.warnings] + [f"note: {n}" for n in found.notes]
     return "\n".join([*lines, f"written to {out}"])

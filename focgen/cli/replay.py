@@ -31,4 +31,5 @@ def run(args: argparse.Namespace) -> Outcome:
     """Do it."""
     found = replay(args.rig, args.logs, args.first, args.last)
     lines = [f"{name}: GOF {one.gof:.4f}, RMSE {one.rmse:.4g}" for name, one in found.logs.items()]
-    return Outcome({"logs": found.logs}, "\n".join(lines))
+    lines += [f"warning: {w}" for w in found.warnings] + [f"note: {n}" for n in found.notes]
+    return Outcome({"logs": found.logs, "warnings": found.warnings, "notes": found.notes}, "\n".join(lines))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from focgen.progress import say
 from focgen.rig.effects import library
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
+from focgen.rig.plausibility import doubts
 from focgen.rig.replay import experiments
 
 UNTRUSTED = 0.2  # of a segment's residual foretold by inputs: its output still carries noise into the next,
@@ -61,6 +63,7 @@ def diagnose(
     rigs, diagnosis, evidence = verdict.reach(
         rig, logs, compose.compose(rig, explanations, logs), explanations, ran, only is not None
     )
+    diagnosis = replace(diagnosis, warnings=doubts(rig, logs))
     if out is not None:
         from focgen.diagnosis.write import write
 

@@ -86,7 +86,8 @@ class NextExperiment:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The answer to where, which and how far. Files are named relative to ``--out``."""
+    """The answer to where, which and how far. Files are named relative to ``--out``. ``notes``: what was done
+    to the logs; ``warnings``: what in them is implausible."""
 
     verdict: str
     where: Where
@@ -101,6 +102,7 @@ class Diagnosis:
     tied: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
     fits: tuple[PlainFit, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from focgen.diagnosis.unexplained import disturbed, is_rounded, is_unknown
 from focgen.diagnosis.unseen import foreseen
 from focgen.diagnosis.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
+from focgen.logs.notes import notes_of
 from focgen.rig.effects import library
 from focgen.rig.engine import slot_in
 from focgen.rig.model import Rig
@@ -65,7 +66,7 @@ def reach(
         propose(logs, explanations, found),
         _description(unknown),
         (),
-        tuple(note for log in logs for note in log.notes),
+        notes_of(logs),
         _plain_fits(explanations),
     )
     return told.rigs, diagnosis, Evidence(made, tuple(explanations))

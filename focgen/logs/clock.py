@@ -1,33 +1,91 @@
-"""Time stamps: checked, recognised as uniform, or resampled."""
+"""Time stamps: checked, counted, recognised as uniform, or resampled."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from focgen.errors import LogError
+from focgen.logs.notes import Note
 
 HELD = ("command", "reference")  # set by a controller and held until the next sample
+SHORT = 5  # samples: a longer hole is never bridged. On a response whose fastest time constant spans ten
+# samples, a straight line over six sample times errs by 3 % of a step at most, unless it jumps inside.
+FEWEST = 8  # samples: less shows neither a rate nor a response
 _JITTER = 0.1  # of a sample: time stamps this close to a uniform grid are rounding, not jitter
+_COARSE = 0.2  # of a sample: a resolution of the stamps that hides a uniform clock
+_FEW = 0.1  # of the samples are lost: more are taken for a clock that ticks otherwise, if there is one
+_TICKING = 0.75  # of the steps within half of their median: holes are told from an irregular clock
+_IRREGULAR = 0.95  # quantile of the steps that stands for the pace of an irregular clock
 _SAME_RATE = 1e-4  # relative
 _PLAUSIBLE = 99.0  # a log is recorded at a rate within this factor of the rig's
 _LONGEST = 5_000_000  # samples
 
+Line = Callable[[int], str]
 
-def check_increasing(time: np.ndarray, where: str, line) -> None:
-    """Raise LogError where a time stamp is missing or not later than the one before it."""
+
+def check_complete(time: np.ndarray, where: str, line: Line) -> None:
+    """Raise LogError where a time stamp is missing; ``line`` names a row."""
     if np.isnan(time).any():
         raise LogError(
             where, f"has no time stamp in {line(int(np.argmax(np.isnan(time))))}", "complete the column"
         )
+
+
+def check_increasing(time: np.ndarray, where: str, line: Line) -> None:
+    """Raise LogError where a time stamp is not later than the one before it."""
     steps = np.diff(time)
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0)) + 1
         what = f"goes from {time[row - 1]:g} to {time[row]:g} s in {line(row)}: time has to increase"
-        raise LogError(
-            where, what, "sort the rows, or name the column that tells the runs apart as run in [signals]"
-        )
+        remedy = "sort the rows, or name the column that tells the runs apart as run in [signals]"
+        if steps.min() == 0:
+            remedy = "log finer time stamps, or drop the rows that repeat one"
+        raise LogError(where, what, remedy)
+
+
+def sittings(time: np.ndarray) -> list[slice]:
+    """Where the clock starts anew: the rows of each part.
+
+    It starts anew where the time falls back by more than a short hole, and then runs on at the log's own
+    pace. A single stamp, or a few rows out of order, that fall back are left for ``check_increasing``.
+    """
+    steps = np.diff(time)
+    forward = steps[steps > 0]
+    reach = (SHORT + 1) * (float(np.median(forward)) if len(forward) else 0.0)
+    falls = [int(row) + 1 for row in np.flatnonzero(steps < -reach)]
+    begins = [row for row in falls if _runs_on(steps[row : row + FEWEST - 1], reach)]
+    return [slice(a, b) for a, b in zip([0, *begins], [*begins, len(time)])]
+
+
+def _runs_on(steps: np.ndarray, reach: float) -> bool:
+    return len(steps) > 0 and bool(np.all((steps >= 0) & (steps <= reach)))
+
+
+def counted(time: np.ndarray) -> np.ndarray | None:
+    """The stamps (m,) of the uniform clock behind rounded ones, or None where it is not evident.
+
+    Stamps rounded to 10 ms repeat when samples are 5 ms apart, and alternate between steps of 10 and 20 ms
+    when those are 15 ms apart. The clock is evident where no stamp is off it by more than its resolution, and
+    where the stamps are not those of a clock with a few samples lost.
+    """
+    steps = np.diff(time)
+    if (steps < 0).any() or not (steps > 0).any() or (steps.min() > 0 and _few_lost(time)):
+        return None
+    rows = np.arange(len(time))
+    step, begin = np.polyfit(rows, time, 1)
+    off = time - (begin + step * rows)
+    resolution = float(steps[steps > 1e-6 * step].min())
+    whole = np.abs(steps / resolution - np.round(steps / resolution)).max() < 1e-3
+    if not whole or resolution < _COARSE * step or np.ptp(off) > 1.01 * resolution:
+        return None
+    return time[0] + step * rows
+
+
+def _few_lost(time: np.ndarray) -> bool:
+    ticks, _ = _ticks(time)
+    return ticks is not None and ticks[-1] + 1 <= (1.0 + _FEW) * len(ticks)
 
 
 def uniform_step(time: np.ndarray) -> float | None:
@@ -49,43 +107,87 @@ def check_unit(time: np.ndarray, sample_time: float, where: str) -> None:
     raise LogError(where, what, "give time in seconds, or correct sample_time")
 
 
+def holes(time: np.ndarray) -> np.ndarray:
+    """The rows (k,) before which more than ``SHORT`` samples are missing, against the log's own pace."""
+    steps = np.diff(time)
+    return np.flatnonzero(steps > (SHORT + 1.5) * pace(steps)) + 1
+
+
+def pace(steps: np.ndarray) -> float:
+    """The usual step (s) of a clock that may have holes: the median, or of an irregular one nearly the
+    longest."""
+    usual = float(np.median(steps))
+    ticks = np.mean(np.abs(steps - usual) <= 0.5 * usual) >= _TICKING
+    return usual if ticks else float(np.quantile(steps, _IRREGULAR))
+
+
 def on_grid(
     time: np.ndarray, signals: Mapping[str, np.ndarray], sample_time: float, where: str
 ) -> tuple[float, dict[str, np.ndarray], tuple[str, ...]]:
     """Return (sample time in s, signals on a uniform grid, notes).
 
-    Uniform logs keep their own rate, whatever the rig's; others are resampled at ``sample_time`` (s):
-    command and reference as held, everything else linear between the stamps.
+    Uniform logs keep their own rate, whatever the rig's, and samples that they lack are bridged; others are
+    resampled at ``sample_time`` (s): command and reference as held, everything else linear between the
+    stamps.
     """
+    ticks, step = _ticks(time)
+    if ticks is None:
+        return _resampled(time, signals, sample_time, where)
+    step, notes = _named_step(step, sample_time, int(ticks[-1]))
+    missing = int(ticks[-1]) + 1 - len(ticks)
+    if not missing:
+        return step, dict(signals), notes
+    _check_length(ticks[-1] + 1, step, where)
+    grid = np.arange(ticks[-1] + 1)
+    full = {role: between(role, grid, ticks, values) for role, values in signals.items()}
+    row = int(np.argmax(np.diff(ticks) > 1))
+    what = "samples missing, bridged by straight lines (command and reference held)"
+    return step, full, (*notes, Note(what, missing, f"at {time[row] + step:g} s"))
+
+
+def between(role: str, grid: np.ndarray, at: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """A role's signal at ``grid`` (n,), from ``values`` (m,) ``at`` some of it: held or on straight lines."""
+    if role not in HELD:
+        return np.interp(grid, at, values)
+    return values[np.maximum(np.searchsorted(at, grid + 1e-9 * (at[-1] - at[0]), side="right") - 1, 0)]
+
+
+def _ticks(time: np.ndarray) -> tuple[np.ndarray | None, float]:
+    """Which sample of a uniform clock each row (m,) is, and its step in s; None where there is no such
+    clock."""
+    rows = np.arange(len(time))
     step = uniform_step(time)
     if step is not None:
-        same = abs(step / sample_time - 1.0) < max(
-            _SAME_RATE, 2.0 * _JITTER / (len(time) - 1)
-        )  # jitter of both ends
-        step = sample_time if same else float(f"{step:.6g}")
-        notes = (
-            ()
-            if same
-            else (f"sampled every {step:g} s and kept so, though the rig runs at {sample_time:g} s",)
-        )
-        return step, dict(signals), notes
+        return rows, step
+    steps = np.diff(time)
+    ticks = np.concatenate([[0], np.cumsum(np.round(steps / np.median(steps)).astype(int))])
+    if (np.diff(ticks) < 1).any():
+        return None, 0.0
+    step, begin = np.polyfit(ticks, time, 1)
+    if ticks[-1] == rows[-1] or np.abs(time - begin - step * ticks).max() > _JITTER * step:
+        return None, 0.0
+    return ticks, float(step)
+
+
+def _named_step(step: float, sample_time: float, last: int) -> tuple[float, tuple[str, ...]]:
+    """The rig's sample time where the log has the same but for jitter of both ends, else its own and a
+    note."""
+    if abs(step / sample_time - 1.0) < max(_SAME_RATE, 2.0 * _JITTER / last):
+        return sample_time, ()
+    step = float(f"{step:.6g}")
+    return step, (f"sampled every {step:g} s and kept so, though the rig runs at {sample_time:g} s",)
+
+
+def _resampled(time, signals, sample_time: float, where: str):
     count = int((time[-1] - time[0]) / sample_time + 1e-6) + 1
+    _check_length(count, sample_time, where)
+    grid = time[0] + sample_time * np.arange(count)
+    resampled = {role: between(role, grid, time, values) for role, values in signals.items()}
+    return sample_time, resampled, (f"time stamps not uniform: resampled every {sample_time:g} s",)
+
+
+def _check_length(count: int, step: float, where: str) -> None:
     if count > _LONGEST:
         raise LogError(
-            where, f"would take {count} samples of {sample_time:g} s", "shorten the log or set sample_time"
+            where, f"would take {count} samples of {step:g} s", "shorten the log or set sample_time"
         )
-    grid = time[0] + sample_time * np.arange(count)
-    resampled = {
-        role: _held(grid, time, values) if role in HELD else np.interp(grid, time, values)
-        for role, values in signals.items()
-    }
-    steps = np.diff(time)
-    note = (
-        f"time stamps not uniform ({steps.min():.3g} to {steps.max():.3g} s apart): "
-        f"resampled every {sample_time:g} s"
-    )
-    return sample_time, resampled, (note,)
-
-
-def _held(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return values[np.maximum(np.searchsorted(time, grid + 1e-9 * (time[-1] - time[0]), side="right") - 1, 0)]

@@ -18,7 +18,8 @@ class Experiment:
     ``signals`` maps a role of :data:`ROLES` to an array of shape (n,) in the log's own units; sample k
     was taken ``k * sample_time`` seconds after ``start``. ``start`` is the session's time of sample 0 in s,
     ``raw_time`` the logged time stamps (m,) in s before any resampling, ``rows`` the signals (m,) at those
-    where they were resampled, ``notes`` what was done to the log.
+    where they were resampled, ``notes`` what was done to the log. ``continues``: the rig ran just before,
+    in samples that are missing or cut out, so that the state in which it begins is unknown.
     """
 
     name: str
@@ -28,6 +29,7 @@ class Experiment:
     raw_time: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     rows: Mapping[str, np.ndarray] | None = None
+    continues: bool = False
 
     def __post_init__(self):
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))

@@ -10,13 +10,13 @@ from typing import Protocol
 import numpy as np
 
 from focgen.errors import LogError
-from focgen.logs import clock
 from focgen.logs.experiment import Experiment
+from focgen.logs.parts import Raw, experiments_of
+from focgen.logs.plausibility import hint
 from focgen.logs.table import LogTable, read_table, stem
 
-_FEWEST = 8  # samples: less shows neither a rate nor a response
-_TOO_LARGE = 10.0  # times the range
-_TOO_SMALL = 0.02  # of the range, in a whole session
+_TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; what is less so is for ``plausibility`` to warn of
+_TOO_SMALL = 0.002  # of the range, in a whole session
 
 Limits = Mapping[str, tuple[float, float]]
 
@@ -49,16 +49,20 @@ def read_logs(
     if not paths:
         raise LogError("logs", "none is given", "name at least one log")
     found = [part for path in paths for part in _experiments(path, signals, sample_time, (first, last))]
-    _check_limits(found, dict(limits or {}))
+    _check_limits(found, dict(limits or {}), signals.columns())
     return in_session_order(_with_own_names(found))
 
 
 def _experiments(path, signals: Roles, sample_time: float, window) -> Iterator[tuple[str, Experiment]]:
-    """Yield (path, experiment) for each run of a file."""
+    """Yield (path, experiment) for each run of a file, or part of one."""
     table = read_table(path)
     columns, notes = _present(table, signals)
+    time = table.numbers(signals.time)
     for name, rows in _runs(table, signals.run):
-        yield str(path), _experiment(table, columns, name, rows, signals.time, sample_time, window, notes)
+        where = f"{table.path}" if len(rows) == len(table) else f"{table.path} run {name}"
+        run = Raw(name, where, f"{where} [{signals.time}]", time, columns, table.line, notes).part(rows)
+        for experiment in experiments_of(run, sample_time, window):
+            yield str(path), experiment
 
 
 def _present(table: LogTable, signals: Roles) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
@@ -96,61 +100,9 @@ def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, np.ndarray]]:
         yield str(names[code]), np.flatnonzero(codes == code)
 
 
-def _experiment(table, columns, name, rows, time_column, sample_time, window, notes) -> Experiment:
-    where = f"{table.path}" if len(rows) == len(table) else f"{table.path} run {name}"
-    time = table.numbers(time_column)[rows]
-    if len(time) < _FEWEST:
-        raise LogError(where, f"has {len(time)} samples", f"give at least {_FEWEST}")
-    clock.check_increasing(time, f"{where} [{time_column}]", lambda row: table.line(int(rows[row])))
-    clock.check_unit(time, sample_time, f"{where} [{time_column}]")
-    kept = _windowed(time, window, where)
-    time, rows = time[kept], rows[kept]
-    values = _complete(table, columns, rows, where)
-    step, even, more = clock.on_grid(time, values, sample_time, where)
-    resampled = any(even[role] is not values[role] for role in values)
-    return Experiment(name, step, even, float(time[0]), time, notes + more, values if resampled else None)
-
-
-def _windowed(time: np.ndarray, window: tuple[float | None, float | None], where: str) -> np.ndarray:
-    first, last = (edge if edge is not None else way * np.inf for edge, way in zip(window, (-1, 1)))
-    since = time - time[0]
-    kept = (since >= first - 1e-9) & (since <= last + 1e-9)
-    if kept.sum() < _FEWEST:
-        span = f"from {max(first, 0):g} to {min(last, since[-1]):g} s"
-        raise LogError(
-            where, f"has {kept.sum()} samples {span}", f"it lasts {since[-1]:g} s: widen --from and --to"
-        )
-    return kept
-
-
-def _complete(table: LogTable, columns, rows: np.ndarray, where: str) -> dict[str, np.ndarray]:
-    """The rows of each role; a role with no value at all is left out, one with some missing is refused."""
-    values = {}
-    for role, column in columns.items():
-        part = column[rows]
-        gaps = np.isnan(part)
-        if (
-            gaps.all()
-            and role != "output"
-            and (role not in ("command", "pressure") or _other(columns, role, rows))
-        ):
-            continue
-        if gaps.any():
-            row, others = table.line(int(rows[np.argmax(gaps)])), int(gaps.sum()) - 1
-            what = f"{role} is empty or not a number in {row}" + (f" and {others} more" if others else "")
-            raise LogError(where, what, "fill the gaps, or cut them off with --from and --to")
-        values[role] = part
-    return values
-
-
-def _other(columns, role: str, rows: np.ndarray) -> bool:
-    other = columns.get("pressure" if role == "command" else "command")
-    return other is not None and not np.isnan(other[rows]).all()
-
-
-def _check_limits(found: list[tuple[str, Experiment]], limits: Limits) -> None:
-    """Raise LogError where a signal leaves its range by an order of magnitude, or uses next to
-    nothing of it.
+def _check_limits(found: list[tuple[str, Experiment]], limits: Limits, columns: Mapping[str, str]) -> None:
+    """Raise LogError where a signal leaves its range so far, or uses so little of it, that its unit must be
+    wrong.
     """
     for role, (low, high) in limits.items():
         largest = max(abs(low), abs(high))
@@ -162,7 +114,8 @@ def _check_limits(found: list[tuple[str, Experiment]], limits: Limits) -> None:
             what = (
                 f"{role} reaches {peak:.3g} in {experiment.name} where the rig's range is {low:g} to {high:g}"
             )
-            raise LogError(path, what, "log it in the rig's unit, or correct [ranges]")
+            unit = hint(role, columns[role], peak / largest)
+            raise LogError(path, what, f"{unit and unit + ' '}log it in the rig's unit, or correct [ranges]")
 
 
 def _with_own_names(found: list[tuple[str, Experiment]]) -> list[Experiment]:
@@ -178,13 +131,15 @@ def in_session_order(experiments: Sequence[Experiment]) -> tuple[Experiment, ...
     """Order experiments on the session's clock.
 
     By time stamps where they do not overlap; otherwise (each starts at 0, say) as given, one after the other,
-    as if no time had passed between them.
+    as if no time had passed between them. One that continues another keeps its distance from it.
     """
     by_time = sorted(experiments, key=lambda e: e.start)
     if all(earlier.start + earlier.time[-1] < later.start for earlier, later in zip(by_time, by_time[1:])):
         return tuple(by_time)
-    placed, now = [], 0.0
+    placed, now, before = [], 0.0, None
     for experiment in experiments:
+        if before is not None and experiment.continues and experiment.start > before.start:
+            now = placed[-1].start + experiment.start - before.start
         placed.append(replace(experiment, start=now))
-        now += len(experiment) * experiment.sample_time
+        now, before = now + len(experiment) * experiment.sample_time, experiment
     return tuple(placed)

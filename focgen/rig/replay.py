@@ -10,11 +10,13 @@ import numpy as np
 
 from focgen.errors import LogError, RigError
 from focgen.logs.experiment import Experiment
+from focgen.logs.notes import notes_of
 from focgen.logs.read import read_logs
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
+from focgen.rig.plausibility import doubts
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 _BESIDES = ("name", "form", "stage", "clock", "carried")
@@ -32,10 +34,13 @@ class Replayed:
 
 @dataclass(frozen=True)
 class Replay:
-    """``logs``: every experiment by its name. ``simulated``: its signals, shape (n,), by role."""
+    """``logs``: every experiment by its name. ``simulated``: its signals, shape (n,), by role. ``notes``:
+    what was done to the logs. ``warnings``: what in them is implausible."""
 
     logs: dict[str, Replayed]
     simulated: dict[str, dict[str, np.ndarray]]
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def replay(
@@ -53,7 +58,8 @@ def replay(
     logs = experiments(rig, logs, first, last)
     simulated = simulate_session(rig, logs)
     results = {log.name: _compared(log, made) for log, made in zip(logs, simulated)}
-    return Replay(results, {log.name: made for log, made in zip(logs, simulated)})
+    made = {log.name: made for log, made in zip(logs, simulated)}
+    return Replay(results, made, notes_of(logs), doubts(rig, logs))
 
 
 def experiments(

@@ -1,0 +1,87 @@
+"""Readings as they stand in a part of a log, mended: outliers, slow sensors, short stretches missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from focgen.logs.clock import HELD, between
+from focgen.logs.notes import Note
+from focgen.logs.outliers import barred_by, outliers, straightened
+from focgen.logs.repeats import fresh_rows, frozen
+
+_DRIVES = ("command", "pressure")
+
+
+def mended(
+    time: np.ndarray, values: Mapping[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Return (signals without holes, notes) of signals (m,) by role, NaN where a reading is missing.
+
+    Outliers of measured signals go to the straight line between their neighbours, and so do readings that are
+    missing; set ones (command, reference) are held. A camera or a gauge that is slower than the log is taken
+    at its fresh readings, with straight lines between: it would seem late by half of what it repeats. An
+    output that repeats is left so, for the controller reads it late.
+    """
+    found, notes = {}, []
+    for role in sorted(values, key=lambda role: (role not in HELD, role not in _DRIVES)):
+        found[role], said = _mended(role, time, values[role], found.get("command", found.get("pressure")))
+        notes += said
+    notes += _frozen(time, {role: values[role] for role in values})
+    return {role: found[role] for role in values}, tuple(notes)
+
+
+def _mended(role: str, time, y, drive) -> tuple[np.ndarray, list[str]]:
+    there = np.flatnonzero(~np.isnan(y))
+    rows, notes = there, []
+    if role not in HELD:
+        slow = fresh_rows(y[there])
+        if slow:
+            rows = there[slow[1]]
+            notes.append(_slow_note(role, slow[0] * len(time) / len(there), time))
+        barred = None if drive is None else barred_by(drive)[rows]
+        wrong = outliers(y[rows], barred)
+        if wrong.any():
+            what = f"outliers of {role} replaced by the straight line between their neighbours"
+            notes.append(Note(what, int(wrong.sum()), f"at {time[rows[np.argmax(wrong)]]:g} s"))
+            y = y.copy()
+            y[rows] = straightened(time[rows], y[rows], wrong)
+    gone = np.isnan(y)
+    if gone.any():
+        how = "held" if role in HELD else "bridged by straight lines"
+        notes.append(
+            Note(f"readings of {role} missing, {how}", int(gone.sum()), f"at {time[np.argmax(gone)]:g} s")
+        )
+    return _filled(role, time, y, rows, there), notes
+
+
+def _filled(role: str, time, y, rows, there) -> np.ndarray:
+    """All rows of a signal from its fresh ``rows``, those of an output held where it was logged."""
+    if len(rows) == len(y):
+        return y
+    if len(rows) < len(there) and role == "output":
+        held = y[rows[np.searchsorted(rows, there, side="right") - 1]]
+        return np.interp(time, time[there], held)
+    return between(role, time, time[rows], y[rows])
+
+
+def _slow_note(role: str, period: float, time: np.ndarray) -> str:
+    rate = (len(time) - 1) / (time[-1] - time[0]) / period
+    done = "straight lines between"
+    if role == "output":
+        done = f"left so, it is {(period - 1) / 2:.2g} samples late on average"
+    return f"{role} is fresh in every {period:.3g}. row only ({rate:.3g} Hz): {done}"
+
+
+def _frozen(time: np.ndarray, values: Mapping[str, np.ndarray]) -> list[str]:
+    notes = []
+    for role in values:
+        others = [y for other, y in values.items() if other != role and not np.isnan(y).any()]
+        stretch = None if role in HELD or np.isnan(values[role]).any() else frozen(values[role], others)
+        if stretch:
+            first, rows = stretch
+            last = min(first + rows, len(time) - 1)
+            place = f"for {time[last] - time[first]:.3g} s from {time[first]:g} s"
+            notes.append(Note(f"{role} frozen while the rig moves: cut it off with --from and --to", 1, place))
+    return notes

@@ -1,0 +1,98 @@
+"""Single readings far off both neighbours: a bit lost on the wire, a spark, a frame misread."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+WIDEST = 3  # readings in a row
+_SIDE = 3  # readings on either side that have to agree
+_FAR = 5.2  # robust standard deviations of a reading from the line through its neighbours
+_CLEAR = 2.75  # times the worst departure of the neighbours from that line
+_LEVEL = 3.0  # times what the two sides differ by
+_EVEN = 0.6  # of the farthest of several in a row is the nearest: they come and go at once
+_BLOCK = 128  # readings over which the noise is taken as even
+_RARE = 0.01  # of the readings: more of them are the signal's own
+_FEWEST = 20  # readings
+_FINE = 1e-3  # of the span: what noise there is at least
+
+
+def outliers(y: np.ndarray, barred: np.ndarray | None = None) -> np.ndarray:
+    """Which readings of ``y`` (n,) are outliers, as a mask (n,); never one where ``barred`` (n,).
+
+    One to three readings in a row count that lie on one side of the line through three neighbours on either
+    side, farther off than noise could (a Hampel test on that distance, with the noise of the place), than the
+    neighbours scatter, and than the two sides differ. So corners, overshoot and edges are none. Where more
+    than one in a hundred would be, the signal is like that, and none is.
+    """
+    found = np.zeros(len(y), bool)
+    if len(y) < _FEWEST or np.ptp(y) == 0.0:
+        return found
+    barred = found if barred is None else barred
+    least = _least_noise(y)
+    for width in range(1, WIDEST + 1):
+        for at in _pulses(y, barred, width, least):
+            found[at : at + width] = True
+    return found if found.sum() <= max(WIDEST, _RARE * len(y)) else np.zeros(len(y), bool)
+
+
+def barred_by(command: np.ndarray) -> np.ndarray:
+    """Where ``command`` (n,) jumps, and shortly after: a signal may move fast there."""
+    jumps = np.abs(np.diff(command, prepend=command[0])) > 0.05 * (float(np.ptp(command)) or np.inf)
+    return np.convolve(jumps, np.ones(14), "full")[3 : 3 + len(command)] > 0.5
+
+
+def straightened(time: np.ndarray, y: np.ndarray, wrong: np.ndarray) -> np.ndarray:
+    """``y`` (n,) with the readings that are ``wrong`` (n,) on the straight line between their neighbours."""
+    return np.where(wrong, np.interp(time, time[~wrong], y[~wrong]), y)
+
+
+def _pulses(y: np.ndarray, barred: np.ndarray, width: int, least: float) -> np.ndarray:
+    """Where outliers of ``width`` readings begin."""
+    whole = 2 * _SIDE + width
+    if len(y) < whole:
+        return np.zeros(0, int)
+    windows = sliding_window_view(y, whole)
+    beside = np.r_[:_SIDE, _SIDE + width : whole]
+    places = np.arange(whole) - (whole - 1) / 2.0
+    level = windows[:, beside].mean(axis=1)
+    slope = windows[:, beside] @ places[beside] / np.sum(places[beside] ** 2)
+    off = windows - level[:, None] - slope[:, None] * places
+    inside, rough = off[:, _SIDE:-_SIDE], np.abs(off[:, beside]).max(axis=1)
+    size = np.abs(inside).min(axis=1)
+    differ = np.abs(windows[:, :_SIDE].mean(axis=1) - windows[:, -_SIDE:].mean(axis=1))
+    hit = (np.abs(np.sign(inside).sum(axis=1)) == width) & (size > _CLEAR * rough) & (size > _LEVEL * differ)
+    hit &= size > _FAR * np.maximum(_noise(np.abs(inside[:, 0])), least)
+    hit &= ~sliding_window_view(barred, whole).any(axis=1)
+    if width > 1:  # pulses that swell, or are as high as the jumps of the signal itself, are its own
+        hit &= (size > _EVEN * np.abs(inside).max(axis=1)) & (size > 2.0 * _jumps(y))
+    return np.flatnonzero(hit) + _SIDE
+
+
+def _noise(off: np.ndarray) -> np.ndarray:
+    """The robust standard deviation at each place of what is ``off`` (m,): its median over the noisiest of
+    the blocks around, or over all."""
+    count = max(1, len(off) // _BLOCK)
+    medians = np.array([np.median(part) for part in np.array_split(off, count)])
+    padded = np.concatenate([medians[:1], medians, medians[-1:]])
+    near = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    sizes = [len(part) for part in np.array_split(off, count)]
+    return 1.4826 * np.maximum(np.repeat(near, sizes), np.median(off))
+
+
+def _least_noise(y: np.ndarray) -> float:
+    """Half a step of a quantised signal, or a little of the span: the median of steps that mostly stay away
+    is 0."""
+    steps = np.abs(np.diff(y))
+    middle = np.median(sliding_window_view(y, 3), axis=1)
+    moved = steps[steps > 1e-9 * np.ptp(y)]
+    return max(0.5 * float(moved.min()), _FINE * float(np.ptp(middle)))
+
+
+def _jumps(y: np.ndarray) -> float:
+    """The largest change from one reading to the next that lasts."""
+    if len(y) < 16:
+        return np.inf
+    middle = np.median(sliding_window_view(y, 7), axis=1)
+    lasting = np.abs(middle[7:] - middle[:-7])
+    return float(np.minimum(lasting, np.abs(np.diff(y))[6 : 6 + len(lasting)]).max())

@@ -1,0 +1,154 @@
+"""One run of a log, and the experiments that are left of it: holes bridged or cut, readings mended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.errors import LogError
+from focgen.logs import clock, missing
+from focgen.logs.clock import FEWEST, HELD
+from focgen.logs.experiment import Experiment
+from focgen.logs.mending import mended
+from focgen.logs.notes import Note
+
+Window = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Raw:
+    """Rows of a log as they stand in the file: ``time`` (m,) in s, ``values`` by role (m,), NaN where a
+    reading is missing; ``where``, ``stamps`` and ``line`` name log, column of time and row in messages."""
+
+    name: str
+    where: str
+    stamps: str
+    time: np.ndarray
+    values: Mapping[str, np.ndarray]
+    line: clock.Line
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def part(self, kept) -> Raw:
+        """The rows ``kept``: a slice, a mask (m,) or row numbers."""
+        rows = np.arange(len(self))[kept]
+        values = {role: y[rows] for role, y in self.values.items()}
+        return replace(self, time=self.time[rows], values=values, line=lambda row: self.line(int(rows[row])))
+
+    def with_notes(self, *notes: str) -> Raw:
+        """The same, with more to be said of it."""
+        return replace(self, notes=(*self.notes, *notes))
+
+
+def experiments_of(run: Raw, sample_time: float, window: Window) -> Iterator[Experiment]:
+    """Yield the experiments of a run, in the order of its rows.
+
+    The clock starting anew begins a new one, and so does what follows a hole that is too long to be bridged:
+    this one ``continues``. All parts after the first are named "NAME (2)" and so on. ``window``: from and to,
+    s since the clock started. Raises LogError where nothing usable is left.
+    """
+    clock.check_complete(run.time, run.stamps, run.line)
+    if len(run) < FEWEST:
+        raise LogError(run.where, f"has {len(run)} samples", f"give at least {FEWEST}")
+    number = 0
+    for rows in _long_enough(clock.sittings(run.time), run):
+        for part, continues in _uncut(_windowed(_counted(run.part(rows)), window), sample_time):
+            number += 1
+            name = run.name if number == 1 else f"{run.name} ({number})"
+            yield _experiment(replace(part, name=name), continues, sample_time)
+
+
+def _long_enough(sittings: list[slice], run: Raw) -> list[slice]:
+    kept = [rows for rows in sittings if rows.stop - rows.start >= FEWEST]
+    if not kept:
+        raise LogError(
+            run.where, "has a clock that starts anew every few samples", "sort the rows, or name the run column"
+        )
+    return kept
+
+
+def _counted(run: Raw) -> Raw:
+    """The run on time stamps that increase: rows logged twice once, rounded stamps counted."""
+    twice = np.flatnonzero(_repeats(run))
+    if len(twice):
+        note = Note("rows logged twice, taken once", len(twice), f"in {run.line(int(twice[0]))}")
+        run = run.part(np.setdiff1d(np.arange(len(run)), twice)).with_notes(note)
+    even = clock.counted(run.time)
+    if even is not None:
+        step = even[1] - even[0]
+        note = f"time stamps are rounded, {step:.4g} s between samples by their number"
+        run = replace(run, time=even).with_notes(note)
+    clock.check_increasing(run.time, run.stamps, run.line)
+    return run
+
+
+def _repeats(run: Raw) -> np.ndarray:
+    """Which rows (m,) repeat the one before, time stamp and all."""
+    same = np.diff(run.time) == 0
+    for y in run.values.values():
+        same &= (y[1:] == y[:-1]) | (np.isnan(y[1:]) & np.isnan(y[:-1]))
+    return np.concatenate([[False], same])
+
+
+def _windowed(run: Raw, window: Window) -> Raw:
+    first, last = (edge if edge is not None else way * np.inf for edge, way in zip(window, (-1, 1)))
+    since = run.time - run.time[0]
+    kept = (since >= first - 1e-9) & (since <= last + 1e-9)
+    if kept.sum() < FEWEST:
+        span = f"from {max(first, 0):g} to {min(last, since[-1]):g} s"
+        raise LogError(
+            run.where, f"has {kept.sum()} samples {span}", f"it lasts {since[-1]:g} s: widen --from and --to"
+        )
+    return run.part(kept)
+
+
+def _uncut(run: Raw, sample_time: float) -> Iterator[tuple[Raw, bool]]:
+    """Yield (part, whether another was cut off before it) for each part between long holes."""
+    clock.check_unit(run.time, sample_time, run.stamps)
+    kept = missing.keep(run.values, run.time)
+    _check_present(run, kept)
+    holes = clock.holes(run.time)
+    notes = list(kept.notes)
+    if len(holes):
+        first = f"of {run.time[holes[0]] - run.time[holes[0] - 1]:g} s at {run.time[holes[0] - 1]:g} s"
+        notes.append(
+            Note("holes in time too long to be bridged: what follows is an experiment of its own", len(holes), first)
+        )
+    begins = np.union1d(holes, np.flatnonzero(np.diff(kept.rows.astype(int), prepend=0) == 1))
+    spans = [rows[kept.rows[rows]] for rows in np.split(np.arange(len(run)), begins)]
+    spans = [rows for rows in spans if len(rows)]
+    long = [rows for rows in spans if len(rows) >= FEWEST]
+    if not long:
+        raise LogError(run.where, f"has no {FEWEST} samples in a row without a hole", "log it again")
+    if len(long) < len(spans):
+        short = next(rows for rows in spans if len(rows) < FEWEST)
+        place = f"at {run.time[short[0]]:g} s"
+        notes.append(Note(f"parts of fewer than {FEWEST} samples left out", len(spans) - len(long), place))
+    for rows in long:
+        part = run.part(rows)
+        part = replace(part, values={role: y for role, y in part.values.items() if role in kept.roles})
+        after = rows[0] > clock.SHORT or rows[0] in holes
+        yield (part.with_notes(*notes) if rows is long[0] else part), bool(after)
+
+
+def _check_present(run: Raw, kept: missing.Kept) -> None:
+    """Raise LogError where a role that is needed has no reading at all."""
+    if kept.rows.any():
+        return
+    role = "output" if "output" not in kept.roles else next(r for r in HELD + ("pressure",) if r in run.values)
+    row = int(np.argmax(missing.long_stretches(run.values[role])))
+    what = f"{role} is empty or not a number in {run.line(row)} and {len(run) - 1} more"
+    raise LogError(run.where, what, "fill the column, or name another in [signals]")
+
+
+def _experiment(part: Raw, continues: bool, sample_time: float) -> Experiment:
+    values, said = mended(part.time, part.values)
+    step, even, more = clock.on_grid(part.time, values, sample_time, part.where)
+    resampled = any(even[role] is not values[role] for role in values)
+    notes = (*part.notes, *said, *more)
+    start, rows = float(part.time[0]), values if resampled else None
+    return Experiment(part.name, step, even, start, part.time, notes, rows, continues)
