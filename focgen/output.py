@@ -75,3 +75,21 @@ def write_file(path: str | Path, text: str) -> None:
         with suppress(OSError):
             scratch.unlink()
         raise InputError(str(path), f"cannot be written ({reason.strerror})", "choose another path") from None
+
+
+def replace_folder(made: Path, target: Path, within: Path) -> None:
+    """Put the folder ``made`` where ``target`` stands, which goes.
+
+    ``target`` must lie in ``within`` as the file system has it, not by its name only: raises InputError
+    where links lead out, or where it cannot be written. Nothing outside ``within`` is ever removed.
+    """
+    root, place = within.resolve(), target.parent.resolve()
+    if target.is_symlink() or not place.is_relative_to(root) or target.name in ("", ".", ".."):
+        raise InputError(str(target), f"leads out of {within}", "put a folder in the place of the link")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists():
+            shutil.rmtree(target)
+        shutil.move(made, target)
+    except OSError as reason:
+        raise InputError(str(target), f"cannot be written ({reason.strerror})", "move it away") from None
