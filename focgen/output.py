@@ -93,6 +93,9 @@ def write_files(
     """Write all of ``files`` (relative path → content) into a folder, or none of them; errors as
     :func:`new_folder`'s.
     """
+    for name in files:
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            raise InputError(str(target), f"{name!r} would be written outside of it", "choose another name")
     with new_folder(target, inputs) as folder:
         for name, content in files.items():
             path = folder / name

@@ -85,8 +85,9 @@ def folder_files(
 ) -> dict[str, str | bytes]:
     """Name and content of every file of a generated folder; the same plan gives the same bytes.
 
-    Raises PlanError for what C cannot express.
+    Raises PlanError for what C cannot express, InputError where the plan's name is no name in C.
     """
+    check_name(plan.name, plan.controller.name)
     title, digest = plan.controller.name, sha256(controller_toml)
     runtime = {
         name: (shipped("c_runtime") / name).read_text(encoding="utf-8")
