@@ -65,7 +65,7 @@ def demo(out: str | Path) -> Demo:
     Raises InputError where ``out`` cannot be written, MissingExtra where matplotlib is not installed.
     """
     examples = shipped("examples")
-    with new_folder(out) as scratch:
+    with new_folder(out, examples.rglob("*")) as scratch:
         for name in ("rig.toml", "logs/steps.csv", "logs/sines.csv"):
             (scratch / name).parent.mkdir(exist_ok=True)
             shutil.copyfile(examples / name, scratch / name)

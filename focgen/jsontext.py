@@ -1,15 +1,18 @@
-"""Results as JSON."""
+"""Results as JSON, and JSON read from files whose content has to be checked."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from focgen.errors import InputError
 
 
 def plain(value: Any) -> Any:
@@ -34,3 +37,47 @@ def plain(value: Any) -> Any:
 def to_json(value: Any) -> str:
     """JSON text, indented, with a final newline."""
     return json.dumps(plain(value), indent=2, ensure_ascii=False) + "\n"
+
+
+def read_json(path: Path, remedy: str) -> Any:
+    """The content of a JSON file. Raises InputError with ``remedy`` where it cannot be read or is no JSON."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as reason:
+        raise InputError(str(path), f"cannot be read ({reason.strerror})", remedy) from None
+    except (ValueError, RecursionError):  # no UTF-8, no JSON, endless digits, brackets without end
+        raise InputError(str(path), "is no JSON", remedy) from None
+
+
+def fits(value: Any, shape: Any) -> bool:
+    """Whether a value from JSON has a shape.
+
+    A shape is a type (``float`` takes any finite number, and none takes a truth value for a number), a
+    pattern for a whole text, None, a tuple of alternatives, ``[shape]`` for a list of it, or ``{key: shape}``
+    for an object that has these keys at least; a key with a question mark may be absent.
+    """
+    if isinstance(shape, dict):
+        return isinstance(value, dict) and all(_has(value, key, part) for key, part in shape.items())
+    if isinstance(shape, list):
+        return isinstance(value, list) and all(fits(item, shape[0]) for item in value)
+    if isinstance(shape, tuple):
+        return any(fits(value, one) for one in shape)
+    if isinstance(shape, re.Pattern):
+        return isinstance(value, str) and shape.fullmatch(value) is not None
+    if shape in (int, float):
+        return _is_number(value, shape)
+    return value is None if shape is None else isinstance(value, shape)
+
+
+def _has(value: dict, key: str, shape: Any) -> bool:
+    name = key.rstrip("?")
+    return fits(value[name], shape) if name in value else name != key
+
+
+def _is_number(value: Any, kind: type) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int if kind is int else (int, float)):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond every float
+        return False

@@ -1,23 +1,50 @@
-"""Writing results so that a failure leaves nothing half-written behind."""
+"""Writing results so that a failure leaves nothing half-written behind, and no input is written over."""
 
 from __future__ import annotations
 
 import os
+import secrets
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from focgen.errors import InputError
 
 
+def check_apart(outputs: Iterable[str | Path], inputs: Iterable[Any]) -> None:
+    """Raise InputError where an output is the same file as one of the inputs, whatever name or link leads
+    there.
+
+    Inputs that are no paths (a rig, an experiment) are passed over.
+    """
+    known = {identity: one for one in inputs if (identity := _identity(one))}
+    for output in outputs:
+        if (identity := _identity(output)) in known:
+            what = f"is the input {known[identity]}, which would be lost"
+            raise InputError(str(output), what, "write to another place")
+
+
+def _identity(path: Any) -> tuple[int, int] | None:
+    """Which file a path leads to: its device and number there; None where it leads to none."""
+    if not isinstance(path, (str, os.PathLike)):
+        return None
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return found.st_dev, found.st_ino
+
+
 @contextmanager
-def new_folder(target: str | Path) -> Iterator[Path]:
+def new_folder(target: str | Path, inputs: Iterable[Any] = ()) -> Iterator[Path]:
     """Yield a temporary folder whose files move into ``target`` when the block ends well.
 
     Files of the same name in ``target`` are replaced, others stay; on any error nothing is written.
-    Raises InputError where ``target`` cannot be written.
+    Raises InputError where ``target`` cannot be written, and where a file would replace one of ``inputs`` by
+    other bytes.
     """
     target = Path(target)
     try:
@@ -29,16 +56,17 @@ def new_folder(target: str | Path) -> Iterator[Path]:
         ) from None
     try:
         yield scratch
-        _move(scratch, target)
+        _move(scratch, target, tuple(inputs))
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
         if not any(target.iterdir()):
             target.rmdir()
 
 
-def _move(scratch: Path, target: Path) -> None:
+def _move(scratch: Path, target: Path, inputs: tuple) -> None:
     """Every file to its place, once it is sure that nothing else stands there."""
     files = sorted(p.relative_to(scratch) for p in scratch.rglob("*") if p.is_file())
+    check_apart((target / name for name in files if not _equal(scratch / name, target / name)), inputs)
     for name in files:
         if (target / name).is_dir():
             raise InputError(str(target / name), "is a folder where a file belongs", "move it away")
@@ -54,24 +82,59 @@ def _move(scratch: Path, target: Path) -> None:
             raise InputError(str(target / name), what, "choose another --out") from None
 
 
-def write_files(target: str | Path, files: Mapping[str, str | bytes]) -> None:
-    """Write all of ``files`` (relative path → content) into a folder, or none of them."""
-    with new_folder(target) as folder:
+def _equal(one: Path, other: Path) -> bool:
+    """Whether both are files of the same bytes: then nothing is lost."""
+    return other.is_file() and one.read_bytes() == other.read_bytes()
+
+
+def write_files(
+    target: str | Path, files: Mapping[str, str | bytes], inputs: Iterable[Any] = ()
+) -> None:
+    """Write all of ``files`` (relative path → content) into a folder, or none of them; errors as
+    :func:`new_folder`'s.
+    """
+    for name in files:
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            raise InputError(str(target), f"{name!r} would be written outside of it", "choose another name")
+    with new_folder(target, inputs) as folder:
         for name, content in files.items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
 
 
-def write_file(path: str | Path, text: str) -> None:
-    """Write one file whole or not at all. Raises InputError where it cannot be written."""
+def write_file(path: str | Path, text: str, inputs: Iterable[Any] = ()) -> None:
+    """Write one file whole or not at all. Raises InputError where it cannot be written, or is one of
+    ``inputs``.
+    """
+    check_apart([path], inputs)
     path = Path(path)
-    scratch = path.with_name(f".{path.name}.part")
+    scratch = path.with_name(f".focgen-{secrets.token_hex(8)}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        scratch.write_text(text, encoding="utf-8")
+        with scratch.open("x", encoding="utf-8") as file:  # never a file, or a link, that is there
+            file.write(text)
         os.replace(scratch, path)
     except OSError as reason:
+        raise InputError(str(path), f"cannot be written ({reason.strerror})", "choose another path") from None
+    finally:
         with suppress(OSError):
             scratch.unlink()
-        raise InputError(str(path), f"cannot be written ({reason.strerror})", "choose another path") from None
+
+
+def replace_folder(made: Path, target: Path, within: Path) -> None:
+    """Put the folder ``made`` where ``target`` stands, which goes.
+
+    ``target`` must lie in ``within`` as the file system has it, not by its name only: raises InputError
+    where links lead out, or where it cannot be written. Nothing outside ``within`` is ever removed.
+    """
+    root, place = within.resolve(), target.parent.resolve()
+    if target.is_symlink() or not place.is_relative_to(root) or target.name in ("", ".", ".."):
+        raise InputError(str(target), f"leads out of {within}", "put a folder in the place of the link")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists():
+            shutil.rmtree(target)
+        shutil.move(made, target)
+    except OSError as reason:
+        raise InputError(str(target), f"cannot be written ({reason.strerror})", "move it away") from None

@@ -15,7 +15,8 @@ import pytest
 import focgen
 from focgen.cli.main import main
 from focgen.codegen.generate import generate
-from focgen.codegen.literals import comment, constant, literal, power_of_two, rows
+from focgen.codegen.literals import constant, literal, power_of_two, rows
+from focgen.codegen.texts import comment
 from focgen.codegen.names import check_name
 from focgen.errors import FocgenError, InputError
 from tests.c_code import STRICT, compiler, run

@@ -200,10 +200,10 @@ def test_it_names_the_first_step_that_is_wrong(sound, tmp_path, arithmetic, step
     assert other != table[begin:end]
     path.write_text(head + table[:begin] + other + table[end:] + rest)
     assert results(folder, ["spba"], compiler("gcc"), *EXACT) == [step]
-    assert main(["verify", str(folder), "--samples", "200"]) == 1
+    assert main(["verify", str(folder), "--samples", "200", "--edited"]) == 1
     out = capsys.readouterr().out
     assert f"wrong at its step {step}" in out and "NOT verified" in out and "samples equal" in out
-    assert main(["verify", str(folder), "--samples", "200", "--json"]) == 1
+    assert main(["verify", str(folder), "--samples", "200", "--edited", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["targets"]["host"]["selftest"] == step
 
 

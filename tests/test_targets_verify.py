@@ -127,7 +127,7 @@ def sown(tmp_path, arithmetic, file, pattern, by):
 def test_a_sum_in_long_is_right_here_and_wrong_there(tmp_path):
     """64 bits on the host, 32 on a Cortex-M: the host alone would pass it."""
     folder = sown(tmp_path, "q31", "foc_rt.h", r"int64_t sum = 0;", "long sum = 0;")
-    found = verify(folder, 400, target=("host", "cortex-m3"))
+    found = verify(folder, 400, target=("host", "cortex-m3"), edited=True)
     assert found.targets["host"].mismatches == 0 and found.targets["cortex-m3"].mismatches > 0
     assert not found.holds and "zig" in found.targets["cortex-m3"].first
 
@@ -147,7 +147,7 @@ def test_c_that_never_returns(tmp_path, monkeypatch, capsys):
     hang = "s->error_now = 0; for (;;) { s->flags++; }"
     folder = sown(tmp_path, "q15", "spba.c", r"s->error_now = 0;", hang)
     monkeypatch.setattr("focgen.verification.compare.PATIENCE", 0.5)
-    assert main(["verify", str(folder), "--samples", "200", "--target", "cortex-m3"]) == 1
+    assert main(["verify", str(folder), "--samples", "200", "--edited", "--target", "cortex-m3"]) == 1
     assert re.search(r"the C did not return within [\d.]+ s, at spba_", capsys.readouterr().out)
 
 
@@ -271,7 +271,7 @@ def test_an_avr_says_the_same(arithmetic, tmp_path):
     assert found.sound and found.samples > 300 and "simavr" in found.tools[0]
     path = folder / "filter.c"
     path.write_text(path.read_text().replace("s->error[s->error_now] = e;", "(void)e;"))
-    assert verify(folder, 300, target="avr").targets["avr"].mismatches > 0
+    assert verify(folder, 300, target="avr", edited=True).targets["avr"].mismatches > 0
 
 
 @pytest.mark.parametrize("arithmetic", ("q15", "q31", "f32"))
@@ -306,7 +306,7 @@ def test_the_self_test_runs_on_the_core(tmp_path):
     assert verify(folder, 100, target="cortex-m4").targets["cortex-m4"].selftest == 0
     path = folder / "spba.c"
     path.write_text(path.read_text().replace("s->error[s->error_now] = e;", "(void)e;"))
-    assert verify(folder, 100, target="cortex-m4").targets["cortex-m4"].selftest != 0
+    assert verify(folder, 100, target="cortex-m4", edited=True).targets["cortex-m4"].selftest != 0
 
 
 def test_the_command_names_its_tools(tmp_path, capsys):

@@ -74,7 +74,7 @@ def test_bounds_that_are_exceeded_are_seen_as_such(sound, tmp_path):
     """What the samples show, whatever the plan says of the bounds."""
     folder = copied(sound, tmp_path, "spba", "q15")
     rewrite(folder, halved_bounds)
-    assert not verify(folder, SAMPLES).targets["host"].within
+    assert not verify(folder, SAMPLES, edited=True).targets["host"].within
 
 
 def leaves(entry, path=()):
@@ -170,7 +170,7 @@ UNUSABLE = {
 def test_an_unusable_folder_is_an_error_of_one_line(sound, tmp_path, what, capsys):
     folder = copied(sound, tmp_path, "spba", "q15")
     UNUSABLE[what](folder)
-    assert main(["verify", str(folder), "--samples", "500"]) == 2
+    assert main(["verify", str(folder), "--samples", "500", "--edited"]) == 2
     out, err = capsys.readouterr()
     assert not out and re.fullmatch(r"focgen: error: [^\n]+: [^\n]+; [^\n]+\n", err), err
 
@@ -197,7 +197,7 @@ def test_c_that_never_returns_is_a_mismatch_that_says_so(sound, tmp_path, capsys
         "spba",
         Fault("hang", "@.c", r"s->error_now = 0;", "s->error_now = 0; for (;;) { s->flags++; }"),
     )
-    assert main(["verify", str(folder), "--samples", "500"]) == 1
+    assert main(["verify", str(folder), "--samples", "500", "--edited"]) == 1
     assert "did not return within" in capsys.readouterr().out
 
 

@@ -86,7 +86,7 @@ def mutated(folder: Path, member: str) -> Path:
 
 @pytest.mark.parametrize("member", MUTATIONS)
 def test_a_member_that_no_output_shows(member, tmp_path):
-    found = verify(mutated(tmp_path, member), 300).targets["host"]
+    found = verify(mutated(tmp_path, member), 300, edited=True).targets["host"]
     assert found.mismatches > 0 and not found.sound
     assert re.search(rf"after run \d+: state\.{member}\b.* is .*, the reference's ", found.first), found.first
 
@@ -95,5 +95,5 @@ def test_it_shows_on_an_emulated_core_and_on_an_avr(tmp_path):
     pytest.importorskip("unicorn")
     folder = mutated(tmp_path, "resting")
     targets = ["cortex-m3"] + ["avr"] * (avr.missing(read_folder(folder).plan) is None)
-    for result in verify(folder, 200, target=targets).targets.values():
+    for result in verify(folder, 200, target=targets, edited=True).targets.values():
         assert result.mismatches > 0 and "state.resting" in result.first, result.first

@@ -35,11 +35,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--compiler", default="zig", choices=COMPILERS, help="what compiles it (default: zig)"
     )
+    parser.add_argument(
+        "--edited", action="store_true", help="count a folder that is not as it was generated, too"
+    )
     parser.add_argument("--against", metavar="DIR", help="another generated folder to compare with")
 
 
 def run(args: Namespace) -> Outcome:
-    found = cost(args.folder, args.target, args.compiler, args.against)
+    found = cost(args.folder, args.target, args.compiler, args.against, args.edited)
     entries = [_entry(one) for one in found.controllers]
     payload = entries[0] if len(entries) == 1 else {"controllers": entries}
     if len(entries) == 1 and args.target != "all":

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 
 from focgen.cli.outcome import Outcome
 from focgen.control.controller import ARITHMETICS
 from focgen.control.files import controller_text
 from focgen.loop.design import design
-from focgen.output import write_file, write_files
+from focgen.output import check_apart, write_file, write_files
 from focgen.report.control import design_pictures
 from focgen.report.control_summary import design_payload, design_text
 from focgen.rig.files import read_rig
@@ -60,13 +61,15 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> Outcome:
+    check_apart([args.out], [args.rig])
     wishes = (args.settling, args.overshoot, args.arithmetic, args.length)
     result = design(args.rig, None, *wishes, delay=args.delay, setpoints=args.setpoints)
     pictures = design_pictures(result, read_rig(args.rig)) if args.report else {}
-    write_file(args.out, controller_text(result.controller))
+    check_apart((Path(args.report) / name for name in pictures), [args.rig])
+    write_file(args.out, controller_text(result.controller), [args.rig])
     text = f"{design_text(result)}\n\nwrote {args.out}\n"
     if pictures:
-        write_files(args.report, pictures)
+        write_files(args.report, pictures, [args.rig])
         text += f"pictures in {args.report}\n"
     text += f"next: focgen simulate {args.rig} {args.out}\n"
     text += f"      focgen generate {args.out} --out DIR --arithmetic {args.arithmetic}"

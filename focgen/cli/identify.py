@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 
 from focgen.cli.outcome import Outcome
 from focgen.identification.identify import identify
-from focgen.output import new_folder, write_file
+from focgen.output import check_apart, new_folder, write_file
 from focgen.report.identification import identification_pictures
 from focgen.report.identification_summary import identification_payload, identification_text
 from focgen.rig.files import rig_text
@@ -43,15 +44,19 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> Outcome:
+    given = (*args.logs, args.rig, *args.unseen)
+    check_apart([args.out], given)
     found = identify(args.logs, args.rig, None, args.first, args.last, args.gain_degree, args.unseen)
     text = f"{identification_text(found)}\n\nwrote {args.out}\n"
     if args.report:
-        with new_folder(args.report) as folder:  # pictures and rig, or neither
-            for name, picture in identification_pictures(found).items():
+        pictures = identification_pictures(found)
+        check_apart((Path(args.report) / name for name in pictures), given)
+        with new_folder(args.report, given) as folder:  # pictures and rig, or neither
+            for name, picture in pictures.items():
                 (folder / name).write_bytes(picture)
-            write_file(args.out, rig_text(found.rig))
+            write_file(args.out, rig_text(found.rig), given)
         text += f"pictures in {args.report}\n"
     else:
-        write_file(args.out, rig_text(found.rig))
+        write_file(args.out, rig_text(found.rig), given)
     text += f"next: focgen design {args.out} --out controller.toml"
     return Outcome(identification_payload(found) | {"new_rig": args.out}, text)

@@ -52,6 +52,6 @@ def run(args: Namespace) -> Outcome:
     )
     text = simulation_text(result)
     if args.report:
-        write_files(args.report, simulation_pictures(result))
+        write_files(args.report, simulation_pictures(result), [args.rig, args.controller])
         text += f"\npictures in {args.report}"
     return Outcome(simulation_payload(result), text, result.holds)

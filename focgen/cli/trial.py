@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from focgen.cli.outcome import Outcome
 from focgen.output import write_files
@@ -96,6 +97,8 @@ def _score(args: argparse.Namespace) -> Outcome:
     if args.out:
         from focgen.report.trials import pictures
 
-        write_files(args.out, {"scores.md": markdown(summary.sets), **pictures(summary.sets)})
+        parts = ("trial.json", "cases/**/*", "sealed/**/*")
+        inputs = (path for folder in args.folder for part in parts for path in Path(folder).glob(part))
+        write_files(args.out, {"scores.md": markdown(summary.sets), **pictures(summary.sets)}, inputs)
         text += f"\ntable and pictures in {args.out}"
     return Outcome(summary, text, holds=summary.reached)

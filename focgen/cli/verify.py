@@ -18,6 +18,10 @@ EXAMPLE = """example:
   agree with the Python reference, and the errors have to stay within the manifest's bounds. Exit
   status 1 where they do not.
 
+  The folder is rendered anew first. Where its C, headers, manifest or controller.toml have been edited, that
+  is said, nothing is compiled unless --edited asks for it, and the exit status is 1. A folder is code: do not
+  verify a stranger's with --edited outside a sandbox.
+
   focgen verify firmware --target all
 
   does the same on emulated microcontrollers, with every cross compiler and emulator that is installed;
@@ -33,15 +37,19 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--target", default="host", choices=(*TARGETS, "all"), help="where to run it (default: host)"
     )
+    parser.add_argument(
+        "--edited", action="store_true", help="compile and run C that is not as it was generated, too"
+    )
 
 
 def run(args: Namespace) -> Outcome:
-    found = verify(args.folder, args.samples, args.seed, args.target)
+    found = verify(args.folder, args.samples, args.seed, args.target, args.edited)
     payload = {
         "name": found.name,
         "arithmetic": found.arithmetic,
         "targets": {name: entry_of(result) for name, result in found.targets.items()},
         "differences": list(found.differences),
+        "notes": list(found.notes),
         "holds": found.holds,
     }
     return Outcome(payload, verification_text(found), found.holds)
@@ -52,7 +60,14 @@ def verification_text(found: Verification) -> str:
     lines = [f"{found.name} ({found.arithmetic})"]
     lines += [f"  {name}: {_result(result)}" for name, result in found.targets.items()]
     lines += [f"  {difference}" for difference in found.differences]
-    return "\n".join([*lines, "verified" if found.holds else "NOT verified"])
+    lines += [f"  note: {note}" for note in found.notes]
+    return "\n".join([*lines, _verdict(found)])
+
+
+def _verdict(found: Verification) -> str:
+    if found.holds:
+        return "verified"
+    return "NOT verified" + (": what ran agrees, but it has been edited" if found.agrees else "")
 
 
 def _result(result: TargetResult) -> str:

@@ -10,8 +10,9 @@ from focgen.codegen.banks import time_constant
 from focgen.codegen.formulas import transfer_text
 from focgen.codegen.guard import unusable_text
 from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
-from focgen.codegen.literals import comment, quantity, wrapped
+from focgen.codegen.literals import quantity, wrapped
 from focgen.codegen.manifest import sizes
+from focgen.codegen.texts import UserText
 from focgen.plan.canonical import memory_bias
 from focgen.plan.model import Plan
 
@@ -24,7 +25,7 @@ class Signal:
     what: str
     low: str
     high: str
-    unit: str
+    unit: UserText
     lsb: str
     bits: int
 
@@ -34,7 +35,7 @@ class ReadmeContext:
     """Everything ``README.md.jinja`` asks for."""
 
     name: str
-    title: str
+    title: UserText
     version: str
     arithmetic: str
     fixed: bool
@@ -45,7 +46,7 @@ class ReadmeContext:
     length: int
     exponential: bool
     memory: str
-    within_horizon: str
+    within_horizon: UserText
     memory_section: str
     signals: list[Signal]
     scheduled: bool
@@ -55,11 +56,10 @@ class ReadmeContext:
     multiplies: int
     proofs: int
     tightest: str
-    operator: str
-    output_per_sample: str
-    truncation: str
+    operator: UserText
+    output_per_sample: UserText
+    truncation: UserText | None
     biases: list[str]
-    unit: str
     selftest: bool
     files: list[str]
 
@@ -72,7 +72,7 @@ def readme_context(
     operator_unit = f"{unit}/s" if plan.integrator and unit else unit
     return ReadmeContext(
         name=plan.name,
-        title=title,
+        title=UserText(title),
         version=focgen.__version__,
         arithmetic=plan.arithmetic,
         fixed=not plan.floating,
@@ -95,18 +95,15 @@ def readme_context(
         tightest=_tightest(plan),
         operator=_quantity(bound.operator, operator_unit),
         output_per_sample=_quantity(bound.output_per_sample, unit),
-        truncation="none can be given"
-        if bound.truncation is None
-        else _quantity(bound.truncation, operator_unit),
+        truncation=None if bound.truncation is None else _quantity(bound.truncation, operator_unit),
         biases=_biases(plan),
-        unit=unit,
         selftest=selftest,
         files=[f"{plan.name}.h", f"{plan.name}.c", *runtime_files(plan, kernels)],
     )
 
 
-def _quantity(value: float, unit: str) -> str:
-    return f"{value:.3g} {unit}".rstrip()
+def _quantity(value: float, unit: str) -> UserText:
+    return UserText(f"{value:.3g} {unit}".rstrip())
 
 
 def _signals(plan: Plan) -> list[Signal]:
@@ -120,7 +117,7 @@ def _signals(plan: Plan) -> list[Signal]:
         signal = plan.schedule.signal
         rows.insert(2, ("sched", "scheduling signal", ranges.schedule, units.schedule, signal, "SCHED_LSB"))
     return [
-        Signal(name, what, f"{ends[0]:g}", f"{ends[1]:g}", unit, f"{plan.name}_{lsb}", form.bits)
+        Signal(name, what, f"{ends[0]:g}", f"{ends[1]:g}", UserText(unit), f"{plan.name}_{lsb}", form.bits)
         for name, what, ends, unit, form, lsb in rows
     ]
 
@@ -189,7 +186,7 @@ class ExampleContext:
     """Everything ``main.c.jinja`` asks for."""
 
     name: str
-    title: str
+    title: UserText
     fixed: bool
     scheduled: bool
     integral: bool
@@ -197,8 +194,7 @@ class ExampleContext:
     reference: str
     reference_about: str
     schedule: str
-    output_unit: str
-    measurement_unit: str
+    output_unit: UserText
     suffix: str
 
 
@@ -209,7 +205,7 @@ def example_context(plan: Plan, title: str) -> ExampleContext:
     at = sum(ranges.schedule) / 2 if plan.schedule else 0.0
     return ExampleContext(
         name=plan.name,
-        title=comment(title),
+        title=UserText(title),
         fixed=not plan.floating,
         scheduled=plan.schedule is not None,
         integral=plan.integrator is not None,
@@ -217,8 +213,7 @@ def example_context(plan: Plan, title: str) -> ExampleContext:
         reference=_number(ranges.reference[1] if middle == 0.0 else middle),
         reference_about=quantity(ranges.reference[1] if middle == 0.0 else middle, units.measurement),
         schedule=_number(at),
-        output_unit=comment(units.output),
-        measurement_unit=comment(units.measurement),
+        output_unit=UserText(units.output),
         suffix="f" if plan.arithmetic == "f32" else "",
     )
 

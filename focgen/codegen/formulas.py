@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from focgen.codegen.literals import comment, quantity, wrapped
+from focgen.codegen.literals import quantity, wrapped
+from focgen.codegen.texts import comment
 from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.plan.canonical import normaliser, realise
 from focgen.plan.model import Plan, Sum

@@ -20,7 +20,7 @@ from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.control.files import controller_text, read_controller
 from focgen.errors import InputError, check_choice
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
-from focgen.output import write_files
+from focgen.output import check_apart, write_files
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST, Plan
 from focgen.resources import shipped
@@ -61,8 +61,8 @@ def generate(
     the history sums shall use; without it they take their portable form. The bits are the same.
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
-    in this arithmetic, InputError for a name or an option that cannot be used or a folder that cannot be
-    written.
+    in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
+    written, or one where a file would replace the controller's own by other bytes.
     """
     _refuse_what_is_missing(package)
     kernels = _kernels(target)
@@ -73,7 +73,8 @@ def generate(
     plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon)
     files = folder_files(plan, text, selftest, kernels)
     old = leftovers(Path(out), called, files)
-    write_files(out, files)
+    check_apart(old, [controller])
+    write_files(out, files, [controller])
     for path in old:
         path.unlink(missing_ok=True)
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
@@ -84,8 +85,9 @@ def folder_files(
 ) -> dict[str, str | bytes]:
     """Name and content of every file of a generated folder; the same plan gives the same bytes.
 
-    Raises PlanError for what C cannot express.
+    Raises PlanError for what C cannot express, InputError where the plan's name is no name in C.
     """
+    check_name(plan.name, plan.controller.name)
     title, digest = plan.controller.name, sha256(controller_toml)
     runtime = {
         name: (shipped("c_runtime") / name).read_text(encoding="utf-8")

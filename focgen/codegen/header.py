@@ -8,8 +8,9 @@ import focgen
 from focgen.codegen.formulas import transfer_text
 from focgen.codegen.guard import unusable_text
 from focgen.codegen.kernels import PORTABLE, Kernels
-from focgen.codegen.literals import comment, constant, literal, power_of_two, quantity
+from focgen.codegen.literals import constant, literal, power_of_two, quantity
 from focgen.codegen.state import Member, members, state_bytes
+from focgen.codegen.texts import UserText, comment
 from focgen.plan.model import Format, Plan
 
 
@@ -27,7 +28,7 @@ class HeaderContext:
     """Everything ``controller.h.jinja`` asks for."""
 
     name: str
-    title: str
+    title: UserText
     version: str
     arithmetic: str
     sha256: str
@@ -49,7 +50,7 @@ def header_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
     """Prepare NAME.h; ``sha256`` is of the controller's file."""
     return HeaderContext(
         name=plan.name,
-        title=comment(title),
+        title=UserText(title),
         version=focgen.__version__,
         arithmetic=plan.arithmetic,
         sha256=sha256,

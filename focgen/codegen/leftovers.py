@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Collection
 from pathlib import Path
 
@@ -21,8 +22,8 @@ def leftovers(folder: Path, name: str, files: Collection[str]) -> tuple[Path, ..
     test = [f"{name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
     inputs = manifest.get("inputs")
     written = inputs.items() if isinstance(inputs, dict) else ()
-    headers = [file for file, digest in written if file.startswith("foc_") and _is(folder / file, digest)]
-    old = [folder / file for file in (*test, *headers) if file not in files and Path(file).name == file]
+    headers = [file for file, digest in written if re.fullmatch(r"foc_\w+\.h", file) and _is(folder / file, digest)]
+    old = [folder / file for file in (*test, *headers) if file not in files]
     return tuple(path for path in old if path.is_file())
 
 

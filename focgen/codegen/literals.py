@@ -1,4 +1,4 @@
-"""Numbers and comments as C text."""
+"""Numbers as C text."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+
+from focgen.codegen.texts import comment
 
 _WIDTH = 106  # of a line
 
@@ -50,17 +52,6 @@ def rows(values: Sequence[int | float], ctype: str) -> list[str]:
     per_row = 8 if 8 * (width + 2) <= _WIDTH else 4
     lines = [texts[i : i + per_row] for i in range(0, len(texts), per_row)]
     return [" ".join(f"{text:>{width}}," for text in line) for line in lines]
-
-
-_REPLACED = {"µ": "u", "μ": "u", "°": "deg ", "Ω": "Ohm", "²": "^2", "³": "^3", "·": " ", "–": "-", "ü": "ue"}
-
-
-def comment(text: str) -> str:
-    """Text that is safe within a C comment: ASCII, one line, no trigraph and no end of the comment in it."""
-    for found, instead in _REPLACED.items():
-        text = text.replace(found, instead)
-    plain = re.sub(r"[^ -~]", "?", " ".join(text.split())).replace("\\", "/")
-    return " ".join(re.sub(r"\?+", "?", plain).replace("*/", "* /").replace("/*", "/ *").split())
 
 
 def quantity(value: float, unit: str = "") -> str:

@@ -7,6 +7,7 @@ from functools import cache
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from focgen.codegen.texts import comment, markdown, printf, string
 from focgen.resources import shipped
 
 _WIDTH = 104
@@ -35,7 +36,7 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    made.filters["broken"] = broken
+    made.filters.update(broken=broken, comment=comment, string=string, printf=printf, markdown=markdown)
     return made
 
 

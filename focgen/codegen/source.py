@@ -9,9 +9,10 @@ from focgen.codegen.expressions import CLAMP, LONGEST_SHIFT, bound, converted, s
 from focgen.codegen.formulas import memory_about, step_formulas, transfer_text, weights_about
 from focgen.codegen.guard import GuardText, guard_text
 from focgen.codegen.kernels import PORTABLE, Kernels
-from focgen.codegen.literals import comment, constant, literal, quantity, scale
+from focgen.codegen.literals import constant, literal, quantity, scale
 from focgen.codegen.state import carries, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
+from focgen.codegen.texts import UserText, comment
 from focgen.plan.canonical import realise
 from focgen.plan.model import Plan, Sum
 
@@ -71,7 +72,7 @@ class SourceContext:
     """
 
     name: str
-    title: str
+    title: UserText
     version: str
     arithmetic: str
     sha256: str
@@ -113,7 +114,7 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
     signal = plan.output.ctype
     return SourceContext(
         name=plan.name,
-        title=comment(title),
+        title=UserText(title),
         version=focgen.__version__,
         arithmetic=plan.arithmetic,
         sha256=sha256,

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 
 from focgen.codegen.banks import BankText, bank_texts, inputs
 from focgen.codegen.expressions import bound, shifted
-from focgen.codegen.literals import comment, exponent, quantity, rows, scale, wrapped
+from focgen.codegen.literals import exponent, quantity, rows, scale, wrapped
 from focgen.codegen.lookahead import LookAhead, Run
 from focgen.codegen.state import plain_bytes, size_of
+from focgen.codegen.texts import comment
 from focgen.plan.model import Block, Plan, Sum
 
 

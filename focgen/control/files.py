@@ -51,6 +51,7 @@ from focgen.control.controller import (
 )
 from focgen.errors import ControllerError
 from focgen.fractional.transfer import TransferFunction
+from focgen.output import write_file
 from focgen.tomlfile import Table, terms_of
 
 
@@ -151,7 +152,7 @@ def _source(table: Table | None) -> Source | None:
 
 def write_controller(controller: Controller, path: str | Path) -> None:
     """Write a controller so that :func:`read_controller` gives an equal one."""
-    Path(path).write_text(controller_text(controller), encoding="utf-8")
+    write_file(path, controller_text(controller))
 
 
 def controller_text(controller: Controller) -> str:

@@ -20,6 +20,7 @@ from focgen.diagnosis.smooth import freed
 from focgen.diagnosis.unexplained import is_unknown
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
+from focgen.output import check_apart
 from focgen.progress import say
 from focgen.rig.effects import library
 from focgen.rig.files import read_rig
@@ -30,6 +31,7 @@ from focgen.rig.replay import experiments
 UNTRUSTED = 0.2  # of a segment's residual foretold by inputs: its output still carries noise into the next,
 # as it carries what the form of an effect found lacks, or a hum
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
+WRITTEN = ("diagnosis.json", "refitted.toml", "augmented.toml")  # beside the pictures
 THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
 
@@ -52,10 +54,13 @@ def diagnose(
     evidence by, at least 2 (0: the built-in one).
     ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how
     strong it is. ``pictures``: whether to draw them.
-    Raises RigError, LogError, ControllerError for files that cannot be used, FocgenError for an unknown
-    effect.
+    Raises RigError, LogError, ControllerError for files that cannot be used, InputError where ``out`` holds
+    one of them in the place of a result, FocgenError for an unknown effect.
     """
     _check(only)
+    given = (rig, *logs, controller)
+    if out is not None:
+        check_apart((Path(out) / name for name in WRITTEN), given)
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
     logs = _usable(experiments(rig, logs, first, last))
     ran = running(read_controller(controller), logs) if controller is not None else None
@@ -67,7 +72,7 @@ def diagnose(
     if out is not None:
         from focgen.diagnosis.write import write
 
-        write(out, diagnosis, evidence, rigs, logs, pictures)
+        write(out, diagnosis, evidence, rigs, logs, pictures, given)
     return diagnosis
 
 

@@ -23,8 +23,11 @@ def write(
     rigs: Rigs,
     logs: Sequence[Experiment],
     drawn: bool = True,
+    inputs: Sequence = (),
 ) -> None:
-    """Write all files into ``out``, or none; pictures where they are to be ``drawn``."""
+    """Write all files into ``out``, or none; pictures where they are to be ``drawn``. Raises InputError where
+    one of ``inputs`` would be written over.
+    """
     files: dict[str, str | bytes] = {
         "diagnosis.json": to_json(diagnosis),
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
@@ -34,4 +37,4 @@ def write(
         from focgen.report.diagnosis import pictures
 
         files |= pictures(diagnosis, evidence, logs)
-    write_files(out, files)
+    write_files(out, files, inputs)

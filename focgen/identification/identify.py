@@ -20,7 +20,7 @@ from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.reach import seen_ranges
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import read_logs
-from focgen.output import write_file
+from focgen.output import check_apart, write_file
 from focgen.progress import track
 from focgen.rig.files import read_rig, rig_text
 from focgen.rig.model import Actuator, LinearActuator, Rig
@@ -49,9 +49,13 @@ def identify(
     through the regulator; fitted is the curvature where logged, else the output through the sensor.
     ``unseen`` are logs that the identified rig is shown against, but not fitted to.
 
-    Raises LogError, RigError or FitError; nothing is written then.
+    Raises LogError, RigError or FitError, and InputError where ``out`` is one of the inputs; nothing is
+    written then.
     """
     _check_degree(gain_degree)
+    given = (*logs, rig, *unseen)
+    if out is not None:
+        check_apart([out], given)
     nominal = rig if isinstance(rig, Rig) else read_rig(rig)
     experiments = _read(logs, nominal, first, last)
     others = _read(unseen, nominal, None, None) if unseen else ()
@@ -66,7 +70,7 @@ def identify(
     told = notes + _notes(excitations, fits, nominal) + told
     result = _compared(excitations, fits, pooled, found, told, _shown(others, found))
     if out is not None:
-        write_file(out, rig_text(found))
+        write_file(out, rig_text(found), given)
     return result
 
 

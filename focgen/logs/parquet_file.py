@@ -20,6 +20,8 @@ def read(path: Path) -> LogTable:
     path.open("rb").close()  # a missing file is reported as one
     try:
         table = pyarrow.parquet.read_table(path)
+    except MemoryError:  # Arrow's, too
+        raise
     except (pyarrow.ArrowException, OSError):
         raise LogError(str(path), "is not a whole Parquet file", "write it again") from None
     return LogTable(str(path), {name: _column(table.column(name)) for name in table.column_names})

@@ -6,6 +6,7 @@ import difflib
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -21,6 +22,7 @@ _READERS = {
     ".mat": "focgen.logs.mat_file",
     ".tdms": "focgen.logs.tdms_file",
 }
+_BINARY = (".parquet", ".mat", ".tdms")  # foreign readers, each in a process of its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,13 +102,21 @@ def read_table(path: str | Path) -> LogTable:
             str(path), "is not a kind of log that can be read", f"give one of {', '.join(_READERS)}"
         )
     try:
-        table = import_module(_READERS[kind]).read(Path(path))
+        table = _reader(kind)(Path(path))
     except OSError as reason:
         why = reason.strerror or " ".join(str(reason).split())
         raise LogError(str(path), f"cannot be read ({why})", "check the path") from None
     if not len(table):
         raise LogError(str(path), "holds no samples", "give a log with a header and one row a sample")
     return table
+
+
+def _reader(kind: str) -> Callable[[Path], LogTable]:
+    if kind in _BINARY:
+        from focgen.logs.apart import read_apart  # which makes tables itself
+
+        return partial(read_apart, _READERS[kind])
+    return import_module(_READERS[kind]).read
 
 
 def stem(path: str | Path) -> str:

@@ -31,6 +31,8 @@ def read(path: Path) -> LogTable:
             for group in groups
             for channel in group.channels()
         ]
+    except MemoryError:
+        raise
     except Exception:  # nptdms has no error of its own for damaged files
         raise LogError(str(path), "is not a whole TDMS file", "write it again") from None
     names = [channel for _, channel, _ in channels]

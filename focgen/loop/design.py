@@ -23,8 +23,12 @@ from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
 from focgen.loop.trial import Steps, run_corner, run_steps
 from focgen.loop.tuning import HORIZON, OVERSHOOT, Tuned, Wish, fastest, meeting, tune
+<<<<<<< HEAD
 from focgen.loop.worst import Worst, worst_case
 from focgen.output import write_file
+=======
+from focgen.output import check_apart, write_file
+>>>>>>> wt-severe
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST
 from focgen.rig.files import read_rig
@@ -130,12 +134,15 @@ def design(
     error of the schedule table.
 
     Raises DesignError where the rig cannot be inverted or the wish is not feasible (naming what is),
-    PlanError where the controller does not fit the arithmetic, RigError where the file cannot be used.
+    PlanError where the controller does not fit the arithmetic, RigError where the file cannot be used,
+    InputError where ``out`` is the rig's file.
 
     A rig that carries effects is designed for without them; the margins then hold those that are linear, and
     the steps that the wish is judged by hold all of them.
     """
     _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance)
+    if out is not None:
+        check_apart([out], [rig])
     model, source = (rig, None) if isinstance(rig, Rig) else (read_rig(rig), _source(rig))
     bench, notes = prepare(model, setpoints, lowest, delay)
     wish, tuned = _tuned(bench, settling, overshoot, notes)
@@ -145,7 +152,7 @@ def design(
     controller = replace(draft, length=memory.length)
     result = _judged(bench, tuned, controller, wish, report, memory, notes)
     if out is not None:
-        write_file(out, controller_text(controller))
+        write_file(out, controller_text(controller), [rig])
     return result
 
 

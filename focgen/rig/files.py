@@ -9,6 +9,7 @@ import tomlkit
 
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
+from focgen.output import write_file
 from focgen.rig.model import (
     UNITY,
     Actuator,
@@ -166,7 +167,7 @@ def _effects(top: Table) -> tuple:
 
 def write_rig(rig: Rig, path: str | Path) -> None:
     """Write a rig so that :func:`read_rig` gives an equal one."""
-    Path(path).write_text(rig_text(rig), encoding="utf-8")
+    write_file(path, rig_text(rig))
 
 
 def rig_text(rig: Rig) -> str:

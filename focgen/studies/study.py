@@ -79,7 +79,7 @@ def study_memory(
     setup = Setup(which, model, band_of(which, model, points), SAMPLES, points, target)
     with Workers(jobs, scheduler) as workers:
         found = _Sweep(setup, grid, Store(Path(out)), workers).result(notes)
-    write(found, Path(out))
+    write(found, Path(out), (controller, rig, *_designed_from(which, controller)))
     return found
 
 
@@ -100,8 +100,7 @@ def _rig(given, controller: Controller, source) -> tuple[Rig | None, list[str]]:
     made_from = controller.designed_from
     if made_from is None:
         return None, ["no rig is named in the controller: give --rig for the closed-loop columns"]
-    folders = [Path.cwd()] if isinstance(source, Controller) else [Path(source).parent, Path.cwd()]
-    places = [place for place in (folder / made_from.file for folder in folders) if place.is_file()]
+    places = _designed_from(controller, source)
     same = [p for p in places if hashlib.sha256(p.read_bytes()).hexdigest() == made_from.sha256]
     if same:
         return read_rig(same[0]), []
@@ -112,6 +111,15 @@ def _rig(given, controller: Controller, source) -> tuple[Rig | None, list[str]]:
         f"{made_from.file}, which the controller was designed from, is not beside it: "
         "give --rig for the closed-loop columns"
     ]
+
+
+def _designed_from(controller: Controller, source) -> list[Path]:
+    """Where the rig that a controller was designed from may be: beside its file, and here."""
+    if controller.designed_from is None:
+        return []
+    folders = [Path.cwd()] if isinstance(source, Controller) else [Path(source).parent, Path.cwd()]
+    places = (folder / controller.designed_from.file for folder in folders)
+    return [place for place in places if place.is_file()]
 
 
 def _setpoints(controller: Controller, rig: Rig | None, given: Sequence[float] | None) -> tuple[float, ...]:

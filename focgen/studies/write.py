@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,14 @@ from focgen.output import write_files
 from focgen.studies.model import Study
 
 
-def write(study: Study, folder: Path) -> None:
-    """Write all of it, or none. Pictures and page where matplotlib is installed."""
+def write(study: Study, folder: Path, inputs: Iterable = ()) -> None:
+    """Write all of it, or none. Pictures and page where matplotlib is installed. Raises InputError where one
+    of ``inputs`` would be written over.
+    """
     files: dict[str, str | bytes] = {
         "study.json": json.dumps(payload(study), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     }
-    write_files(folder, files | _shown(study))
+    write_files(folder, files | _shown(study), inputs)
 
 
 def _shown(study: Study) -> dict[str, str | bytes]:

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from focgen.cache import kept
 from focgen.codegen.render import render
 from focgen.codegen.state import state_bytes
 from focgen.compiler import find_compiler
@@ -27,7 +28,6 @@ from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.targets.driver import DTYPES, RESUME, Answers, driver_context, lane_of
 from focgen.targets.emulator import TargetFault
-from focgen.targets.toolchains import cache_folder
 
 MCU = "atmega2560"
 APT = "apt-get install gcc-avr avr-libc simavr libsimavr-dev libelf-dev"
@@ -73,14 +73,19 @@ def tools() -> str:
 def _simulator() -> Path | None:
     """The program that feeds simavr, compiled once; None where simavr's library is not installed."""
     source = Path(__file__).with_name("simavr_run.c")
-    target = cache_folder() / f"simavr_run-{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}"
-    if not target.is_file():
-        part = target.with_name(f"{target.name}.part")
-        command = [*find_compiler(), "-O2", "-I/usr/include/simavr", str(source), "-o", str(part)]
-        if subprocess.run([*command, "-lsimavr", "-lelf"], capture_output=True).returncode:
-            return None
-        part.replace(target)
-    return target
+    name = f"simavr_run-{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}"
+    try:
+        return kept(name, _compile_simulator)
+    except BuildError:
+        return None
+
+
+def _compile_simulator(target: Path) -> None:
+    """Raises BuildError where simavr's library is not installed."""
+    source = Path(__file__).with_name("simavr_run.c")
+    command = [*find_compiler(), "-O2", "-I/usr/include/simavr", str(source), "-o", str(target)]
+    if subprocess.run([*command, "-lsimavr", "-lelf"], capture_output=True).returncode:
+        raise BuildError("simavr", "its library is not installed", APT)
 
 
 class AvrLibrary:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -17,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
+from focgen.cache import kept
 from focgen.compiler import compile_shared
 from focgen.errors import FocgenError, MissingExtra
 from focgen.targets.cores import Core
 from focgen.targets.legality import memory_accesses
 from focgen.targets.program import FLASH, FLASH_SIZE, RAM, RAM_SIZE, STACK, WORK_SIZE, Program
-from focgen.targets.toolchains import cache_folder
 
 PAINT = 0xA5
 """What unused stack is filled with."""
@@ -112,11 +111,7 @@ def _watcher() -> ctypes.CDLL:
     """watch.c, compiled for this computer and kept."""
     source = Path(__file__).with_name("watch.c")
     name = f"watch-{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}.so"
-    target = cache_folder() / name
-    if not target.is_file():
-        part = target.with_name(f"{name}.{os.getpid()}")
-        compile_shared([source], part, ["-std=c99", "-O2"])
-        part.replace(target)
+    target = kept(name, lambda part: compile_shared([source], part, ["-std=c99", "-O2"]))
     return ctypes.CDLL(str(target))
 
 

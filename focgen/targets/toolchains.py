@@ -13,6 +13,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from focgen.cache import cache_folder
 from focgen.compiler import first_complaint
 from focgen.errors import BuildError, MissingExtra
 from focgen.targets.cores import Core
@@ -120,21 +121,6 @@ def _run(chain: Toolchain, core: Core, source: Path, parts: list[str]) -> None:
     if done.returncode:
         raise BuildError(str(source), f"{chain.title} for {core.name}: {first_complaint(done.stderr)}",
                          "generate the folder again")  # fmt: skip
-
-
-def cache_folder() -> Path:
-    """Where built things are kept: $XDG_CACHE_HOME/focgen, ~/.cache/focgen, or a temporary folder."""
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    folder = Path(base) / "focgen"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass
-    folder = Path(tempfile.gettempdir()) / f"focgen-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
-    folder.mkdir(exist_ok=True)
-    return folder
 
 
 def _environment() -> dict[str, str]:

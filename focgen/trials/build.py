@@ -4,32 +4,19 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import os
-import tempfile
 from pathlib import Path
 
 import cffi
 
+from focgen.cache import kept
 from focgen.compiler import compile_shared
 
 _SOURCES = Path(__file__).parent / "c"
 _FLAGS = ("-O2", "-std=c11", "-D_GNU_SOURCE", "-ffp-contract=off")
 
 
-def _cache() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(base) / "focgen"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder
-    except OSError:
-        return Path(tempfile.gettempdir())
-
-
 def _compile(target: Path) -> None:
-    part = target.with_suffix(f".{os.getpid()}.part")
-    compile_shared(sorted(_SOURCES.glob("*.c")), part, _FLAGS)
-    os.replace(part, target)
+    compile_shared(sorted(_SOURCES.glob("*.c")), target, _FLAGS)
 
 
 @functools.cache
@@ -38,9 +25,7 @@ def library():
     digest = hashlib.sha256(" ".join(_FLAGS).encode())
     for path in sorted(_SOURCES.iterdir()):
         digest.update(path.read_bytes())
-    target = _cache() / f"trials-{digest.hexdigest()[:16]}.so"
-    if not target.exists():
-        _compile(target)
+    target = kept(f"trials-{digest.hexdigest()[:16]}.so", _compile)
     ffi = cffi.FFI()
     ffi.cdef((_SOURCES / "interface.h").read_text(encoding="utf-8"))
     return ffi, ffi.dlopen(str(target))

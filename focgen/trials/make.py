@@ -28,6 +28,7 @@ from focgen.rig.files import rig_table
 from focgen.trials.cases import Case, make_case
 from focgen.trials.closed_cases import make_closed_case
 from focgen.trials.excitation import SUITES
+from focgen.trials.facts import SIGNALS
 from focgen.trials.plan import CLOSED_KINDS, KINDS, assignments
 from focgen.trials.recording import as_csv
 from focgen.trials.sealing import commitment, sealed
@@ -91,7 +92,7 @@ def _check(folder: Path, cases: int, seed: int, signals: str, suite: str) -> Non
         raise InputError(str(folder), "already holds a trial", "choose another folder")
     if cases < 1 or seed < 0:
         raise InputError("trial make", f"cannot make {cases} cases from seed {seed}", "give positive numbers")
-    if signals not in ("C", "B", "A"):
+    if signals not in SIGNALS:
         raise InputError("--signals", f"is {signals!r}", "choose C, B or A")
     if suite not in SUITES:
         raise InputError("--suite", f"is {suite!r}", f"choose one of {', '.join(SUITES)}")

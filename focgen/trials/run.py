@@ -19,7 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from focgen.errors import InputError
+from focgen.output import replace_folder
 from focgen.progress import say, track
+from focgen.trials.facts import facts_of, outcome_in
 
 _ONE_THREAD = {
     name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -46,14 +48,6 @@ def processes(jobs: int | None) -> int:
     return jobs or os.cpu_count() or 1
 
 
-def facts_of(folder: Path) -> dict:
-    """The content of trial.json. Raises InputError where the folder holds no trial."""
-    try:
-        return json.loads((folder / "trial.json").read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError):
-        raise InputError(str(folder), "holds no trial", "make one by `focgen trial make`") from None
-
-
 def run(
     *folders: str | Path, jobs: int | None = None, limit: float = 900.0, minutes: float | None = None
 ) -> Ran:
@@ -64,14 +58,17 @@ def run(
     """
     at_once = processes(jobs)
     places = [Path(folder) for folder in folders]
-    cases = _in_turn([[(place, n) for n in facts_of(place)["commitments"]] for place in places])
+    cases = _in_turn([[(place, n) for n in facts_of(place).commitments] for place in places])
+    for place, n in cases:
+        if not (place / "cases" / n).is_dir():
+            raise InputError(str(place), f"lacks case {n}", "make the cases anew")
     waiting = [(place, n) for place, n in cases if not ran(place / "runs" / n)]
     begun = time.monotonic()
 
     def one(place: Path, number: str) -> bool:
         if minutes is not None and time.monotonic() - begun > 60.0 * minutes:
             return False
-        diagnose_case(place / "cases" / number, place / "runs" / number, limit)
+        diagnose_case(place, "runs", number, limit)
         return True
 
     with ThreadPoolExecutor(at_once) as pool:
@@ -101,25 +98,34 @@ def _done(folder: Path) -> bool:
 
 def outcome_of(folder: Path) -> dict:
     """What happened in a run; a run that left no word has failed."""
-    try:
-        return json.loads((folder / "outcome.json").read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError):
-        return {"status": "failed", "seconds": None, "fault": "not run"}
+    return outcome_in(folder) or {"status": "failed", "seconds": None, "fault": "not run"}
 
 
-def diagnose_case(case: Path, target: Path, limit: float, effects: tuple[str, ...] = ()) -> None:
-    """Diagnose one case away from everything else, then bring the results to ``target``."""
+def diagnose_case(
+    trial: Path, kind: str, number: str, limit: float, effects: tuple[str, ...] = ()
+) -> None:
+    """Diagnose a case of a trial away from everything else, then bring the results to TRIAL/KIND/NUMBER.
+
+    Raises InputError where the case cannot be read, or the results' place lies outside the trial.
+    """
+    case, target = trial / "cases" / number, trial / kind / number
     with tempfile.TemporaryDirectory(prefix="focgen-trial-") as scratch:
         blind, out = Path(scratch) / "case", Path(scratch) / "out"
-        shutil.copytree(case, blind)
+        try:
+            shutil.copytree(case, blind)
+        except OSError as reason:
+            raise InputError(str(case), f"cannot be copied ({_first(reason)})", "make the cases anew") from None
         fault = _process(blind, out, limit, effects)
         out.mkdir(exist_ok=True)
         if not (out / "outcome.json").exists():
             word = {"status": "failed", "seconds": None, "fault": fault}
             (out / "outcome.json").write_text(json.dumps(word) + "\n", encoding="utf-8")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(target, ignore_errors=True)
-        shutil.move(out, target)
+        replace_folder(out, target, trial)
+
+
+def _first(reason: OSError) -> str:
+    """Why copying failed, in one line; it collects a list of what failed."""
+    return reason.strerror or " ".join(str(reason).split())[:120]
 
 
 def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> str:

@@ -16,9 +16,10 @@ from focgen.errors import FocgenError, InputError
 from focgen.output import write_file
 from focgen.progress import say, track
 from focgen.trials import achieved, baselines
+from focgen.trials.facts import achieved_in, diagnosis_in, facts_of
 from focgen.trials.judging import Judged, forgone, judge
 from focgen.trials.rows import Row, rows, stated_in
-from focgen.trials.run import diagnose_case, facts_of, outcome_of, processes, ran
+from focgen.trials.run import diagnose_case, outcome_of, processes, ran
 from focgen.trials.sealing import unseal
 from focgen.trials.worker import oracle_possible
 
@@ -85,7 +86,7 @@ def _scored(folder: Path, oracle: bool, baseline: bool, partial: bool, jobs: int
     facts = facts_of(folder)
     labels = {
         number: _unsealed(folder, number, committed)
-        for number, committed in facts["commitments"].items()
+        for number, committed in facts.commitments.items()
         if not partial or ran(folder / "runs" / number)
     }
     if oracle:
@@ -95,13 +96,13 @@ def _scored(folder: Path, oracle: bool, baseline: bool, partial: bool, jobs: int
         judged = [one.result() for one in track(waiting, "trial score")]
     scores = Scores(
         str(folder),
-        facts["signals"],
-        facts["suite"],
-        facts["seed"],
+        facts.signals,
+        facts.suite,
+        facts.seed,
         len(judged),
         sum(j.verdict == "failed" for j in judged),
-        len(facts["commitments"]) - len(judged),
-        rows(judged, facts["signals"]),
+        len(facts.commitments) - len(judged),
+        rows(judged, facts.signals),
         confusions(judged),
         tuple(stated_in(judged)),
     )
@@ -111,13 +112,20 @@ def _scored(folder: Path, oracle: bool, baseline: bool, partial: bool, jobs: int
 
 
 def _unsealed(folder: Path, number: str, committed: str) -> dict:
-    carried = (folder / "cases" / number / "commitment.txt").read_text(encoding="utf-8").strip()
-    if carried != committed:
+    if _carried(folder / "cases" / number / "commitment.txt") != committed:
         raise InputError(
             str(folder / "cases" / number), "carries another commitment than the trial", "make the cases anew"
         )
     sealed = folder / "sealed" / number
     return unseal(sealed / "label.json", committed, sealed / "unseen")
+
+
+def _carried(path: Path) -> str:
+    """The commitment that a case carries. Raises InputError where it carries none."""
+    try:
+        return path.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError):
+        raise InputError(str(path), "cannot be read", "make the cases anew") from None
 
 
 def _ask_oracle(folder: Path, labels: dict[str, dict], jobs: int) -> None:
@@ -135,8 +143,9 @@ def _ask_oracle(folder: Path, labels: dict[str, dict], jobs: int) -> None:
         asked = [
             pool.submit(
                 diagnose_case,
-                folder / "cases" / n,
-                folder / "oracle" / n,
+                folder,
+                "oracle",
+                n,
                 900.0,
                 tuple(t["effect"] for t in labels[n]["truth"]),
             )
@@ -166,19 +175,14 @@ def _judged(folder: Path, number: str, label: dict, baseline: bool) -> Judged:
 
 
 def _diagnosis_of(run: Path) -> dict | None:
-    if outcome_of(run)["status"] != "done":
-        return None
-    try:
-        return json.loads((run / "diagnosis.json").read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError):
-        return None
+    return diagnosis_in(run) if outcome_of(run)["status"] == "done" else None
 
 
 def _kept(folder: Path, run: Path, number: str, label: dict) -> float | None:
     """The achieved shrink of a run, replayed once and kept beside it; None where there is none to measure."""
-    note = run / "achieved.json"
-    if note.exists():
-        return json.loads(note.read_text(encoding="utf-8"))
+    kept = achieved_in(run)
+    if kept is not None:
+        return kept[0]
     if not (run / "augmented.toml").exists():
         return None
     try:
@@ -187,7 +191,7 @@ def _kept(folder: Path, run: Path, number: str, label: dict) -> float | None:
         )
     except FocgenError:
         return None
-    note.write_text(json.dumps(value), encoding="utf-8")
+    write_file(run / "achieved.json", json.dumps(value))
     return value
 
 

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from focgen.errors import InputError
+from focgen.trials.facts import sealed_label
 
 
 def canonical(label: dict) -> bytes:
@@ -26,9 +27,8 @@ def sealed(salt: str, label: dict) -> str:
 
 def unseal(path: Path, committed: str, unseen: Path) -> dict:
     """The label, if it and the unseen logs are what was committed to. Raises InputError where not."""
-    content = json.loads(path.read_text(encoding="utf-8"))
-    label = content["label"]
-    if commitment(content["salt"], label) != committed:
+    salt, label = sealed_label(path)
+    if commitment(salt, label) != committed:
         raise InputError(str(path), "is not the label that was committed to", "make the cases anew")
     for name, digest in label["unseen"].items():
         if file_hash(unseen / name) != digest:

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from focgen.codegen.kernels import TARGETS
@@ -17,11 +17,9 @@ from focgen.targets.cores import core
 from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr
 from focgen.targets.emulator import emulator_title
 from focgen.targets.toolchains import Toolchain, absent, toolchains
-from focgen.verification.folder import GeneratedFolder, read_folder
+from focgen.verification.folder import REMEMBERED, GeneratedFolder, read_folder, sources
 
 COMPILERS = ("zig", "gcc")
-REMEMBERED = "cost.json"
-"""The file beside a controller's C that remembers what it cost; no part of what was generated."""
 
 
 @dataclass(frozen=True)
@@ -48,22 +46,33 @@ class Costs:
 
 
 def cost(folder: str | Path, target: str | Sequence[str] = "all", compiler: str = "zig",
-         against: str | Path | None = None) -> Costs:  # fmt: skip
+         against: str | Path | None = None, edited: bool = False) -> Costs:  # fmt: skip
     """Count what a step costs on emulated cores, and what flash, RAM and stack are used.
 
     ``folder`` has been generated, or holds generated folders: then each of them is counted. ``target``: a
     name of ``TARGETS``, several, or "all". ``compiler``: "zig" or "gcc" (arm-none-eabi-gcc, where installed).
     ``against``: another generated folder to compare with; without it the costs are compared with those of the
-    folder's previous C, which its cost.json remembers.
+    folder's previous C, which its cost.json remembers. ``edited``: compile a folder although it is not as it
+    was generated.
 
-    Raises InputError for a folder that is none, BuildError where the C does not compile.
+    Raises InputError for a folder that is none, has been edited, or was made by another version of focgen,
+    BuildError where the C does not compile.
     """
     names = asked_for(target, TARGETS)
     check_choice("--compiler", compiler, COMPILERS)
-    folders = [read_folder(path) for path in _generated(Path(folder))]
-    other = None if against is None else read_folder(against)
+    folders = [_read(path, edited) for path in _generated(Path(folder))]
+    other = None if against is None else _read(Path(against), edited)
     beside = {} if other is None else {name: _on(name, other, compiler) for name in names}
     return Costs(tuple(_counted(read, names, compiler, other, beside) for read in folders))
+
+
+def _read(path: Path, edited: bool) -> GeneratedFolder:
+    read = read_folder(path)
+    if read.differences and not edited:
+        changed = ", ".join(dict.fromkeys(one.partition(":")[0] for one in read.differences))
+        remedy = "generate it again, or give --edited to compile it as it is"
+        raise InputError(str(path), f"has been edited: {changed}", remedy)
+    return read
 
 
 def _generated(path: Path) -> list[Path]:
@@ -84,7 +93,12 @@ def _counted(read: GeneratedFolder, names: Sequence[str], compiler: str, other: 
                           None if other is None else other.path)  # fmt: skip
 
 
-def _on(name: str, read: GeneratedFolder, compiler: str) -> Cost:
+def _on(name: str, given: GeneratedFolder, compiler: str) -> Cost:
+    with sources(given) as place:
+        return _compiled(name, replace(given, path=place), compiler)
+
+
+def _compiled(name: str, read: GeneratedFolder, compiler: str) -> Cost:
     if name == "avr":
         return cost_on_avr(read.plan, read.path)
     one = core(name)

@@ -1,30 +1,41 @@
-"""A generated folder read back: its plan, made anew from its controller, and what its manifest claims."""
+"""A generated folder read back: rendered anew from what it holds, and compared byte for byte."""
 
 from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
-from focgen.codegen.manifest import manifest_of, sha256
-from focgen.control.controller import Controller
+from focgen.codegen.generate import folder_files
+from focgen.codegen.kernels import PORTABLE, Kernels
+from focgen.codegen.manifest import sha256
 from focgen.control.files import read_controller
 from focgen.errors import InputError
+from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.model import ErrorBound, Plan
+from focgen.verification.recorded import AGAIN, Recorded, read_recorded
 
-_AGAIN = "run focgen generate again"
+BESIDE = ("README.md", "example/main.c")
+"""Files that nothing is compiled from: theirs to change."""
+REMEMBERED = "cost.json"
+"""The file beside a controller's C that remembers what it cost; no part of what was generated."""
 _ROUNDING = 1e-9  # relative
+_MOST = 8  # strangers that are named
 
 
 @dataclass(frozen=True, eq=False)
 class GeneratedFolder:
-    """``plan`` from the folder's own controller.toml; ``bound`` as the manifest claims it; ``differences``
-    between what the manifest says and what the plan gives; ``selftest``: whether it has NAME_selftest.c;
-    ``kernels``: how it computes its sums.
+    """``plan`` from the folder's own controller.toml; ``bound`` as the manifest claims it; ``selftest``:
+    whether it has NAME_selftest.c; ``kernels``: how it computes its sums.
+
+    ``files``: name and content of every file, rendered anew from controller.toml and the manifest's options.
+    ``differences``: what the folder has edited of them; ``notes``: what else is in it, or is not.
     """
 
     path: Path
@@ -33,76 +44,88 @@ class GeneratedFolder:
     differences: tuple[str, ...]
     selftest: bool = False
     kernels: Kernels = PORTABLE
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def read_folder(path: str | Path) -> GeneratedFolder:
-    """Read a generated folder. Raises InputError where it is none, or lacks a file."""
+    """Read a generated folder. Raises InputError where it is none, lacks a file, or was made by another
+    version of focgen. Nothing of it is compiled.
+    """
     path = Path(path)
-    manifest = _manifest(path)
+    recorded = read_recorded(path)
+    controller = read_controller(path / "controller.toml")
+    options = recorded.length, recorded.name, recorded.memory, recorded.tolerance, recorded.horizon
+    plan = build_plan(controller, recorded.arithmetic, *options)
+    given = _bytes(path / "controller.toml")
+    files = folder_files(plan, given, recorded.selftest, recorded.kernels)
+    for name in files:
+        if name not in BESIDE and not (path / name).is_file():
+            raise InputError(str(path), f"lacks {name}", AGAIN)
+    differences = tuple(_edited(path, files, recorded))
+    notes = tuple(_notes(path, files))
+    kernels = recorded.kernels
+    return GeneratedFolder(path, plan, recorded.bound, differences, recorded.selftest, kernels, files, notes)
+
+
+@contextmanager
+def sources(read: GeneratedFolder) -> Iterator[Path]:
+    """The folder to compile from: a new one that holds what was rendered and nothing else, so that no file
+    laid beside it takes part; the folder itself where it has been edited.
+    """
+    if read.differences:
+        yield read.path
+        return
+    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+        write_files(scratch, read.files)
+        yield Path(scratch)
+
+
+def _bytes(path: Path) -> bytes:
     try:
-        controller = read_controller(path / "controller.toml")
-        plan = _plan(controller, manifest)
-        claimed = _claimed(manifest["error_bound"])
-    except KeyError as reason:
-        raise InputError(str(path / "manifest.json"), f"lacks {reason}", _AGAIN) from None
-    except (TypeError, ValueError) as reason:
-        raise InputError(
-            str(path / "manifest.json"), f"is not as it was written ({reason})", _AGAIN
-        ) from None
-    test = [f"{plan.name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
-    kernels = Kernels(manifest["kernels"]["target"] if "kernels" in manifest else None)
-    headers = runtime_files(plan, kernels)
-    for name in (f"{plan.name}.h", f"{plan.name}.c", *headers, *test):
+        return path.read_bytes()
+    except OSError as reason:
+        raise InputError(str(path), f"cannot be read ({reason.strerror})", AGAIN) from None
+
+
+def _same_bytes(path: Path, content: str | bytes) -> bool:
+    return _bytes(path) == (content if isinstance(content, bytes) else content.encode("utf-8"))
+
+
+def _edited(path: Path, files: Mapping[str, str | bytes], recorded: Recorded) -> Iterator[str]:
+    """Yield what is not as it is rendered, of the files that count."""
+    digest = recorded.content["inputs"].get("controller.toml")
+    if digest != sha256(files["controller.toml"]):
+        yield "controller.toml: is not the one that the folder was made from"
+    for name, content in files.items():
+        if name in (*BESIDE, "manifest.json", "controller.toml") or _same_bytes(path / name, content):
+            continue
+        yield f"{name}: is not what focgen writes for this controller.toml"
+    if not _same_bytes(path / "manifest.json", files["manifest.json"]):
+        found = tuple(_differences(json.loads(files["manifest.json"]), recorded.content, ""))
+        yield from found or ("manifest.json: has other bytes than were written",)
+
+
+def _notes(path: Path, files: Mapping[str, str | bytes]) -> Iterator[str]:
+    """Yield what nothing is compiled from, where it is not as it was written, and what does not belong."""
+    for name in BESIDE:
         if not (path / name).is_file():
-            raise InputError(str(path), f"lacks {name}", _AGAIN)
-    inputs = {name: sha256((path / name).read_bytes()) for name in ("controller.toml", *headers)}
-    expected = json.loads(json.dumps(manifest_of(plan, inputs, "selftest" in manifest, kernels)))
-    differences = tuple(_differences(expected, manifest, ""))
-    return GeneratedFolder(path, plan, claimed, differences, bool(test), kernels)
+            yield f"{name}: is missing"
+        elif not _same_bytes(path / name, files[name]):
+            yield f"{name}: has been edited"
+    known = {*files, REMEMBERED, *(str(Path(name).parent) for name in files)}
+    found = [*path.iterdir(), *((path / "example").iterdir() if (path / "example").is_dir() else ())]
+    strangers = sorted(name for one in found if (name := one.relative_to(path).as_posix()) not in known)
+    yield from (f"{_shown(name)}: does not belong to the folder" for name in strangers[:_MOST])
+    if len(strangers) > _MOST:
+        yield f"{len(strangers) - _MOST} more files do not belong to the folder"
 
 
-def _plan(controller: Controller, manifest: dict[str, Any]) -> Plan:
-    """As it was made: the form of the memory is the manifest's, whatever the controller's file prefers."""
-    arithmetic, name, memory = manifest["arithmetic"], manifest["name"], manifest["memory"]
-    if memory == "exponential":
-        asked = manifest["tolerance"], manifest["horizon"]
-        return build_plan(controller, arithmetic, None, name, memory, *asked)
-    return build_plan(controller, arithmetic, manifest["length"], name, memory)
-
-
-def _manifest(path: Path) -> dict[str, Any]:
-    if not path.is_dir():
-        raise InputError(str(path), "is no folder", "name a folder that focgen generate has written")
-    try:
-        manifest = json.loads((path / "manifest.json").read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(
-            str(path), "has no manifest.json", "name a folder that focgen generate has written"
-        ) from None
-    except (OSError, ValueError) as reason:
-        raise InputError(str(path / "manifest.json"), f"cannot be read ({reason})", _AGAIN) from None
-    if not isinstance(manifest, dict):
-        raise InputError(str(path / "manifest.json"), "is no JSON object", _AGAIN)
-    return manifest
-
-
-def _claimed(bound: dict[str, Any]) -> ErrorBound:
-    quantisation, truncation = bound["quantisation"], bound["truncation"]["operator"]
-    return ErrorBound(
-        float(quantisation["operator"]),
-        float(quantisation["output_per_sample"]),
-        truncation,
-        float(quantisation.get("operator_per_sample", 0.0)),
-    )
-
-
-def _differences(expected: Any, found: Any, place: str):
+def _differences(expected: Any, found: Any, place: str) -> Iterator[str]:
     """Yield every place where the manifest is not what the plan gives."""
     if isinstance(expected, dict) and isinstance(found, dict):
         for key in sorted(expected.keys() | found.keys()):
-            where = f"{place}.{key}" if place else key
-            if key == "generator":
-                continue
+            where = f"{place}.{_shown(key)}" if place else _shown(key)
             if key not in found or key not in expected:
                 yield f"manifest.json: {where} is {'missing' if key in expected else 'unknown'}"
             else:
@@ -115,10 +138,15 @@ def _differences(expected: Any, found: Any, place: str):
 
 
 def _same(expected: Any, found: Any) -> bool:
-    """Equal; floating figures to within what another processor's transforms may change."""
+    """Equal; floating figures to a last digit or two, which are named together and not one by one."""
     if isinstance(expected, float) and isinstance(found, float):
         return math.isclose(expected, found, rel_tol=_ROUNDING)
     return type(expected) is type(found) and expected == found
+
+
+def _shown(name: str) -> str:
+    """A name that somebody else has given, on one line."""
+    return "".join(char if char.isprintable() else "?" for char in name)[:60]
 
 
 def _short(value: Any) -> str:

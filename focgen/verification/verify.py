@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from focgen.codegen.kernels import TARGETS as CORES
@@ -11,52 +11,71 @@ from focgen.errors import InputError
 from focgen.targets.asked import asked_for
 from focgen.verification.compare import TargetResult, compare, observed, self_tested
 from focgen.verification.elsewhere import on_avr, on_core
-from focgen.verification.folder import GeneratedFolder, read_folder
+from focgen.verification.folder import GeneratedFolder, read_folder, sources
 from focgen.verification.host import Library
 
 __all__ = ["TARGETS", "TargetResult", "Verification", "compare", "verify"]
 
 TARGETS = ("host", *CORES)
 _SAMPLES = 10_000  # on the host
+_LEFT = "the folder has been edited, so nothing of it was compiled (--edited does)"
 
 
 @dataclass(frozen=True)
 class Verification:
-    """``targets`` by name; ``differences`` between the manifest and what its controller gives; ``holds``: all
-    is well, and something was run.
+    """``targets`` by name; ``differences`` between the folder and what its controller.toml gives; ``notes`` on
+    files that nothing is compiled from; ``agrees``: what ran does; ``holds``: it does, and nothing was edited.
     """
 
     name: str
     arithmetic: str
     targets: dict[str, TargetResult]
     differences: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def agrees(self) -> bool:
+        """Whether everything that ran agrees and stays within its bounds, and something ran."""
+        ran = [t for t in self.targets.values() if t.skipped is None]
+        return bool(ran) and all(t.sound for t in ran)
 
     @property
     def holds(self) -> bool:
-        """Whether everything that ran agrees and stays within its bounds, and something ran."""
-        ran = [t for t in self.targets.values() if t.skipped is None]
-        return bool(ran) and not self.differences and all(t.sound for t in ran)
+        """Whether everything agrees, and it is what was generated."""
+        return self.agrees and not self.differences
 
 
 def verify(
-    folder: str | Path, samples: int | None = None, seed: int = 0, target: str | Sequence[str] = "host"
+    folder: str | Path,
+    samples: int | None = None,
+    seed: int = 0,
+    target: str | Sequence[str] = "host",
+    edited: bool = False,
 ) -> Verification:
     """Compile the C of a generated folder and compare it with the bit-true reference.
 
+    First the folder is rendered anew from what it holds. Where C, headers, manifest or controller.toml have
+    other bytes, they are ``differences``, and nothing is compiled unless ``edited`` asks for it.
     ``samples`` of mixed inputs, from ``seed``, besides the worst case of every node; by default 10,000 on
     this computer, and in an emulator as many as take seconds. ``target``: a name of ``TARGETS``, several, or
     "all".
-    The C runs in a process of its own; where it crashes or does not return, that is a mismatch.
+    The C runs in a process of its own; where it crashes or does not return, that is a mismatch. That is no
+    sandbox: an edited folder is code, and runs with the caller's rights.
 
-    Raises InputError for a folder that is none, BuildError where the C does not compile.
+    Raises InputError for a folder that is none or was made by another version of focgen, BuildError where the
+    C does not compile.
     """
     if samples is not None and (not isinstance(samples, int) or samples < 1):
         raise InputError("--samples", f"is {samples!r}", "give at least 1")
     if seed < 0:
         raise InputError("--seed", f"is {seed}", "give 0 or more")
-    read = read_folder(folder)
-    results = {name: _on(name, read, samples, seed) for name in asked_for(target, TARGETS)}
-    return Verification(read.plan.name, read.plan.arithmetic, results, read.differences)
+    names, read = asked_for(target, TARGETS), read_folder(folder)
+    if read.differences and not edited:
+        results = dict.fromkeys(names, TargetResult(skipped=_LEFT))
+    else:
+        with sources(read) as place:
+            results = {name: _on(name, replace(read, path=place), samples, seed) for name in names}
+    return Verification(read.plan.name, read.plan.arithmetic, results, read.differences, read.notes)
 
 
 def _on(name: str, read: GeneratedFolder, samples: int | None, seed: int) -> TargetResult:

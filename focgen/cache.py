@@ -1,0 +1,106 @@
+"""Programs that are compiled once a machine and kept: only where nobody else could have put them.
+
+What stands in the cache is loaded and run. So the cache is the user's own folder, or there is none: then a
+private temporary folder stands in for it, as long as the process lives.
+"""
+
+from __future__ import annotations
+
+import atexit
+import functools
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from focgen.progress import say
+
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def cache_folder() -> Path:
+    """$XDG_CACHE_HOME/focgen or ~/.cache/focgen where it is this user's alone, else a private temporary
+    folder.
+
+    Alone: the folder belongs to the user and nobody else may write there, nor rename it from above.
+    """
+    try:
+        return _folder(_wanted())
+    except RuntimeError:  # there is no home
+        return _temporary()
+
+
+def kept(name: str, build: Callable[[Path], None]) -> Path:
+    """The file ``name`` of the cache; ``build(path)`` writes it where it is absent or could be another's.
+
+    Raises what ``build`` raises; then nothing is left behind.
+    """
+    target = cache_folder() / name
+    if _is_own(target, stat.S_ISREG):
+        return target
+    handle, part = tempfile.mkstemp(prefix=f".{name}.", dir=target.parent)
+    os.close(handle)
+    try:
+        build(Path(part))
+        os.chmod(part, 0o700)
+        os.replace(part, target)
+    finally:
+        Path(part).unlink(missing_ok=True)
+    return target
+
+
+def _wanted() -> Path:
+    """Where the user's caches are. A relative $XDG_CACHE_HOME is void, as its specification has it."""
+    base = Path(os.environ.get("XDG_CACHE_HOME") or "")
+    return (base if base.is_absolute() else Path.home() / ".cache") / "focgen"
+
+
+@functools.cache
+def _folder(wanted: Path) -> Path:
+    try:
+        wanted.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError:
+        return _temporary()
+    if not is_private(wanted):
+        say(f"{wanted}: others can write there, so it is not used; `chmod 700 {wanted}` if it is yours")
+        return _temporary()
+    return wanted if os.access(wanted, os.W_OK | os.X_OK) else _temporary()
+
+
+def is_private(folder: Path) -> bool:
+    """Whether a folder belongs to this user, and nobody but the administrator may write in it or rename it.
+
+    True where the system has no owners to ask for (Windows, whose user folders are private).
+    """
+    if not hasattr(os, "getuid"):
+        return True
+    place = folder.resolve()
+    return _is_own(place, stat.S_ISDIR) and all(_holds(parent) for parent in place.parents)
+
+
+def _holds(folder: Path) -> bool:
+    """Whether what stands in a folder can be renamed or removed by its owner and the administrator alone."""
+    found = folder.stat()
+    safe = not found.st_mode & _OTHERS or found.st_mode & stat.S_ISVTX
+    return found.st_uid in (0, os.getuid()) and bool(safe)
+
+
+def _is_own(path: Path, kind: Callable[[int], bool]) -> bool:
+    """Whether ``path`` is of this kind, itself and no link to one, this user's, and written by nobody else."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return False
+    if not hasattr(os, "getuid"):
+        return kind(found.st_mode)
+    return kind(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & _OTHERS
+
+
+@functools.cache
+def _temporary() -> Path:
+    """A new folder of a name that nobody could foresee; it goes with the process that made it."""
+    folder, maker = tempfile.mkdtemp(prefix="focgen-"), os.getpid()
+    atexit.register(lambda: os.getpid() == maker and shutil.rmtree(folder, ignore_errors=True))
+    return Path(folder)

@@ -1,0 +1,88 @@
+"""The process that reads one log: ``python -m focgen.logs.reader MODULE PATH``.
+
+Answers on stdout: a line of JSON, ``{"columns": [[name, texts or null, count], …]}`` or ``{"fault": [kind,
+…]}``, and behind it the columns of numbers as float64, one after the other.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+from focgen.errors import LogError, MissingExtra
+from focgen.logs.table import LogTable
+
+MEMORY = 4 << 30  # bytes; a log of 10 million rows and 20 columns takes less than half
+_KINDS = ("focgen.logs.mat_file", "focgen.logs.parquet_file", "focgen.logs.tdms_file")
+
+
+def main(module: str, path: Path) -> None:
+    """Read and answer. What goes wrong is an answer, too."""
+    answer = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever a library prints is no part of it
+    _limit()
+    try:
+        head, columns = _columns(_read(module, path))
+    except (LogError, MissingExtra) as error:
+        head, columns = {"fault": [type(error).__name__, error.where, error.what, error.remedy]}, []
+    except OSError as reason:
+        head, columns = {"fault": ["OSError", reason.errno, reason.strerror or str(reason)]}, []
+    except MemoryError:
+        what = f"takes more than {MEMORY >> 30} GB to read"
+        head, columns = {"fault": ["LogError", str(path), what, "split it into smaller files"]}, []
+    except Exception as reason:  # noqa: BLE001 - readers raise whatever a damaged file leads them to
+        what = f"is damaged: its reader stopped with {type(reason).__name__}"
+        head, columns = {"fault": ["LogError", str(path), what, "save it again, or as .csv"]}, []
+    answer.write(json.dumps(head).encode("ascii") + b"\n")
+    for column in columns:
+        answer.write(column.data)
+    answer.close()
+
+
+def _read(module: str, path: Path) -> LogTable:
+    if module not in _KINDS:
+        raise ValueError(module)
+    return import_module(module).read(path)
+
+
+def _limit() -> None:
+    """Bound memory, where the system can; leave no core behind."""
+    try:
+        import resource
+    except ImportError:
+        return
+    for what, most in ((resource.RLIMIT_AS, MEMORY), (resource.RLIMIT_CORE, 0)):
+        hard = resource.getrlimit(what)[1]
+        try:
+            resource.setrlimit(what, (most if hard < 0 else min(most, hard), hard))
+        except (OSError, ValueError):  # a system that does not know this limit
+            continue
+
+
+def _columns(table: LogTable) -> tuple[dict, list[np.ndarray]]:
+    """The answer's first line, and the columns of numbers."""
+    head, numbers = [], []
+    for name, column in table.columns.items():
+        if isinstance(column, np.ndarray) and column.dtype.kind in "fiub":
+            numbers.append(np.ascontiguousarray(column, dtype=np.float64))
+            head.append([str(name), None, len(column)])
+        else:
+            cells = column.tolist() if isinstance(column, np.ndarray) else column
+            head.append([str(name), [_cell(cell) for cell in cells], len(cells)])
+    return {"columns": head}, numbers
+
+
+def _cell(cell) -> str:
+    """As a file of text would have it: nothing where it is empty, 1 and 0 for truth values."""
+    if cell is None:
+        return ""
+    return str(int(cell)) if isinstance(cell, bool) else str(cell)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]))

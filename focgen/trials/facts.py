@@ -1,0 +1,113 @@
+"""What a trial's JSON files say, checked where it is read: their names become paths, their figures scores."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from focgen.errors import InputError
+from focgen.jsontext import fits, read_json
+from focgen.trials.excitation import SUITES
+
+SIGNALS = ("C", "B", "A")
+_NUMBER = re.compile(r"[0-9]{4,9}")
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+_LOG = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")  # a file's name, never a path
+_WORD = re.compile(r"\w+")
+_ANEW = "make the cases anew"
+
+_FACTS = {"suite": str, "signals": str, "seed": int, "commitments": dict}
+_TRUTH = {"effect": _WORD, "stage": str, "visible": bool, "severity": str, "form": str}
+_LABEL = {"kind": str, "suite": str, "truth": [_TRUTH], "floor": float, "unseen": dict}
+_DESIGN = {"tied?": [str], "resolves?": [str]}
+_OUTCOME = {"status": re.compile("done|failed"), "seconds": (float, None), "fault": (str, None)}
+_DIAGNOSIS = {
+    "verdict": str,
+    "where?": ({"stage?": (str, None)}, None),
+    "causes?": ([{"candidates": [{"effect": str, "confidence": float}]}], None),
+    "next_experiment?": ({"what?": str, "why?": str}, None),
+    "shrink?": (float, None),
+    "shrink_interval?": ([float], None),
+    "fits?": ([{"effect": str, "error": float}], None),
+    "gap": {"refitted": float, "explained": float, "floor": float},
+}
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A trial: ``suite``, ``signals`` and ``seed`` as it was made with, and each case's commitment by its
+    number ("0001").
+    """
+
+    suite: str
+    signals: str
+    seed: int
+    commitments: dict[str, str]
+
+
+def facts_of(folder: Path) -> Facts:
+    """The content of trial.json. Raises InputError where the folder holds no trial, or one whose trial.json
+    is not as it was written.
+    """
+    path = folder / "trial.json"
+    if not path.is_file():
+        raise InputError(str(folder), "holds no trial", "make one by `focgen trial make`")
+    found = read_json(path, _ANEW)
+    if not fits(found, _FACTS):
+        raise InputError(str(path), f"is no trial: it needs {', '.join(_FACTS)}", _ANEW)
+    facts = Facts(*(found[key] for key in _FACTS))
+    if facts.suite not in SUITES or facts.signals not in SIGNALS or facts.seed < 0:
+        what = f"suite {facts.suite!r}, signals {facts.signals!r}, seed {facts.seed} are none of a trial's"
+        raise InputError(str(path), what, _ANEW)
+    for number, digest in facts.commitments.items():
+        if not fits(number, _NUMBER):
+            raise InputError(str(path), f"calls a case {number!r}, which is no number such as 0001", _ANEW)
+        if not fits(digest, _DIGEST):
+            raise InputError(str(path), f"has no SHA-256 for case {number}", _ANEW)
+    return facts
+
+
+def sealed_label(path: Path) -> tuple[str, dict]:
+    """Salt and label of a sealed case. Raises InputError where the file holds none."""
+    found = read_json(path, _ANEW)
+    if not fits(found, {"salt": str, "label": _LABEL}) or not found["salt"].isascii():
+        raise InputError(str(path), "holds no label", _ANEW)
+    label = found["label"]
+    if not fits(label.get("design") or {}, _DESIGN):
+        raise InputError(str(path), "has a design that is none", _ANEW)
+    for name, digest in label["unseen"].items():
+        if not fits(name, _LOG) or not fits(digest, _DIGEST):
+            raise InputError(str(path), f"names {name!r}, which is no unseen log of the case", _ANEW)
+    return found["salt"], label
+
+
+def outcome_in(run: Path) -> dict[str, Any] | None:
+    """What happened in a run; None where it left no word."""
+    return _found(run / "outcome.json", _OUTCOME)
+
+
+def diagnosis_in(run: Path) -> dict[str, Any] | None:
+    """The diagnosis of a run; None where there is none, or none that can be judged."""
+    found = _found(run / "diagnosis.json", _DIAGNOSIS)
+    interval = (found or {}).get("shrink_interval")
+    return None if interval is not None and len(interval) != 2 else found
+
+
+def _found(path: Path, shape: Any) -> Any:
+    try:
+        found = read_json(path, _ANEW)
+    except InputError:
+        return None
+    return found if fits(found, shape) else None
+
+
+def achieved_in(run: Path) -> tuple[float | None] | None:
+    """The achieved shrink that was kept beside a run, which may be None; no tuple where nothing was kept."""
+    try:
+        found = json.loads((run / "achieved.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return (found,) if fits(found, (float, None)) else None
