@@ -10,6 +10,7 @@ import focgen
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.selftest import selftest_entry
 from focgen.codegen.state import plain_bytes, size_of, state_bytes
+from focgen.fractional.elementary import rounded_up
 from focgen.plan.canonical import memory_bias
 from focgen.plan.model import (
     FLAG_HIGH,
@@ -119,7 +120,7 @@ def _exponential(plan: Plan) -> dict[str, Any]:
         "states": plan.states,
         "multiplies": plan.multiplies,
         "orders": [
-            {"order": memory.order, "states": memory.states, "tolerance": memory.tolerance}
+            {"order": memory.order, "states": memory.states, "tolerance": rounded_up(memory.tolerance)}
             for memory in plan.memories
         ],
         "compensated": any(bank.compensated for table in plan.sums for bank in table.banks),
