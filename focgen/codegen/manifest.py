@@ -96,17 +96,17 @@ def proof_entry(proof: Proof) -> dict[str, Any]:
 
 
 def bound_entry(bound: ErrorBound) -> dict[str, Any]:
-    """The two parts of the error bound, in physical units."""
+    """The two parts of the error bound, in physical units; in six digits, rounded upwards."""
     quantisation = {
-        "operator": bound.operator,
-        "output_per_sample": bound.output_per_sample,
-        "parts": dict(bound.parts),
+        "operator": rounded_up(bound.operator),
+        "output_per_sample": rounded_up(bound.output_per_sample),
+        "parts": {cause: rounded_up(value) for cause, value in bound.parts},
     }
     if bound.operator_per_sample:
-        quantisation["operator_per_sample"] = bound.operator_per_sample
-    truncation = {"operator": bound.truncation}
+        quantisation["operator_per_sample"] = rounded_up(bound.operator_per_sample)
+    truncation = {"operator": None if bound.truncation is None else rounded_up(bound.truncation)}
     if bound.within_horizon is not None:
-        truncation["within_horizon"] = bound.within_horizon
+        truncation["within_horizon"] = rounded_up(bound.within_horizon)
     return {"quantisation": quantisation, "truncation": truncation}
 
 

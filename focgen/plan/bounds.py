@@ -16,8 +16,6 @@ computes in double itself, and its rounding is counted, too.
 The inputs' rounding, |ê − e|, is included: the bound holds against physical inputs, not only against those
 that are whole counts.
 
-Every bound is given in six digits, rounded upwards.
-
 The inner integral's error grows by 2 |δr| a sample until its clamp ends it, and clamps, which never lengthen
 a distance, add nothing but the rounding of their own limits; likewise the integrator's.
 """
@@ -29,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.errors import PlanError
-from focgen.fractional.elementary import exact_sum, l1, rounded_up
+from focgen.fractional.elementary import exact_sum, l1
 from focgen.plan.banks import drive_error
 from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error
@@ -62,16 +60,14 @@ def error_bound(plan: Plan, tables: Tables) -> ErrorBound:
     growth, ceiling = g * v.growth * _SLACK, g * v.ceiling * _SLACK
     operator = static + ceiling
     _refuse_meaningless(plan, parts, g * account.reach)
-    missed = truncation(plan, tables)
-    within = truncation(plan, tables, past_horizon=False) if plan.exponential else None
     return ErrorBound(
-        operator=rounded_up(operator),
-        output_per_sample=rounded_up(account.output(static, growth, operator)),
-        truncation=None if missed is None else rounded_up(missed),
-        within_horizon=None if within is None else rounded_up(within),
-        operator_per_sample=rounded_up(static + growth) if growth else 0.0,
-        parts=tuple((cause, rounded_up(value)) for cause, value in parts.items() if value)
-        + (("inner integral", rounded_up(ceiling)),) * bool(ceiling),
+        operator=operator,
+        output_per_sample=account.output(static, growth, operator),
+        truncation=truncation(plan, tables),
+        within_horizon=truncation(plan, tables, past_horizon=False) if plan.exponential else None,
+        operator_per_sample=static + growth if growth else 0.0,
+        parts=tuple((cause, value) for cause, value in parts.items() if value)
+        + (("inner integral", ceiling),) * bool(ceiling),
     )
 
 

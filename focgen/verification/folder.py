@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from focgen.plan.build import build_plan
 from focgen.plan.model import ErrorBound, Plan
 
 _AGAIN = "run focgen generate again"
-_ROUNDING = 1e-9  # relative
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +113,7 @@ def _differences(expected: Any, found: Any, place: str):
 
 
 def _same(expected: Any, found: Any) -> bool:
-    """Equal; floating figures to within what another processor's transforms may change."""
-    if isinstance(expected, float) and isinstance(found, float):
-        return math.isclose(expected, found, rel_tol=_ROUNDING)
+    """Equal in every digit and in type: every machine finds the same."""
     return type(expected) is type(found) and expected == found
 
 
