@@ -10,6 +10,7 @@ import focgen
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.selftest import selftest_entry
 from focgen.codegen.state import plain_bytes, size_of, state_bytes
+from focgen.fractional.elementary import rounded_up
 from focgen.plan.canonical import memory_bias
 from focgen.plan.model import (
     FLAG_HIGH,
@@ -95,17 +96,17 @@ def proof_entry(proof: Proof) -> dict[str, Any]:
 
 
 def bound_entry(bound: ErrorBound) -> dict[str, Any]:
-    """The two parts of the error bound, in physical units."""
+    """The two parts of the error bound, in physical units; in six digits, rounded upwards."""
     quantisation = {
-        "operator": bound.operator,
-        "output_per_sample": bound.output_per_sample,
-        "parts": dict(bound.parts),
+        "operator": rounded_up(bound.operator),
+        "output_per_sample": rounded_up(bound.output_per_sample),
+        "parts": {cause: rounded_up(value) for cause, value in bound.parts},
     }
     if bound.operator_per_sample:
-        quantisation["operator_per_sample"] = bound.operator_per_sample
-    truncation = {"operator": bound.truncation}
+        quantisation["operator_per_sample"] = rounded_up(bound.operator_per_sample)
+    truncation = {"operator": None if bound.truncation is None else rounded_up(bound.truncation)}
     if bound.within_horizon is not None:
-        truncation["within_horizon"] = bound.within_horizon
+        truncation["within_horizon"] = rounded_up(bound.within_horizon)
     return {"quantisation": quantisation, "truncation": truncation}
 
 
@@ -119,7 +120,7 @@ def _exponential(plan: Plan) -> dict[str, Any]:
         "states": plan.states,
         "multiplies": plan.multiplies,
         "orders": [
-            {"order": memory.order, "states": memory.states, "tolerance": memory.tolerance}
+            {"order": memory.order, "states": memory.states, "tolerance": rounded_up(memory.tolerance)}
             for memory in plan.memories
         ],
         "compensated": any(bank.compensated for table in plan.sums for bank in table.banks),

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from focgen.fractional import elementary
 from focgen.fractional.exponential_certificate import Certificate, certify
 from focgen.fractional.exponential_fit import Alternation, eased, ladder
 
@@ -141,7 +142,7 @@ def checked_differences(order: float, horizon: int) -> int:
 
 
 def _poles_and_weights(fit: Alternation) -> tuple[np.ndarray, np.ndarray]:
-    return np.exp(-np.exp(fit.log_rates[::-1])), np.exp(fit.log_weights[::-1])
+    return elementary.exp(-elementary.exp(fit.log_rates[::-1])), elementary.exp(fit.log_weights[::-1])
 
 
 def _memory(order: float, horizon: int, tolerance: float, fit: Alternation) -> ExponentialMemory:

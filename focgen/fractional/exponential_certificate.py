@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.fractional import elementary
 from focgen.fractional.weights import gl_weights_at
 
 _HEAD = 4096  # every lag up to here
@@ -65,15 +66,15 @@ def certify(beta: float, differences: int, horizon: int, poles, weights) -> Cert
     head = np.arange(min(_HEAD, horizon) + 1)
     e, g = error.differences(0, head), error.exact(0, head)
     relative = float(np.max(np.abs(e) / g))
-    largest, per_unit = float(np.max(np.abs(e))), float(np.sum(np.abs(_differenced(e, differences))))
+    largest, per_unit = float(np.max(np.abs(e))), elementary.l1(_differenced(e, differences))
     kernel = relative
     if horizon > _HEAD:
-        grid = _lags(_HEAD, horizon, max((0.01 * relative) ** (1.0 / 3.0), _GAPS[0]))
+        grid = _lags(_HEAD, horizon, max(_cube_root(0.01 * relative), _GAPS[0]))
         sizes = error.sizes(0, grid)
         kernel = max(kernel, float(np.max(sizes / error.exact(0, grid[1:]))))
         largest = max(largest, float(np.max(sizes)))
         per_unit += error.total(differences, grid)
-    per_unit += _ROUNDING * 2.0**differences * float(np.sum(g))
+    per_unit += _ROUNDING * 2.0**differences * elementary.l1(g)
     beyond = _beyond(error, differences, horizon)
     return Certificate(kernel + _ROUNDING, largest + _ROUNDING, per_unit, beyond)
 
@@ -101,8 +102,10 @@ class _Error:
 
     def modelled(self, m: int, lags: np.ndarray) -> np.ndarray:
         """∇^m h."""
-        powers = self.poles ** np.maximum(lags[:, None] - 1.0 - m, 0.0)
-        values = powers @ (self.weights * (self.poles - 1.0) ** m)
+        parts = self.weights.copy()
+        for _ in range(m):
+            parts *= self.poles - 1.0
+        values = elementary.total(parts[:, None] * elementary.powers(self.poles, np.maximum(lags - 1.0 - m, 0.0)))
         return np.where(lags == 0, 1.0, values) if m == 0 else values
 
     def differences(self, m: int, lags: np.ndarray) -> np.ndarray:
@@ -126,7 +129,7 @@ class _Error:
         ends, length = np.abs(self.differences(m, grid)), np.diff(grid)
         ends += _ROUNDING * np.abs(self.exact(m, grid))
         chords = 0.5 * length * (ends[:-1] + ends[1:]) + 0.5 * (ends[1:] - ends[:-1])
-        return float(np.sum(chords + length * self.off_chord(m, grid)))
+        return elementary.exact_sum(chords + length * self.off_chord(m, grid))
 
 
 def _differenced(e: np.ndarray, m: int) -> np.ndarray:
@@ -136,8 +139,14 @@ def _differenced(e: np.ndarray, m: int) -> np.ndarray:
 
 
 def _lags(first: int, last: int, gap: float) -> np.ndarray:
-    count = math.ceil(math.log(last / first) / min(gap, _GAPS[1])) + 1
-    return np.unique(np.rint(np.geomspace(first, last, count)).astype(np.int64))
+    reach = float(elementary.log(last / first))
+    count = math.ceil(reach / min(gap, _GAPS[1])) + 1
+    between = np.rint(first * elementary.exp(np.arange(count) * (reach / (count - 1)))).astype(np.int64)
+    return np.unique(np.concatenate([[first], np.clip(between, first, last), [last]]))
+
+
+def _cube_root(x: float) -> float:
+    return elementary.power(x, 1.0 / 3.0) if x > 0.0 else 0.0
 
 
 def _beyond(error: _Error, differences: int, horizon: int) -> float:

@@ -8,6 +8,9 @@ smaller largest error (de la Vallée-Poussin; Braess, Nonlinear Approximation Th
 The alternation is found by Remez's exchange, on logarithms of rates and weights. It needs a good start, which
 the ladder gives: the best fit with n modes, pulled apart in the middle where it is periodic in log lag,
 starts n + 1 modes at a longer horizon, and is then drawn back to the horizon that was asked for.
+
+Where an error is all but level, the last bit of a sum decides which lag is its largest, and with it every bit
+of the fit. So all of it is computed by :mod:`focgen.fractional.elementary`, the same on every machine.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.fractional import elementary
 from focgen.fractional.weights import gl_weights_at
 
 _ALL_LAGS = 200  # up to here every lag is looked at, then _COARSE or _FINE places a factor of e
@@ -27,6 +31,7 @@ _SPARSE, _COARSE, _FINE = 40, 100, 300
 _EASES = tuple(0.5 * i for i in range(1, 11))
 _ROUGH, _LEVEL = 2.0, 1.005  # largest over smallest extremum: on the way, and at the end
 _EXCHANGES, _NEWTONS, _LAWSONS = 30, 30, 60
+_LOG_2 = 0.6931471805599453
 _LONGEST = 34.0  # log of the longest horizon on the way
 
 
@@ -58,12 +63,12 @@ class Problem:
 
     def __init__(self, beta: float, log_horizon: float, ease: float = 0.0):
         self.beta, self.log_horizon, self.ease = beta, log_horizon, ease
-        self.horizon = round(math.exp(log_horizon))
+        self.horizon = round(float(elementary.exp(log_horizon)))
 
     def lags(self, density: int) -> np.ndarray:
         """Return the lags to look at, ``density`` of them where the lag grows by a factor of e."""
         count = int(self.log_horizon * density) + 2
-        spread = np.rint(np.exp(np.linspace(0.0, self.log_horizon, count))).astype(np.int64)
+        spread = np.rint(elementary.exp(np.arange(count) * (self.log_horizon / (count - 1)))).astype(np.int64)
         head = np.arange(1, min(_ALL_LAGS, self.horizon) + 1)
         return np.unique(np.concatenate([head, np.minimum(spread, self.horizon), [self.horizon]]))
 
@@ -81,7 +86,7 @@ class Problem:
             fit = self._levelled(fit)
             if fit is None:
                 return None
-            error = _modes(fit, lags).sum(axis=1) / scale - target
+            error = elementary.total(_modes(fit, lags)) / scale - target
             extrema = _extrema(error)
             if len(extrema) != len(fit.places):
                 return None
@@ -93,13 +98,13 @@ class Problem:
 
     def _levelled(self, fit: Alternation) -> Alternation | None:
         """Newton's method for errors of one size and alternating signs at the places of ``fit``."""
-        n, signs = fit.modes, (-1.0) ** np.arange(2 * fit.modes + 1, 0, -1)
+        n, signs = fit.modes, np.where(np.arange(2 * fit.modes + 1) % 2, 1.0, -1.0)
         scale, target = self.scaled(fit.places)
         for _ in range(_NEWTONS):
-            by_weight = _modes(fit, fit.places) / scale[:, None]
-            by_rate = by_weight * -np.exp(fit.log_rates) * (fit.places - 1.0)[:, None]
-            jacobian = np.hstack([by_rate, by_weight, -fit.error * signs[:, None]])
-            step = _newton_step(jacobian, target + signs * fit.error - by_weight.sum(axis=1))
+            by_weight = _modes(fit, fit.places) / scale
+            by_rate = by_weight * -elementary.exp(fit.log_rates)[:, None] * (fit.places - 1.0)
+            jacobian = np.vstack([by_rate, by_weight, -fit.error * signs]).T
+            step = _newton_step(jacobian, target + signs * fit.error - elementary.total(by_weight))
             if step is None:
                 return None
             largest = np.abs(step).max()
@@ -107,7 +112,7 @@ class Problem:
             fit = Alternation(
                 fit.log_rates + step[:n],
                 fit.log_weights + step[n:-1],
-                fit.error * math.exp(step[-1]),
+                fit.error * float(elementary.exp(step[-1])),
                 fit.places,
             )
             if largest < 0.01 * math.sqrt(fit.error):  # what is left is the square of this step
@@ -138,7 +143,7 @@ def ladder(beta: float, horizon: int) -> Ladder:
 
 
 def _climb(beta: float, horizon: int) -> Iterator[Alternation]:
-    goal = math.log(horizon)
+    goal = float(elementary.log(horizon))
     short = min(goal, 3.0)
     fit = _drawn(beta, _single(Problem(beta, short)), short, goal)
     while fit is not None:
@@ -149,7 +154,7 @@ def _climb(beta: float, horizon: int) -> Iterator[Alternation]:
 def eased(beta: float, horizon: int, fit: Alternation, tolerance: float) -> Alternation:
     """Return ``fit``, re-levelled with as much ``ease`` as keeps every lag within ``tolerance``."""
     for ease in _EASES:
-        problem = Problem(beta, math.log(horizon), ease)
+        problem = Problem(beta, float(elementary.log(horizon)), ease)
         easier = problem.solve(fit, _FINE, _LEVEL)
         if easier is None or easier.error * (1.0 + ease) > 0.99 * tolerance:
             break
@@ -158,19 +163,19 @@ def eased(beta: float, horizon: int, fit: Alternation, tolerance: float) -> Alte
 
 
 def _modes(fit: Alternation, lags: np.ndarray) -> np.ndarray:
-    return np.exp(fit.log_weights - np.exp(fit.log_rates) * (lags - 1.0)[:, None])
+    """Every mode at every lag, shape (n, lags)."""
+    rates = elementary.exp(fit.log_rates)
+    return elementary.exp(fit.log_weights[:, None] - rates[:, None] * (lags - 1.0))
 
 
 def _newton_step(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray | None:
     scale = np.abs(jacobian).max(axis=0)
     if not (np.all(scale > 0) and np.all(np.isfinite(jacobian))):
         return None
-    try:
-        with np.errstate(over="ignore"):  # a step that no number can hold is none
-            step = np.linalg.solve(jacobian / scale, residual) / scale
-    except np.linalg.LinAlgError:
-        return None
-    return step if np.all(np.isfinite(step)) else None
+    with np.errstate(over="ignore", invalid="ignore"):  # a step that no number can hold is none
+        step = elementary.solve(jacobian / scale, residual)
+        step = None if step is None else step / scale
+    return step if step is not None and np.all(np.isfinite(step)) else None
 
 
 def _extrema(error: np.ndarray) -> np.ndarray:
@@ -184,10 +189,10 @@ def _single(problem: Problem) -> Alternation | None:
     """One mode: start from the one that meets the first and the last weight."""
     last = problem.horizon
     first_weight, last_weight = gl_weights_at(-problem.beta, np.array([1, last]))
-    rate = math.log(first_weight / last_weight) / (last - 1)
-    start = Alternation(np.log([rate]), np.log([first_weight]), 0.0, np.array([1]))
+    rate = float(elementary.log(first_weight / last_weight)) / (last - 1)
+    start = Alternation(elementary.log([rate]), elementary.log([first_weight]), 0.0, np.array([1]))
     lags = problem.lags(_COARSE)
-    excess = _modes(start, lags).sum(axis=1) / gl_weights_at(-problem.beta, lags) - 1.0
+    excess = elementary.total(_modes(start, lags)) / gl_weights_at(-problem.beta, lags) - 1.0
     half = 0.5 * float(excess.max())
     places = np.array([1, lags[np.argmax(excess)], last])
     start = Alternation(start.log_rates, start.log_weights - half, half, places)
@@ -200,7 +205,7 @@ def _pair(problem: Problem, single: Alternation) -> Alternation | None:
     goal = problem.log_horizon
     start = Alternation(
         np.array([single.log_rates[0], -0.5 * goal]),
-        np.log([last_weight, first_weight - last_weight]),
+        elementary.log([last_weight, first_weight - last_weight]),
         0.1 * single.error,
         _distinct(goal * np.array([0.0, 0.2, 0.5, 0.8, 1.0]), problem.horizon),
     )
@@ -229,7 +234,7 @@ def _pulled_apart(fit: Alternation, longer: Problem, period: float) -> Alternati
     decay = (1.0 - longer.beta) * period
     rates = np.concatenate([fit.log_rates[: middle + 1] - period, fit.log_rates[middle:]])
     weights = np.concatenate([fit.log_weights[: middle + 1] - decay, fit.log_weights[middle:]])
-    places, cut = np.log(fit.places), 2 * (n - middle)
+    places, cut = elementary.log(fit.places), 2 * (n - middle)
     between = places[cut - 1] + period * np.array([0.5, 1.0])
     places = np.concatenate([places[:cut], between, places[cut:] + period])
     return Alternation(rates, weights, fit.error, _distinct(np.sort(places), longer.horizon))
@@ -258,15 +263,16 @@ def _stretched(fit: Alternation, here: float, problem: Problem) -> Alternation:
     """Stretch rates and places in log lag; the error follows exp(−π² n / ln 8R) (Braess, Hackbusch 2005)."""
     factor = problem.log_horizon / here
     rates = fit.log_rates[-1] - factor * (fit.log_rates[-1] - fit.log_rates)
-    weights = fit.log_weights + math.log(factor) + (1.0 - problem.beta) * (rates - fit.log_rates)
-    slope = math.pi**2 * fit.modes / (here + math.log(8.0)) ** 2
-    error = min(0.99, fit.error * math.exp(slope * (problem.log_horizon - here)))
-    return Alternation(rates, weights, error, _distinct(np.log(fit.places) * factor, problem.horizon))
+    weights = fit.log_weights + float(elementary.log(factor)) + (1.0 - problem.beta) * (rates - fit.log_rates)
+    slope = fit.modes * (math.pi / (here + 3.0 * _LOG_2)) ** 2
+    error = min(0.99, fit.error * float(elementary.exp(slope * (problem.log_horizon - here))))
+    places = _distinct(elementary.log(fit.places) * factor, problem.horizon)
+    return Alternation(rates, weights, error, places)
 
 
 def _distinct(log_places: np.ndarray, horizon: int) -> np.ndarray:
     """Return rising lags nearest to e^``log_places``, the last at the horizon."""
-    places = np.rint(np.exp(log_places)).astype(np.int64)
+    places = np.rint(elementary.exp(log_places)).astype(np.int64)
     for i in range(1, len(places)):
         places[i] = max(places[i], places[i - 1] + 1)
     places[-1] = max(horizon, places[-1])
@@ -276,18 +282,21 @@ def _distinct(log_places: np.ndarray, horizon: int) -> np.ndarray:
 def best_weights(beta: float, horizon: int, poles: np.ndarray) -> np.ndarray:
     """Return the weights at lag 1 that make the largest relative error small for given ``poles``, shape (n,).
 
-    Least squares, reweighted by Lawson's rule until the largest error no longer falls.
+    Least squares, reweighted by Lawson's rule until the largest error no longer falls; −∞ where two poles
+    are too close to one another for that.
     """
-    lags = Problem(beta, math.log(horizon)).lags(_SPARSE)
-    basis = poles ** (lags[:, None] - 1.0) / gl_weights_at(-beta, lags)[:, None]
+    lags = Problem(beta, float(elementary.log(horizon))).lags(_SPARSE)
+    basis = elementary.powers(poles, lags - 1.0) / gl_weights_at(-beta, lags)
     importance = np.full(len(lags), 1.0 / len(lags))
-    best, smallest = None, math.inf
+    best, smallest = np.full(len(poles), -math.inf), math.inf
     for _ in range(_LAWSONS):
         root = np.sqrt(importance)
-        weights = np.linalg.lstsq(root[:, None] * basis, root, rcond=None)[0]
-        error = np.abs(basis @ weights - 1.0)
+        weights = elementary.least_squares((root * basis).T, root)
+        if weights is None:
+            break
+        error = np.abs(elementary.total(weights[:, None] * basis) - 1.0)
         if error.max() < smallest:
             best, smallest = weights, float(error.max())
         importance *= error
-        importance /= importance.sum()
+        importance /= elementary.exact_sum(importance)
     return best

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from focgen.fractional import elementary
 from focgen.fractional.exponential import TOLERANCES, ExponentialMemory, checked_differences, memory_of
 from focgen.fractional.exponential_fit import Alternation, best_weights, eased, ladder
 
@@ -42,10 +43,10 @@ def _held(order: float, horizon: int, fit: Alternation, rounded: Rounding) -> Ex
     """With the weights that suit the rounded poles best, or those of the fit if these are better; None where
     two poles become one.
     """
-    poles = 1.0 - rounded(-np.expm1(-np.exp(fit.log_rates[::-1])))
+    poles = 1.0 - rounded(-elementary.expm1(-elementary.exp(fit.log_rates[::-1])))
     if not (np.all(np.diff(poles) > 0.0) and poles[0] >= 0.0 and poles[-1] < 1.0):
         return None
     beta = checked_differences(order, horizon) - order
-    weights = [best_weights(beta, horizon, poles), np.exp(fit.log_weights[::-1])]
+    weights = [best_weights(beta, horizon, poles), elementary.exp(fit.log_weights[::-1])]
     memories = [memory_of(order, horizon, poles, w) for w in weights if np.all(w >= 0.0)]
     return min(memories, key=lambda memory: memory.tolerance)

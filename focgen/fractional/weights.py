@@ -13,6 +13,8 @@ import math
 import numpy as np
 from scipy.special import rgamma
 
+from focgen.fractional import elementary
+
 _HEAD = 128  # weights from the recursion: the series is exact to rounding from here on
 _HEAD_PER_ORDER = 40.0
 _LARGEST_ORDER = 101.0  # of the bias at order −100
@@ -69,8 +71,8 @@ def _recursion(order: float, count: int) -> np.ndarray:
 def _decay(order: float, indices: np.ndarray, start: int) -> np.ndarray:
     """Return w_j / w_start."""
     place, place0 = indices - order / 2, start - order / 2
-    ratio = (place / place0) ** -(order + 1.0)
-    return ratio * np.exp(_series(order, place) - _series(order, place0))
+    ratio = elementary.log(place / place0) * -(order + 1.0)
+    return elementary.exp(ratio + (_series(order, place) - _series(order, place0)))
 
 
 def _series(order: float, place):

@@ -111,7 +111,7 @@ class _Search:
         low, high = self.bench.pressures[0], self.bench.pressures[-1]
         first = float(level * self.unit)
         slope = first * (ratio - 1.0) / (high - low) if ratio != 1.0 else 0.0  # one point has ratio 1
-        return Line(float(first - slope * low), float(slope))
+        return Line(_certain(float(first - slope * low)), _certain(float(slope)))
 
     def measures(self, lines: list[Line]) -> list[tuple[StepMeasures, ...]]:
         """Return what each line makes of each operating point."""
@@ -126,6 +126,12 @@ class _Search:
         with np.errstate(invalid="ignore"):
             spread = times.max(axis=1) - times.min(axis=1)
         return _Trials(pairs, times.mean(axis=1), np.nan_to_num(spread, nan=np.inf), overshoot)
+
+
+def _certain(found: float) -> float:
+    """Round to six digits, as many as a schedule is written with: settling times in simulation, and the levels
+    that follow from them, agree to ten or more between processors, so six are the same on all."""
+    return float(f"{found:.6g}")
 
 
 def simulate_lines(

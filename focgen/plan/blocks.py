@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.fractional.elementary import l1
 from focgen.plan.formats import Interval, Word, exponent_for, integer, limit, weighted
 from focgen.plan.model import Block, Format
 
@@ -63,7 +64,7 @@ def split(
     ``largest`` is the largest magnitude of a sample in counts. Raises PlanError, naming ``where``, where no
     format covers the weights.
     """
-    cut = _Cut(largest, word, 2.0 ** -(word.bits + 1) * float(np.abs(weights).sum()), where)
+    cut = _Cut(largest, word, 2.0 ** -(word.bits + 1) * l1(weights), where)
     drafts = []
     for start, stop in _octaves(first, first + len(weights)):
         drafts += _halved(weights[start - first : stop - first], start, cut)
@@ -96,7 +97,7 @@ def finest_exponent(weights: np.ndarray, largest: int, word: Word, where: str) -
     magnitude = np.abs(weights)
     room = limit(word.sum_bits) - (1 << (word.sum_bits - SPARE))
     by_weight = exponent_for(float(magnitude.max()), word.limit, where, "a weight")
-    by_sum = exponent_for(float(magnitude.sum()) * largest, room, where, "a sum of weights")
+    by_sum = exponent_for(l1(weights) * largest, room, where, "a sum of weights")
     exponent = max(by_weight, by_sum)
     while int(np.abs(np.rint(weights * 2.0**-exponent)).sum()) * largest > room:
         exponent += 1

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.errors import PlanError
+from focgen.fractional.elementary import exact_sum, l1
 from focgen.plan.banks import drive_error
 from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error
@@ -126,7 +127,7 @@ class _Account:
             return 0.0
         exact, size = table.weights[first:], table.size[first:]
         lags = np.arange(first, first + len(exact))
-        taps = float(np.abs(np.array(made.values) - exact).sum() + (self.recursion(lags) * size).sum())
+        taps = l1(np.array(made.values) - exact) + exact_sum(self.recursion(lags) * size)
         return taps + 2.0 * sum(
             abs(c - w) + 16.0 * _DOUBLE * abs(w) for c, w in zip(_mode_weights(made), _exact_weights(table))
         )
@@ -265,8 +266,8 @@ class _Floating(_Account):
         if made is None:
             return 0.0
         count, partial = made.taps + 2, np.cumsum(np.abs(made.weights)[::-1])
-        here = self.u * (1.0 + gamma(count, self.u)) * float(partial.sum() + partial[-1])
-        there = gamma(count, _DOUBLE) * float(np.abs(table.weights).sum())
+        here = self.u * (1.0 + gamma(count, self.u)) * (exact_sum(partial) + float(partial[-1]))
+        there = gamma(count, _DOUBLE) * l1(table.weights)
         taps = 1.01 * (here + there) * largest + count * self.tiny * (1.0 + largest)
         return taps + sum(self.bank_error(bank, float(partial[-1])) for bank in made.banks) * largest
 
@@ -281,7 +282,7 @@ class _Floating(_Account):
         here = _drive_error(rates, m, self.u, self.tiny, bank.compensated)
         there = _drive_error(rates, m, _DOUBLE, _TINY["f64"], False)
         sums = gamma(bank.modes + 2, self.u) + gamma(bank.modes + 2, _DOUBLE)
-        return 1.01 * (float(c @ (here + there)) + sums * (2.0 * m * float(c.sum()) + before))
+        return 1.01 * (exact_sum(c * (here + there)) + sums * (2.0 * m * exact_sum(c) + before))
 
     def inner_edge(self) -> float:
         return (self.u + _DOUBLE) * self.Z

@@ -33,6 +33,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
+from focgen.fractional.elementary import exact_sum, l1, power, total
 from focgen.fractional.transfer import Polynomial, polynomial
 from focgen.fractional.weights import gl_weights, short_memory_bias
 from focgen.plan.modes import Modes, Response
@@ -91,7 +92,7 @@ class Table:
     @property
     def total(self) -> float:
         """Σ w_j: the gain for a constant; a mode's is 0."""
-        return float(self.weights.sum())
+        return exact_sum(self.weights)
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ def _whole(order: float) -> float:
 def normaliser(controller: Controller) -> float:
     """The denominator's coefficient of the present sample, which all weights are divided by."""
     h = controller.sample_time
-    return sum(t.coefficient * h**-t.order for t in realise(controller).den)
+    return sum(t.coefficient * power(h, -t.order) for t in realise(controller).den)
 
 
 def tables(controller: Controller, length: int) -> Tables:
@@ -185,8 +186,8 @@ def tables_by(controller: Controller, fold: Callable[[Polynomial], Table]) -> Ta
 
 def folded(terms: Polynomial, step: float, length: int) -> Table:
     """Σ c h^−β w_j^(β) for j = 0 … ``length``, cut where all that follows is exactly zero."""
-    each = np.array([t.coefficient * step**-t.order * gl_weights(t.order, length) for t in terms])
-    weights, size = each.sum(axis=0), np.abs(each).sum(axis=0)
+    each = np.array([t.coefficient * power(step, -t.order) * gl_weights(t.order, length) for t in terms])
+    weights, size = total(each), total(np.abs(each))
     keep = int(np.flatnonzero(weights)[-1]) + 1
     return Table(weights[:keep], size[:keep])
 
@@ -203,14 +204,14 @@ def tail_l1(terms: Polynomial, step: float, length: int) -> float:
     The weights of one order have one sign from lag β + 1 on and sum to zero in all (to 1 for order 0), so a
     tail's sum of magnitudes is the magnitude of the partial sum of eq. (11)'s weights before it.
     """
-    return sum(abs(t.coefficient) * step**-t.order * _tail(t.order, length) for t in terms)
+    return sum(abs(t.coefficient) * power(step, -t.order) * _tail(t.order, length) for t in terms)
 
 
 def _tail(order: float, length: int) -> float:
     if order.is_integer():
-        return float(np.abs(gl_weights(order, max(length, int(order)))[length + 1 :]).sum())
+        return l1(gl_weights(order, max(length, int(order)))[length + 1 :])
     settled = max(length, int(order) + 1)
-    early = float(np.abs(gl_weights(order, settled)[length + 1 :]).sum())
+    early = l1(gl_weights(order, settled)[length + 1 :])
     return early + abs(short_memory_bias(order, settled))
 
 
@@ -223,7 +224,7 @@ def memory_bias(controller: Controller, length: int) -> tuple[tuple[float, float
     form, h = realise(controller), controller.sample_time
     terms = [t for t in form.direct + form.rest + form.den if t.order > 0.0]
     return tuple(
-        (t.coefficient, t.order, t.coefficient * h**-t.order * short_memory_bias(t.order, length))
+        (t.coefficient, t.order, t.coefficient * power(h, -t.order) * short_memory_bias(t.order, length))
         for t in terms
     )
 

@@ -3,6 +3,7 @@ weights."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,7 +166,7 @@ def _floor(direct: _Parts | None, inner: InnerIntegrator | None, sample: _Sample
 
 
 def _log2(lsb: float) -> int:
-    return int(np.log2(lsb))
+    return math.frexp(lsb)[1] - 1
 
 
 def _combined(
@@ -230,7 +231,7 @@ def _noise(made: Filter, own: Inverse) -> float:
     aligned = sum(len(s.blocks) + len(s.banks) for s in sums) + 1
     drives = sum(drive_error(s) for s in sums) * 2.0**-made.narrow
     carried = own.norm_after(np.array([1.0, -1.0]))
-    at_reset = 2.0 * max(1.0, own.norm * (1.0 + float(np.sum(made.feedback.table.values))))
+    at_reset = 2.0 * max(1.0, own.norm * (1.0 + math.fsum(made.feedback.table.values)))
     return 0.5 * carried + own.norm * (0.5 * aligned * 2.0**-made.narrow + drives) + at_reset
 
 
@@ -264,8 +265,8 @@ def _recursion(direct, inner, sample: _Sample, back: _Parts, exponent: int) -> F
 
 def _still(direct: Sum | None, table: Sum | None) -> float:
     """The gain from a constant e to v, the inner integral apart."""
-    total = float(np.sum(direct.values)) if direct else 0.0
-    return total / (1.0 + float(np.sum(table.values))) if table else total
+    total = math.fsum(direct.values) if direct else 0.0
+    return total / (1.0 + math.fsum(table.values)) if table else total
 
 
 def _steady(direct: Sum | None, table: Sum, sample: _Sample, exponent: int, word: Word) -> tuple[int, int]:

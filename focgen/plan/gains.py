@@ -165,6 +165,6 @@ def _machine_gain(schedule: Schedule, points: np.ndarray, places: np.ndarray, si
     segment = np.searchsorted(points, places, side=side) - 1
     inside = np.clip(segment, 0, len(points) - 2)
     gains = np.array(schedule.gains, dtype=float)
-    slopes = np.array(schedule.slopes) * 2.0 ** -np.array(schedule.slope_shifts, dtype=float)
+    slopes = np.ldexp(np.array(schedule.slopes, dtype=float), -np.array(schedule.slope_shifts, dtype=np.intc))
     linear = gains[inside] + slopes[inside] * (places - points[inside]) / schedule.signal.lsb
     return np.where(segment < 0, gains[0], np.where(segment >= len(points) - 1, gains[-1], linear))

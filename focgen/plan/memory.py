@@ -14,6 +14,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
+from focgen.fractional.elementary import power, total
 from focgen.fractional.exponential import ExponentialMemory
 from focgen.fractional.exponential_rounded import fit_rounded
 from focgen.fractional.transfer import Polynomial, Term
@@ -120,8 +121,8 @@ def exponential_tables(controller: Controller, memories: tuple[ExponentialMemory
 def _folded(terms: Polynomial, step: float, memories: dict[float, ExponentialMemory]) -> Table:
     """Whole orders, and lag 0 of the others with their differences, as taps."""
     count = max(math.ceil(t.order) for t in terms)
-    each = np.array([t.coefficient * step**-t.order * _differences(math.ceil(t.order), count) for t in terms])
-    taps, size = each.sum(axis=0), np.abs(each).sum(axis=0)
+    each = np.array([t.coefficient * power(step, -t.order) * _differences(math.ceil(t.order), count) for t in terms])
+    taps, size = total(each), total(np.abs(each))
     keep = int(np.flatnonzero(size)[-1]) + 1
     modes = tuple(_modes(t, step, memories[t.order]) for t in terms if t.order in memories)
     return Table(taps[:keep], size[:keep], modes, response_of(taps[:keep], 0, modes))
@@ -133,5 +134,5 @@ def _differences(m: int, count: int) -> np.ndarray:
 
 
 def _modes(term: Term, step: float, memory: ExponentialMemory) -> Modes:
-    factor = term.coefficient * step**-term.order
+    factor = term.coefficient * power(step, -term.order)
     return Modes(memory.order, 1.0 - np.array(memory.poles), factor * np.array(memory.weights))

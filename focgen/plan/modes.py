@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+
+from focgen.fractional.elementary import exact_sum, l1, powers, total
 
 LAGS = 1 << 15  # up to here a response is written out
 
@@ -35,15 +36,14 @@ class Modes:
 
     def response(self, lags: int = LAGS) -> np.ndarray:
         """By lag from 0 to ``lags``."""
-        unit = np.eye(1, lags - 1)[0]
-        parts = [lfilter([w * q], [1.0, q - 1.0], unit) for q, w in zip(self.rates, self.weights)]
-        found = np.concatenate([[0.0, float(np.sum(self.weights))], -np.sum(parts, axis=0)])
+        parts = [w * q * _powers(1.0 - q, lags - 1) for q, w in zip(self.rates, self.weights)]
+        found = np.concatenate([[0.0, exact_sum(self.weights)], -total(parts)])
         return np.diff(found, prepend=0.0) if self.differences == 2 else found
 
     def left_out(self, lags: int = LAGS) -> float:
         """Bound on the sum of magnitudes beyond ``lags``."""
-        late = np.abs(self.weights) * (1.0 - self.rates) ** (lags - 1)
-        return float(np.sum(late * (2.0 if self.differences == 2 else 1.0)))
+        late = np.abs(self.weights) * powers(1.0 - self.rates, np.array([lags - 1.0]))[:, 0]
+        return exact_sum(late * (2.0 if self.differences == 2 else 1.0))
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Response:
     @property
     def l1(self) -> float:
         """Σ |w_j|."""
-        return float(np.abs(self.weights).sum()) + self.left_out
+        return l1(self.weights) + self.left_out
 
 
 def response_of(
@@ -67,6 +67,15 @@ def response_of(
     taps = np.concatenate([np.zeros(first), np.asarray(taps, dtype=float)])
     if not modes:
         return Response(taps)
-    total = sum((m.response(lags) for m in modes), np.zeros(lags + 1))
-    total[: len(taps)] += taps
-    return Response(total, sum(m.left_out(lags) for m in modes))
+    whole = sum((m.response(lags) for m in modes), np.zeros(lags + 1))
+    whole[: len(taps)] += taps
+    return Response(whole, sum(m.left_out(lags) for m in modes))
+
+
+def _powers(base: float, count: int) -> np.ndarray:
+    """The powers 0 … ``count`` − 1, twice as many with every product."""
+    found, next_power = np.ones(1), float(base)
+    while len(found) < count:
+        found = np.concatenate([found, next_power * found])
+        next_power *= next_power
+    return found[:count]

@@ -199,11 +199,11 @@ def rounding_reach(plan: Plan, own) -> float:
 def reset_error(plan: Plan) -> float:
     """How far a reset's v can be from the integer recursion's own rest, in counts."""
     feedback = plan.feedback
-    direct = float(np.sum(plan.direct.values)) if plan.direct else 0.0
+    direct = math.fsum(plan.direct.values) if plan.direct else 0.0
     exact = direct / at_rest(plan) * plan.error.lsb / plan.filtered.lsb
     return 0.5 + abs(exact - feedback.steady * 2.0**-feedback.steady_shift) * span(plan.error).worst
 
 
 def at_rest(plan: Plan) -> float:
     """A(1): positive for a stable recursion."""
-    return 1.0 + float(np.sum(plan.feedback.table.values))
+    return 1.0 + math.fsum(plan.feedback.table.values)

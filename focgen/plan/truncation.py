@@ -7,6 +7,7 @@ horizon and once for ever: Σ |∇^m (h_j − g_j)| for each term.
 from __future__ import annotations
 
 from focgen.control.controller import Controller
+from focgen.fractional.elementary import power
 from focgen.fractional.transfer import Polynomial
 from focgen.plan.canonical import Realisation, Tables, folded, inner_limits, realise, tail_l1
 from focgen.plan.gains import largest_gain
@@ -49,7 +50,7 @@ def _left_out(plan: Plan, terms: Polynomial, past_horizon: bool) -> float:
         return tail_l1(terms, plan.sample_time, plan.length)
     proved = {memory.order: memory.certificate for memory in plan.memories}
     return sum(
-        abs(t.coefficient) * plan.sample_time**-t.order * proved[t.order].output_error(1.0, past_horizon)
+        abs(t.coefficient) * power(plan.sample_time, -t.order) * proved[t.order].output_error(1.0, past_horizon)
         for t in terms
         if t.order in proved
     )

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.errors import PlanError
+from focgen.fractional.elementary import l1
 from focgen.plan.model import FLAG_HIGH, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
 from focgen.plan.proofs import inverse_of_recursion
 from focgen.plan.scenario import Reset, Scenario, Trace, Track
@@ -66,8 +67,8 @@ def _l1(table: Sum | None) -> float:
     """Of taps, and of modes, whose drives reach 2 m times what drives them."""
     if table is None:
         return 0.0
-    modes = sum(2.0 * bank.differences * float(np.abs(bank.values).sum()) for bank in table.banks)
-    return float(np.abs(table.values).sum()) + modes
+    modes = sum(2.0 * bank.differences * l1(bank.values) for bank in table.banks)
+    return l1(table.values) + modes
 
 
 def _drive(table: Sum) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -25,7 +24,6 @@ BESIDE = ("README.md", "example/main.c")
 """Files that nothing is compiled from: theirs to change."""
 REMEMBERED = "cost.json"
 """The file beside a controller's C that remembers what it cost; no part of what was generated."""
-_ROUNDING = 1e-9  # relative
 _MOST = 8  # strangers that are named
 
 
@@ -138,9 +136,7 @@ def _differences(expected: Any, found: Any, place: str) -> Iterator[str]:
 
 
 def _same(expected: Any, found: Any) -> bool:
-    """Equal; floating figures to a last digit or two, which are named together and not one by one."""
-    if isinstance(expected, float) and isinstance(found, float):
-        return math.isclose(expected, found, rel_tol=_ROUNDING)
+    """Equal in every digit and in type: every machine finds the same."""
     return type(expected) is type(found) and expected == found
 
 

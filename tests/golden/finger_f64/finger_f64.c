@@ -148,7 +148,7 @@ static uint8_t finger_f64_ends(double u)
 /* As if the error had been e for ever. */
 static void finger_f64_settle(finger_f64_state *s, double e)
 {
-    const double v = 1.2960293636996549 * e; /* e times 1.29603 */
+    const double v = 1.296029363699654 * e; /* e times 1.29603 */
     uint16_t i;
 
     for (i = 0; i < finger_f64_ERRORS; i++) {
