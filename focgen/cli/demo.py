@@ -38,9 +38,9 @@ def _payload(made: Demo) -> dict:
             "firmware": {a: made.folder / "firmware" / a for a in made.generated},
         },
         "identify": {
-            "T": found.pooled.T,
-            "alpha": found.pooled.alpha,
-            "gain": found.pooled.gain,
+            "T": found.joint.T,
+            "alpha": found.joint.alpha,
+            "gain": found.joint.gain,
             "gof": {model: values["mean"] for model, values in found.gof.items()},
         },
         "design": {

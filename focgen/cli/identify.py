@@ -17,9 +17,13 @@ EXAMPLE = """example:
   focgen identify logs/steps.csv --rig rig.toml --out identified.toml --report pictures \\
     --unseen logs/sines.csv
 
-  fits K, T and alpha to each experiment, pools T and alpha, draws the line K(p) through the gains, and
-  writes the rig with them to identified.toml. Prints the goodness of fit of every model from 1 pole to
-  3 poles and 2 zeros (Table I)."""
+  fits one K(p), T and alpha to all experiments at once and writes the rig with them to identified.toml. Fits
+  each experiment by itself as well, and prints the goodness of fit of every model from 1 pole to 3 poles and
+  2 zeros (Table I).
+
+  focgen identify pump.csv --rig rig.toml --stages regulator,actuator --delay --out identified.toml
+
+  identifies the regulator from command and pressure, too, and the actuator with a dead time."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -41,12 +45,39 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--report", metavar="DIR", help="write pictures there: Table I, fits, parameters, loops"
     )
+    parser.add_argument(
+        "--stages",
+        type=_stages,
+        default=("actuator",),
+        metavar="STAGE,…",
+        help="which to identify: regulator (command to pressure), actuator, sensor (curvature to output); "
+        "default: actuator",
+    )
+    parser.add_argument("--delay", action="store_true", help="fit the actuator's dead time as well")
+    parser.add_argument(
+        "--no-integer", action="store_true", help="leave out the integer-order models beside each fit"
+    )
+
+
+def _stages(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
 def run(args: Namespace) -> Outcome:
     given = (*args.logs, args.rig, *args.unseen)
     check_apart([args.out], given)
-    found = identify(args.logs, args.rig, None, args.first, args.last, args.gain_degree, args.unseen)
+    found = identify(
+        args.logs,
+        args.rig,
+        None,
+        args.first,
+        args.last,
+        args.gain_degree,
+        args.unseen,
+        args.stages,
+        args.delay,
+        not args.no_integer,
+    )
     text = f"{identification_text(found)}\n\nwrote {args.out}\n"
     if args.report:
         pictures = identification_pictures(found)

@@ -44,10 +44,9 @@ class Course:
         """Whether the input jumps at the first sample."""
         return bool(np.any(self.jumps[:, 0] != 0.0))
 
-    def row(self, which: int) -> Course:
-        """One power alone."""
-        parts = (None if part is None else part[which : which + 1] for part in vars(self).values())
-        return Course(*parts)
+    def first(self, count: int) -> Course:
+        """The first ``count`` powers alone."""
+        return Course(*(None if part is None else part[:count] for part in vars(self).values()))
 
 
 def noise_level(values: np.ndarray) -> float:

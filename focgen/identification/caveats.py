@@ -1,4 +1,4 @@
-"""What a set of logs cannot show, said before anybody relies on it."""
+"""What a set of logs cannot show, said before anybody relies on it: one sentence a kind."""
 
 from __future__ import annotations
 
@@ -6,35 +6,98 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from focgen.identification.between import noise_level
 from focgen.identification.excitation import Excitation
+from focgen.identification.fractional import FractionalFit
 from focgen.identification.model import ExperimentFit
+from focgen.identification.single import is_step
+from focgen.identification.sure import relative_halves
+from focgen.logs.notes import listed
 
 _FALL = 0.5  # of the step: the input comes nearer to 0 by at least this in a release
 _WIDE = 0.3  # of a parameter: an interval wider than this says little
+_WORSE = 0.01  # of GOF: by so much more a rig is visibly worse than the single fits
+_MISFIT = 3.0  # times the noise of the readings: what is left is more than noise
+_LEFT = 0.05  # of the spread: what is left below is of no concern
 
 
-def warnings_of(excitations: Sequence[Excitation], fits: Sequence[ExperimentFit]) -> tuple[str, ...]:
-    """The warnings that apply, most important first."""
-    found = []
-    if not any(_releases(x) for x in excitations):
+def warnings_of(
+    excitations: Sequence[Excitation],
+    fit: FractionalFit,
+    fits: Sequence[ExperimentFit],
+    failed: Sequence[str],
+    quality: dict[str, dict[str, float]],
+) -> tuple[str, ...]:
+    """The warnings that apply, most important first. ``failed``: experiments that have no fit of their own."""
+    misfit = _misfit(excitations, fit)
+    found = _rig_is_worse(fits, quality) or ([_MODEL_SHORT.format(misfit)] if misfit else [])
+    found += _unsure(excitations, fit, misfit)
+    found += _singles(fits, failed, misfit)
+    if all(is_step(x) for x in excitations) and not any(_releases(x) for x in excitations):
         found.append(
             "positive steps only: whether the actuator unloads as it loads, and its hysteresis, cannot be "
             "seen; log the releases too, and a slow sine"
         )
-    levels = np.array([x.loaded for x in excitations])
-    rising = len(levels) > 2 and bool(np.all(np.diff(levels) > 0.0))
-    if rising:
+    if _rising(excitations):
         found.append(
             "the levels rise from run to run: a gain that grows with the level cannot be told from one that "
             "grows with every load; shuffle them, or repeat the first at the end"
         )
-    found += [
-        f"{f.name}: {key} is known to ±{_half(f, key):.0%} only; hold the step longer or lower the noise"
-        for f in fits
-        for key in ("K", "T", "alpha")
-        if _half(f, key) > _WIDE
-    ]
     return tuple(found)
+
+
+_MODEL_SHORT = (
+    "the model leaves {:.1f} times the noise of the readings: something that it does not have, such as "
+    "hysteresis, another speed of unloading, or drift; `focgen diagnose` names it"
+)
+
+
+def _rig_is_worse(fits: Sequence[ExperimentFit], quality: dict[str, dict[str, float]]) -> list[str]:
+    own = {f.name: quality["fom"][f.name] - quality["rig"][f.name] for f in fits}
+    if not own or float(np.mean(list(own.values()))) <= _WORSE:
+        return []
+    rig, single = (float(np.mean([quality[m][name] for name in own])) for m in ("rig", "fom"))
+    return [
+        f"the rig reaches a GOF of {rig:.3f} where every experiment by itself reaches {single:.3f}: what differs "
+        "between them is not in one K(p), T and alpha, such as hysteresis, another speed of unloading, or drift; "
+        "`focgen diagnose` names it"
+    ]
+
+
+def _misfit(excitations: Sequence[Excitation], fit: FractionalFit) -> float | None:
+    """What is left over the noise of the readings, where it is much more."""
+    ratios = []
+    for x, made in zip(excitations, fit.simulated):
+        left, noise = float(np.std(x.measured - made)), noise_level(x.measured)
+        if left > _LEFT * x.spread and noise > 0.0:
+            ratios.append(left / noise)
+    worst = float(np.median(ratios)) if ratios else 0.0
+    return worst if worst > _MISFIT else None
+
+
+def _unsure(excitations: Sequence[Excitation], fit: FractionalFit, misfit: float | None) -> list[str]:
+    wide = {k: h for k, h in relative_halves(excitations, fit).items() if h > _WIDE}
+    if not wide:
+        return []
+    known = ", ".join(f"{k} to ±{h:.0%}" for k, h in wide.items())
+    remedy = "the model is short of something first" if misfit else "hold steps longer, or lower the noise"
+    return [f"the rig is known badly, {known}: {remedy}"]
+
+
+def _singles(fits: Sequence[ExperimentFit], failed: Sequence[str], misfit: float | None) -> list[str]:
+    wide = [f.name for f in fits if any(_half(f, key) > _WIDE for key in ("K", "T", "alpha"))]
+    said = []
+    if wide:
+        remedy = "" if misfit else "; hold steps longer or lower the noise for Table I"
+        said.append(f"{listed(wide)}: K, T or alpha known to ±{_WIDE:.0%} or worse by itself{remedy}")
+    if failed:
+        said.append(f"{listed(failed)}: K, T and alpha not determined by itself, and not in Table I")
+    return said
+
+
+def _rising(excitations: Sequence[Excitation]) -> bool:
+    levels = np.array([x.loaded for x in excitations])
+    return len(levels) > 2 and bool(np.all(np.diff(levels) > 0.0))
 
 
 def _releases(x: Excitation) -> bool:

@@ -35,7 +35,8 @@ class Excitation:
     value ahead of the first sample; ``level`` the value it is stepped to. ``course`` holds pressure^m − before^m,
     m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1 where the curvature is.
     ``rest_shown``: whether the log begins before the first step, so that it shows the output's zero.
-    ``reference`` (n,) where a loop was closed.
+    ``reference`` (n,) where a loop was closed. ``late``: the nominal dead time of the stages that it is seen through,
+    s.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Excitation:
     notes: tuple[str, ...] = ()
     rest_shown: bool = True
     reference: np.ndarray | None = None
+    late: float = 0.0
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -80,9 +82,9 @@ class Excitation:
         """The measured signal's standard deviation, its units."""
         return float(np.std(self.measured))
 
-    def first_power(self) -> Excitation:
-        """The same, driven by K times the pressure alone."""
-        return self if self.powers == 1 else replace(self, course=self.course.row(0))
+    def with_powers(self, count: int) -> Excitation:
+        """The same, driven by the first ``count`` powers of the pressure alone."""
+        return self if self.powers == count else replace(self, course=self.course.first(count))
 
     def bare(self) -> Excitation:
         """A copy without what was made along the way, to be sent to another process."""
@@ -176,6 +178,7 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
         experiment.notes,
         before is None,
         _varying_reference(experiment),
+        rig.delays.regulator * (role == "command") + rig.delays.sensor * (fitted == "output"),
     )
 
 

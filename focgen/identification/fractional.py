@@ -15,7 +15,7 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.feedback import instruments_of
-from focgen.identification.noise import ResidualModel, covariance, half_width, residual_model
+from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
 from focgen.identification.past import MOST_STEPS, Past, asks_for_past, best_time, columns, times
 from focgen.identification.problem import Point, Problem, delay_reach, starts
 
@@ -176,7 +176,7 @@ def _finished(problem: Problem, point: Point) -> FractionalFit:
     jacobians = problem.jacobians(point)
     by = None if instruments is None else problem.jacobians(point, instruments)
     try:
-        spread = covariance(jacobians, models, problem.penalties, by)
+        spread = sandwich(jacobians, models, problem.penalties, by)
     except np.linalg.LinAlgError:
         names = ", ".join(e.name for e in problem.experiments)
         raise FitError(
@@ -237,7 +237,7 @@ def _offset_variance(problem: Problem, point: Point, models) -> float:
     """Of the offset of a single experiment."""
     rows = problem.jacobians(point, offset=True)
     try:
-        return float(covariance(rows, models, problem.penalties)[-1, -1])
+        return float(sandwich(rows, models, problem.penalties)[-1, -1])
     except np.linalg.LinAlgError:
         return float("inf")
 

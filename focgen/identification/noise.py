@@ -63,18 +63,28 @@ def residual_model(residual: np.ndarray) -> ResidualModel:
     return best
 
 
-def covariance(
+def covariance(jacobian: np.ndarray, models: list[ResidualModel]) -> np.ndarray:
+    """Covariance (k, k) of the k parameters of a fit; ``jacobian`` (n, k) has the rows of all ``models`` in
+    order.
+
+    The parameters' own number is taken off the degrees of freedom. Raises numpy.linalg.LinAlgError where the
+    parameters cannot be told apart.
+    """
+    ends = np.cumsum([model.count for model in models])
+    return sandwich(np.split(jacobian, ends[:-1]), models, [0.0] * len(models))
+
+
+def sandwich(
     jacobians: list[np.ndarray],
     models: list[ResidualModel],
     priors: list[float],
     instruments: list[np.ndarray] | None = None,
 ) -> np.ndarray:
-    """Covariance (k, k) of the k parameters of a fit.
+    """The same for experiments that have a prior, or instruments.
 
     ``jacobians``: of each experiment, (n, k), whose residual ``models`` describe; rows beyond a model's count
     stand for a prior, whose residual is white with the variance in ``priors``. ``instruments``, shaped alike,
-    where the residual was made orthogonal to these. The parameters' own number is taken off the degrees of
-    freedom. Raises numpy.linalg.LinAlgError where the parameters cannot be told apart.
+    where the residual was made orthogonal to these.
     """
     by = jacobians if instruments is None else instruments
     bread = np.linalg.inv(sum(z.T @ j for z, j in zip(by, jacobians)))

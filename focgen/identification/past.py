@@ -41,6 +41,12 @@ def times(count: int) -> np.ndarray:
     return np.concatenate([[0], powers]).astype(float)
 
 
+def fine_times(count: int) -> np.ndarray:
+    """The same with four times an octave."""
+    most = np.log2(LOOKED_BACK * count - 2.0)
+    return np.concatenate([[0.0], 2.0 ** np.arange(0.0, most, 0.25)])
+
+
 def columns(x: Excitation, kernels: Kernels, when: np.ndarray, rows: int = 3) -> np.ndarray:
     """What is left of unit steps made ``when`` (steps,) samples before the first one: (rows + 1, steps, n).
 

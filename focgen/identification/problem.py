@@ -115,7 +115,7 @@ class Problem:
         run = self.experiments[i]
         past = self.pasts[i] is not None if past is None else past
         count = run.stepped.count if past else len(run)
-        delay = max(self.delay_at(x) + nudge * self.step, 0.0)
+        delay = max(self.delay_at(x) + nudge * self.step, 0.0) + run.late
         return kernels(float(x[0]), float(x[1]), run.step, count, delay)
 
     # -- the value at a trial -------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ def fit_each(
     ``pasts`` and ``delay`` (s) as found from all together; ``integer``: integer-order models, too.
     """
     fits, failed = [], []
-    singles = [x.first_power() for x in excitations]
+    singles = [x.with_powers(1) for x in excitations]
     for x, past in track(list(zip(singles, pasts)), "fitting experiment"):
         try:
             fits.append(fit_fractional([x], delay, [past]))

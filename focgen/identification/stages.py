@@ -14,6 +14,7 @@ import numpy as np
 
 from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
+from focgen.identification.digits import told_value
 from focgen.identification.directions import UpDown, fit_directions
 from focgen.identification.rational import Record, parts
 from focgen.identification.shapes import Fitted, ShapeFit, choose, clearly_better, delay_seconds, fit_shapes, refit
@@ -36,7 +37,7 @@ class StageFit:
     and T2 or wn and damping, zero and delay to (value, half 95 % interval), times in s, wn in rad/s.
     ``gain_relative`` and ``time_relative`` are half 95 % intervals relative to the values. ``fits``: every
     shape that was tried. ``up_down``: time constants of the two directions, None where they are not both
-    seen. ``simulated`` (n,) of each of the experiments called ``names``.
+    seen. ``measured`` and ``simulated`` (n,) of each of the experiments called ``names``, every ``step`` s.
     """
 
     stage: str
@@ -50,8 +51,16 @@ class StageFit:
     fits: tuple[ShapeFit, ...]
     up_down: UpDown | None
     names: tuple[str, ...]
+    measured: tuple[np.ndarray, ...]
     simulated: tuple[np.ndarray, ...]
+    step: float
     notes: tuple[str, ...]
+
+    @property
+    def traces(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Time (s), measured and simulated signal of each experiment, all (n,)."""
+        pairs = zip(self.measured, self.simulated)
+        return [(np.arange(len(y)) * self.step, y, made) for y, made in pairs]
 
 
 def identify_stage(experiments: Sequence[Experiment], stage: str) -> StageFit:
@@ -81,16 +90,18 @@ def identify_stage(experiments: Sequence[Experiment], stage: str) -> StageFit:
         fits=tuple(f.report for f in fits),
         up_down=up_down,
         names=tuple(e.name for e in used),
+        measured=tuple(r.measured for r in chosen.problem.records),
         simulated=tuple(chosen.solved.models(chosen.solved.rows)),
+        step=step,
         notes=notes_of(stage, [e.name for e in experiments], chosen, fits, up_down, step),
     )
 
 
 def transfer_of(parameters: dict[str, tuple[float, float]]) -> TransferFunction:
-    """The transfer function of a shape's parameters, its denominator's leading coefficient 1."""
-    value = {name: pair[0] for name, pair in parameters.items()}
+    """The transfer function of a shape's parameters, as many digits as hold: (T s + 1) or a leading s²."""
+    value = {name: told_value(*pair) for name, pair in parameters.items()}
     if "T" in value:
-        den = [(1.0, 1.0), (1.0 / value["T"], 0.0)]
+        den = [(value["T"], 1.0), (1.0, 0.0)]
     elif "wn" in value:
         den = [(1.0, 2.0), (2.0 * value["damping"] * value["wn"], 1.0), (value["wn"] ** 2, 0.0)]
     elif "T1" in value:
@@ -100,7 +111,8 @@ def transfer_of(parameters: dict[str, tuple[float, float]]) -> TransferFunction:
         den = [(1.0, 0.0)]
     scale = value["gain"] * den[-1][0]
     zero = [(scale * value["zero"], 1.0)] if "zero" in value else []
-    return TransferFunction([*zero, (scale, 0.0)], den)
+    num, den = ([(told_value(c, 0.0), order) for c, order in terms] for terms in ([*zero, (scale, 0.0)], den))
+    return TransferFunction(num, den)
 
 
 def _usable(experiments: Sequence[Experiment], stage: str) -> list[Experiment]:

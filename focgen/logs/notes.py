@@ -49,7 +49,7 @@ def notes_of(experiments: Sequence[Noted]) -> tuple[str, ...]:
 
 def _line(what: str, found: list[tuple[str, str]], of: int) -> str:
     names = list(dict.fromkeys(name for name, _ in found))
-    whose = "all experiments" if 1 < len(names) == of else _listed(names)
+    whose = "all experiments" if 1 < len(names) == of else listed(names)
     counted = [(name, note) for name, note in found if isinstance(note, Note)]
     if not counted:
         return f"{whose}: {what}"
@@ -63,7 +63,7 @@ def _places(count: int, first: str) -> str:
     return first if count == 1 else f"{count}, the first {first}"
 
 
-def _listed(names: Iterable[str]) -> str:
+def listed(names: Iterable[str]) -> str:
     """Names as one says them: "7, 9 and 11"."""
     names = list(names)
     if len(names) > _NAMED:

@@ -23,12 +23,8 @@ from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
 from focgen.loop.trial import Steps, run_corner, run_steps
 from focgen.loop.tuning import HORIZON, OVERSHOOT, Tuned, Wish, fastest, meeting, tune
-<<<<<<< HEAD
 from focgen.loop.worst import Worst, worst_case
-from focgen.output import write_file
-=======
 from focgen.output import check_apart, write_file
->>>>>>> wt-severe
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST
 from focgen.rig.files import read_rig

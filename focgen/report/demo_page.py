@@ -53,11 +53,11 @@ def demo_page(
 
 def demo_lead(identification: Identification, design: Design, verified: dict[str, Verification]) -> str:
     """The whole result in a few sentences."""
-    gof, pooled = identification.gof, identification.pooled
+    gof, joint = identification.gof, identification.joint
     samples = sum(v.targets["host"].samples for v in verified.values())
     wrong = sum(v.targets["host"].mismatches for v in verified.values())
     return (
-        f"A fractional model with T = {pooled.T:.3g} and α = {pooled.alpha:.3g} fits six step tests with a "
+        f"A fractional model with T = {joint.T:.3g} and α = {joint.alpha:.3g} fits six step tests with a "
         f"mean GOF of {gof['fom']['mean']:.3f} (one pole: {gof['iom_1p']['mean']:.3f}; three poles and two "
         f"zeros: {gof['iom_3p2z']['mean']:.3f}). Inverted, it gives a controller that settles in "
         f"{design.settling_s:.2f} s on average with at most {design.overshoot_pct:.1f} % overshoot. "

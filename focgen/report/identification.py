@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from focgen.control.units import unit_of
-from focgen.identification.model import ExperimentFit, Identification, Pooled
+from focgen.identification.model import ExperimentFit, Identification, Joint
+from focgen.identification.stages import StageFit
 from focgen.report.identification_summary import model_label
 from focgen.report.style import COLOURS, CYCLE, GREY, figure, png, with_unit
 
@@ -17,21 +18,35 @@ _LAST = 0.5  # of a swinging log: the part drawn as loops, when the start has di
 
 
 def identification_pictures(found: Identification) -> dict[str, bytes]:
-    """Return PNG pictures by file name; ``loops.png`` only where a log swings."""
-    pictures = {
-        "gof.png": _gof(found),
-        "fits.png": _fits(found),
-        "models.png": _models(found),
-        "parameters.png": _parameters(found),
-    }
+    """Return PNG pictures by file name: ``loops.png`` only where a log swings, ``parameters.png`` where two are
+    steps, and those of a stage where it was identified."""
+    pictures = {f"{name}.png": _stage(found, fit) for name, fit in found.stages.items()}
+    if found.joint is None or not found.experiments:
+        return pictures
+    pictures |= {"gof.png": _gof(found), "fits.png": _fits(found), "models.png": _models(found)}
+    if sum(fit.step for fit in found.experiments) > 1:
+        pictures["parameters.png"] = _parameters(found)
     if any(log.swings for log in found.unseen) or any(not fit.step for fit in found.experiments):
         pictures["loops.png"] = _loops(found)
     return pictures
 
 
+def _stage(found: Identification, fit: StageFit) -> bytes:
+    """What leaves a stage, measured and as identified, run by run."""
+    with figure(1, 1, size=(7.0, 3.4)) as (fig, axes):
+        for i, (time, measured, simulated) in enumerate(fit.traces):
+            axes.plot(time, measured, color=CYCLE[i % len(CYCLE)], lw=0.8, label=fit.names[i])
+            axes.plot(time, simulated, color=COLOURS["ideal"], lw=1.0)
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel(_named(found, {"regulator": "pressure", "sensor": "output"}[fit.stage]))
+        axes.set_title(f"The {fit.stage}: measured (colour) and identified, {fit.shape} (black)")
+        _legend_beside(axes, [measured[-1] for _, measured, _ in fit.traces])
+        return png(fig)
+
+
 def _gof(found: Identification) -> bytes:
     names = [fit.name for fit in found.experiments] + ["mean"]
-    models = [m for m in found.gof if m != "rig"]
+    models = list(found.gof)
     with figure(1, 1, size=(7.0, 3.2)) as (fig, axes):
         width = 0.8 / len(models)
         for i, model in enumerate(models):
@@ -121,7 +136,7 @@ def _parameters(found: Identification) -> bytes:
     with figure(3, 1, size=(7.0, 6.6), sharex=True) as (fig, axes):
         for ax, key in zip(axes, ("K", "T", "alpha")):
             _draw_each(ax, steps, key)
-        _draw_pooled(axes, found.pooled, [fit.level for fit in steps])
+        _draw_joint(axes, found.joint, [fit.level for fit in steps])
         for ax, label in zip(axes, labels):
             low, high = ax.get_ylim()
             ax.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
@@ -140,23 +155,24 @@ def _draw_each(axes, steps: Sequence[ExperimentFit], key: str) -> None:
     axes.errorbar(levels, values, half, fmt="o", color=COLOURS["model"], capsize=3, label=label)
 
 
-def _draw_pooled(axes, pooled: Pooled, levels: Sequence[float]) -> None:
+def _draw_joint(axes, joint: Joint, levels: Sequence[float]) -> None:
     """K(p), and T and α of all experiments together."""
     reach = np.linspace(min(levels), max(levels), 50)
-    line = np.polynomial.polynomial.polyval(reach, pooled.gain)
-    label = f"K(p), R² = {pooled.gain_r2:.4f}" if len(pooled.gain) > 1 else "K, pooled"
+    line = np.polynomial.polynomial.polyval(reach, joint.gain)
+    r2 = "" if joint.gain_r2 is None else f", R² = {joint.gain_r2:.4f}"
+    label = f"K(p), all together{r2}" if len(joint.gain) > 1 else "K, all together"
     axes[0].plot(reach, line, color=COLOURS["ideal"], label=label)
     for ax, key in zip(axes[1:], ("T", "alpha")):
-        value = getattr(pooled, key)
-        ax.axhspan(*pooled.ci95[key], color=COLOURS["band"])
-        ax.axhline(value, color=COLOURS["ideal"], label=f"pooled: {value:.4g}, 95 % interval", zorder=1)
+        value = getattr(joint, key)
+        ax.axhspan(*joint.ci95[key], color=COLOURS["band"])
+        ax.axhline(value, color=COLOURS["ideal"], label=f"all together: {value:.4g}, 95 % interval", zorder=1)
 
 
 def _loops(found: Identification) -> bytes:
     """Fig. 8: output over input, logged and as the identified rig has it."""
     swings = [(u.name, u.pressure, u.measured, u.simulated) for u in found.unseen if u.swings]
     swings += [
-        (f.name, f.pressure, f.measured, found.pooled.simulated[f.name])
+        (f.name, f.pressure, f.measured, found.joint.simulated[f.name])
         for f in found.experiments
         if not f.step
     ]

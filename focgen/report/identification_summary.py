@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import math
 
-from focgen.identification.model import ExperimentFit, Identification
+from focgen.identification.model import ExperimentFit, Identification, Joint
+from focgen.identification.stages import StageFit
 from focgen.report.page import TableOf, text_table
+from focgen.tomlfile import terms_of
 
 _DECIMALS = 7  # more are written with an exponent
 
 
 def identification_payload(found: Identification) -> dict:
     """What ``focgen identify --json`` carries."""
-    pooled = found.pooled
     return {
         "name": found.rig.name,
         "experiments": [_experiment(fit) for fit in found.experiments],
-        "rig": {
-            "T": pooled.T,
-            "alpha": pooled.alpha,
-            "gain": list(pooled.gain),
-            "gain_r2": pooled.gain_r2,
-            "ci95": pooled.ci95,
-        },
+        "rig": _joint(found.joint),
+        "stages": {name: _stage(fit) for name, fit in found.stages.items()},
         "gof": found.gof,
         "bic": found.bic,
         "unseen": {log.name: log.gof for log in found.unseen},
@@ -31,8 +27,32 @@ def identification_payload(found: Identification) -> dict:
     }
 
 
+def _joint(joint: Joint | None) -> dict | None:
+    if joint is None:
+        return None
+    keys = ("T", "alpha", "delay", "gain_r2", "ci95", "by_reference")
+    begun = {name: past.steps for name, past in joint.pasts.items()}
+    return {key: getattr(joint, key) for key in keys} | {"gain": list(joint.gain), "initial_steps": begun}
+
+
+def _stage(fit: StageFit) -> dict:
+    up_down = None
+    if fit.up_down is not None:
+        up_down = {key: getattr(fit.up_down, key) for key in ("rising", "falling", "one_line_will_do", "gof")}
+    return {
+        "shape": fit.shape,
+        "num": terms_of(fit.transfer.num),
+        "den": terms_of(fit.transfer.den),
+        "delay": fit.delay,
+        "gof": fit.gof,
+        "parameters": {name: {"value": v, "ci95": (v - h, v + h)} for name, (v, h) in fit.parameters.items()},
+        "up_down": up_down,
+        "shapes": {one.shape: {"bic": one.bic, "gof": one.gof, "refused": one.refused} for one in fit.fits},
+    }
+
+
 def _experiment(fit: ExperimentFit) -> dict:
-    keys = ("name", "K", "T", "alpha", "ci95", "level", "offset", "gof", "fitted", "driven_by", "step")
+    keys = ("name", "K", "T", "alpha", "ci95", "level", "offset", "gof", "fitted", "driven_by", "step", "past")
     return {key: getattr(fit, key) for key in keys} | {
         "integer": {f.name: {"num": f.num, "den": f.den, "offset": f.offset} for f in fit.integer}
     }
@@ -40,7 +60,13 @@ def _experiment(fit: ExperimentFit) -> dict:
 
 def model_label(model: str) -> str:
     """``iom_2p1z`` as Table I writes it."""
-    return {"fom": "FOM", "rig": "rig (pooled)"}.get(model, f"IOM ({model.removeprefix('iom_')})")
+    return {"fom": "FOM", "rig": "the rig"}.get(model, f"IOM ({model.removeprefix('iom_')})")
+
+
+def stage_text(fit: StageFit) -> str:
+    """A stage in one line: what it is, and how well it fits."""
+    parts = ", ".join(f"{name} = {_pm(v, (v - h, v + h))}" for name, (v, h) in fit.parameters.items())
+    return f"{fit.stage}: {fit.shape}, {parts}; GOF {fit.gof:.3f}"
 
 
 def quality_table(found: Identification) -> TableOf:
@@ -59,7 +85,7 @@ def quality_table(found: Identification) -> TableOf:
 
 
 def parameter_table(found: Identification) -> TableOf:
-    """K, T and alpha of each experiment, with 95 % intervals, and the pooled ones."""
+    """K, T and alpha of each experiment, with 95 % intervals, and of all together."""
     rows = [
         (
             fit.name,
@@ -70,8 +96,8 @@ def parameter_table(found: Identification) -> TableOf:
         )
         for fit in found.experiments
     ]
-    pooled = found.pooled
-    rows.append(("pooled", "", "", _pm(pooled.T, pooled.ci95["T"]), _pm(pooled.alpha, pooled.ci95["alpha"])))
+    joint = found.joint
+    rows.append(("all together", "", "", _pm(joint.T, joint.ci95["T"]), _pm(joint.alpha, joint.ci95["alpha"])))
     return TableOf(
         ("experiment", "level", "K", "T (s^alpha)", "alpha"), tuple(rows), "K / (T s^alpha + 1), ± 95 %"
     )
@@ -87,19 +113,26 @@ def _pm(value: float, span: tuple[float, float]) -> str:
 
 
 def gain_text(found: Identification) -> str:
-    """K(p) with its intervals, and R² where it is more than a constant."""
-    powers = ("", " p", *(f" p^{i}" for i in range(2, len(found.pooled.gain))))
+    """K(p) with its intervals, R² where it is more than a constant, and the dead time where there is one."""
+    powers = ("", " p", *(f" p^{i}" for i in range(2, len(found.joint.gain))))
     terms = " + ".join(
         f"({_pm(g, span)}){power}"
-        for g, span, power in zip(found.pooled.gain, found.pooled.ci95["gain"], powers)
+        for g, span, power in zip(found.joint.gain, found.joint.ci95["gain"], powers)
     )
-    r2 = f",  R² = {found.pooled.gain_r2:.4f}" if len(found.pooled.gain) > 1 else ""
-    return f"K(p) = {terms}{r2}"
+    known = found.joint.gain_r2 is not None and len(found.joint.gain) > 1
+    r2 = f",  R² of the single fits = {found.joint.gain_r2:.4f}" if known else ""
+    span = found.joint.ci95.get("delay")
+    late = f"\ndead time = {_pm(found.joint.delay, span)} s" if span else ""
+    return f"K(p) = {terms}{r2}{late}"
 
 
 def identification_text(found: Identification) -> str:
     """The identification for people."""
-    parts = [text_table(quality_table(found)), text_table(parameter_table(found)), gain_text(found)]
+    parts = [stage_text(fit) for fit in found.stages.values()]
+    if found.experiments:
+        parts += [text_table(quality_table(found)), text_table(parameter_table(found))]
+    if found.joint:
+        parts.append(gain_text(found))
     if found.unseen:
         parts.append(
             "not fitted, only shown: " + ", ".join(f"{u.name} GOF {u.gof:.3f}" for u in found.unseen)

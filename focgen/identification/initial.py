@@ -1,0 +1,43 @@
+"""A known actuator's answer to an experiment that may begin anywhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from focgen.identification.excitation import Excitation
+from focgen.identification.kernel import kernels
+from focgen.identification.past import MOST_STEPS, asks_for_past, best_time, columns, fine_times, times
+from focgen.rig.model import Actuator
+
+_EXACT = 1e-4  # of the spread: what is left below shows no past
+
+
+def answer_from_its_past(x: Excitation, actuator: Actuator, delay: float = 0.0) -> np.ndarray:
+    """The actuator's output (n,) for an experiment, with the offset that fits best, and from the initial state that
+    the data ask for; ``delay`` in s.
+
+    The past is one step, or a few, at times on a grid: the one that takes off most, then the next.
+    """
+    at = math.log(actuator.T) / actuator.alpha, actuator.alpha, x.step
+    gain = np.array(actuator.gain)
+    made = gain @ x.respond(kernels(*at, len(x), delay + x.late), 1)[0, : len(gain)]
+    left = x.measured - made
+    chosen: list[np.ndarray] = []
+    long = kernels(*at, x.stepped.count, delay + x.late)
+    reach = float(np.ptp(x.measured))
+    while len(chosen) < MOST_STEPS and np.std(left) > _EXACT * x.spread:
+        if not asks_for_past(left, columns(x, long, times(len(x)), 1)[0], reach):
+            break
+        grid = columns(x, long, fine_times(len(x)), 1)[0]
+        chosen.append(grid[best_time(left, grid)])
+        left = _without(x.measured - made, chosen)
+    return x.measured - left + left.mean()
+
+
+def _without(left: np.ndarray, chosen: list[np.ndarray]) -> np.ndarray:
+    """What a past of these columns, beside an offset, leaves; the offset stays in."""
+    basis = np.column_stack([np.ones(len(left)), *chosen])
+    amounts = np.linalg.lstsq(basis, left, rcond=1e-8)[0]
+    return left - basis[:, 1:] @ amounts[1:]

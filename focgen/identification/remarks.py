@@ -1,0 +1,67 @@
+"""What was done to the logs and taken for granted, each kind of it said once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from focgen.identification.model import Identification
+from focgen.identification.stages import StageFit
+from focgen.logs.experiment import Experiment
+from focgen.logs.notes import listed, notes_of
+from focgen.rig.model import UNITY, LinearActuator, Rig
+
+_INPUTS = {"pressure": "measured pressure", "command": "command through the regulator"}
+_OUTPUTS = {"curvature": "curvature", "output": "output through the sensor"}
+
+
+def remarks_of(
+    experiments: Sequence[Experiment], nominal: Rig, found: Identification, stages: dict[str, StageFit]
+) -> tuple[str, ...]:
+    """The notes, those on the logs first."""
+    said = [*notes_of(experiments)]
+    for fit in stages.values():
+        said += fit.notes
+    said += _pasts(found)
+    said += _singles(found)
+    if isinstance(nominal.actuator, LinearActuator) and found.joint:
+        said.append(
+            "the rig's actuator was a transfer function; the identified one is K(p) p through "
+            "1/(T s^alpha + 1)"
+        )
+    said += _taken_for_one(experiments, nominal, stages)
+    said += [
+        f"driven by the {_INPUTS[driven]}, fitted to the {_OUTPUTS[fitted]}"
+        for driven, fitted in sorted({(f.driven_by, f.fitted) for f in found.experiments})
+    ]
+    if found.joint and found.joint.by_reference:
+        said.append("closed loop: fitted with the reference as the instrument, which feedback's noise is not in")
+    return tuple(said)
+
+
+def _pasts(found: Identification) -> list[str]:
+    pasts = found.joint.pasts if found.joint else {}
+    if not pasts:
+        return []
+    verb = "begins" if len(pasts) == 1 else "begin"
+    return [f"{listed(pasts)} {verb} in a transient: the state from what was before is estimated along"]
+
+
+def _singles(found: Identification) -> list[str]:
+    bare = [f.name for f in found.experiments if f.integer and not any(m.offset for m in f.integer)]
+    if not bare:
+        return []
+    verb = "begins with the step and shows" if len(bare) == 1 else "begin with the step and show"
+    return [f"{listed(bare)} {verb} no offset: integer-order models have none"]
+
+
+def _taken_for_one(experiments: Sequence[Experiment], nominal: Rig, stages: dict[str, StageFit]) -> list[str]:
+    """Stages that both ends of are logged, and that the rig does not have."""
+    said = []
+    for stage, ends in (("regulator", ("command", "pressure")), ("sensor", ("curvature", "output"))):
+        logged = any(all(role in e for role in ends) for e in experiments)
+        if stage not in stages and getattr(nominal, stage) == UNITY and logged:
+            said.append(
+                f"no [{stage}] in the rig: it is taken for 1, though {ends[0]} and {ends[1]} are logged; "
+                f"--stages {stage},actuator identifies it"
+            )
+    return said
