@@ -14,7 +14,6 @@ import numpy as np
 
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
-from focgen.identification.feedback import instruments_of
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
 from focgen.identification.past import MOST_STEPS, Past, asks_for_past, best_time, columns, times
 from focgen.identification.problem import Point, Problem, delay_reach, starts
@@ -26,7 +25,8 @@ _FLAT = 1e-13  # relative fall of the cost, likewise
 _RECONSIDERED = 3  # times that the pasts are chosen anew
 _EXACT = 1e-4  # of the spread: what is left below shows no past
 _EDGE = 1e-6  # distance of α from its bounds
-_INSTRUMENTED = 12  # rounds of the instrumental-variable fit
+_WHITENED = 15  # times that model and noise model are fitted in turn
+_AGREED = 1e-5  # of log τ and α: they agree
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class FractionalFit:
     "alpha", "delay", "gain" (powers,) to half a 95 % interval, and "offset" to that of a single experiment.
     ``gain_covariance`` (powers, powers). ``offset`` (experiments,), ``simulated``: the model's outputs;
     ``pasts``: for each experiment the unknown past that was estimated, None where it began at rest.
-    ``by_reference``: whether a closed loop's reference was the instrument.
+    ``closed_loop``: whether a loop was closed, so that a noise model was fitted along.
     """
 
     gain: np.ndarray
@@ -50,7 +50,7 @@ class FractionalFit:
     residuals: list[ResidualModel]
     simulated: list[np.ndarray]
     pasts: tuple[Past | None, ...]
-    by_reference: bool = False
+    closed_loop: bool = False
 
     @property
     def K(self) -> float:
@@ -78,6 +78,8 @@ def fit_fractional(
         if asked == problem.pasts:
             break
         problem, best = _with_pasts(problem, best, asked)
+    if any(x.reference is not None for x in experiments):
+        problem, best = _whitened(problem, best)
     _check(experiments, best)
     return _finished(problem, best)
 
@@ -167,40 +169,36 @@ def _check(experiments: Sequence[Excitation], best: Point) -> None:
         raise FitError(names, what, "the log does not show such dynamics; look at its columns and its time")
 
 
+def _whitened(problem: Problem, point: Point) -> tuple[Problem, Point]:
+    """The fit with a noise model for each closed loop, both estimated in turn until they agree.
+
+    In a closed loop the input answers the disturbance in the output. The prediction error of a model with the right
+    noise model is not correlated with inputs of the past, so the fit is not biased (Ljung, 1999, §13.4).
+    """
+    for _ in range(_WHITENED):
+        before, models = point.x, [residual_model(part) for part in problem.residuals(point)]
+        filters = [m.a if x.reference is not None else None for m, x in zip(models, problem.experiments)]
+        penalties = [m.variance for m in models]
+        problem = problem.with_whitening(filters, penalties)
+        point = _descended(problem, point.x)
+        if float(np.max(np.abs(point.x - before))) < _AGREED:
+            break
+    return problem, point
+
+
 def _finished(problem: Problem, point: Point) -> FractionalFit:
-    models = [residual_model(part) for part in problem.residuals(point)]
-    instruments = instruments_of(problem.experiments)
-    if instruments is not None:
-        point = _by_instruments(problem, point, instruments)
-        models = [residual_model(part) for part in problem.residuals(point)]
-    jacobians = problem.jacobians(point)
-    by = None if instruments is None else problem.jacobians(point, instruments)
+    models = [residual_model(part) for part in problem.residuals(point, white=True)]
     try:
-        spread = sandwich(jacobians, models, problem.penalties, by)
+        spread = sandwich(problem.jacobians(point), models, problem.penalties)
     except np.linalg.LinAlgError:
         names = ", ".join(e.name for e in problem.experiments)
         raise FitError(
             names, "the logs do not determine K, T and alpha", "record longer holds at more levels"
         ) from None
-    return _with_intervals(problem, point, spread, models, instruments is not None)
+    return _with_intervals(problem, point, spread, models)
 
 
-def _by_instruments(problem: Problem, point: Point, instruments) -> Point:
-    """Make the residual orthogonal to what the reference alone would have moved (Ljung, 1999, §7.6)."""
-    for _ in range(_INSTRUMENTED):
-        by = np.vstack(problem.jacobians(point, instruments))
-        own = np.vstack(problem.jacobians(point))
-        left = np.concatenate(problem.projected_residuals(point))
-        step = np.linalg.solve(by.T @ own, by.T @ left)
-        searched = len(point.x)
-        x = problem.inside(point.x - problem.short(step[:searched]))
-        point = problem.at(x, point.gain - step[searched:])
-        if float(np.max(np.abs(step[:searched]))) < 1e-8:
-            break
-    return point
-
-
-def _with_intervals(problem: Problem, point: Point, spread, models, by_reference: bool) -> FractionalFit:
+def _with_intervals(problem: Problem, point: Point, spread, models) -> FractionalFit:
     log_tau, alpha = point.x[:2]
     T = float(np.exp(alpha * log_tau))
     searched = len(point.x)
@@ -229,7 +227,7 @@ def _with_intervals(problem: Problem, point: Point, spread, models, by_reference
         models,
         problem.simulated(point),
         problem.pasts,
-        by_reference,
+        any(a is not None for a in problem.whitening),
     )
 
 

@@ -152,7 +152,7 @@ def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[Experim
         | ({"delay": span(fit.delay, fit.half["delay"])} if fit.half["delay"] else {}),
         simulated=dict(zip(names, fit.simulated)),
         pasts={name: past for name, past in zip(names, fit.pasts) if past is not None},
-        by_reference=fit.by_reference,
+        closed_loop=fit.closed_loop,
     )
 
 

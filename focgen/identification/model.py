@@ -51,8 +51,8 @@ class Joint:
 
     ``delay`` in s. ``ci95`` maps T, alpha, delay and gain to 95 % intervals. ``gain_r2`` is that of the line
     through the single fits' K, None with fewer than two of them. ``simulated``, by experiment: its output, offset
-    and initial state included. ``pasts``: the experiments that began with an unknown past. ``by_reference``:
-    whether a closed loop's reference was the instrument.
+    and initial state included. ``pasts``: the experiments that began with an unknown past. ``closed_loop``:
+    whether a loop was closed, so that a noise model was fitted along.
     """
 
     T: float
@@ -63,7 +63,7 @@ class Joint:
     ci95: dict[str, Span | tuple[Span, ...]]
     simulated: dict[str, np.ndarray]
     pasts: Mapping[str, Past]
-    by_reference: bool
+    closed_loop: bool
 
 
 @dataclass(frozen=True, eq=False)

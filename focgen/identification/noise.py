@@ -78,23 +78,20 @@ def sandwich(
     jacobians: list[np.ndarray],
     models: list[ResidualModel],
     priors: list[float],
-    instruments: list[np.ndarray] | None = None,
 ) -> np.ndarray:
-    """The same for experiments that have a prior, or instruments.
+    """The same for experiments that have a prior.
 
     ``jacobians``: of each experiment, (n, k), whose residual ``models`` describe; rows beyond a model's count
-    stand for a prior, whose residual is white with the variance in ``priors``. ``instruments``, shaped alike,
-    where the residual was made orthogonal to these.
+    stand for a prior, whose residual is white with the variance in ``priors``.
     """
-    by = jacobians if instruments is None else instruments
-    bread = np.linalg.inv(sum(z.T @ j for z, j in zip(by, jacobians)))
-    meat = sum(_carried(z, model, prior) for z, model, prior in zip(by, models, priors))
+    bread = np.linalg.inv(sum(j.T @ j for j in jacobians))
+    meat = sum(_carried(j, model, prior) for j, model, prior in zip(jacobians, models, priors))
     count = sum(model.count for model in models)
-    return bread @ meat @ bread.T * count / max(count - bread.shape[0], 1)
+    return bread @ meat @ bread * count / max(count - bread.shape[0], 1)
 
 
 def _carried(rows: np.ndarray, model: ResidualModel, prior: float) -> np.ndarray:
-    """Zᵀ Γ Z, Γ the autocovariance of a residual and of the prior below it."""
+    """Jᵀ Γ J, Γ the autocovariance of a residual and of the prior below it."""
     spread = lfilter([1.0], model.a, rows[: model.count][::-1], axis=0)  # Γ = σ² H Hᵀ, H the filter 1/a
     below = rows[model.count :]
     return model.variance * spread.T @ spread + prior * below.T @ below

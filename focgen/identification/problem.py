@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from focgen.identification.excitation import Excitation
 from focgen.identification.kernel import Kernels, kernels
@@ -58,7 +59,8 @@ class Problem:
 
     ``x`` is (log τ, α), then the dead time in samples where it is ``delay_free``, then log(θ + 1), θ in samples,
     of every step of a past. ``pasts``: an unknown past for each experiment, or None for a begin at rest;
-    ``penalties``: the variance (scaled) that weighs a past's prior against the data.
+    ``penalties``: the variance (scaled) that weighs a past's prior against the data. ``whitening``: for each
+    experiment the autoregressive filter [1, a₁, …] that makes its residual white, None where it is taken as it is.
     """
 
     ALPHAS = (0.05, 1.95)
@@ -70,17 +72,23 @@ class Problem:
         delay_free: bool,
         delay: float = 0.0,
         penalties: Sequence[float] | None = None,
+        whitening: Sequence[np.ndarray | None] | None = None,
     ):
         self.experiments, self.pasts = tuple(experiments), tuple(pasts)
         self.delay_free, self.delay = delay_free, delay
         self.step = experiments[0].step
         self.weights = [1.0 / x.spread for x in experiments]
         self.penalties = list(penalties) if penalties is not None else [1e-4] * len(experiments)
+        self.whitening = tuple(whitening) if whitening is not None else (None,) * len(experiments)
         self.core = 2 + delay_free
         ends = self.core + np.cumsum([0, *(p.steps if p else 0 for p in self.pasts)])
         self.of_past = [slice(int(a), int(b)) for a, b in zip(ends, ends[1:])]
         self._low, self._high, self._most = self._edges()
         self._store: dict = {}
+
+    def with_whitening(self, filters: Sequence[np.ndarray | None], penalties: Sequence[float]) -> Problem:
+        """The same seen through these filters, for residuals of these variances behind them."""
+        return Problem(self.experiments, self.pasts, self.delay_free, self.delay, penalties, filters)
 
     def _edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The least and the largest ``x`` that make sense, and the longest step in one round."""
@@ -120,18 +128,17 @@ class Problem:
 
     # -- the value at a trial -------------------------------------------------------------------------------
 
-    def at(self, x: np.ndarray, gain: np.ndarray | None = None) -> Point:
-        """The trial ``x`` with the best ``gain``, or the one given."""
+    def at(self, x: np.ndarray) -> Point:
+        """The trial ``x`` with the best gain."""
         parts = [self._value(x, i) for i in range(len(self.experiments))]
-        if gain is None:
-            stacked = np.vstack([_triangle(np.vstack([drives, [target]])) for drives, target, _ in parts])
-            gain = np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0]
+        stacked = np.vstack([_triangle(np.vstack([drives, [target]])) for drives, target, _ in parts])
+        gain = np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0]
         cost, offsets, amounts = 0.0, [], []
         for i, (drives, target, local) in enumerate(parts):
             left = target - gain @ drives
             cost += float(left @ left)
             raw = self.weights[i] * (self.experiments[i].measured - gain @ self._responses(x, i)[0])
-            found = local.amounts(raw)
+            found = local.amounts(self._white(i, raw[None])[0])
             offsets.append(float(found[0]))
             amounts.append(found[1:])
         return Point(np.array(x, float), gain, offsets, amounts, cost)
@@ -139,8 +146,17 @@ class Problem:
     def _value(self, x: np.ndarray, i: int) -> tuple[np.ndarray, np.ndarray, _Local]:
         """Drives and target of an experiment, scaled, its local columns projected out."""
         local, w = self._local(x, i), self.weights[i]
-        rows = local.without(w * np.vstack([self._responses(x, i)[0], self.experiments[i].measured]))
+        columns = w * np.vstack([self._responses(x, i)[0], self.experiments[i].measured])
+        rows = local.without(self._white(i, columns))
         return rows[:-1], rows[-1], local
+
+    def _white(self, i: int, columns: np.ndarray) -> np.ndarray:
+        """Columns (k, n) through the experiment's whitening filter; nothing counts until that is filled."""
+        if self.whitening[i] is None or not len(columns):
+            return columns
+        white = lfilter(self.whitening[i], [1.0], columns, axis=1)
+        white[:, : len(self.whitening[i]) - 1] = 0.0
+        return white
 
     def _responses(self, x: np.ndarray, i: int) -> np.ndarray:
         """Rows × powers × n."""
@@ -161,13 +177,13 @@ class Problem:
         n, w, past = len(self.experiments[i]), self.weights[i], self.pasts[i]
         made = [np.full(n, w)] if offset else []
         if past is None:
-            basis = np.array(made).reshape(len(made), n).T
+            basis = self._white(i, np.array(made).reshape(len(made), n)).T
             sizes = np.linalg.norm(basis, axis=0)
             return _Local(basis / sizes, np.diag(sizes), 0)
         made = np.vstack([*made, w * self._columns(x, i)[0]])
         prior = np.zeros((past.steps, len(made)))
         prior[:, int(offset) :] = np.sqrt(self.penalties[i]) / past.reach * np.eye(past.steps)
-        return _Local(*np.linalg.qr(np.vstack([made.T, prior])), past.steps)
+        return _Local(*np.linalg.qr(np.vstack([self._white(i, made).T, prior])), past.steps)
 
     def _kept(self, what: str, i: int, x: np.ndarray, make):
         """What was made for the last two trials."""
@@ -181,26 +197,26 @@ class Problem:
 
     # -- derivatives ----------------------------------------------------------------------------------------
 
-    def _slopes(self, point: Point, i: int, run: Excitation | None = None) -> np.ndarray:
+    def _slopes(self, point: Point, i: int) -> np.ndarray:
         """Derivatives of an experiment's scaled output by those of ``x`` that it depends on; see :meth:`_own`."""
         x, w = point.x, self.weights[i]
-        made = self._responses(x, i) if run is None else run.respond(self.kernels(x, i))
-        slopes = np.einsum("rmn,m->rn", made[1:], point.gain)
+        slopes = np.einsum("rmn,m->rn", self._responses(x, i)[1:], point.gain)
         if self.pasts[i] is not None:
             slopes = slopes + np.einsum("rjn,j->rn", self._columns(x, i)[1:3], point.amounts[i])
         if self.delay_free:
-            slopes = np.vstack([slopes, self._by_delay(point, i, run or self.experiments[i])])
+            slopes = np.vstack([slopes, self._by_delay(point, i)])
         if self.pasts[i] is not None:
             slopes = np.vstack([slopes, self._columns(x, i)[3] * point.amounts[i][:, None]])
-        return w * slopes
+        return self._white(i, w * slopes)
 
     def _own(self, i: int) -> np.ndarray:
         """Which of ``x`` an experiment depends on."""
         here = self.of_past[i]
         return np.concatenate([np.arange(self.core), np.arange(here.start, here.stop)])
 
-    def _by_delay(self, point: Point, i: int, run: Excitation) -> np.ndarray:
+    def _by_delay(self, point: Point, i: int) -> np.ndarray:
         """The derivative by the dead time, a sample."""
+        run = self.experiments[i]
         low = min(_NUDGE, float(point.x[2]))
         ends = []
         for nudge in (_NUDGE, -low):
@@ -208,28 +224,21 @@ class Problem:
             value = point.gain @ run.respond(made, 1)[0]
             if self.pasts[i] is not None:
                 when = np.exp(point.x[self.of_past[i]]) - 1.0
-                value = value + point.amounts[i] @ columns(self.experiments[i], made, when, 1)[0]
+                value = value + point.amounts[i] @ columns(run, made, when, 1)[0]
             ends.append(value)
         return (ends[0] - ends[1]) / (_NUDGE + low)
 
-    def jacobians(
-        self, point: Point, instruments: Sequence[Excitation | None] | None = None, offset: bool = False
-    ) -> list[np.ndarray]:
+    def jacobians(self, point: Point, offset: bool = False) -> list[np.ndarray]:
         """Derivatives of each experiment's scaled output by x and gain, (n + prior rows, parameters), its local
-        columns projected out.
-
-        ``instruments``: experiments that take the place of the measured ones, None for those that stay.
-        ``offset``: the offset is the last column instead of being projected out.
+        columns projected out; ``offset``: the offset is the last column instead.
         """
         found = []
         for i, x in enumerate(self.experiments):
-            other = instruments[i] if instruments else None
             w, slopes = self.weights[i], np.zeros((len(point.x), len(x)))
-            drives = self._responses(point.x, i) if other is None else other.respond(self.kernels(point.x, i))
-            slopes[self._own(i)] = self._slopes(point, i, other)
-            rows = [slopes, w * drives[0]]
+            slopes[self._own(i)] = self._slopes(point, i)
+            rows = [slopes, self._white(i, w * self._responses(point.x, i)[0])]
             if offset:
-                rows.append(np.full((1, len(x)), w))
+                rows.append(self._white(i, np.full((1, len(x)), w)))
             found.append(self._local(point.x, i, not offset).without(np.vstack(rows)).T)
         return found
 
@@ -250,11 +259,6 @@ class Problem:
 
     # -- results --------------------------------------------------------------------------------------------
 
-    def projected_residuals(self, point: Point) -> list[np.ndarray]:
-        """Model − measured of each experiment, scaled, its local columns projected out, prior rows below."""
-        values = [self._value(point.x, i) for i in range(len(self.experiments))]
-        return [point.gain @ drives - target for drives, target, _ in values]
-
     def from_rest(self, point: Point, i: int) -> np.ndarray:
         """The output of experiment ``i`` without offset and past."""
         return point.gain @ self._responses(point.x, i)[0]
@@ -269,10 +273,11 @@ class Problem:
             found.append(y)
         return found
 
-    def residuals(self, point: Point) -> list[np.ndarray]:
-        """Model − measured of each experiment, scaled."""
+    def residuals(self, point: Point, white: bool = False) -> list[np.ndarray]:
+        """Model − measured of each experiment, scaled, and ``white`` through its filter."""
         made = self.simulated(point)
-        return [w * (y - x.measured) for w, y, x in zip(self.weights, made, self.experiments)]
+        rows = [w * (y - x.measured) for w, y, x in zip(self.weights, made, self.experiments)]
+        return [self._white(i, row[None])[0] for i, row in enumerate(rows)] if white else rows
 
 
 def delay_reach(experiments: Sequence[Excitation]) -> float:

@@ -33,8 +33,8 @@ def remarks_of(
         f"driven by the {_INPUTS[driven]}, fitted to the {_OUTPUTS[fitted]}"
         for driven, fitted in sorted({(f.driven_by, f.fitted) for f in found.experiments})
     ]
-    if found.joint and found.joint.by_reference:
-        said.append("closed loop: fitted with the reference as the instrument, which feedback's noise is not in")
+    if found.joint and found.joint.closed_loop:
+        said.append("closed loop: fitted with a model of the noise, so that feedback brings no bias")
     return tuple(said)
 
 

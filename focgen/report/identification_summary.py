@@ -30,7 +30,7 @@ def identification_payload(found: Identification) -> dict:
 def _joint(joint: Joint | None) -> dict | None:
     if joint is None:
         return None
-    keys = ("T", "alpha", "delay", "gain_r2", "ci95", "by_reference")
+    keys = ("T", "alpha", "delay", "gain_r2", "ci95", "closed_loop")
     begun = {name: past.steps for name, past in joint.pasts.items()}
     return {key: getattr(joint, key) for key in keys} | {"gain": list(joint.gain), "initial_steps": begun}
 
