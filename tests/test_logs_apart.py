@@ -91,7 +91,8 @@ def test_what_a_library_prints_is_no_answer(tmp_path, monkeypatch):
         "import os\nprint('{\"columns\": []}')\nos.write(1, b'noise')\n"
         "class Channel:\n    name = 'u'\n    def __getitem__(self, at):\n        return [1.0, 2.5]\n"
         "class Group:\n    name = 'g'\n    channels = lambda self: [Channel()]\n"
-        "class TdmsFile:\n    groups = lambda self: [Group()]\n    read = classmethod(lambda cls, path: cls())\n"
+        "class TdmsFile:\n    groups = lambda self: [Group()]\n"
+        "    read = classmethod(lambda cls, path: cls())\n"
     )
     found = read_table(standing_in(tmp_path, monkeypatch, text))
     assert list(found.columns) == ["u"] and found.columns["u"].tolist() == [1.0, 2.5]
@@ -170,7 +171,8 @@ def test_damaged_files_never_reach_the_caller(tmp_path):
         raw = bytearray(rng.choice(seeds))
         for _ in range(rng.randint(1, 4)):
             at = rng.randrange(len(raw))
-            raw[at : at + rng.choice((0, 1, 4))] = rng.choice((bytes([rng.randrange(256)]), b"\xff\xff\xff\xff"))
+            by = rng.choice((bytes([rng.randrange(256)]), b"\xff\xff\xff\xff"))
+            raw[at : at + rng.choice((0, 1, 4))] = by
         (tmp_path / "log.mat").write_bytes(raw)
         try:
             read += len(read_table(tmp_path / "log.mat")) > 0
