@@ -88,7 +88,7 @@ def _holds(folder: Path) -> bool:
 
 
 def _is_own(path: Path, kind: Callable[[int], bool]) -> bool:
-    """Whether ``path`` is of this kind, itself and no link to one, this user's, and written by nobody else."""
+    """Whether ``path`` is of this kind, itself and no link to one, this user's, and no other may write it."""
     try:
         found = path.lstat()
     except OSError:

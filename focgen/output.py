@@ -87,11 +87,10 @@ def _equal(one: Path, other: Path) -> bool:
     return other.is_file() and one.read_bytes() == other.read_bytes()
 
 
-def write_files(
-    target: str | Path, files: Mapping[str, str | bytes], inputs: Iterable[Any] = ()
-) -> None:
-    """Write all of ``files`` (relative path → content) into a folder, or none of them; errors as
-    :func:`new_folder`'s.
+def write_files(target: str | Path, files: Mapping[str, str | bytes], inputs: Iterable[Any] = ()) -> None:
+    """Write all of ``files`` (relative path → content) into a folder, or none of them.
+
+    Raises InputError as :func:`new_folder` does, and for a name that leads out of the folder.
     """
     for name in files:
         if Path(name).is_absolute() or ".." in Path(name).parts:

@@ -35,6 +35,20 @@ def crashing(path: Path) -> None:
     path.write_bytes(raw)
 
 
+CHANNEL = """
+class Channel:
+    name = 'u'
+    def __getitem__(self, at):
+        return {values}
+class Group:
+    name = 'g'
+    channels = lambda self: [Channel()]
+class TdmsFile:
+    groups = lambda self: [Group()]
+    read = classmethod(lambda cls, path: cls())
+"""
+
+
 def standing_in(folder: Path, monkeypatch, text: str) -> Path:
     """A package nptdms of our own, which the reader of .tdms finds first; its log."""
     (folder / "nptdms").mkdir()
@@ -87,14 +101,19 @@ def test_a_pipe_that_nobody_writes_is_given_up(tmp_path, monkeypatch):
 
 
 def test_what_a_library_prints_is_no_answer(tmp_path, monkeypatch):
-    text = (
-        "import os\nprint('{\"columns\": []}')\nos.write(1, b'noise')\n"
-        "class Channel:\n    name = 'u'\n    def __getitem__(self, at):\n        return [1.0, 2.5]\n"
-        "class Group:\n    name = 'g'\n    channels = lambda self: [Channel()]\n"
-        "class TdmsFile:\n    groups = lambda self: [Group()]\n    read = classmethod(lambda cls, path: cls())\n"
-    )
+    noise = "import os\nprint('{\"columns\": []}')\nos.write(1, b'noise')\n"
+    text = noise + CHANNEL.format(values="[1.0, 2.5]")
     found = read_table(standing_in(tmp_path, monkeypatch, text))
     assert list(found.columns) == ["u"] and found.columns["u"].tolist() == [1.0, 2.5]
+
+
+def test_the_limits_hold_while_a_log_is_read(tmp_path, monkeypatch):
+    resource = pytest.importorskip("resource")
+    values = "[float(resource.getrlimit(n)[0]) for n in (resource.RLIMIT_AS, resource.RLIMIT_CORE)]"
+    text = "import resource\n" + CHANNEL.format(values=values)
+    found = read_table(standing_in(tmp_path, monkeypatch, text)).columns["u"].tolist()
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    assert found == [reader.MEMORY if hard < 0 else min(hard, reader.MEMORY), 0.0]
 
 
 def test_a_missing_library_reaches_the_user_unchanged(tmp_path, monkeypatch):
@@ -170,7 +189,8 @@ def test_damaged_files_never_reach_the_caller(tmp_path):
         raw = bytearray(rng.choice(seeds))
         for _ in range(rng.randint(1, 4)):
             at = rng.randrange(len(raw))
-            raw[at : at + rng.choice((0, 1, 4))] = rng.choice((bytes([rng.randrange(256)]), b"\xff\xff\xff\xff"))
+            by = rng.choice((bytes([rng.randrange(256)]), b"\xff\xff\xff\xff"))
+            raw[at : at + rng.choice((0, 1, 4))] = by
         (tmp_path / "log.mat").write_bytes(raw)
         try:
             read += len(read_table(tmp_path / "log.mat")) > 0

@@ -112,7 +112,8 @@ def test_what_a_trial_lacks_is_told_in_one_line(trial, missing, capsys):
 
 # ------------------------------------------------------------------------------------------- mutations
 
-ODD = (None, True, 0, -1, 1e999, 10**400, 0.5, "", "x", "../x", "/", "\x00", "C" * 300, [], [[]], {}, {"a": 1})
+ODD = (None, True, 0, -1, 1e999, 10**400, 0.5, "", "x", "../x", "/", "\x00", "C" * 300,
+       [], [[]], {}, {"a": 1})  # fmt: skip
 
 
 def mutated(text: str, rng: random.Random) -> bytes:

@@ -1,8 +1,9 @@
 """Whatever is broken in generated C, ``verify`` says so: one fault at a time, sown into the text.
 
 The bytes tell of each before anything is compiled; compiled all the same, as ``edited`` asks for, the samples
-must tell of it, too. A lost saturation of a *narrowing* is not among them: it is proved that none is ever reached
-(test_codegen_runtime.py tries those functions by themselves); a lost clamp of an input or of the integral is.
+must tell of it, too. A lost saturation of a *narrowing* is not among them: it is proved that none is ever
+reached (test_codegen_runtime.py tries those functions by themselves); a lost clamp of an input or of the
+integral is.
 """
 
 import json

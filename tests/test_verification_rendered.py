@@ -88,9 +88,9 @@ EDITED = {
     "a comment": ("spba.c", appended("spba.c")),
     "code at the end": (
         "spba.c",
-        appended("spba.c", '#include <stdlib.h>\n__attribute__((constructor)) static void x(void) { abort(); }'),
+        appended("spba.c", "void abort(void);\n__attribute__((constructor)) static void x(void) { abort(); }"),
     ),
-    "a trigger": ("spba.c", replaced("spba.c", "    unsigned flags = 0;", "    unsigned flags = ref == 123;")),
+    "a trigger": ("spba.c", replaced("spba.c", "unsigned flags = 0;", "unsigned flags = u == 123;")),
     "a coefficient in a comment": ("spba.h", replaced("spba.h", "1.32 s^0.6", "1.33 s^0.6")),
     "a member": ("spba.h", replaced("spba.h", "typedef struct {", "typedef struct {\n    int extra;")),
     "the header's end of line": ("spba.h", replaced("spba.h", "\n", "\r\n")),
@@ -123,7 +123,8 @@ def test_an_edited_folder_is_compiled_where_that_is_asked_for(folder, capsys):
     appended("spba.c")(folder)
     assert main(["verify", str(folder), "--samples", "200", "--edited"]) == 1
     out = capsys.readouterr().out
-    assert "samples equal in every bit" in out and "NOT verified: what ran agrees, but it has been edited" in out
+    assert "samples equal in every bit" in out
+    assert "NOT verified: what ran agrees, but it has been edited" in out
     assert "spba.c: is not what focgen writes" in out
 
 
@@ -133,7 +134,7 @@ NOTED = {
     "example/main.c: has been edited": appended("example/main.c"),
     "example/main.c: is missing": lambda folder: shutil.rmtree(folder / "example"),
     "mine.txt: does not belong to the folder": lambda folder: (folder / "mine.txt").write_text("x"),
-    "example/mine.c: does not belong to the folder": lambda folder: (folder / "example" / "mine.c").write_text("x"),
+    "example/x.c: does not belong to the folder": lambda folder: (folder / "example" / "x.c").write_text("x"),
 }
 
 
@@ -179,7 +180,10 @@ def test_what_is_compiled_is_what_was_compared(folder):
 # ------------------------------------------------------------------------------------------- the manifest
 
 
-@pytest.mark.parametrize("name", ("{0}/outside", "../outside", "a/b", "", "int", "x;y", "spba\n", "..", "NULL"))
+NAMES = ("{0}/outside", "../outside", "a/b", "", "int", "x;y", "spba\n", "..", "NULL")
+
+
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("edited", (False, True))
 def test_a_name_that_leads_elsewhere_is_refused(folder, tmp_path, name, edited, nothing_compiled, capsys):
     name = name.format(tmp_path)
@@ -220,7 +224,10 @@ def test_an_option_that_is_none_is_refused(folder, change, told, nothing_compile
     assert re.search(told, err) and err.count("\n") == 1, err
 
 
-@pytest.mark.parametrize("raw", (b"[" * 3000, b'{"length": ' + b"9" * 5000 + b"}", b"\xff", b"NaN", b'{"a": 1e999}'))
+RAW = (b"[" * 3000, b'{"length": ' + b"9" * 5000 + b"}", b"\xff", b"NaN", b'{"a": 1e999}')
+
+
+@pytest.mark.parametrize("raw", RAW)
 def test_what_is_no_manifest_is_refused(folder, raw, capsys):
     (folder / "manifest.json").write_bytes(raw)
     assert main(["verify", str(folder)]) == 2
@@ -246,7 +253,8 @@ def test_a_study_counts_a_controller_of_any_name():
     """What it is called is no name in C, and no path."""
     from focgen.studies.costs import costs as studied
 
-    named = [studied(build_plan(paper_controller(8, name=name), "q15"), None) for name in ("spba", "../My loop; x")]
+    plans = [build_plan(paper_controller(8, name=name), "q15") for name in ("spba", "../My loop; x")]
+    named = [studied(plan, None) for plan in plans]
     assert named[0].flash_bytes == named[1].flash_bytes > 0 and named[1].note is None
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Collection
 from pathlib import Path
 
 from focgen.codegen.manifest import sha256
+from focgen.errors import InputError
+from focgen.jsontext import read_json
 
 
 def leftovers(folder: Path, name: str, files: Collection[str]) -> tuple[Path, ...]:
@@ -22,15 +23,16 @@ def leftovers(folder: Path, name: str, files: Collection[str]) -> tuple[Path, ..
     test = [f"{name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
     inputs = manifest.get("inputs")
     written = inputs.items() if isinstance(inputs, dict) else ()
-    headers = [file for file, digest in written if re.fullmatch(r"foc_\w+\.h", file) and _is(folder / file, digest)]
+    runtime = [(file, digest) for file, digest in written if re.fullmatch(r"foc_\w+\.h", file)]
+    headers = [file for file, digest in runtime if _is(folder / file, digest)]
     old = [folder / file for file in (*test, *headers) if file not in files]
     return tuple(path for path in old if path.is_file())
 
 
 def _manifest(folder: Path) -> dict:
     try:
-        found = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = read_json(folder / "manifest.json", "")
+    except InputError:
         return {}
     return found if isinstance(found, dict) else {}
 

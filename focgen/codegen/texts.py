@@ -1,4 +1,4 @@
-"""A user's text in generated files: a comment, a string, a format and a page of Markdown each have their rule.
+"""A user's text in generated files: comment, string, format and Markdown have each their rule.
 
 A name or a unit stands in :class:`UserText` until it is printed. That has no form of its own: a template that
 prints it says by a filter (``comment``, ``string``, ``printf``, ``markdown``) where it stands, or fails.

@@ -36,12 +36,17 @@ def main(module: str, path: Path) -> None:
         what = f"takes more than {MEMORY >> 30} GB to read"
         head, columns = {"fault": ["LogError", str(path), what, "split it into smaller files"]}, []
     except Exception as reason:  # noqa: BLE001 - readers raise whatever a damaged file leads them to
-        what = f"is damaged: its reader stopped with {type(reason).__name__}"
+        what = f"is damaged: its reader stopped with {_kind(reason)}"
         head, columns = {"fault": ["LogError", str(path), what, "save it again, or as .csv"]}, []
     answer.write(json.dumps(head).encode("ascii") + b"\n")
     for column in columns:
         answer.write(column.data)
     answer.close()
+
+
+def _kind(reason: Exception) -> str:
+    kind = type(reason)
+    return kind.__name__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__name__}"
 
 
 def _read(module: str, path: Path) -> LogTable:

@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from focgen.errors import InputError
+from focgen.jsontext import read_json
 from focgen.output import write_file
 from focgen.studies.jobs import Job
 
@@ -22,9 +24,10 @@ class Store:
     def find(self, job: Job) -> dict[str, Any] | None:
         """The answer, or None where there is none that can be read."""
         try:
-            return json.loads(self._place(job).read_text(encoding="utf-8"))
-        except (OSError, json.JSONDecodeError):
+            found = read_json(self._place(job), "")
+        except InputError:
             return None
+        return found if isinstance(found, dict) else None
 
     def keep(self, job: Job, found: dict[str, Any]) -> dict[str, Any]:
         """Write an answer, whole or not at all, and return it as it will be read."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,7 +106,7 @@ def _found(path: Path, shape: Any) -> Any:
 def achieved_in(run: Path) -> tuple[float | None] | None:
     """The achieved shrink that was kept beside a run, which may be None; no tuple where nothing was kept."""
     try:
-        found = json.loads((run / "achieved.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        found = read_json(run / "achieved.json", _ANEW)
+    except InputError:
         return None
     return (found,) if fits(found, (float, None)) else None

@@ -101,9 +101,7 @@ def outcome_of(folder: Path) -> dict:
     return outcome_in(folder) or {"status": "failed", "seconds": None, "fault": "not run"}
 
 
-def diagnose_case(
-    trial: Path, kind: str, number: str, limit: float, effects: tuple[str, ...] = ()
-) -> None:
+def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tuple[str, ...] = ()) -> None:
     """Diagnose a case of a trial away from everything else, then bring the results to TRIAL/KIND/NUMBER.
 
     Raises InputError where the case cannot be read, or the results' place lies outside the trial.
@@ -114,7 +112,8 @@ def diagnose_case(
         try:
             shutil.copytree(case, blind)
         except OSError as reason:
-            raise InputError(str(case), f"cannot be copied ({_first(reason)})", "make the cases anew") from None
+            what = f"cannot be copied ({_first(reason)})"
+            raise InputError(str(case), what, "make the cases anew") from None
         fault = _process(blind, out, limit, effects)
         out.mkdir(exist_ok=True)
         if not (out / "outcome.json").exists():

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from focgen.codegen.kernels import TARGETS
 from focgen.errors import InputError, MissingExtra, check_choice
+from focgen.jsontext import read_json
 from focgen.output import write_file
 from focgen.targets.asked import asked_for, entry_of
 from focgen.targets.cores import core
@@ -135,12 +136,12 @@ def _remember(read: GeneratedFolder, compiler: str, found: dict[str, Cost]) -> d
 def _stored(path: Path) -> dict:
     """What a folder remembers; nothing where that cannot be read."""
     try:
-        stored = json.loads(path.read_text(encoding="utf-8"))
+        stored = read_json(path, "")
         for part in stored.values():
             for entry in (*part["targets"].values(), *part["previous"].values()):
                 cost_of(entry)
         return stored
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+    except (InputError, ValueError, TypeError, KeyError, AttributeError):
         return {}
 
 

@@ -1,4 +1,4 @@
-"""What a folder's manifest.json says it was made with, checked before a name becomes a path or an option a plan."""
+"""What a manifest says that its folder was made with, checked before any of it becomes a path or a plan."""
 
 from __future__ import annotations
 

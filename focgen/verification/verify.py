@@ -23,8 +23,9 @@ _LEFT = "the folder has been edited, so nothing of it was compiled (--edited doe
 
 @dataclass(frozen=True)
 class Verification:
-    """``targets`` by name; ``differences`` between the folder and what its controller.toml gives; ``notes`` on
-    files that nothing is compiled from; ``agrees``: what ran does; ``holds``: it does, and nothing was edited.
+    """``targets`` by name; ``differences`` between the folder and what its controller.toml gives; ``notes``
+    on files that nothing is compiled from; ``agrees``: what ran does; ``holds``: it does, and nothing was
+    edited.
     """
 
     name: str
