@@ -91,7 +91,8 @@ def test_a_clock_that_starts_anew_begins_an_experiment(tmp_path):
     assert [log.name for log in logs] == ["log", "log (2)", "log (3)"]
     assert [len(log) for log in logs] == [400, 350, 250] and not any(log.continues for log in logs)
     assert [log.start for log in logs] == pytest.approx([0.0, 4.0, 7.5])
-    back = read_columns(tmp_path, ramp(t_s=7200.0 + STEP * np.arange(COUNT) - 3600.0 * (np.arange(COUNT) > 499)))
+    hour_back = 7200.0 + STEP * np.arange(COUNT) - 3600.0 * (np.arange(COUNT) > 499)
+    back = read_columns(tmp_path, ramp(t_s=hour_back))
     assert [len(log) for log in back] == [500, 500]
 
 
@@ -120,7 +121,8 @@ def test_repeated_stamps_without_a_uniform_clock_are_refused(tmp_path):
 
 def test_rows_logged_twice_are_taken_once(tmp_path):
     (log,) = read_columns(tmp_path, rows_of(ramp(), np.sort(np.r_[:COUNT, 77, 500])))
-    assert np.array_equal(log["output"], ramp()["kappa_per_mm"]) and noted(log, "twice", "2, the first in line 80")
+    assert np.array_equal(log["output"], ramp()["kappa_per_mm"])
+    assert noted(log, "twice", "2, the first in line 80")
 
 
 @pytest.mark.parametrize("column", ["p_bar", "kappa_cam_per_mm", "kappa_per_mm", "u_V"])
@@ -226,7 +228,8 @@ def measured(rng, signal, noise) -> np.ndarray:
     """With white or slow noise, and through a converter or not."""
     white = rng.normal(size=len(signal))
     if rng.random() < 0.5:
-        white = np.sqrt(0.5) * (white + np.sqrt(1 - 0.81) * _filtered(rng.normal(size=len(signal)), 0.1, 0) * 10)
+        slow = np.sqrt(1 - 0.81) * 10 * _filtered(rng.normal(size=len(signal)), 0.1, 0)
+        white = np.sqrt(0.5) * (white + slow)
     y = signal + noise * white
     count = noise * rng.choice([0.0, 0.3, 3.0, 20.0])
     return np.round(y / count) * count if count else y
