@@ -250,8 +250,8 @@ def test_no_outlier_is_seen_where_there_is_none(kind):
     "kind, width", [("overshoot", 1), *((k, w) for k in ("steps", "sines") for w in (1, 2, 3))]
 )
 def test_outliers_at_rest_of_the_signal_are_found(kind, width):
-    """Away from the steps, 8 to 40 standard deviations of the noise off; slow sines. A signal that rings hides
-    some, and one that jumps as high keeps pulses of several readings."""
+    """Away from the steps, 8 to 40 standard deviations of the noise off; slow sines. Ringing hides some,
+    and one that jumps as high keeps pulses of several readings."""
     rng, found, wrong = np.random.default_rng(6), 0, 0
     for _ in range(60):
         signal, _, _ = clean(rng, kind)

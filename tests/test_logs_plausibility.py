@@ -29,7 +29,7 @@ def example(request):
 
 
 def slipped(logs, only=None, faster=1.0, exchange=(), **slips) -> list[Experiment]:
-    """The logs with functions applied to roles, two roles exchanged, only some roles kept, or another clock."""
+    """The logs with functions applied to roles, two exchanged, only some kept, or another clock."""
     changed = []
     for log in logs:
         signals = {role: slips.get(role, lambda y: y)(y) for role, y in log.signals.items()}
@@ -64,7 +64,7 @@ SLIPS = {
     "sign of command": (dict(command=times(-1.0)), "sign of command flipped"),
     "gauge and camera": (dict(exchange=("pressure", "curvature")), "pressure and curvature exchanged"),
     "gauge and output": (dict(exchange=("pressure", "output")), "columns of pressure and output exchanged"),
-    "camera and sensor": (dict(exchange=("curvature", "output")), "columns of curvature and output exchanged"),
+    "camera and sensor": (dict(exchange=("curvature", "output")), "curvature and output exchanged"),
     "absolute": (dict(pressure=lambda p: p + 1.013), "absolute instead of gauge pressure"),
     "minutes": (dict(faster=1 / 60), "minutes instead of seconds"),
     "row numbers": (dict(faster=50.0), "row numbers instead of seconds"),
@@ -189,6 +189,19 @@ def test_the_example_logs_stay_silent(example):
     for only in (("pressure", "output"), ("command", "output"), ("command", "pressure", "output")):
         assert doubts(rig, slipped(logs, only)) == ()
     assert doubts(rig, slipped(logs, faster=4.0)) == (), "a log at a quarter of the rate"
+
+
+def test_an_absolute_pressure_within_the_range_is_told_by_the_command_at_rest():
+    """A range of 6 bar; the same values in an unnamed unit, or with the command up, may be right."""
+    command = np.repeat([0.0, 2.0, 6.0, 0.0], 100)
+    limits = {"command": (0.0, 10.0), "pressure": (0.0, 6.0)}
+
+    def said(command, column):
+        log = Experiment("a", 0.01, {"command": command, "pressure": 1.013 + 0.5 * np.repeat([0, 2, 6, 0], 100)})
+        return by_ranges([log], limits, {"pressure": column})
+
+    assert "absolute" in said(command, "p_bar")[0]
+    assert said(command, "p") == () and said(command + 2.0, "p_bar") == () and said(command, "p_kPa") == ()
 
 
 def test_units_by_name():

@@ -43,7 +43,7 @@ Signals = dict[str, list[np.ndarray]]
 @dataclass(frozen=True)
 class Slip:
     """``roles`` hold ``factor`` times what they should plus ``shift``; or, ``exchanged``, two of them each
-    other's signal. ``words`` say so; of slips that explain alike the one of less ``price`` is the likelier."""
+    other's signal. ``words`` say so; of slips that explain alike the one of less ``price`` is likelier."""
 
     words: str
     roles: tuple[str, ...]
@@ -224,23 +224,27 @@ def _out_of_range(signals: Signals, limits: Limits) -> list[str]:
 
 def _absolute(signals: Signals, limits: Limits, columns: Mapping[str, str]) -> Slip | None:
     """The slip of an absolute for a gauge pressure, where it rests at that of the air and its range begins at
-    0."""
+    0. Within the range that is a slip only of a known unit, and no small offset, with the command at rest.
+    """
     if "pressure" not in signals or "pressure" not in limits:
         return None
     low, high = limits["pressure"]
-    unit = (unit_of(columns.get("pressure", "")) or ("pressure", "bar"))[1]
+    known = unit_of(columns.get("pressure", ""))
+    unit = (known or ("pressure", "bar"))[1]
     air = _ATMOSPHERE / _SIZES["pressure"].get(unit, 1.0)
     rest = _lowest(signals)
-    at_rest = rest > EXCESS * high or ("command" in limits and _commanded_rest(signals, limits["command"]))
+    at_rest = rest > EXCESS * high or (
+        known and rest > _REST * high and _commanded_rest(signals, limits.get("command"))
+    )
     if abs(low) > _REST * high or not _WEATHER[0] <= rest / air <= _WEATHER[1] or not at_rest:
         return None
     slip = Slip("absolute instead of gauge pressure", ("pressure",), shift=rest)
     return None if _peak(slip.undone(signals)["pressure"]) > EXCESS * high else slip
 
 
-def _commanded_rest(signals: Signals, span: tuple[float, float]) -> bool:
+def _commanded_rest(signals: Signals, span: tuple[float, float] | None) -> bool:
     """Whether the lowest pressure comes with a command at the lower end of its range."""
-    if "command" not in signals:
+    if "command" not in signals or span is None:
         return False
     pressure, command = (np.concatenate(signals[role]) for role in ("pressure", "command"))
     resting = command[pressure <= np.quantile(pressure, 0.02)]
