@@ -71,6 +71,8 @@ def test_holes_in_an_irregular_clock_are_told_from_its_own_steps(tmp_path):
     time = np.cumsum(np.random.default_rng(3).uniform(0.2, 1.8, COUNT)) * STEP
     (whole,) = read_columns(tmp_path, ramp(t_s=time))
     assert noted(whole, "not uniform")
+    bursts = np.cumsum(np.where(np.arange(COUNT) % 3 == 0, 8.37, 1.0)) * STEP
+    assert len(read_columns(tmp_path, ramp(t_s=bursts))) == 1, "three rows at a time"
     parts = read_columns(tmp_path, ramp(t_s=time + 500.0 * (np.arange(COUNT) >= 400)))
     assert [part.continues for part in parts] == [False, True]
     assert parts[0].time[-1] < 6.0 and parts[1].start == pytest.approx(time[400] + 500.0)
@@ -266,6 +268,14 @@ def test_outliers_at_rest_of_the_signal_are_found(kind, width):
     assert found >= (56 if width == 1 else 45) and wrong == 0
 
 
+def test_pulses_that_come_often_are_the_signal():
+    rng = np.random.default_rng(8)
+    pulses = np.zeros(2000)
+    pulses[rng.permutation(200)[:40] * 10] = 1.0
+    y = pulses + 0.01 * rng.normal(size=2000)
+    assert not outliers(y).any() and outliers(np.where(np.arange(2000) < 1700, y - pulses, y)).any()
+
+
 def test_an_outlier_of_a_log_is_bridged_and_counted(tmp_path):
     rng = np.random.default_rng(1)
     noise = 1e-5 * rng.normal(size=COUNT)
@@ -303,6 +313,8 @@ def test_a_coarse_converter_is_not_taken_for_a_slow_camera():
         count = noise * rng.uniform(0.5, 30.0)
         assert fresh_rows(np.round((signal + noise * rng.normal(size=len(signal))) / count) * count) is None
     assert fresh_rows(np.floor(np.arange(2000) / 7.0)) is None
+    at_times = np.repeat(rng.normal(size=700), rng.integers(1, 6, 700))
+    assert fresh_rows(at_times) is None, "readings that come at no rate of their own"
 
 
 def test_a_frozen_reading_is_named(tmp_path):
@@ -312,7 +324,8 @@ def test_a_frozen_reading_is_named(tmp_path):
     stuck[420:480] = stuck[420]
     (log,) = read_columns(tmp_path, ramp(kappa_cam_per_mm=stuck, kappa_per_mm=moving))
     assert noted(log, "curvature frozen", "for 0.6 s from 4.2 s") and len(log.notes) == 1
-    ceiling = np.minimum(moving, 0.005)
+    ceiling = np.where(np.arange(COUNT) < 200, np.minimum(moving, 0.009), 0.8 * moving)
     assert frozen(ceiling, [moving]) is None, "a reading that saturates is not frozen"
     assert frozen(stuck, [np.zeros(COUNT)]) is None, "nothing moves"
-    assert frozen(np.round(moving, 2), [moving]) is None, "a coarse converter"
+    play = np.clip(np.cumsum(np.r_[np.ones(300), np.zeros(100), -np.ones(600)]), -200, 900)
+    assert frozen(np.round(play / 5), [moving]) is None, "a coarse converter behind play"

@@ -189,6 +189,9 @@ def test_the_example_logs_stay_silent(example):
     for only in (("pressure", "output"), ("command", "output"), ("command", "pressure", "output")):
         assert doubts(rig, slipped(logs, only)) == ()
     assert doubts(rig, slipped(logs, faster=4.0)) == (), "a log at a quarter of the rate"
+    assert doubts(replace(rig, sample_time=0.8), logs) == (), "a fortieth of the sample time, and no minutes"
+    shifted = slipped(logs, pressure=lambda p: p + 0.08, output=lambda y: y + 0.012)
+    assert doubts(rig, shifted) == (), "offsets"
 
 
 def test_an_absolute_pressure_within_the_range_is_told_by_the_command_at_rest():
@@ -197,7 +200,8 @@ def test_an_absolute_pressure_within_the_range_is_told_by_the_command_at_rest():
     limits = {"command": (0.0, 10.0), "pressure": (0.0, 6.0)}
 
     def said(command, column):
-        log = Experiment("a", 0.01, {"command": command, "pressure": 1.013 + 0.5 * np.repeat([0, 2, 6, 0], 100)})
+        pressure = 1.013 + 0.5 * np.repeat([0.0, 2.0, 6.0, 0.0], 100)
+        log = Experiment("a", 0.01, {"command": command, "pressure": pressure})
         return by_ranges([log], limits, {"pressure": column})
 
     assert "absolute" in said(command, "p_bar")[0]
