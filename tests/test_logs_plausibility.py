@@ -192,6 +192,10 @@ def test_the_example_logs_stay_silent(example):
     assert doubts(replace(rig, sample_time=0.8), logs) == (), "a fortieth of the sample time, and no minutes"
     shifted = slipped(logs, pressure=lambda p: p + 0.08, output=lambda y: y + 0.012)
     assert doubts(rig, shifted) == (), "offsets"
+    far = slipped(logs, curvature=lambda y: y + 1.0)
+    assert doubts(rig, far) == (), "a camera's arbitrary zero"
+    exchanged = slipped(logs, exchange=("curvature", "output"), output=lambda y: y + 1.0)
+    assert "curvature and output exchanged" in doubts(rig, exchanged)[0], "whatever the camera's zero"
 
 
 def test_an_absolute_pressure_within_the_range_is_told_by_the_command_at_rest():
