@@ -71,6 +71,8 @@ def test_holes_in_an_irregular_clock_are_told_from_its_own_steps(tmp_path):
     time = np.cumsum(np.random.default_rng(3).uniform(0.2, 1.8, COUNT)) * STEP
     (whole,) = read_columns(tmp_path, ramp(t_s=time))
     assert noted(whole, "not uniform")
+    bursts = np.cumsum(np.where(np.arange(COUNT) % 3 == 0, 8.37, 1.0)) * STEP
+    assert len(read_columns(tmp_path, ramp(t_s=bursts))) == 1, "three rows at a time"
     parts = read_columns(tmp_path, ramp(t_s=time + 500.0 * (np.arange(COUNT) >= 400)))
     assert [part.continues for part in parts] == [False, True]
     assert parts[0].time[-1] < 6.0 and parts[1].start == pytest.approx(time[400] + 500.0)
@@ -91,7 +93,8 @@ def test_a_clock_that_starts_anew_begins_an_experiment(tmp_path):
     assert [log.name for log in logs] == ["log", "log (2)", "log (3)"]
     assert [len(log) for log in logs] == [400, 350, 250] and not any(log.continues for log in logs)
     assert [log.start for log in logs] == pytest.approx([0.0, 4.0, 7.5])
-    back = read_columns(tmp_path, ramp(t_s=7200.0 + STEP * np.arange(COUNT) - 3600.0 * (np.arange(COUNT) > 499)))
+    hour_back = 7200.0 + STEP * np.arange(COUNT) - 3600.0 * (np.arange(COUNT) > 499)
+    back = read_columns(tmp_path, ramp(t_s=hour_back))
     assert [len(log) for log in back] == [500, 500]
 
 
@@ -120,7 +123,8 @@ def test_repeated_stamps_without_a_uniform_clock_are_refused(tmp_path):
 
 def test_rows_logged_twice_are_taken_once(tmp_path):
     (log,) = read_columns(tmp_path, rows_of(ramp(), np.sort(np.r_[:COUNT, 77, 500])))
-    assert np.array_equal(log["output"], ramp()["kappa_per_mm"]) and noted(log, "twice", "2, the first in line 80")
+    assert np.array_equal(log["output"], ramp()["kappa_per_mm"])
+    assert noted(log, "twice", "2, the first in line 80")
 
 
 @pytest.mark.parametrize("column", ["p_bar", "kappa_cam_per_mm", "kappa_per_mm", "u_V"])
@@ -226,7 +230,8 @@ def measured(rng, signal, noise) -> np.ndarray:
     """With white or slow noise, and through a converter or not."""
     white = rng.normal(size=len(signal))
     if rng.random() < 0.5:
-        white = np.sqrt(0.5) * (white + np.sqrt(1 - 0.81) * _filtered(rng.normal(size=len(signal)), 0.1, 0) * 10)
+        slow = np.sqrt(1 - 0.81) * 10 * _filtered(rng.normal(size=len(signal)), 0.1, 0)
+        white = np.sqrt(0.5) * (white + slow)
     y = signal + noise * white
     count = noise * rng.choice([0.0, 0.3, 3.0, 20.0])
     return np.round(y / count) * count if count else y
@@ -247,8 +252,8 @@ def test_no_outlier_is_seen_where_there_is_none(kind):
     "kind, width", [("overshoot", 1), *((k, w) for k in ("steps", "sines") for w in (1, 2, 3))]
 )
 def test_outliers_at_rest_of_the_signal_are_found(kind, width):
-    """Away from the steps, 8 to 40 standard deviations of the noise off; slow sines. A signal that rings hides
-    some, and one that jumps as high keeps pulses of several readings."""
+    """Away from the steps, 8 to 40 standard deviations of the noise off; slow sines. Ringing hides some,
+    and one that jumps as high keeps pulses of several readings."""
     rng, found, wrong = np.random.default_rng(6), 0, 0
     for _ in range(60):
         signal, _, _ = clean(rng, kind)
@@ -261,6 +266,14 @@ def test_outliers_at_rest_of_the_signal_are_found(kind, width):
         found += bool(seen[at : at + width].all())
         wrong += int(seen.sum()) - int(seen[at : at + width].sum())
     assert found >= (56 if width == 1 else 45) and wrong == 0
+
+
+def test_pulses_that_come_often_are_the_signal():
+    rng = np.random.default_rng(8)
+    pulses = np.zeros(2000)
+    pulses[rng.permutation(200)[:40] * 10] = 1.0
+    y = pulses + 0.01 * rng.normal(size=2000)
+    assert not outliers(y).any() and outliers(np.where(np.arange(2000) < 1700, y - pulses, y)).any()
 
 
 def test_an_outlier_of_a_log_is_bridged_and_counted(tmp_path):
@@ -300,6 +313,8 @@ def test_a_coarse_converter_is_not_taken_for_a_slow_camera():
         count = noise * rng.uniform(0.5, 30.0)
         assert fresh_rows(np.round((signal + noise * rng.normal(size=len(signal))) / count) * count) is None
     assert fresh_rows(np.floor(np.arange(2000) / 7.0)) is None
+    at_times = np.repeat(rng.normal(size=700), rng.integers(2, 5, 700))
+    assert fresh_rows(at_times) is None, "readings that come at no rate of their own"
 
 
 def test_a_frozen_reading_is_named(tmp_path):
@@ -309,7 +324,8 @@ def test_a_frozen_reading_is_named(tmp_path):
     stuck[420:480] = stuck[420]
     (log,) = read_columns(tmp_path, ramp(kappa_cam_per_mm=stuck, kappa_per_mm=moving))
     assert noted(log, "curvature frozen", "for 0.6 s from 4.2 s") and len(log.notes) == 1
-    ceiling = np.minimum(moving, 0.005)
-    assert frozen(ceiling, [moving]) is None, "a reading that saturates is not frozen"
+    ceiling = np.where(np.arange(COUNT) < 200, np.minimum(moving, 0.009), 0.8 * moving)
+    assert frozen(ceiling, [np.roll(moving, 50)]) is None, "a reading that saturates is not frozen"
     assert frozen(stuck, [np.zeros(COUNT)]) is None, "nothing moves"
-    assert frozen(np.round(moving, 2), [moving]) is None, "a coarse converter"
+    play = np.cumsum(np.r_[np.ones(300), np.zeros(100), np.ones(200), -np.ones(400)])
+    assert frozen(np.round(play / 5), [moving]) is None, "a coarse converter behind play"

@@ -13,7 +13,7 @@ from focgen.logs import Experiment, read_logs
 from focgen.logs.plausibility import doubts as by_ranges
 from focgen.logs.plausibility import hint, unit_of
 from focgen.rig.files import read_rig, write_rig
-from focgen.rig.model import Actuator, Ranges, Rig, Signals
+from focgen.rig.model import UNITY, Actuator, Ranges, Rig, Signals
 from focgen.rig.plausibility import doubts
 from focgen.rig.replay import simulate_session
 from tests.test_logs_read import LIMITS, SIGNALS, read_columns, table
@@ -29,7 +29,7 @@ def example(request):
 
 
 def slipped(logs, only=None, faster=1.0, exchange=(), **slips) -> list[Experiment]:
-    """The logs with functions applied to roles, two roles exchanged, only some roles kept, or another clock."""
+    """The logs with functions applied to roles, two exchanged, only some kept, or another clock."""
     changed = []
     for log in logs:
         signals = {role: slips.get(role, lambda y: y)(y) for role, y in log.signals.items()}
@@ -62,9 +62,9 @@ SLIPS = {
     "sign of output": (dict(output=times(-1.0)), "sign of output flipped"),
     "sign of pressure": (dict(pressure=times(-1.0)), "sign of pressure flipped"),
     "sign of command": (dict(command=times(-1.0)), "sign of command flipped"),
-    "gauge and camera": (dict(exchange=("pressure", "curvature")), "columns of pressure and curvature exchanged"),
+    "gauge and camera": (dict(exchange=("pressure", "curvature")), "pressure and curvature exchanged"),
     "gauge and output": (dict(exchange=("pressure", "output")), "columns of pressure and output exchanged"),
-    "camera and sensor": (dict(exchange=("curvature", "output")), "columns of curvature and output exchanged"),
+    "camera and sensor": (dict(exchange=("curvature", "output")), "curvature and output exchanged"),
     "absolute": (dict(pressure=lambda p: p + 1.013), "absolute instead of gauge pressure"),
     "minutes": (dict(faster=1 / 60), "minutes instead of seconds"),
     "row numbers": (dict(faster=50.0), "row numbers instead of seconds"),
@@ -102,7 +102,7 @@ def test_slips_in_logs_of_two_columns(example, slip):
 
 
 BARE = {
-    "psi": (dict(pressure=times(14.5038)), "allows 0.25: 12.2 times: .*psi instead of bar"),
+    "psi": (dict(pressure=times(14.5038)), "allows 0.25: 12.2 times; .*psi instead of bar"),
     "per cent": (dict(command=times(50.0)), "per cent"),
     "sign": (dict(output=times(-1.0)), "sign of output flipped"),
     "gauge and output": (dict(exchange=("pressure", "output")), "pressure and output exchanged"),
@@ -116,7 +116,7 @@ def test_ranges_alone_tell_gross_slips(slip):
     rig = read_rig(EXAMPLES / "rig.toml")
     logs = read_logs([EXAMPLES / "logs" / "steps.csv"], rig.signals, rig.sample_time)
     how, words = BARE[slip]
-    rig = replace(rig, actuator=None, regulator=TransferFunction([(1.0, 0.0)]), sensor=TransferFunction([(1, 0)]))
+    rig = replace(rig, actuator=None, regulator=UNITY, sensor=UNITY)
     (said,) = doubts(rig, slipped(logs, **how))
     with pytest.raises(LogError, match=words):
         raise LogError(said, "", "")
@@ -128,7 +128,12 @@ def test_a_range_exceeded_without_a_known_unit_is_said_from_half_as_much_again_o
         log = Experiment("a", 0.01, {"command": np.ones(50), "output": factor * np.linspace(0, 1, 50)})
         return by_ranges([log], {"output": (0.0, 1.0)}, {"output": "angle"})
 
-    assert said(1.45) == () and "1.6 times: correct [ranges]" in said(1.6)[0]
+    assert said(1.45) == () and "1.6 times; correct [ranges]" in said(1.6)[0]
+
+
+def _noisy(rng, y):
+    noise = rng.uniform(0.0, 0.02) * rng.normal(size=len(y))
+    return y + np.ptp(y) * (noise + 0.05 * rng.normal())
 
 
 def varied(rng) -> tuple[Rig, list[Experiment]]:
@@ -161,13 +166,11 @@ def varied(rng) -> tuple[Rig, list[Experiment]]:
         np.where(time > 1.0, 1.0, 0.0),
     ]
     share = rng.choice([0.3, 0.6, 1.0])
-    inputs = [Experiment(f"{i}", step, {"command": share * volts * s}, 100.0 * i) for i, s in enumerate(shapes)]
+    commands = [share * volts * shape for shape in shapes]
+    inputs = [Experiment(f"{i}", step, {"command": u}, 100.0 * i) for i, u in enumerate(commands)]
     logs = []
     for log, made in zip(inputs, simulate_session(real, inputs)):
-        noisy = {
-            role: y + 0.02 * np.ptp(y) * rng.uniform(0, 1) * rng.normal(size=len(y)) + 0.05 * np.ptp(y) * rng.normal()
-            for role, y in made.items()
-        }
+        noisy = {role: _noisy(rng, y) for role, y in made.items()}
         logs.append(replace(log, signals={**log.signals, **noisy}))
     only = [ALL, ("command", "pressure", "output"), ("pressure", "output"), ("command", "output")]
     return rig, slipped(logs, only[rng.integers(4)])
@@ -186,6 +189,27 @@ def test_the_example_logs_stay_silent(example):
     for only in (("pressure", "output"), ("command", "output"), ("command", "pressure", "output")):
         assert doubts(rig, slipped(logs, only)) == ()
     assert doubts(rig, slipped(logs, faster=4.0)) == (), "a log at a quarter of the rate"
+    assert doubts(replace(rig, sample_time=0.8), logs) == (), "a fortieth of the sample time, and no minutes"
+    shifted = slipped(logs, pressure=lambda p: p + 0.08, output=lambda y: y + 0.012)
+    assert doubts(rig, shifted) == (), "offsets"
+    far = slipped(logs, curvature=lambda y: y + 1.0)
+    assert doubts(rig, far) == (), "a camera's arbitrary zero"
+    exchanged = slipped(logs, exchange=("curvature", "output"), output=lambda y: y + 1.0)
+    assert "curvature and output exchanged" in doubts(rig, exchanged)[0], "whatever the camera's zero"
+
+
+def test_an_absolute_pressure_within_the_range_is_told_by_the_command_at_rest():
+    """A range of 6 bar; the same values in an unnamed unit, or with the command up, may be right."""
+    command = np.repeat([0.0, 2.0, 6.0, 0.0], 100)
+    limits = {"command": (0.0, 10.0), "pressure": (0.0, 6.0)}
+
+    def said(command, column):
+        pressure = 1.013 + 0.5 * np.repeat([0.0, 2.0, 6.0, 0.0], 100)
+        log = Experiment("a", 0.01, {"command": command, "pressure": pressure})
+        return by_ranges([log], limits, {"pressure": column})
+
+    assert "absolute" in said(command, "p_bar")[0]
+    assert said(command, "p") == () and said(command + 2.0, "p_bar") == () and said(command, "p_kPa") == ()
 
 
 def test_units_by_name():

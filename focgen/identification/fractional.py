@@ -26,6 +26,7 @@ _RECONSIDERED = 3  # times that the pasts are chosen anew
 _EXACT = 1e-4  # of the spread: what is left below shows no past
 _EDGE = 1e-6  # distance of α from its bounds
 _WHITENED = 15  # times that model and noise model are fitted in turn
+_SEARCHED_ANEW = 3  # of these times the fit begins at the coarse grid, too: the biased one may be far off
 _AGREED = 1e-5  # of log τ and α: they agree
 
 
@@ -175,12 +176,15 @@ def _whitened(problem: Problem, point: Point) -> tuple[Problem, Point]:
     In a closed loop the input answers the disturbance in the output. The prediction error of a model with the right
     noise model is not correlated with inputs of the past, so the fit is not biased (Ljung, 1999, §13.4).
     """
-    for _ in range(_WHITENED):
+    for turn in range(_WHITENED):
         before, models = point.x, [residual_model(part) for part in problem.residuals(point)]
         filters = [m.a if x.reference is not None else None for m, x in zip(models, problem.experiments)]
         penalties = [m.variance for m in models]
         problem = problem.with_whitening(filters, penalties)
-        point = _descended(problem, point.x)
+        found = [_descended(problem, point.x)]
+        if turn < _SEARCHED_ANEW and not any(problem.pasts):
+            found.append(_searched(problem))
+        point = min(found, key=lambda each: each.cost)
         if float(np.max(np.abs(point.x - before))) < _AGREED:
             break
     return problem, point

@@ -100,4 +100,4 @@ def _carried(rows: np.ndarray, model: ResidualModel, prior: float) -> np.ndarray
 def half_width(variance: np.ndarray | float, effective: float, parameters: int) -> np.ndarray | float:
     """Half the 95 % interval of an estimate, by Student's t with what ``effective`` samples leave."""
     freedom = max(effective - parameters, 1.0)
-    return np.sqrt(variance) * student.ppf(0.975, freedom)
+    return np.sqrt(np.where(variance >= 0.0, variance, np.inf)) * student.ppf(0.975, freedom)

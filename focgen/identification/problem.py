@@ -138,7 +138,7 @@ class Problem:
             left = target - gain @ drives
             cost += float(left @ left)
             raw = self.weights[i] * (self.experiments[i].measured - gain @ self._responses(x, i)[0])
-            found = local.amounts(self._white(i, raw[None])[0])
+            found = local.amounts(self.white(i, raw[None])[0])
             offsets.append(float(found[0]))
             amounts.append(found[1:])
         return Point(np.array(x, float), gain, offsets, amounts, cost)
@@ -147,10 +147,10 @@ class Problem:
         """Drives and target of an experiment, scaled, its local columns projected out."""
         local, w = self._local(x, i), self.weights[i]
         columns = w * np.vstack([self._responses(x, i)[0], self.experiments[i].measured])
-        rows = local.without(self._white(i, columns))
+        rows = local.without(self.white(i, columns))
         return rows[:-1], rows[-1], local
 
-    def _white(self, i: int, columns: np.ndarray) -> np.ndarray:
+    def white(self, i: int, columns: np.ndarray) -> np.ndarray:
         """Columns (k, n) through the experiment's whitening filter; nothing counts until that is filled."""
         if self.whitening[i] is None or not len(columns):
             return columns
@@ -169,6 +169,10 @@ class Problem:
         make = lambda: columns(self.experiments[i], self.kernels(x, i), when)  # noqa: E731
         return self._kept("past", i, np.append(x[: self.core], when), make)
 
+    def local(self, i: int) -> _Local:
+        """The offset of an experiment that begins at rest."""
+        return self._kept("at rest", i, np.empty(0), lambda: self._made_local(np.empty(0), i, True))
+
     def _local(self, x: np.ndarray, i: int, offset: bool = True) -> _Local:
         make = lambda: self._made_local(x, i, offset)  # noqa: E731
         return self._kept(f"local {offset}", i, np.append(x[: self.core], x[self.of_past[i]]), make)
@@ -177,13 +181,13 @@ class Problem:
         n, w, past = len(self.experiments[i]), self.weights[i], self.pasts[i]
         made = [np.full(n, w)] if offset else []
         if past is None:
-            basis = self._white(i, np.array(made).reshape(len(made), n)).T
+            basis = self.white(i, np.array(made).reshape(len(made), n)).T
             sizes = np.linalg.norm(basis, axis=0)
             return _Local(basis / sizes, np.diag(sizes), 0)
         made = np.vstack([*made, w * self._columns(x, i)[0]])
         prior = np.zeros((past.steps, len(made)))
         prior[:, int(offset) :] = np.sqrt(self.penalties[i]) / past.reach * np.eye(past.steps)
-        return _Local(*np.linalg.qr(np.vstack([self._white(i, made).T, prior])), past.steps)
+        return _Local(*np.linalg.qr(np.vstack([self.white(i, made).T, prior])), past.steps)
 
     def _kept(self, what: str, i: int, x: np.ndarray, make):
         """What was made for the last two trials."""
@@ -207,7 +211,7 @@ class Problem:
             slopes = np.vstack([slopes, self._by_delay(point, i)])
         if self.pasts[i] is not None:
             slopes = np.vstack([slopes, self._columns(x, i)[3] * point.amounts[i][:, None]])
-        return self._white(i, w * slopes)
+        return self.white(i, w * slopes)
 
     def _own(self, i: int) -> np.ndarray:
         """Which of ``x`` an experiment depends on."""
@@ -236,9 +240,9 @@ class Problem:
         for i, x in enumerate(self.experiments):
             w, slopes = self.weights[i], np.zeros((len(point.x), len(x)))
             slopes[self._own(i)] = self._slopes(point, i)
-            rows = [slopes, self._white(i, w * self._responses(point.x, i)[0])]
+            rows = [slopes, self.white(i, w * self._responses(point.x, i)[0])]
             if offset:
-                rows.append(self._white(i, np.full((1, len(x)), w)))
+                rows.append(self.white(i, np.full((1, len(x)), w)))
             found.append(self._local(point.x, i, not offset).without(np.vstack(rows)).T)
         return found
 
@@ -277,7 +281,7 @@ class Problem:
         """Model − measured of each experiment, scaled, and ``white`` through its filter."""
         made = self.simulated(point)
         rows = [w * (y - x.measured) for w, y, x in zip(self.weights, made, self.experiments)]
-        return [self._white(i, row[None])[0] for i, row in enumerate(rows)] if white else rows
+        return [self.white(i, row[None])[0] for i, row in enumerate(rows)] if white else rows
 
 
 def delay_reach(experiments: Sequence[Excitation]) -> float:
@@ -298,14 +302,15 @@ def starts(problem: Problem) -> list[np.ndarray]:
 
 
 def _fewer(problem: Problem) -> Problem:
-    """The problem with as many experiments as the grid looks at."""
-    chosen, total = [], 0
+    """The problem with as many experiments as the grid looks at, each from rest."""
+    total, count = 0, 0
     for x in problem.experiments:
-        if chosen and total + len(x) > _GRID_SAMPLES:
-            break
-        chosen.append(x)
         total += len(x)
-    return Problem(chosen, (None,) * len(chosen), problem.delay_free, problem.delay)
+        if count and total > _GRID_SAMPLES:
+            break
+        count += 1
+    chosen, seen = problem.experiments[:count], problem.whitening[:count]
+    return Problem(chosen, (None,) * count, problem.delay_free, problem.delay, whitening=seen)
 
 
 def _best_of_order(problem: Problem, alpha: float) -> tuple[float, np.ndarray]:
@@ -331,9 +336,9 @@ def _best_delay(problem: Problem, log_tau: float, alpha: float) -> tuple[float, 
 def _cost_of(problem: Problem, made: list[np.ndarray], lag: int) -> float:
     """The sum of squares where each response comes ``lag`` samples later."""
     parts = []
-    for run, response, w in zip(problem.experiments, made, problem.weights):
+    for i, (run, response, w) in enumerate(zip(problem.experiments, made, problem.weights)):
         late = np.hstack([np.zeros((len(response), lag)), response])[:, : len(run)]
-        rows = w * np.vstack([late, run.measured])
-        parts.append(_triangle(rows - rows.mean(axis=1, keepdims=True)))
+        local = problem.local(i)
+        parts.append(_triangle(local.without(problem.white(i, w * np.vstack([late, run.measured])))))
     triangle = _triangle(np.vstack(parts).T)
     return float(triangle[-1, -1] ** 2)

@@ -28,7 +28,7 @@ def mended(
     for role in sorted(values, key=lambda role: (role not in HELD, role not in _DRIVES)):
         found[role], said = _mended(role, time, values[role], found.get("command", found.get("pressure")))
         notes += said
-    notes += _frozen(time, {role: values[role] for role in values})
+    notes += _frozen(time, values)
     return {role: found[role] for role in values}, tuple(notes)
 
 
@@ -83,5 +83,6 @@ def _frozen(time: np.ndarray, values: Mapping[str, np.ndarray]) -> list[str]:
             first, rows = stretch
             last = min(first + rows, len(time) - 1)
             place = f"for {time[last] - time[first]:.3g} s from {time[first]:g} s"
-            notes.append(Note(f"{role} frozen while the rig moves: cut it off with --from and --to", 1, place))
+            what = f"{role} frozen while the rig moves: cut it off with --from and --to"
+            notes.append(Note(what, 1, place))
     return notes

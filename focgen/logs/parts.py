@@ -9,7 +9,7 @@ import numpy as np
 
 from focgen.errors import LogError
 from focgen.logs import clock, missing
-from focgen.logs.clock import FEWEST, HELD
+from focgen.logs.clock import FEWEST
 from focgen.logs.experiment import Experiment
 from focgen.logs.mending import mended
 from focgen.logs.notes import Note
@@ -65,9 +65,8 @@ def experiments_of(run: Raw, sample_time: float, window: Window) -> Iterator[Exp
 def _long_enough(sittings: list[slice], run: Raw) -> list[slice]:
     kept = [rows for rows in sittings if rows.stop - rows.start >= FEWEST]
     if not kept:
-        raise LogError(
-            run.where, "has a clock that starts anew every few samples", "sort the rows, or name the run column"
-        )
+        what = "has a clock that starts anew every few samples"
+        raise LogError(run.where, what, "sort the rows, or name the column that tells the runs apart as run")
     return kept
 
 
@@ -107,39 +106,45 @@ def _windowed(run: Raw, window: Window) -> Raw:
 
 
 def _uncut(run: Raw, sample_time: float) -> Iterator[tuple[Raw, bool]]:
-    """Yield (part, whether another was cut off before it) for each part between long holes."""
+    """Yield (part, whether the rig ran unseen before it) for each part between long holes."""
     clock.check_unit(run.time, sample_time, run.stamps)
     kept = missing.keep(run.values, run.time)
     _check_present(run, kept)
+    run = replace(run, values={role: run.values[role] for role in kept.roles})
     holes = clock.holes(run.time)
-    notes = list(kept.notes)
-    if len(holes):
-        first = f"of {run.time[holes[0]] - run.time[holes[0] - 1]:g} s at {run.time[holes[0] - 1]:g} s"
-        notes.append(
-            Note("holes in time too long to be bridged: what follows is an experiment of its own", len(holes), first)
-        )
     begins = np.union1d(holes, np.flatnonzero(np.diff(kept.rows.astype(int), prepend=0) == 1))
     spans = [rows[kept.rows[rows]] for rows in np.split(np.arange(len(run)), begins)]
     spans = [rows for rows in spans if len(rows)]
     long = [rows for rows in spans if len(rows) >= FEWEST]
     if not long:
         raise LogError(run.where, f"has no {FEWEST} samples in a row without a hole", "log it again")
-    if len(long) < len(spans):
-        short = next(rows for rows in spans if len(rows) < FEWEST)
-        place = f"at {run.time[short[0]]:g} s"
-        notes.append(Note(f"parts of fewer than {FEWEST} samples left out", len(spans) - len(long), place))
+    notes = (*kept.notes, *_hole_notes(run.time, holes), *_short_notes(run.time, spans))
     for rows in long:
         part = run.part(rows)
-        part = replace(part, values={role: y for role, y in part.values.items() if role in kept.roles})
-        after = rows[0] > clock.SHORT or rows[0] in holes
-        yield (part.with_notes(*notes) if rows is long[0] else part), bool(after)
+        unseen = rows[0] > clock.SHORT or rows[0] in holes
+        yield (part.with_notes(*notes) if rows is long[0] else part), bool(unseen)
+
+
+def _hole_notes(time: np.ndarray, holes: np.ndarray) -> list[Note]:
+    if not len(holes):
+        return []
+    before, after = time[holes[0] - 1], time[holes[0]]
+    what = "holes in time too long to be bridged, what follows is an experiment of its own"
+    return [Note(what, len(holes), f"of {after - before:g} s at {before:g} s")]
+
+
+def _short_notes(time: np.ndarray, spans: list[np.ndarray]) -> list[Note]:
+    short = [rows for rows in spans if len(rows) < FEWEST]
+    what = f"parts of fewer than {FEWEST} samples left out"
+    return [Note(what, len(short), f"at {time[short[0][0]]:g} s")] if short else []
 
 
 def _check_present(run: Raw, kept: missing.Kept) -> None:
     """Raise LogError where a role that is needed has no reading at all."""
     if kept.rows.any():
         return
-    role = "output" if "output" not in kept.roles else next(r for r in HELD + ("pressure",) if r in run.values)
+    inputs = [role for role in ("command", "pressure") if role in run.values]
+    role = "output" if "output" not in kept.roles else inputs[0]
     row = int(np.argmax(missing.long_stretches(run.values[role])))
     what = f"{role} is empty or not a number in {run.line(row)} and {len(run) - 1} more"
     raise LogError(run.where, what, "fill the column, or name another in [signals]")

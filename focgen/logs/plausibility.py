@@ -20,6 +20,7 @@ _UNUSED = 0.02  # of its range: a signal that never leaves it is implausible
 _USED = 0.2  # of its range: so much of it a slip leaves used, where only the ranges tell
 _TWO = 0.2  # nats: what a slip of two columns, or a factor e of an unused range, has to explain better
 _FLIPPED = 0.3  # of its range: so far on the wrong side
+_UPRIGHT = 0.1  # of its range: so little on the right one
 _SEEN = 0.7  # correlation: below, a response tells no gain
 _ATMOSPHERE = 1.01325  # bar
 _WEATHER = (0.9, 1.05)  # of it: hills and weather
@@ -33,6 +34,7 @@ _SIZES = {  # what one of each unit is, in the first of its kind
     "current": {"A": 1.0, "mA": 1e-3},
 }
 _SPELLED = {"permm": "1/mm", "percm": "1/cm", "perm": "1/m", "1pm": "1/m", "1pmm": "1/mm", "hpa": "mbar"}
+_ANY_CASE = ("bar", "kPa", "mbar", "psi", "rad", "deg", "1/mm", "1/cm", "1/m")  # a name in v is no voltage
 
 Limits = Mapping[str, tuple[float, float]]
 Signals = dict[str, list[np.ndarray]]
@@ -41,7 +43,7 @@ Signals = dict[str, list[np.ndarray]]
 @dataclass(frozen=True)
 class Slip:
     """``roles`` hold ``factor`` times what they should plus ``shift``; or, ``exchanged``, two of them each
-    other's signal. ``words`` say so; of slips that explain alike the one of less ``price`` is the likelier."""
+    other's signal. ``words`` say so; of slips that explain alike the one of less ``price`` is likelier."""
 
     words: str
     roles: tuple[str, ...]
@@ -110,14 +112,14 @@ def doubts(
     odd = [*_out_of_range(signals, limits), *(link.in_words() for link in links if not link.within(_GAIN))]
     absolute = _absolute(signals, limits, columns or {})
     if absolute:
-        return (f"pressure rests at {_lowest(signals):.3g}: {absolute.words}?",)
+        return (f"pressure rests at {_lowest(signals):.3g}; {absolute.words}?",)
     if not odd:
         return ()
     found = _most_likely(_candidates(signals, limits, columns or {}), signals, limits, response)
     beyond = _out_of_range(signals, limits)
     if found is None and not beyond and all(link.ratio > 0 for link in links if link.known):
         return ()  # a gain that is no unit's is for an identification to find
-    return (f"{odd[0]}: {found.words}?" if found else f"{odd[0]}: correct [ranges], or a unit, or a sign",)
+    return (f"{odd[0]}; {found.words}?" if found else f"{odd[0]}; correct [ranges], or a unit, or a sign",)
 
 
 def hint(role: str, column: str, factor: float) -> str:
@@ -137,7 +139,7 @@ def unit_of(text: str) -> tuple[str, str] | None:
     last = _SPELLED.get(last.lower(), last)
     for kind, sizes in _SIZES.items():
         for unit in sizes:
-            if unit.lower() == last.lower() and (unit == last or unit not in ("mV", "mA", "V", "A", "Pa", "MPa")):
+            if unit == last or (unit in _ANY_CASE and unit.lower() == last.lower()):
                 return kind, unit
     return None
 
@@ -210,33 +212,39 @@ def _out_of_range(signals: Signals, limits: Limits) -> list[str]:
         excess = peak / _largest(limits[role])
         bottom, top = (f(f(y) for y in signals[role]) for f in (min, max))
         if excess >= EXCESS:
-            found.append((excess, f"{role} reaches {peak:.3g} where [ranges] allows {high:g}: {excess:.3g} times"))
+            words = f"{role} reaches {peak:.3g} where [ranges] allows {high:g}: {excess:.3g} times"
+            found.append((excess, words))
         elif 0.0 < excess < _UNUSED:
             found.append((1 / excess, f"{role} reaches {peak:.3g} only, where [ranges] allows {high:g}"))
-        elif low >= 0.0 and -bottom > _FLIPPED * high and top < _UNUSED * 5 * high:
-            found.append((1.0, f"{role} is negative, down to {bottom:.3g}, where [ranges] begins at {low:g}"))
+        elif low >= 0.0 and -bottom > _FLIPPED * high and top < _UPRIGHT * high:
+            words = f"{role} is negative, down to {bottom:.3g}, where [ranges] begins at {low:g}"
+            found.append((1.0, words))
     return [words for _, words in sorted(found, key=lambda entry: -entry[0])]
 
 
 def _absolute(signals: Signals, limits: Limits, columns: Mapping[str, str]) -> Slip | None:
     """The slip of an absolute for a gauge pressure, where it rests at that of the air and its range begins at
-    0."""
+    0. Within the range that is a slip only of a known unit, and no small offset, with the command at rest.
+    """
     if "pressure" not in signals or "pressure" not in limits:
         return None
     low, high = limits["pressure"]
-    unit = (unit_of(columns.get("pressure", "")) or ("pressure", "bar"))[1]
+    known = unit_of(columns.get("pressure", ""))
+    unit = (known or ("pressure", "bar"))[1]
     air = _ATMOSPHERE / _SIZES["pressure"].get(unit, 1.0)
     rest = _lowest(signals)
-    at_rest = rest > EXCESS * high or ("command" in limits and _commanded_rest(signals, limits["command"]))
+    at_rest = rest > EXCESS * high or (
+        known and rest > _REST * high and _commanded_rest(signals, limits.get("command"))
+    )
     if abs(low) > _REST * high or not _WEATHER[0] <= rest / air <= _WEATHER[1] or not at_rest:
         return None
     slip = Slip("absolute instead of gauge pressure", ("pressure",), shift=rest)
     return None if _peak(slip.undone(signals)["pressure"]) > EXCESS * high else slip
 
 
-def _commanded_rest(signals: Signals, span: tuple[float, float]) -> bool:
+def _commanded_rest(signals: Signals, span: tuple[float, float] | None) -> bool:
     """Whether the lowest pressure comes with a command at the lower end of its range."""
-    if "command" not in signals:
+    if "command" not in signals or span is None:
         return False
     pressure, command = (np.concatenate(signals[role]) for role in ("pressure", "command"))
     resting = command[pressure <= np.quantile(pressure, 0.02)]

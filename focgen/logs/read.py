@@ -15,7 +15,7 @@ from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.table import LogTable, read_table, stem
 
-_TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; what is less so is for ``plausibility`` to warn of
+_TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
 
 Limits = Mapping[str, tuple[float, float]]

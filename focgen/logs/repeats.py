@@ -11,7 +11,6 @@ _FINE = 0.5  # of the changes, at most, are the smallest there is: more are a co
 _SLOWEST = 50  # rows a reading
 _LONG = 20  # rows: a shorter stretch is not called frozen
 _UNUSUAL = 10.0  # times the longest of the usual repetitions
-_LIVELY = 0.8  # of the other rows change as often as usual
 _MOVES = 0.1  # of its span: by as much another signal moves meanwhile
 _INSIDE = 0.02  # of the span: nearer to an end a signal rests or saturates
 
@@ -27,7 +26,7 @@ def fresh_rows(y: np.ndarray) -> tuple[float, np.ndarray] | None:
         return None
     gaps, sizes = np.diff(changes), np.abs(np.diff(y)[changes - 1])
     period = float(np.median(gaps))
-    if not 2.0 <= period <= _SLOWEST or np.mean(sizes < 1.5 * sizes.min()) > _FINE:
+    if not 2.0 <= period <= _SLOWEST or _coarse(sizes):
         return None
     for _ in range(3):
         periods = np.maximum(1, np.round(gaps / period))
@@ -36,6 +35,11 @@ def fresh_rows(y: np.ndarray) -> tuple[float, np.ndarray] | None:
     if period < 1.9 or np.mean(regular) < _REGULAR or np.mean(periods == 1) < _SINGLE:
         return None
     return period, _slots(changes, periods.astype(int), gaps)
+
+
+def _coarse(sizes: np.ndarray) -> bool:
+    """Whether most changes are by one count of a converter."""
+    return bool(np.mean(sizes < 1.5 * sizes.min()) > _FINE)
 
 
 def _slots(changes: np.ndarray, periods: np.ndarray, gaps: np.ndarray) -> np.ndarray:
@@ -56,12 +60,14 @@ def frozen(y: np.ndarray, others: list[np.ndarray]) -> tuple[int, int] | None:
     """
     ends = np.concatenate([[0], np.flatnonzero(np.diff(y) != 0.0) + 1, [len(y)]])
     lengths = np.diff(ends)
+    if len(lengths) < _CHANGES or _coarse(np.abs(np.diff(y[ends[:-1]]))):
+        return None
     span = float(np.ptp(y))
     inside = np.abs(y[ends[:-1]] - (y.min() + y.max()) / 2) < (0.5 - _INSIDE) * span
     usual = float(np.median(lengths))
     for run in np.argsort(-lengths):
         first, rows = int(ends[run]), int(lengths[run])
-        if rows < max(_LONG, _UNUSUAL * usual) or (len(lengths) - 1) * usual < _LIVELY * (len(y) - rows):
+        if rows < max(_LONG, _UNUSUAL * usual):
             return None
         stretch = slice(first, first + rows)
         if inside[run] and any(np.ptp(other[stretch]) > _MOVES * np.ptp(other) > 0 for other in others):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -34,7 +35,8 @@ def doubts(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     if time:
         return time
     limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
-    found = plausibility.doubts(experiments, limits, _units(rig), lambda signals: links(rig, experiments, signals))
+    response = partial(links, rig, experiments)
+    found = plausibility.doubts(experiments, limits, _units(rig), response)
     return found or _exchanged(rig, experiments)
 
 
@@ -78,6 +80,8 @@ def _modelled(rig: Rig, stages: Sequence[str]) -> bool:
 
 
 def _simulated(rig: Rig, experiments, parts, stages, held: bool, faster: float = 1.0) -> list[np.ndarray]:
+    if "actuator" not in stages:  # linear: an offset of the input from the first sample on is no step
+        parts = [y - y[0] for y in parts]
     step = experiments[0].sample_time * faster
     run = Run.of([len(y) for y in parts], [e.start * faster for e in experiments], step)
     made = Chain(rig).run(np.concatenate(parts), stages[0], stages[-1], run, held)
@@ -116,7 +120,7 @@ def _time(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
         odd = not 1.0 / (2.0 * _HONEST) <= ratio <= 2.0 * _HONEST
         if likely and odd and _responds_better(rig, experiments, factor):
             what = f"time has samples {step:.3g} s apart where the rig's sample_time is {rig.sample_time:g} s"
-            return (f"{what}: {words}?",)
+            return (f"{what}; {words}?",)
     return ()
 
 
@@ -140,7 +144,7 @@ def _exchanged(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     )
     if exchanged > _EXCHANGED * as_it_is:
         return ()
-    return ("curvature lags behind output: the columns of curvature and output exchanged?",)
+    return ("curvature lags behind output; the columns of curvature and output exchanged?",)
 
 
 def _misfit(expected: list[np.ndarray], measured: list[np.ndarray]) -> float:
