@@ -48,7 +48,7 @@ class _Switched(Problem):
         super().__init__(fitted.shape, fitted.problem.records)
         self.stage = fitted.solved.x
         self.begins = [_beginning(fitted, i) for i in range(len(self.records))]
-        self.owned = [own for own, _ in fitted.solved.rows]
+        self.owned = [own if r.moves else own[:1] for r, (own, _) in zip(self.records, fitted.solved.rows)]
 
     def inside(self, x: np.ndarray) -> np.ndarray:
         return np.concatenate([np.clip(x[:2], -_WIDEST, _WIDEST), np.clip(x[2:], 0.0, self.latest)])
@@ -137,9 +137,9 @@ def _time(problem: _Switched, solved: Solved, scale: float) -> float:
 
 
 def _beginning(fitted: Fitted, index: int) -> np.ndarray:
-    """The state at a record's first sample, in units of the input, as the linear fit has it."""
+    """The state at a record's first sample, in units of the input: at rest, or as the linear fit has it."""
     record, poles = fitted.problem.records[index], fitted.shape.poles
-    if record.rests:
+    if not record.moves:
         return np.zeros(poles)
     own, _ = fitted.solved.rows[index]
     free = fitted.solved.own[index][1 : 1 + poles] @ own[1 : 1 + poles, :poles]

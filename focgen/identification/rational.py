@@ -55,7 +55,7 @@ class Record:
 
     ``drive`` is the input from its first value on, and the stage's state there is free. Where ``rests`` it
     is the whole input of a log that begins with its step: the stage was at rest at 0 before. Where ``moves``
-    the input was another one shortly before the log.
+    the stage is not known to have been at rest at the first sample.
     """
 
     name: str
@@ -175,11 +175,11 @@ def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> list[tu
     """
     delay = delay_of(shape, x)
     if not shape.poles:
-        return [(np.ones((1, len(r))), _static(r, delay)[None]) for r in records]
+        return [(_own_of_gain(r, delay), _static(r, delay)[None]) for r in records]
     made = discretise(shape.poles, x, delay, records[0].hold)
     own = np.array(_own(shape, made, max(map(len, records))))
     free = 1 + shape.poles
-    counts = [1 if r.rests else len(own) if r.moves and r.hold == "zero" else free for r in records]
+    counts = [1 if r.rests else len(own) if r.moves else free for r in records]
     return [(own[:count, : len(r)], _shared(shape, made, r)) for count, r in zip(counts, records)]
 
 
@@ -191,6 +191,12 @@ def _own(shape: Shape, made: Discrete, count: int) -> list[np.ndarray]:
 def _shared(shape: Shape, made: Discrete, record: Record) -> np.ndarray:
     drive, den = shifted(record.drive, made.late), made.denominator
     return np.array([lfilter(made.numerator(state), den, drive) for state in range(1 + shape.zeros)])
+
+
+def _own_of_gain(record: Record, delay: float) -> np.ndarray:
+    """An offset, and another one while the input from before the first sample acts."""
+    early = (np.arange(len(record)) < delay).astype(float)
+    return np.array([np.ones(len(record)), early][: 2 if record.moves and delay > 0.0 else 1])
 
 
 def _static(record: Record, delay: float) -> np.ndarray:

@@ -222,6 +222,8 @@ def _refusal(problem: Problem, made: dict[str, tuple[float, float]], step: float
         return "the zero answers in the wrong direction first"
     if zero - half <= 0.0:
         return "the zero's interval reaches 0"
+    if problem.shape.poles > 1 and np.isinf(made["gain"][1]):
+        return "its poles cannot be told apart"
     if not made["gain"][1] < abs(made["gain"][0]):
         return ""  # nothing is known then: said by whoever takes it
     vague = [name for name, spread in made.items() if name != "delay" and _is_vague(name, *spread, step)]
