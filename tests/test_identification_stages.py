@@ -1,6 +1,6 @@
 """Regulator and sensor from their own signals: right shape, honest intervals, both directions apart.
 
-The truth is simulated here, by scipy's zero-order hold on a grid 20 times finer than the log's.
+The truth is simulated here, by scipy's holds on a grid 20 times finer than the log's.
 """
 
 from functools import cache
@@ -38,9 +38,9 @@ def commands(seed=0, count=1500):
     return [staircase(rng, count), steps(count, 6.0, 50, count // 2), prbs(rng, count)]
 
 
-def on_fine_grid(system, fine, h, late=0.0):
-    """The answer at the samples to an input held on the fine grid, from rest, ``late`` samples later."""
-    num, den, _ = cont2discrete(system, h / FINER, "zoh")
+def on_fine_grid(system, fine, h, late=0.0, hold="zoh"):
+    """The answer at the samples to an input known on the fine grid, from rest, ``late`` samples later."""
+    num, den, _ = cont2discrete(system, h / FINER, hold)
     shift = round(late * FINER)
     fine = np.concatenate([np.zeros(shift), fine])[: len(fine)]
     return lfilter(np.ravel(num), den, fine)[::FINER]
@@ -60,13 +60,14 @@ def regulator_logs(system, inputs, h=0.01, noise=0.004, late=0.0, seed=0, offset
 def sensor_logs(system, h=0.01, count=3000, input_noise=0.005, noise=0.002, seed=0, late=0.0):
     """A curvature that swings smoothly, known on the fine grid; both signals are measured with noise."""
     rng = np.random.default_rng(seed)
-    time = np.arange(count * FINER) * h / FINER
+    time = np.arange((count + 100) * FINER) * h / FINER  # the first 100 samples are before the log
     logs = []
     for i in range(3):
         phases, rates = rng.uniform(0.0, 6.0, 6), np.array([0.3, 0.7, 1.5, 3.0, 6.0, 9.0])
         curvature = np.sin(np.outer(rates, time) + phases[:, None]).T @ (0.004 / np.sqrt(rates)) + 0.01
-        output = on_fine_grid(system, curvature, h, late) + noise * 0.02 * rng.standard_normal(count)
-        measured = curvature[::FINER] + input_noise * 0.02 * rng.standard_normal(count)
+        output = on_fine_grid(system, curvature, h, late, "foh")[100:]
+        output = output + noise * 0.02 * rng.standard_normal(count)
+        measured = curvature[100 * FINER :: FINER] + input_noise * 0.02 * rng.standard_normal(count)
         logs.append(Experiment(f"run {i}", h, {"curvature": measured, "output": output}))
     return logs
 
@@ -222,7 +223,7 @@ def test_long_logs_are_fitted_to_the_last_sample():
     logs = regulator_logs(([2.0], [0.3, 1.0]), [staircase(rng, 120_000, 400)])
     fit = identify_stage(logs, "regulator")
     assert fit.shape == "1p" and covers(fit, "T", 0.3) and covers(fit, "gain", 2.0)
-    assert len(fit.simulated[0]) == 120_000 and fit.parameters["T"][1] < 1.2e-4
+    assert len(fit.simulated[0]) == 120_000 and fit.parameters["T"][1] < 1.5e-4
     assert any("compared on" in note for note in fit.notes)
 
 
@@ -238,7 +239,7 @@ def test_the_papers_sensor_behind_a_noisy_camera():
 
 
 def test_noise_on_the_sensors_input_does_not_bias_it():
-    fits = [identify_stage(sensor_logs(([10.0], [1.0, 10.0]), seed=s), "sensor") for s in range(8)]
+    fits = [identify_stage(sensor_logs(([10.0], [1.0, 10.0]), seed=s), "sensor") for s in range(4)]
     gains, times = (np.array([f.parameters[name][0] for f in fits]) for name in ("gain", "T"))
     assert abs(gains.mean() - 1.0) < 0.001
     assert abs(times.mean() - 0.1) < 0.001
@@ -251,15 +252,15 @@ def test_a_camera_that_is_late():
 
 def test_a_static_sensor_and_what_noise_takes_of_its_gain():
     rng = np.random.default_rng(5)
-    true = 0.002 * np.sin(np.arange(3000) * 0.01)
-    noisy = true + 0.0005 * rng.standard_normal(3000)
+    true = 0.001 * np.sin(np.outer([0.02, 0.05, 0.11, 0.19], np.arange(3000))).sum(axis=0)
+    noisy = true + 0.0002 * rng.standard_normal(3000)
     log = Experiment("static", 0.01, {"curvature": noisy, "output": 1.5 * true})
     fit = identify_stage([log], "sensor")
-    expected = 0.0005**2 / np.var(noisy)
+    expected = 0.0002**2 / np.var(noisy)
     assert fit.shape == "gain"
-    assert fit.parameters["gain"][0] == pytest.approx(1.5 * (1.0 - expected), rel=0.01)
+    assert fit.parameters["gain"][0] == pytest.approx(1.5 * (1.0 - expected), rel=0.002)
     note = next(n for n in fit.notes if "smaller" in n)
-    assert float(note.split("up to ")[1].split("%")[0]) == pytest.approx(100.0 * expected, rel=0.1)
+    assert float(note.split("up to ")[1].split("%")[0]) == pytest.approx(100.0 * expected, rel=0.3)
 
 
 # rising and falling

@@ -15,7 +15,7 @@ import numpy as np
 from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.directions import UpDown, fit_directions
-from focgen.identification.rational import Record, parts
+from focgen.identification.rational import LATEST, Record, parts
 from focgen.identification.shapes import Fitted, ShapeFit, choose, clearly_better, delay_seconds, fit_shapes, refit
 from focgen.identification.stage_notes import notes_of
 from focgen.logs.experiment import Experiment
@@ -124,14 +124,17 @@ def _record(experiment: Experiment, stage: str) -> Record:
     source, target, hold = _SIGNALS[stage]
     drive, measured = (np.asarray(experiment[role], float) for role in (source, target))
     rests = hold == "zero" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
-    drive = drive if rests else drive - drive[0]
-    return Record(experiment.name, drive, measured, hold, bool(rests), not (rests or _still(drive, measured)))
+    moves = not (rests or _still(drive, measured))
+    return Record(experiment.name, drive if rests else drive - drive[0], measured, hold, bool(rests), moves)
 
 
 def _still(drive: np.ndarray, measured: np.ndarray) -> bool:
-    """Whether a log begins at rest: the measured signal stays where it is until the input first changes."""
+    """Whether a log begins at rest: the measured signal stays where it is until the input first changes.
+
+    An input that is not 0 at first may have stepped there just before: then longer than any dead time.
+    """
     changed = int(np.argmax(drive != drive[0])) or len(drive)
-    if changed < _SHOWS:
+    if changed < (LATEST * len(drive) if drive[0] else _SHOWS):
         return False
     before = measured[:changed]
     noise = float(np.median(np.abs(np.diff(before))))
