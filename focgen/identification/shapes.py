@@ -8,8 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from focgen.identification.input_noise import fair_square
 from focgen.identification.noise import half_width, residual_model
-from focgen.identification.projected import Problem, Solved, mean_square, uncertainty
+from focgen.identification.projected import Problem, Solved, uncertainty
 from focgen.identification.rational import SHAPES, Record, Shape, delay_of, parts
 from focgen.identification.starts import best_of, scan, starts_of
 
@@ -151,7 +152,7 @@ def criterion(problem: Problem, solved: Solved, parameters: int, independent: fl
     A free initial state is known from a few samples however long the record: what it costs does not grow.
     """
     states = sum(len(own) - 1 for own in solved.own)
-    return float(independent * np.log(mean_square(problem, solved)) + parameters * np.log(independent) + states)
+    return float(independent * np.log(fair_square(problem, solved)) + parameters * np.log(independent) + states)
 
 
 def fit_of(problem: Problem, solved: Solved) -> float:
