@@ -370,11 +370,12 @@ def test_a_measured_pump_fills_faster_than_it_vents(open_data):
 
 
 def test_a_measured_dead_time(open_data):
-    """Published models of this process have the input of three samples before at first. A held input takes one
-    of these itself, so the dead time lies between two samples and three; a first-order model, with a lag too
-    few, makes it longer."""
+    """Published models of this process begin with the input of three samples before. A held input takes one of
+    these itself, so the dead time lies between two samples and three; a first-order model, with a lag too few,
+    makes it longer."""
     table = read(open_data / "hair_dryer_delay.csv")
-    fit = identify_stage([Experiment("dryer", 0.08, {"command": table["u_V"], "pressure": table["y_V"]})], "regulator")
+    log = Experiment("dryer", 0.08, {"command": table["u_V"], "pressure": table["y_V"]})
+    fit = identify_stage([log], "regulator")
     delay, half = fit.parameters["delay"]
     assert half < 0.02 and delay + half >= 0.16 and delay - half <= 0.24
     first_order = next(f for f in fit.fits if f.shape == "1p+delay")

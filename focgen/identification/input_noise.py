@@ -19,9 +19,9 @@ _PULSE = 4096  # samples
 
 
 def input_noise(records: Sequence[Record]) -> float:
-    """Variance of the noise on a measured input, from its second differences; 0 for a command, which is known.
+    """Variance of the noise on a measured input, from its second differences; 0 for a command.
 
-    An upper bound where the input itself moves within few samples.
+    A command is known. An upper bound where the input itself moves within few samples.
     """
     if records[0].hold == "zero":
         return 0.0

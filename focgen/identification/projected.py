@@ -107,7 +107,8 @@ def mean_square(problem: Problem, solved: Solved) -> float:
 def uncertainty(problem: Problem, solved: Solved, linear_only: bool = False) -> tuple[np.ndarray, float]:
     """Covariance of (nonlinear parameters, shared weights), and the effective number of samples.
 
-    ``linear_only`` takes the nonlinear parameters as known: their rows and columns are 0. Raises numpy.linalg.LinAlgError where the records do not tell the parameters apart.
+    ``linear_only`` takes the nonlinear parameters as known: their rows and columns are 0. Raises
+    numpy.linalg.LinAlgError where the records do not tell the parameters apart.
     """
     records = problem.records
     ends = np.cumsum([len(r) for r in records])[:-1]

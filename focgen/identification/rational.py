@@ -45,7 +45,8 @@ class Shape:
         return 1 + self.poles + self.zeros + self.delayed
 
 
-SHAPES = tuple(Shape(*kind, delayed) for kind in ((0, 0), (1, 0), (2, 0), (2, 1)) for delayed in (False, True))
+_KINDS = ((0, 0), (1, 0), (2, 0), (2, 1))
+SHAPES = tuple(Shape(*kind, delayed) for kind in _KINDS for delayed in (False, True))
 """Every shape that is tried; (2, 1) last, since the smaller ones give it its starts."""
 
 
@@ -76,13 +77,16 @@ class Record:
         begin = max(begins, key=lambda b: float(np.var(self.measured[b : b + count])))
         drive, measured = (signal[begin : begin + count] for signal in (self.drive, self.measured))
         rests = self.rests and begin == 0
-        return Record(self.name, drive if rests else drive - drive[0], measured, self.hold, rests, begin > 0)
+        drive = drive if rests else drive - drive[0]
+        return Record(self.name, drive, measured, self.hold, rests, self.moves or begin > 0)
 
 
 def parts(records: Sequence[Record], limit: int) -> list[Record]:
-    """A part of every record, so that they have at most ``limit`` samples together; each keeps ``_FEWEST``."""
+    """A part of every record, at most ``limit`` samples together; each keeps ``_FEWEST``."""
     total = sum(map(len, records))
-    return [r.part(max(len(r) * limit // total, _FEWEST)) for r in records] if total > limit else list(records)
+    if total <= limit:
+        return list(records)
+    return [r.part(max(len(r) * limit // total, _FEWEST)) for r in records]
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +171,10 @@ def shifted(signal: np.ndarray, late: int) -> np.ndarray:
     return np.concatenate([np.zeros(min(late, len(signal))), signal[: max(len(signal) - late, 0)]])
 
 
-def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> list[tuple[np.ndarray, np.ndarray]]:
+Rows = list[tuple[np.ndarray, np.ndarray]]
+
+
+def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> Rows:
     """What every record is a sum of: its own rows (·, n), and those whose weights all records share (·, n).
 
     Shared are the response of unit gain and, with a zero, its derivative per sample. Its own are an offset,

@@ -1,4 +1,4 @@
-"""Every shape of a stage fitted to its records, with intervals, Schwarz's criterion, and whether it can be."""
+"""Every shape of a stage fitted to its records, with intervals and Schwarz's criterion, and the choice."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def refit(fitted: Fitted, records: Sequence[Record], step: float) -> Fitted:
 
 
 def _few(records: Sequence[Record], late: float) -> Sequence[Record]:
-    """Parts of the records that are enough to find an optimum roughly, with a dead time of ``late`` samples."""
+    """Parts of the records, enough to find an optimum roughly with a dead time of ``late`` samples."""
     few = parts(records, _ROUGHLY)
     return few if late < _SMALL * min(map(len, few)) else records
 
@@ -152,7 +152,8 @@ def criterion(problem: Problem, solved: Solved, parameters: int, independent: fl
     A free initial state is known from a few samples however long the record: what it costs does not grow.
     """
     states = sum(len(own) - 1 for own in solved.own)
-    return float(independent * np.log(fair_square(problem, solved)) + parameters * np.log(independent) + states)
+    misfit = independent * np.log(fair_square(problem, solved))
+    return float(misfit + parameters * np.log(independent) + states)
 
 
 def fit_of(problem: Problem, solved: Solved) -> float:
@@ -167,7 +168,9 @@ def _uncertainty(problem: Problem, solved: Solved) -> tuple[np.ndarray | None, f
         return None, 3.0
 
 
-def _parameters(problem, solved: Solved, spread, effective: float, step: float) -> dict[str, tuple[float, float]]:
+def _parameters(
+    problem: Problem, solved: Solved, spread: np.ndarray | None, effective: float, step: float
+) -> dict[str, tuple[float, float]]:
     """Name → (value, half interval): the gradients of the named values carry the covariance over."""
     shape, x = problem.shape, np.concatenate([solved.x, solved.shared])
     names, values = _named(shape, x, step)

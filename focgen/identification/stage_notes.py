@@ -8,7 +8,10 @@ from focgen.identification.directions import UpDown
 from focgen.identification.input_noise import attenuation
 from focgen.identification.shapes import MARGIN, Fitted
 
-_WORDS = {"regulator": ("fills", "vents", "pressure", "valve_asymmetry"), "sensor": ("rises", "falls", "output", "")}
+_WORDS = {
+    "regulator": ("fills", "vents", "pressure", "valve_asymmetry"),
+    "sensor": ("rises", "falls", "output", ""),
+}
 _MATERIAL = 0.005  # of a gain
 
 
@@ -20,10 +23,10 @@ def notes_of(
     up_down: UpDown | None,
     step: float,
 ) -> tuple[str, ...]:
-    """Sentences on a stage's fit; ``given`` are the names of all experiments, ``step`` the sample time in s."""
+    """Sentences on a stage's fit; ``given`` names all experiments, ``step`` is the sample time in s."""
     records = chosen.problem.records
     used = {r.name for r in records}
-    said = [*_directions(stage, chosen, up_down), *_rate(stage, chosen, step), *_rivals(chosen, fits)]
+    said = _directions(stage, chosen, up_down) + _rate(stage, chosen, step) + _rivals(chosen, fits)
     said += [f"{r.name}: begins with its step; taken as at rest at 0 before" for r in records if r.rests]
     if left := [name for name in given if name not in used]:
         said.append(f"{', '.join(left)}: not used, too short or without the {stage}'s two signals")
@@ -51,8 +54,8 @@ def _rate(stage: str, chosen: Fitted, step: float) -> list[str]:
         return []
     if chosen.shape.delayed and chosen.report.parameters["delay"][0] <= step * 1.001:
         return [
-            f"the {stage} follows within one sample of {step:g} s; how fast cannot be seen, and a dead time of "
-            "one sample stands for it"
+            f"the {stage} follows within one sample of {step:g} s; how fast cannot be seen, and a dead time "
+            "of one sample stands for it"
         ]
     return [f"no dynamics of the {stage} are seen at {step:g} s a sample; sample faster to see them"]
 
@@ -67,7 +70,9 @@ def _rivals(chosen: Fitted, fits: Sequence[Fitted]) -> list[str]:
         and f.shape.parameters <= chosen.shape.parameters
         and f.report.bic < chosen.report.bic + MARGIN
     ]
-    return [f"{' and '.join(alike)} fits as well; log steps at a higher rate to tell them apart"] if alike else []
+    if not alike:
+        return []
+    return [f"{' and '.join(alike)} fits as well; log steps at a higher rate to tell them apart"]
 
 
 def _attenuated(chosen: Fitted) -> list[str]:

@@ -16,7 +16,15 @@ from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.directions import UpDown, fit_directions
 from focgen.identification.rational import LATEST, Record, parts
-from focgen.identification.shapes import Fitted, ShapeFit, choose, clearly_better, delay_seconds, fit_shapes, refit
+from focgen.identification.shapes import (
+    Fitted,
+    ShapeFit,
+    choose,
+    clearly_better,
+    delay_seconds,
+    fit_shapes,
+    refit,
+)
 from focgen.identification.stage_notes import notes_of
 from focgen.logs.experiment import Experiment
 
