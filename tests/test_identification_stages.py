@@ -10,6 +10,7 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 from focgen.errors import FitError
+from focgen.identification.rational import Record, Shape, responses
 from focgen.identification.stages import identify_stage
 from focgen.logs.experiment import Experiment
 
@@ -153,6 +154,31 @@ def test_without_noise_the_truth_is_found():
 # other shapes
 
 
+@pytest.mark.parametrize("late", [0.0, 0.35, 2.8, 5.0])
+@pytest.mark.parametrize("hold", ["zero", "linear"])
+@pytest.mark.parametrize(
+    "shape, x, system",
+    [
+        (Shape(1, 0, True), [4.0], ([1.0], [4.0, 1.0])),
+        (Shape(2, 1, True), [0.3, 0.4], ([0.09], [1.0, 0.24, 0.09])),
+        (Shape(2, 1, True), [0.3, 1.0], ([0.09], [1.0, 0.6, 0.09])),
+    ],
+)
+def test_responses_are_those_of_a_finer_grid(shape, x, system, hold, late):
+    """Time in samples: T, or wn and damping, here once below and once exactly 1."""
+    drive = np.concatenate([[0.0], np.random.default_rng(0).standard_normal(80)])
+    places = np.arange(81 * FINER) / FINER
+    fine = drive[places.astype(int)] if hold == "zero" else np.interp(places, np.arange(81), drive)
+    record = Record("run", drive, drive, hold)
+    _, made = responses(shape, np.append(np.log(x), late), [record])[0]
+    rule = "zoh" if hold == "zero" else "foh"
+    truth = on_fine_grid(system, fine, 1.0, late, rule)
+    assert np.allclose(made[0], truth, atol=1e-9)
+    if shape.zeros:
+        slope = on_fine_grid(([*system[0], 0.0], system[1]), fine, 1.0, late, rule)
+        assert np.allclose(made[1], slope, atol=1e-9)
+
+
 def test_a_dead_time_of_a_fraction_of_a_sample():
     fit = identify_stage(regulator_logs(([2.0], [0.05, 1.0]), commands(), late=2.35), "regulator")
     assert fit.shape == "1p+delay"
@@ -164,6 +190,10 @@ def test_a_long_dead_time_is_found_by_its_correlation():
     fit = identify_stage(regulator_logs(([2.0], [0.2, 1.0]), commands(), late=60.0), "regulator")
     assert fit.shape == "1p+delay"
     assert covers(fit, "delay", 0.6)
+    binary = [prbs(np.random.default_rng(seed), 1500, 4) for seed in (1, 2)]
+    fit = identify_stage(regulator_logs(([2.0], [0.02, 1.0]), binary, late=59.35, seed=1), "regulator")
+    assert fit.shape == "1p+delay"
+    assert covers(fit, "delay", 0.5935) and covers(fit, "T", 0.02)
 
 
 def test_two_real_poles_with_a_zero():
