@@ -191,9 +191,9 @@ def test_a_long_dead_time_is_found_by_its_correlation():
     assert fit.shape == "1p+delay"
     assert covers(fit, "delay", 0.6)
     binary = [prbs(np.random.default_rng(seed), 1500, 4) for seed in (1, 2)]
-    fit = identify_stage(regulator_logs(([2.0], [0.02, 1.0]), binary, late=59.35, seed=1), "regulator")
+    fit = identify_stage(regulator_logs(([2.0], [0.02, 1.0]), binary, late=199.35, seed=1), "regulator")
     assert fit.shape == "1p+delay"
-    assert covers(fit, "delay", 0.5935) and covers(fit, "T", 0.02)
+    assert covers(fit, "delay", 1.9935) and covers(fit, "T", 0.02)
 
 
 def test_two_real_poles_with_a_zero():

@@ -182,7 +182,8 @@ def _parameters(
         for d in np.diag(nudges)
     ]
     slopes = np.array(slopes).T
-    half = half_width(np.einsum("ij,jk,ik->i", slopes, spread, slopes), effective, len(x))
+    variance = np.einsum("ij,jk,ik->i", slopes, spread, slopes)
+    half = half_width(np.where(variance >= 0.0, variance, np.inf), effective, len(x))  # rounding below 0
     made = {name: (float(v), float(h)) for name, v, h in zip(names, values, half)}
     if _by_whole_samples(problem):
         made["delay"] = (made["delay"][0], step)  # a held input shows no part of a sample
