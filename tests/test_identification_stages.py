@@ -312,12 +312,14 @@ def test_the_other_way_round():
     assert not found.one_line_will_do and found.rising[0] > 1.8 * found.falling[0]
 
 
-@pytest.mark.parametrize("seeds", [6, pytest.param(100, marks=pytest.mark.long)])
-def test_one_line_will_do_where_both_are_equal(seeds):
+@pytest.mark.parametrize("seeds, share", [(6, 0.75), pytest.param(100, 0.9, marks=pytest.mark.long)])
+def test_one_line_will_do_where_both_are_equal(seeds, share):
+    """At 95 %, fewer than 9 of 12 intervals, or than 180 of 200, cover the truth in one of 400 tries."""
     fits = over_seeds(seeds, lambda seed: chamber_logs(3.0, 3.0, seed))
     good = sum(f.up_down.one_line_will_do and f.shape == "1p" and not f.notes for f in fits)
     assert good >= 0.98 * seeds
-    assert np.mean([abs(f.up_down.rising[0] - 3.0) <= f.up_down.rising[1] for f in fits]) >= 0.8
+    pairs = [pair for f in fits for pair in (f.up_down.rising, f.up_down.falling)]
+    assert np.mean([abs(value - 3.0) <= half for value, half in pairs]) >= share
 
 
 def test_steps_up_alone_do_not_show_the_falling():

@@ -48,7 +48,7 @@ class _Switched(Problem):
         super().__init__(fitted.shape, fitted.problem.records)
         self.stage = fitted.solved.x
         self.begins = [_beginning(fitted, i) for i in range(len(self.records))]
-        self.owned = [own if r.moves else own[:1] for r, (own, _) in zip(self.records, fitted.solved.rows)]
+        self.owned = [own for own, _ in fitted.solved.rows]  # as free as the one line it is compared with
 
     def inside(self, x: np.ndarray) -> np.ndarray:
         return np.concatenate([np.clip(x[:2], -_WIDEST, _WIDEST), np.clip(x[2:], 0.0, self.latest)])
