@@ -1,6 +1,6 @@
 """Regulator and sensor from their own signals: right shape, honest intervals, both directions apart.
 
-The truth is simulated here, by scipy's zero-order hold on a grid 20 times finer than the log's.
+The truth is simulated here, by scipy's holds on a grid 20 times finer than the log's.
 """
 
 from functools import cache
@@ -10,6 +10,7 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 from focgen.errors import FitError
+from focgen.identification.rational import Record, Shape, responses
 from focgen.identification.stages import identify_stage
 from focgen.logs.experiment import Experiment
 
@@ -38,9 +39,9 @@ def commands(seed=0, count=1500):
     return [staircase(rng, count), steps(count, 6.0, 50, count // 2), prbs(rng, count)]
 
 
-def on_fine_grid(system, fine, h, late=0.0):
-    """The answer at the samples to an input held on the fine grid, from rest, ``late`` samples later."""
-    num, den, _ = cont2discrete(system, h / FINER, "zoh")
+def on_fine_grid(system, fine, h, late=0.0, hold="zoh"):
+    """The answer at the samples to an input known on the fine grid, from rest, ``late`` samples later."""
+    num, den, _ = cont2discrete(system, h / FINER, hold)
     shift = round(late * FINER)
     fine = np.concatenate([np.zeros(shift), fine])[: len(fine)]
     return lfilter(np.ravel(num), den, fine)[::FINER]
@@ -60,13 +61,14 @@ def regulator_logs(system, inputs, h=0.01, noise=0.004, late=0.0, seed=0, offset
 def sensor_logs(system, h=0.01, count=3000, input_noise=0.005, noise=0.002, seed=0, late=0.0):
     """A curvature that swings smoothly, known on the fine grid; both signals are measured with noise."""
     rng = np.random.default_rng(seed)
-    time = np.arange(count * FINER) * h / FINER
+    time = np.arange((count + 100) * FINER) * h / FINER  # the first 100 samples are before the log
     logs = []
     for i in range(3):
         phases, rates = rng.uniform(0.0, 6.0, 6), np.array([0.3, 0.7, 1.5, 3.0, 6.0, 9.0])
         curvature = np.sin(np.outer(rates, time) + phases[:, None]).T @ (0.004 / np.sqrt(rates)) + 0.01
-        output = on_fine_grid(system, curvature, h, late) + noise * 0.02 * rng.standard_normal(count)
-        measured = curvature[::FINER] + input_noise * 0.02 * rng.standard_normal(count)
+        output = on_fine_grid(system, curvature, h, late, "foh")[100:]
+        output = output + noise * 0.02 * rng.standard_normal(count)
+        measured = curvature[100 * FINER :: FINER] + input_noise * 0.02 * rng.standard_normal(count)
         logs.append(Experiment(f"run {i}", h, {"curvature": measured, "output": output}))
     return logs
 
@@ -152,6 +154,31 @@ def test_without_noise_the_truth_is_found():
 # other shapes
 
 
+@pytest.mark.parametrize("late", [0.0, 0.35, 2.8, 5.0])
+@pytest.mark.parametrize("hold", ["zero", "linear"])
+@pytest.mark.parametrize(
+    "shape, x, system",
+    [
+        (Shape(1, 0, True), [4.0], ([1.0], [4.0, 1.0])),
+        (Shape(2, 1, True), [0.3, 0.4], ([0.09], [1.0, 0.24, 0.09])),
+        (Shape(2, 1, True), [0.3, 1.0], ([0.09], [1.0, 0.6, 0.09])),
+    ],
+)
+def test_responses_are_those_of_a_finer_grid(shape, x, system, hold, late):
+    """Time in samples: T, or wn and damping, here once below and once exactly 1."""
+    drive = np.concatenate([[0.0], np.random.default_rng(0).standard_normal(80)])
+    places = np.arange(81 * FINER) / FINER
+    fine = drive[places.astype(int)] if hold == "zero" else np.interp(places, np.arange(81), drive)
+    record = Record("run", drive, drive, hold)
+    _, made = responses(shape, np.append(np.log(x), late), [record])[0]
+    rule = "zoh" if hold == "zero" else "foh"
+    truth = on_fine_grid(system, fine, 1.0, late, rule)
+    assert np.allclose(made[0], truth, atol=1e-9)
+    if shape.zeros:
+        slope = on_fine_grid(([*system[0], 0.0], system[1]), fine, 1.0, late, rule)
+        assert np.allclose(made[1], slope, atol=1e-9)
+
+
 def test_a_dead_time_of_a_fraction_of_a_sample():
     fit = identify_stage(regulator_logs(([2.0], [0.05, 1.0]), commands(), late=2.35), "regulator")
     assert fit.shape == "1p+delay"
@@ -163,6 +190,10 @@ def test_a_long_dead_time_is_found_by_its_correlation():
     fit = identify_stage(regulator_logs(([2.0], [0.2, 1.0]), commands(), late=60.0), "regulator")
     assert fit.shape == "1p+delay"
     assert covers(fit, "delay", 0.6)
+    binary = [prbs(np.random.default_rng(seed), 1500, 4) for seed in (1, 2)]
+    fit = identify_stage(regulator_logs(([2.0], [0.02, 1.0]), binary, late=199.35, seed=1), "regulator")
+    assert fit.shape == "1p+delay"
+    assert covers(fit, "delay", 1.9935) and covers(fit, "T", 0.02)
 
 
 def test_two_real_poles_with_a_zero():
@@ -222,7 +253,7 @@ def test_long_logs_are_fitted_to_the_last_sample():
     logs = regulator_logs(([2.0], [0.3, 1.0]), [staircase(rng, 120_000, 400)])
     fit = identify_stage(logs, "regulator")
     assert fit.shape == "1p" and covers(fit, "T", 0.3) and covers(fit, "gain", 2.0)
-    assert len(fit.simulated[0]) == 120_000 and fit.parameters["T"][1] < 1.2e-4
+    assert len(fit.simulated[0]) == 120_000 and fit.parameters["T"][1] < 1.5e-4
     assert any("compared on" in note for note in fit.notes)
 
 
@@ -238,7 +269,7 @@ def test_the_papers_sensor_behind_a_noisy_camera():
 
 
 def test_noise_on_the_sensors_input_does_not_bias_it():
-    fits = [identify_stage(sensor_logs(([10.0], [1.0, 10.0]), seed=s), "sensor") for s in range(8)]
+    fits = [identify_stage(sensor_logs(([10.0], [1.0, 10.0]), seed=s), "sensor") for s in range(4)]
     gains, times = (np.array([f.parameters[name][0] for f in fits]) for name in ("gain", "T"))
     assert abs(gains.mean() - 1.0) < 0.001
     assert abs(times.mean() - 0.1) < 0.001
@@ -251,15 +282,15 @@ def test_a_camera_that_is_late():
 
 def test_a_static_sensor_and_what_noise_takes_of_its_gain():
     rng = np.random.default_rng(5)
-    true = 0.002 * np.sin(np.arange(3000) * 0.01)
-    noisy = true + 0.0005 * rng.standard_normal(3000)
+    true = 0.001 * np.sin(np.outer([0.02, 0.05, 0.11, 0.19], np.arange(3000))).sum(axis=0)
+    noisy = true + 0.0002 * rng.standard_normal(3000)
     log = Experiment("static", 0.01, {"curvature": noisy, "output": 1.5 * true})
     fit = identify_stage([log], "sensor")
-    expected = 0.0005**2 / np.var(noisy)
+    expected = 0.0002**2 / np.var(noisy)
     assert fit.shape == "gain"
-    assert fit.parameters["gain"][0] == pytest.approx(1.5 * (1.0 - expected), rel=0.01)
+    assert fit.parameters["gain"][0] == pytest.approx(1.5 * (1.0 - expected), rel=0.002)
     note = next(n for n in fit.notes if "smaller" in n)
-    assert float(note.split("up to ")[1].split("%")[0]) == pytest.approx(100.0 * expected, rel=0.1)
+    assert float(note.split("up to ")[1].split("%")[0]) == pytest.approx(100.0 * expected, rel=0.3)
 
 
 # rising and falling
@@ -281,12 +312,14 @@ def test_the_other_way_round():
     assert not found.one_line_will_do and found.rising[0] > 1.8 * found.falling[0]
 
 
-@pytest.mark.parametrize("seeds", [6, pytest.param(100, marks=pytest.mark.long)])
-def test_one_line_will_do_where_both_are_equal(seeds):
+@pytest.mark.parametrize("seeds, share", [(6, 0.75), pytest.param(100, 0.9, marks=pytest.mark.long)])
+def test_one_line_will_do_where_both_are_equal(seeds, share):
+    """At 95 %, fewer than 9 of 12 intervals, or than 180 of 200, cover the truth in one of 400 tries."""
     fits = over_seeds(seeds, lambda seed: chamber_logs(3.0, 3.0, seed))
     good = sum(f.up_down.one_line_will_do and f.shape == "1p" and not f.notes for f in fits)
     assert good >= 0.98 * seeds
-    assert np.mean([abs(f.up_down.rising[0] - 3.0) <= f.up_down.rising[1] for f in fits]) >= 0.8
+    pairs = [pair for f in fits for pair in (f.up_down.rising, f.up_down.falling)]
+    assert np.mean([abs(value - 3.0) <= half for value, half in pairs]) >= share
 
 
 def test_steps_up_alone_do_not_show_the_falling():
@@ -369,11 +402,12 @@ def test_a_measured_pump_fills_faster_than_it_vents(open_data):
 
 
 def test_a_measured_dead_time(open_data):
-    """Published models of this process have the input of three samples before at first. A held input takes one
-    of these itself, so the dead time lies between two samples and three; a first-order model, with a lag too
-    few, makes it longer."""
+    """Published models of this process begin with the input of three samples before. A held input takes one of
+    these itself, so the dead time lies between two samples and three; a first-order model, with a lag too few,
+    makes it longer."""
     table = read(open_data / "hair_dryer_delay.csv")
-    fit = identify_stage([Experiment("dryer", 0.08, {"command": table["u_V"], "pressure": table["y_V"]})], "regulator")
+    log = Experiment("dryer", 0.08, {"command": table["u_V"], "pressure": table["y_V"]})
+    fit = identify_stage([log], "regulator")
     delay, half = fit.parameters["delay"]
     assert half < 0.02 and delay + half >= 0.16 and delay - half <= 0.24
     first_order = next(f for f in fit.fits if f.shape == "1p+delay")

@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 from focgen.identification.noise import half_width
 from focgen.identification.projected import Problem, Solved, mean_square, uncertainty
 from focgen.identification.rational import Discrete, Record, Shape, delay_of, discretise, shifted
-from focgen.identification.shapes import MARGIN, Fitted, criterion, fit_of, simplest
+from focgen.identification.shapes import MARGIN, Fitted, fit_of, simplest
 
 _MATERIAL = 1.25  # ratio of the two time constants: a smaller one matters to no controller
 _SURE = 2.576  # standard errors of its logarithm, 99 %
@@ -48,7 +48,7 @@ class _Switched(Problem):
         super().__init__(fitted.shape, fitted.problem.records)
         self.stage = fitted.solved.x
         self.begins = [_beginning(fitted, i) for i in range(len(self.records))]
-        self.owned = [own for own, _ in fitted.solved.rows]
+        self.owned = [own for own, _ in fitted.solved.rows]  # as free as the one line it is compared with
 
     def inside(self, x: np.ndarray) -> np.ndarray:
         return np.concatenate([np.clip(x[:2], -_WIDEST, _WIDEST), np.clip(x[2:], 0.0, self.latest)])
@@ -71,7 +71,8 @@ class _TwoScales:
 
     @property
     def bic(self) -> float:
-        return criterion(self.problem, self.solved, self.parameters, self.one.independent)
+        fell = mean_square(self.problem, self.solved) / mean_square(self.one.problem, self.one.solved)
+        return self.one.report.bic + self.one.independent * math.log(fell) + math.log(self.one.independent)
 
     @property
     def parameters(self) -> int:
@@ -86,7 +87,8 @@ def fit_directions(fits: Sequence[Fitted], chosen: Fitted, step: float) -> tuple
     the chosen one only imitate two time constants.
     """
     alone = Shape(1)
-    tried = [f for f in fits if f.shape.poles and not f.shape.zeros and (not f.report.refused or f.shape == alone)]
+    plain = [f for f in fits if f.shape.poles and not f.shape.zeros]
+    tried = [f for f in plain if not f.report.refused or f.shape == alone]
     made = [two for f in tried if (two := _two_scales(f)) is not None] if chosen.shape.poles else []
     if not made:
         return None, chosen
@@ -137,9 +139,9 @@ def _time(problem: _Switched, solved: Solved, scale: float) -> float:
 
 
 def _beginning(fitted: Fitted, index: int) -> np.ndarray:
-    """The state at a record's first sample, in units of the input, as the linear fit has it."""
+    """The state at a record's first sample, in units of the input: at rest, or as the linear fit has it."""
     record, poles = fitted.problem.records[index], fitted.shape.poles
-    if record.rests:
+    if not record.moves:
         return np.zeros(poles)
     own, _ = fitted.solved.rows[index]
     free = fitted.solved.own[index][1 : 1 + poles] @ own[1 : 1 + poles, :poles]

@@ -17,6 +17,7 @@ from focgen.identification.noise import covariance, residual_model
 from focgen.identification.rational import LATEST, Record, Shape, inside, responses
 
 _RANK = 1e-12  # of the largest eigenvalue of unit columns' products: below it they are one column
+_ALIKE = 1e-9  # likewise, below which no covariance can be trusted
 _NUDGE = 1e-4  # of a parameter (logarithm or samples), for its derivative
 _NONE = 1e-5  # of the measured spread: a residual below it is rounding
 
@@ -107,7 +108,8 @@ def mean_square(problem: Problem, solved: Solved) -> float:
 def uncertainty(problem: Problem, solved: Solved, linear_only: bool = False) -> tuple[np.ndarray, float]:
     """Covariance of (nonlinear parameters, shared weights), and the effective number of samples.
 
-    ``linear_only`` takes the nonlinear parameters as known: their rows and columns are 0. Raises numpy.linalg.LinAlgError where the records do not tell the parameters apart.
+    ``linear_only`` takes the nonlinear parameters as known: their rows and columns are 0. Raises
+    numpy.linalg.LinAlgError where the records do not tell the parameters apart.
     """
     records = problem.records
     ends = np.cumsum([len(r) for r in records])[:-1]
@@ -117,7 +119,7 @@ def uncertainty(problem: Problem, solved: Solved, linear_only: bool = False) -> 
     sizes = np.linalg.norm(jacobian, axis=0)
     unit = jacobian / np.where(sizes > 0.0, sizes, 1.0)
     alike = np.linalg.eigvalsh(unit.T @ unit)
-    if alike[0] <= _RANK * alike[-1]:
+    if alike[0] <= _ALIKE * alike[-1]:
         raise np.linalg.LinAlgError("parameters with the same effect, or none")
     spread = covariance(unit, models) / np.outer(sizes, sizes)
     count, shared = len(solved.left), jacobian.shape[1]

@@ -45,7 +45,8 @@ class Shape:
         return 1 + self.poles + self.zeros + self.delayed
 
 
-SHAPES = tuple(Shape(*kind, delayed) for kind in ((0, 0), (1, 0), (2, 0), (2, 1)) for delayed in (False, True))
+_KINDS = ((0, 0), (1, 0), (2, 0), (2, 1))
+SHAPES = tuple(Shape(*kind, delayed) for kind in _KINDS for delayed in (False, True))
 """Every shape that is tried; (2, 1) last, since the smaller ones give it its starts."""
 
 
@@ -55,7 +56,7 @@ class Record:
 
     ``drive`` is the input from its first value on, and the stage's state there is free. Where ``rests`` it
     is the whole input of a log that begins with its step: the stage was at rest at 0 before. Where ``moves``
-    the input was another one shortly before the log.
+    the stage is not known to have been at rest at the first sample.
     """
 
     name: str
@@ -76,13 +77,16 @@ class Record:
         begin = max(begins, key=lambda b: float(np.var(self.measured[b : b + count])))
         drive, measured = (signal[begin : begin + count] for signal in (self.drive, self.measured))
         rests = self.rests and begin == 0
-        return Record(self.name, drive if rests else drive - drive[0], measured, self.hold, rests, begin > 0)
+        drive = drive if rests else drive - drive[0]
+        return Record(self.name, drive, measured, self.hold, rests, self.moves or begin > 0)
 
 
 def parts(records: Sequence[Record], limit: int) -> list[Record]:
-    """A part of every record, so that they have at most ``limit`` samples together; each keeps ``_FEWEST``."""
+    """A part of every record, at most ``limit`` samples together; each keeps ``_FEWEST``."""
     total = sum(map(len, records))
-    return [r.part(max(len(r) * limit // total, _FEWEST)) for r in records] if total > limit else list(records)
+    if total <= limit:
+        return list(records)
+    return [r.part(max(len(r) * limit // total, _FEWEST)) for r in records]
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +171,10 @@ def shifted(signal: np.ndarray, late: int) -> np.ndarray:
     return np.concatenate([np.zeros(min(late, len(signal))), signal[: max(len(signal) - late, 0)]])
 
 
-def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> list[tuple[np.ndarray, np.ndarray]]:
+Rows = list[tuple[np.ndarray, np.ndarray]]
+
+
+def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> Rows:
     """What every record is a sum of: its own rows (·, n), and those whose weights all records share (·, n).
 
     Shared are the response of unit gain and, with a zero, its derivative per sample. Its own are an offset,
@@ -175,11 +182,11 @@ def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> list[tu
     """
     delay = delay_of(shape, x)
     if not shape.poles:
-        return [(np.ones((1, len(r))), _static(r, delay)[None]) for r in records]
+        return [(_own_of_gain(r, delay), _static(r, delay)[None]) for r in records]
     made = discretise(shape.poles, x, delay, records[0].hold)
     own = np.array(_own(shape, made, max(map(len, records))))
     free = 1 + shape.poles
-    counts = [1 if r.rests else len(own) if r.moves and r.hold == "zero" else free for r in records]
+    counts = [1 if r.rests else len(own) if r.moves else free for r in records]
     return [(own[:count, : len(r)], _shared(shape, made, r)) for count, r in zip(counts, records)]
 
 
@@ -191,6 +198,12 @@ def _own(shape: Shape, made: Discrete, count: int) -> list[np.ndarray]:
 def _shared(shape: Shape, made: Discrete, record: Record) -> np.ndarray:
     drive, den = shifted(record.drive, made.late), made.denominator
     return np.array([lfilter(made.numerator(state), den, drive) for state in range(1 + shape.zeros)])
+
+
+def _own_of_gain(record: Record, delay: float) -> np.ndarray:
+    """An offset, and another one while the input from before the first sample acts."""
+    early = (np.arange(len(record)) < delay).astype(float)
+    return np.array([np.ones(len(record)), early][: 2 if record.moves and delay > 0.0 else 1])
 
 
 def _static(record: Record, delay: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Every shape of a stage fitted to its records, with intervals, Schwarz's criterion, and whether it can be."""
+"""Every shape of a stage fitted to its records, with intervals and Schwarz's criterion, and the choice."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from focgen.identification.input_noise import fair_square
 from focgen.identification.noise import half_width, residual_model
-from focgen.identification.projected import Problem, Solved, mean_square, uncertainty
+from focgen.identification.projected import Problem, Solved, uncertainty
 from focgen.identification.rational import SHAPES, Record, Shape, delay_of, parts
 from focgen.identification.starts import best_of, scan, starts_of
 
@@ -85,7 +86,7 @@ def refit(fitted: Fitted, records: Sequence[Record], step: float) -> Fitted:
 
 
 def _few(records: Sequence[Record], late: float) -> Sequence[Record]:
-    """Parts of the records that are enough to find an optimum roughly, with a dead time of ``late`` samples."""
+    """Parts of the records, enough to find an optimum roughly with a dead time of ``late`` samples."""
     few = parts(records, _ROUGHLY)
     return few if late < _SMALL * min(map(len, few)) else records
 
@@ -151,7 +152,8 @@ def criterion(problem: Problem, solved: Solved, parameters: int, independent: fl
     A free initial state is known from a few samples however long the record: what it costs does not grow.
     """
     states = sum(len(own) - 1 for own in solved.own)
-    return float(independent * np.log(mean_square(problem, solved)) + parameters * np.log(independent) + states)
+    misfit = independent * np.log(fair_square(problem, solved))
+    return float(misfit + parameters * np.log(independent) + states)
 
 
 def fit_of(problem: Problem, solved: Solved) -> float:
@@ -166,7 +168,9 @@ def _uncertainty(problem: Problem, solved: Solved) -> tuple[np.ndarray | None, f
         return None, 3.0
 
 
-def _parameters(problem, solved: Solved, spread, effective: float, step: float) -> dict[str, tuple[float, float]]:
+def _parameters(
+    problem: Problem, solved: Solved, spread: np.ndarray | None, effective: float, step: float
+) -> dict[str, tuple[float, float]]:
     """Name → (value, half interval): the gradients of the named values carry the covariance over."""
     shape, x = problem.shape, np.concatenate([solved.x, solved.shared])
     names, values = _named(shape, x, step)
@@ -178,7 +182,8 @@ def _parameters(problem, solved: Solved, spread, effective: float, step: float) 
         for d in np.diag(nudges)
     ]
     slopes = np.array(slopes).T
-    half = half_width(np.einsum("ij,jk,ik->i", slopes, spread, slopes), effective, len(x))
+    variance = np.einsum("ij,jk,ik->i", slopes, spread, slopes)
+    half = half_width(np.where(variance >= 0.0, variance, np.inf), effective, len(x))  # rounding below 0
     made = {name: (float(v), float(h)) for name, v, h in zip(names, values, half)}
     if _by_whole_samples(problem):
         made["delay"] = (made["delay"][0], step)  # a held input shows no part of a sample
@@ -222,6 +227,8 @@ def _refusal(problem: Problem, made: dict[str, tuple[float, float]], step: float
         return "the zero answers in the wrong direction first"
     if zero - half <= 0.0:
         return "the zero's interval reaches 0"
+    if problem.shape.poles > 1 and np.isinf(made["gain"][1]):
+        return "its poles cannot be told apart"
     if not made["gain"][1] < abs(made["gain"][0]):
         return ""  # nothing is known then: said by whoever takes it
     vague = [name for name, spread in made.items() if name != "delay" and _is_vague(name, *spread, step)]

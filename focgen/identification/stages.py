@@ -16,15 +16,23 @@ from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.digits import told_value
 from focgen.identification.directions import UpDown, fit_directions
-from focgen.identification.rational import Record, parts
-from focgen.identification.shapes import Fitted, ShapeFit, choose, clearly_better, delay_seconds, fit_shapes, refit
+from focgen.identification.rational import LATEST, Record, parts
+from focgen.identification.shapes import (
+    Fitted,
+    ShapeFit,
+    choose,
+    clearly_better,
+    delay_seconds,
+    fit_shapes,
+    refit,
+)
 from focgen.identification.stage_notes import notes_of
 from focgen.logs.experiment import Experiment
 
 _SIGNALS = {"regulator": ("command", "pressure", "zero"), "sensor": ("curvature", "output", "linear")}
 _FEWEST = 30  # samples
 _MOST = 50_000  # samples that the shapes are compared on
-_SHOWS = 4  # samples, twice as many of which show whether a log begins at rest
+_SHOWS = 8  # samples that show whether a log begins at rest
 _MOVES = 10.0  # times its noise: a signal that moves by more has answered to a step
 
 
@@ -136,19 +144,21 @@ def _record(experiment: Experiment, stage: str) -> Record:
     source, target, hold = _SIGNALS[stage]
     drive, measured = (np.asarray(experiment[role], float) for role in (source, target))
     rests = hold == "zero" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
-    drive = drive if rests else drive - drive[0]
-    return Record(experiment.name, drive, measured, hold, bool(rests), not _still(drive, measured))
+    moves = not (rests or _still(drive, measured))
+    return Record(experiment.name, drive if rests else drive - drive[0], measured, hold, bool(rests), moves)
 
 
 def _still(drive: np.ndarray, measured: np.ndarray) -> bool:
-    """Whether a log begins at rest: the measured signal stays where it is until the input first changes."""
+    """Whether a log begins at rest: the measured signal stays where it is until the input first changes.
+
+    An input that is not 0 at first may have stepped there just before: then longer than any dead time.
+    """
     changed = int(np.argmax(drive != drive[0])) or len(drive)
-    half = changed // 2
-    if half < _SHOWS:
+    if changed < (LATEST * len(drive) if drive[0] else _SHOWS):
         return False
-    noise = float(np.median(np.abs(np.diff(measured))))
-    moved = float(np.median(measured[half:changed])) - float(np.median(measured[:half]))
-    return abs(moved) <= noise + 1e-3 * float(np.ptp(measured))
+    before = measured[:changed]
+    noise = float(np.median(np.abs(np.diff(before))))
+    return float(np.ptp(before)) <= _MOVES * noise + 1e-3 * float(np.ptp(measured))
 
 
 def _answers(measured: np.ndarray) -> bool:
@@ -170,7 +180,7 @@ def _check(records: Sequence[Record], stage: str) -> None:
 def _check_known(chosen: Fitted, fits: Sequence[Fitted], stage: str) -> None:
     """Raise FitError where the gain's interval reaches 0, in the shape taken or in one that is far better."""
     source, target, _ = _SIGNALS[stage]
-    better = [f for f in fits if f.gain_unknown and clearly_better(f, chosen)]
+    better = [f for f in fits if f.gain_unknown and not f.report.refused and clearly_better(f, chosen)]
     if not chosen.gain_unknown and not better:
         return
     gain, half = (better[0] if better else chosen).report.parameters["gain"]

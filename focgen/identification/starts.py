@@ -35,8 +35,9 @@ def scan(records: Sequence[Record], poles: int) -> list[np.ndarray]:
     low = np.flatnonzero((best <= known[:-2]) & (best <= known[2:]))
     order = low[np.argsort(best[low], kind="stable")][:_KEPT]
     late = list(dict.fromkeys([int(order[0]), 0, *map(int, order[1:])]))
-    made = [[float(m)] if times[0] is None else [np.log(times[np.argmin(costs[:, m])]), float(m)] for m in late]
-    return [np.array(start) for start in made]
+    if not poles:
+        return [np.array([float(m)]) for m in late]
+    return [np.array([np.log(times[np.argmin(costs[:, m])]), float(m)]) for m in late]
 
 
 def _time_constants(records: Sequence[Record]) -> np.ndarray:
@@ -86,7 +87,9 @@ def _from_pair(slow: float, fast: float) -> np.ndarray:
     return np.log([1.0 / np.sqrt(slow * fast), 0.5 * (slow + fast) / np.sqrt(slow * fast)])
 
 
-def starts_of(problem: Problem, found: dict[Shape, np.ndarray], scanned: Sequence[np.ndarray]) -> list[np.ndarray]:
+def starts_of(
+    problem: Problem, found: dict[Shape, np.ndarray], scanned: Sequence[np.ndarray]
+) -> list[np.ndarray]:
     """The starts of a shape, from the scan and from the optima ``found`` of the smaller shapes."""
     shape = problem.shape
     if shape.poles == 0:
