@@ -1,14 +1,14 @@
 """The worst that a controller, as designed, meets within what is not known of its rig.
 
 The margins are looked at in every corner of the rig's uncertainty, at the operating points' pressures. Steps
-are simulated in those few corners only where the margins are smallest or the loop is slowest.
+are simulated in those few corners only where a margin is the smallest, and where the loop is slowest.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class Worst:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Margins at one corner and pressure."""
+    """Margins in one corner at one pressure."""
 
     off: Uncertainty
     pressure: float
@@ -84,15 +84,12 @@ def worst_case(
     points, with their ``nominal`` steps; ``simulated``: what simulates them in a corner.
     """
     seen = _margins(rig, controller, plan, delay, pressures)
-    least = {name: min(seen, key=lambda s: _order(s, name)) for name in ("phase_deg", "gain_db", "delay_s")}
-    crossing = [s for s in seen if math.isfinite(s.margins.crossover_rad_s)]
-    slowest = min(crossing or seen, key=lambda s: s.margins.crossover_rad_s)
-    chosen = tuple(dict.fromkeys(s.off for s in (*least.values(), slowest) if s.off != EXACT))
+    chosen = tuple(off for off in dict.fromkeys(_telling(seen)) if off != EXACT)
     steps = [(EXACT, nominal), *((off, simulated(moved(rig, off))) for off in chosen)]
     flat = [(off, at, m) for off, each in steps for at, m in zip(references, each, strict=True)]
     over = {name: _largest(flat, name) for name in ("overshoot_pct", "settling_s")}
     return Worst(
-        **{name: _smallest(seen, name) for name in least},
+        **{name: _smallest(seen, name) for name in ("phase_deg", "gain_db", "delay_s")},
         **over,
         stable=all(s.margins.stable for s in seen),
         corners=len({s.off for s in seen} - {EXACT}),
@@ -118,6 +115,19 @@ def _margins(rig: Rig, controller: Controller, plan: Plan, delay: int, pressures
             gain = running_gain(plan, pressure if controller.scheduled else None) * slope_at(rig, pressure)
             seen.append(_Seen(off, pressure, margins(known[dynamics].times(factor * gain))))
     return seen
+
+
+def _telling(seen: list[_Seen]) -> list[Uncertainty]:
+    """The corners worth a simulation.
+
+    Where the crossover is lowest the loop is slow. But what settles last is what is left where the controller
+    no longer cancels the actuator, and whether that comes from above or below depends on T: so that corner is
+    looked at with T off the other way, too.
+    """
+    crossing = [s for s in seen if math.isfinite(s.margins.crossover_rad_s)]
+    slow = min(crossing or seen, key=lambda s: s.margins.crossover_rad_s).off
+    other = replace(slow, actuator=replace(slow.actuator, time=-slow.actuator.time))
+    return [*(min(seen, key=lambda s: _order(s, name)).off for name in ("phase_deg", "gain_db")), slow, other]
 
 
 def _order(seen: _Seen, name: str) -> float:
