@@ -43,6 +43,25 @@ def test_step_is_mittag_leffler_at_every_scale(order):
 
 
 @pytest.mark.parametrize("hold", ["zero", "linear"])
+@pytest.mark.parametrize("delay", [0.3 * STEP, 2 * STEP, 17.81 * STEP])
+@pytest.mark.parametrize("order", [0.35, 0.6, 1.3])
+def test_a_delayed_step_is_mittag_leffler_earlier(order, delay, hold):
+    y = Convolution(model(1.0, 1.32, order), STEP, hold, delay).run(np.ones(700))
+    samples = [1, 2, 5, 18, 19, 20, 63, 200, 256, 699]
+    truth = [mittag_leffler_step(max(k * STEP - delay, 0.0), 1.32, order) for k in samples]
+    assert np.max(np.abs(y[samples] - truth)) < 1e-12
+
+
+@pytest.mark.parametrize("delay", [0.3 * STEP, 2 * STEP, 17.81 * STEP])
+@pytest.mark.parametrize("transfer", [model(2.0, 1.32, 0.6), REGULATOR, OSCILLATING])
+def test_a_delayed_ramp_is_the_exact_one_earlier(transfer, delay):
+    t = np.maximum(seconds(700) - delay, 0.0)
+    truth = ramp_response(transfer, np.maximum(t, 1e-9)) * (t > 0.0)
+    y = Convolution(transfer, STEP, "linear", delay).run(seconds(700))
+    assert np.max(np.abs(y - truth)) < 1e-10 * np.max(np.abs(truth))
+
+
+@pytest.mark.parametrize("hold", ["zero", "linear"])
 @pytest.mark.parametrize("transfer", [model(2.0, 1.32, 0.6), REGULATOR * model(1.0, 1.32, 0.6), OSCILLATING])
 def test_arbitrary_inputs_superpose_exactly(hold, transfer):
     """Steps (held) or ramps (linear) laid over one another, each from the exact response."""

@@ -119,6 +119,16 @@ def test_the_sampled_loop_is_its_difference_equation_sample_by_sample(dead_time)
     np.testing.assert_allclose(found, y, atol=1e-12)
 
 
+@pytest.mark.parametrize("dead_time", [0.3, 0.3037])
+def test_the_pressure_that_is_measured_is_late_as_the_output_is(dead_time):
+    """Nothing but the regulator's delay: what is measured behind it is the output."""
+    controller, rig = integral(2.0), dead(Delays(regulator=dead_time))
+    stepper, start = FloatStepper(controller, 200, 1), Equilibrium(0.0, 0.0, 0.0)
+    run = run_loop(chain(rig, H, 200), stepper, np.ones((200, 1)), start, 0)
+    np.testing.assert_allclose(run.pressure, run.output, atol=1e-12)
+    assert run.pressure[-1, 0] > 0.5
+
+
 @pytest.mark.parametrize("delays", [*STAGES, Delays(0.1037, 0.05, 0.1463)])
 def test_the_chain_is_the_exact_response_to_held_commands_later(delays):
     """Linear stages: kernel by kernel, against the step response of their product at t − L."""

@@ -22,7 +22,7 @@ from focgen.plan.response import designed_response, running_gain, running_respon
 from focgen.rig.model import Actuator, Rig
 
 _ALIASES = 40  # pairs of side bands summed one by one
-_LOW = 1e-5  # of the sampling frequency: where the curves begin
+LOW = 1e-5  # of the sampling frequency: where the curves begin
 _LERCH = 0.2  # spacing in ln t: the rule's own error is about exp(−π²/spacing)
 _HIGH = 1e3  # of the same: where the continuous ones end
 
@@ -41,25 +41,39 @@ def slope_at(rig: Rig, pressure: float) -> float:
     return float(drive.deriv()(pressure))
 
 
+def side_bands(sample_time: float, omega) -> np.ndarray:
+    """The frequencies that sampling brings to ``omega`` (n,), rad/s, (81, n); those beyond are summed at once."""
+    bands = np.arange(-_ALIASES, _ALIASES + 1)[:, None]
+    return np.asarray(omega, dtype=float) + 2.0 * math.pi / sample_time * bands
+
+
 def held_response(
-    transfer: TransferFunction, sample_time: float, omega, more: Response | None = None, delay: float = 0.0
+    transfer: TransferFunction,
+    sample_time: float,
+    omega,
+    more: Response | None = None,
+    delay: float = 0.0,
+    known: np.ndarray | None = None,
 ) -> np.ndarray:
     """The response of hold, ``transfer``, a ``delay`` (s) and sampling, at ``omega`` ≤ π/h rad/s: all side
     bands added up.
 
     The sample is taken before the hold moves on, so what passes at once arrives one sample late. ``more``: a
     factor of the response that is no transfer function, as an effect's; beyond 40 bands it adds nothing.
+    ``known``: the transfer function at :func:`side_bands`, where it has been computed.
     """
     h, omega = sample_time, np.asarray(omega, dtype=float)
     whole, part = split_delay(delay, h)
     back = np.exp(-1j * omega * h)
     at_once, rest = _split(transfer)
+    passing = at_once
     if more is not None:
         at_once = at_once * more(omega)
     if not rest.num:
         return at_once * back ** (whole + 1)
-    bands = omega + 2.0 * math.pi / h * np.arange(-_ALIASES, _ALIASES + 1)[:, None]
-    near = rest.frequency_response(bands) * (1.0 if more is None else more(bands))
+    bands = side_bands(h, omega)
+    near = rest.frequency_response(bands) if known is None else known - passing
+    near = near * (1.0 if more is None else more(bands))
     if part:
         near = near * np.exp(-1j * bands * part * h)
     total = (near / (1j * bands)).sum(axis=0) + (_far_bands(rest, h, omega, part) if more is None else 0.0)
@@ -157,7 +171,7 @@ def shapes(rig: Rig, controller: Controller, plan: Plan, delay: int) -> Shapes:
     """
     h, chain = controller.sample_time, Delayed(chain_transfer(rig), rig.delays.total)
     effects, _, _ = linear_part(rig)
-    low, nyquist = _LOW * 2.0 * math.pi / h, math.pi / h
+    low, nyquist = LOW * 2.0 * math.pi / h, math.pi / h
     unit = running_gain(plan, any_schedule(controller))
 
     def held(omega):
@@ -223,6 +237,7 @@ def margins_at(rig: Rig, controller: Controller, plan: Plan, loops: Shapes, pres
 
 
 __all__ = [
+    "LOW",
     "PointMargins",
     "Shapes",
     "any_schedule",
@@ -232,5 +247,6 @@ __all__ = [
     "margins_at",
     "sampled_response",
     "shapes",
+    "side_bands",
     "slope_at",
 ]

@@ -1,25 +1,27 @@
 """The worst that a controller, as designed, meets within what is not known of its rig.
 
 The margins are looked at in every corner of the rig's uncertainty, at the operating points' pressures. Steps
-are simulated in those few corners only where the margins are smallest or the loop is slowest.
+are simulated in those few corners only where a margin is the smallest, and where the loop is slowest; with
+effects, which take longer, in the one where the phase margin is the smallest.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from focgen.control.controller import Controller
-from focgen.control.margins import Curve, Margins, margins
+from focgen.control.margins import Curve, Margins, curve, margins
 from focgen.control.measures import StepMeasures
+from focgen.fractional.transfer import TransferFunction
 from focgen.loop.linear_effects import linear_part
-from focgen.loop.response import any_schedule, chain_transfer, held_response, shapes, slope_at
+from focgen.loop.response import LOW, any_schedule, chain_transfer, held_response, side_bands, slope_at
 from focgen.plan.model import Plan
 from focgen.plan.response import running_gain, running_response
-from focgen.rig.corners import EXACT, corners, moved, without_gain
+from focgen.rig.corners import EXACT, STAGES, corners, moved, transfer_of, without_gain
 from focgen.rig.model import Rig, Uncertainty
 
 Simulated = Callable[[Rig], Sequence[StepMeasures | None]]
@@ -61,7 +63,7 @@ class Worst:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Margins at one corner and pressure."""
+    """Margins in one corner at one pressure."""
 
     off: Uncertainty
     pressure: float
@@ -84,15 +86,13 @@ def worst_case(
     points, with their ``nominal`` steps; ``simulated``: what simulates them in a corner.
     """
     seen = _margins(rig, controller, plan, delay, pressures)
-    least = {name: min(seen, key=lambda s: _order(s, name)) for name in ("phase_deg", "gain_db", "delay_s")}
-    crossing = [s for s in seen if math.isfinite(s.margins.crossover_rad_s)]
-    slowest = min(crossing or seen, key=lambda s: s.margins.crossover_rad_s)
-    chosen = tuple(dict.fromkeys(s.off for s in (*least.values(), slowest) if s.off != EXACT))
+    telling = _telling(seen)[:1] if rig.effects else _telling(seen)
+    chosen = tuple(off for off in dict.fromkeys(telling) if off != EXACT)
     steps = [(EXACT, nominal), *((off, simulated(moved(rig, off))) for off in chosen)]
     flat = [(off, at, m) for off, each in steps for at, m in zip(references, each, strict=True)]
     over = {name: _largest(flat, name) for name in ("overshoot_pct", "settling_s")}
     return Worst(
-        **{name: _smallest(seen, name) for name in least},
+        **{name: _smallest(seen, name) for name in ("phase_deg", "gain_db", "delay_s")},
         **over,
         stable=all(s.margins.stable for s in seen),
         corners=len({s.off for s in seen} - {EXACT}),
@@ -103,21 +103,67 @@ def worst_case(
 
 def _margins(rig: Rig, controller: Controller, plan: Plan, delay: int, pressures) -> list[_Seen]:
     """The margins of the running loop in every corner, at every pressure."""
-    h, unit = controller.sample_time, running_gain(plan, any_schedule(controller))
-    omega = shapes(rig, controller, plan, delay).running.omega
-    effects, _, _ = linear_part(rig)
-    ahead = running_response(plan, omega, any_schedule(controller)) / unit * np.exp(-1j * omega * h * delay)
-    seen, known = [], {}
+    loops = _Loops(rig, controller, plan, delay)
+    seen = []
     for off in corners(rig):
-        factor, dynamics = without_gain(off)
-        if dynamics not in known:  # gains only multiply
-            one = moved(rig, dynamics)
-            found = held_response(chain_transfer(one), h, omega, effects, one.delays.total)
-            known[dynamics] = Curve(omega, ahead * found)
+        factor, dynamics = without_gain(off)  # gains only multiply
+        loop = loops.in_corner(dynamics)
         for pressure in dict.fromkeys(pressures):
             gain = running_gain(plan, pressure if controller.scheduled else None) * slope_at(rig, pressure)
-            seen.append(_Seen(off, pressure, margins(known[dynamics].times(factor * gain))))
+            seen.append(_Seen(off, pressure, margins(loop.times(factor * gain))))
     return seen
+
+
+class _Loops:
+    """The running loop but for its gain, in any corner, on the grid that the rig as given asks for."""
+
+    def __init__(self, rig: Rig, controller: Controller, plan: Plan, delay: int):
+        self.rig, self.h = rig, controller.sample_time
+        at = any_schedule(controller)
+        unit = running_gain(plan, at)
+        self.effects, _, _ = linear_part(rig)
+
+        def ahead(omega):
+            return running_response(plan, omega, at) / unit * np.exp(-1j * omega * self.h * delay)
+
+        def nominal(omega):
+            held = held_response(chain_transfer(rig), self.h, omega, self.effects, rig.delays.total)
+            return ahead(omega) * held
+
+        given = curve(nominal, LOW * 2.0 * math.pi / self.h, math.pi / self.h)
+        self.omega, self.ahead = given.omega, ahead(given.omega)
+        self.bands = side_bands(self.h, self.omega)
+        self.stages: dict[TransferFunction, np.ndarray] = {}
+        self.found = {EXACT: given}
+
+    def in_corner(self, dynamics: Uncertainty) -> Curve:
+        """The loop where all but gains is off by ``dynamics``."""
+        if dynamics not in self.found:
+            one = moved(self.rig, dynamics)
+            parts = [transfer_of(one, stage) for stage in STAGES]
+            known = math.prod(self._at_bands(part) for part in parts if part is not None)
+            transfer, late = chain_transfer(one), one.delays.total
+            held = held_response(transfer, self.h, self.omega, self.effects, late, known)
+            self.found[dynamics] = Curve(self.omega, self.ahead * held)
+        return self.found[dynamics]
+
+    def _at_bands(self, part: TransferFunction) -> np.ndarray:
+        if part not in self.stages:
+            self.stages[part] = part.frequency_response(self.bands)
+        return self.stages[part]
+
+
+def _telling(seen: list[_Seen]) -> list[Uncertainty]:
+    """The corners worth a simulation, the most telling first.
+
+    Where the crossover is lowest the loop is slow. But what settles last is what is left where the controller
+    no longer cancels the actuator, and whether that comes from above or below depends on T: so that corner is
+    looked at with T off the other way, too.
+    """
+    crossing = [s for s in seen if math.isfinite(s.margins.crossover_rad_s)]
+    slow = min(crossing or seen, key=lambda s: s.margins.crossover_rad_s).off
+    other = replace(slow, actuator=replace(slow.actuator, time=-slow.actuator.time))
+    return [*(min(seen, key=lambda s: _order(s, name)).off for name in ("phase_deg", "gain_db")), slow, other]
 
 
 def _order(seen: _Seen, name: str) -> float:
