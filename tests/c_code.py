@@ -18,7 +18,8 @@ STRICT = """-std=c99 -pedantic -Wall -Wextra -Wconversion -Wdouble-promotion -Ws
 EXACT = ["-std=c99", "-O2", "-ffp-contract=off"]
 SANITISERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
-TRIVIAL = "#include <stdint.h>\n#include <stdio.h>\n#include <string.h>\nint main(void) { return puts(\"\") < 0; }\n"
+HEADERS = "#include <stdint.h>\n#include <string.h>\n"
+TRIVIAL = HEADERS + '#include <stdio.h>\nint main(void) { return puts("") < 0; }\n'
 FUSED = "int main(void) { volatile double a = 3.0, b = 2.0, c = 1.0; return a * b + c != 7.0; }\n"
 """A program that a processor without fused multiply-add cannot run where the flags ask for one."""
 
@@ -38,12 +39,11 @@ def compiler(name: str, *flags: str, source: str = TRIVIAL) -> list[str]:
 
 
 def cross_compiler(name: str, *flags: str) -> list[str]:
-    """The command of a compiler for another machine. Skips where there is none, or where it makes no object with
-    ``flags`` of a source that includes stdint.h and string.h."""
+    """The command of a compiler for another machine. Skips where there is none, or where it makes no object
+    with ``flags`` of a source that includes stdint.h and string.h."""
     if not shutil.which(name):
         pytest.skip(f"{name} is not on this machine")
-    source = "#include <stdint.h>\n#include <string.h>\nint32_t one(void) { return 1; }\n"
-    missing = lacking((name,), (*flags, "-c"), source)
+    missing = lacking((name,), (*flags, "-c"), HEADERS + "int32_t one(void) { return 1; }\n")
     if missing:
         pytest.skip(f"{name} {' '.join(flags)} makes no object here: {missing}")
     return [name]
@@ -63,10 +63,14 @@ def lacking(command: tuple[str, ...], flags: tuple[str, ...], source: str, *argu
     with tempfile.TemporaryDirectory() as folder:
         text, made = Path(folder) / "asked.c", Path(folder) / "asked.exe"
         text.write_text(source)
-        built = subprocess.run([*command, *flags, text, "-o", made], capture_output=True, text=True, cwd=folder)
-        if built.returncode or "-c" in flags:
-            return _reason(built)
-        return _reason(subprocess.run([made, *arguments], capture_output=True, text=True, cwd=folder))
+        done = _done([*command, *flags, text, "-o", made], folder)
+        if done.returncode == 0 and "-c" not in flags:
+            done = _done([made, *arguments], folder)
+        return _reason(done)
+
+
+def _done(command: list, folder: str) -> subprocess.CompletedProcess:
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder)
 
 
 def _reason(done: subprocess.CompletedProcess) -> str:
@@ -77,8 +81,8 @@ def _reason(done: subprocess.CompletedProcess) -> str:
 
 
 def fusing() -> list[str]:
-    """The flags with which this machine's compilers fuse products and sums; ask the compiler with FUSED whether
-    what it makes runs. Skips on processors of which this is not known."""
+    """The flags with which this machine's compilers fuse products and sums; ask the compiler with FUSED
+    whether what it makes runs. Skips on processors of which this is not known."""
     flags = {"x86_64": ["-mfma"], "AMD64": ["-mfma"], "aarch64": [], "arm64": []}.get(platform.machine())
     if flags is None:
         pytest.skip(f"nothing is known here of fused multiply-adds on {platform.machine()}")

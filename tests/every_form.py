@@ -1,6 +1,7 @@
 """Makes everything that is compared between machines, and prints the digest of each file as JSON.
 
-``python -m tests.every_form FOLDER``. Two digests are of numpy's own functions: they show what a setting changes.
+``python -m tests.every_form FOLDER``. Two digests are of numpy's own functions, which show what a setting
+changes.
 """
 
 from __future__ import annotations
@@ -18,14 +19,13 @@ from focgen.cli.main import main
 from tests.test_codegen_golden import CONTROLLER, EXPONENTIAL, FORMS, options
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "rig.toml"
-ROUNDED = ["--arithmetic", "q15", "--name", "finger_q15", *EXPONENTIAL]
+FURTHER = {f"exp_{a}": ["--arithmetic", a, "--name", f"finger_{a}", *EXPONENTIAL] for a in ("q15", "f64")}
 WISHES = {"example": [], "fastest": ["--overshoot", "10"]}
 
 
 def make(folder: Path) -> None:
-    """Every golden form, poles rounded to 16 bits, and designs of the example rig, each with a folder of C."""
-    forms = {form: options(form) for form in FORMS} | {"exp_q15": ROUNDED}
-    for form, how in forms.items():
+    """Every golden form, poles of 16 bits and of all their bits, and designs of the example rig with their C."""
+    for form, how in {**{form: options(form) for form in FORMS}, **FURTHER}.items():
         done(["generate", str(CONTROLLER), "--out", str(folder / form), *how])
     for name, wish in WISHES.items():
         controller = folder / f"{name}.toml"

@@ -42,8 +42,8 @@ def generated(form: str, out: Path) -> dict[str, bytes]:
 
 
 def without_digests(files: dict[str, bytes]) -> bytes:
-    """The manifest's text with its digests, which are those of the folder's own ``files``, left out: a change of
-    the runtime is none of the generator."""
+    """The manifest's text with its digests, which are those of the folder's own ``files``, left out: a change
+    of the runtime is none of the generator."""
     text = files["manifest.json"].decode()
     for name, digest in json.loads(text)["inputs"].items():
         assert digest == hashlib.sha256(files[name]).hexdigest(), name

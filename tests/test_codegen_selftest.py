@@ -263,7 +263,8 @@ def test_the_manifest_says_what_it_takes(sound):
         entry = json.loads((folder / "manifest.json").read_text())["selftest"]
         assert f"SELFTEST_STEPS {entry['steps']}u" in (folder / "spba_selftest.h").read_text()
         run(*compiler("gcc"), "-std=c99", "-O0", "-c", folder / "spba_selftest.c", "-o", folder / "x.o")
-        tables = [line.split() for line in run(tool("nm"), "-S", folder / "x.o").splitlines() if " r " in line]
+        symbols = run(tool("nm"), "-S", folder / "x.o").splitlines()
+        tables = [line.split() for line in symbols if " r " in line]
         assert sum(int(size, 16) for _, size, _, _ in tables) == entry["table_bytes"]
 
 

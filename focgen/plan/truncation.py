@@ -49,10 +49,9 @@ def _left_out(plan: Plan, terms: Polynomial, past_horizon: bool) -> float:
     if not plan.exponential:
         return tail_l1(terms, plan.sample_time, plan.length)
     proved = {memory.order: memory.certificate for memory in plan.memories}
+    h, own = plan.sample_time, [t for t in terms if t.order in proved]
     return sum(
-        abs(t.coefficient) * power(plan.sample_time, -t.order) * proved[t.order].output_error(1.0, past_horizon)
-        for t in terms
-        if t.order in proved
+        abs(t.coefficient) * power(h, -t.order) * proved[t.order].output_error(1.0, past_horizon) for t in own
     )
 
 

@@ -140,11 +140,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *at, size_t size)
 
 
 def missing() -> str:
-    """What fuzzing lacks on this machine: clang, its libFuzzer, or the sanitisers' runtimes; empty where nothing."""
+    """What fuzzing lacks on this machine: clang, its libFuzzer, the sanitisers' runtimes; empty where nothing."""
     if not shutil.which("clang"):
         return "clang is not on this machine (Debian: apt install clang)"
     reason = lacking(("clang",), tuple(FLAGS), _EMPTY, "-runs=1")
-    return reason and f"clang's libFuzzer or sanitisers are not on this machine (Debian: libclang-rt-dev): {reason}"
+    where = "not on this machine (Debian: apt install libclang-rt-dev)"
+    return reason and f"clang's libFuzzer or its sanitisers' runtimes are {where}: {reason}"
 
 
 def fuzz(plan: Plan, folder: Path, seconds: float, seed: int = 1, kernels: Kernels = PORTABLE) -> Fuzzed:
