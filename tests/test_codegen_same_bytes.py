@@ -15,8 +15,21 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from scipy import signal as scipy_signal
+
+from focgen.control.files import controller_text, read_controller
+from focgen.fractional import discrete
+from focgen.loop import tuning
+from focgen.loop.design import design
+from focgen.plan import stability
+from focgen.plan.build import build_plan
+from focgen.plan.model import Plan
+from tests.test_codegen_golden import CONTROLLER, FORMS, arithmetic
+from tests.test_control_design import SECOND_ORDER, linear_rig
 
 try:
     from numpy._core import _multiarray_umath as core
@@ -75,3 +88,53 @@ def test_the_settings_change_what_is_left_to_the_processor():
         pytest.skip("this processor has nothing that could be left out")
     here, old = made()["numpy"], made("an old processor")["numpy"]
     assert old["functions"] != here["functions"] and old["algebra"] != here["algebra"]
+
+
+# ------------------------------------------------------------------- what no setting of this machine varies
+
+
+def noisy(function, size: float, seed: int = 1):
+    """A function whose result is off as another library's may be: by ``size`` of its root mean square."""
+    random = np.random.default_rng(seed)
+
+    def off(*arguments):
+        found = np.asarray(function(*arguments))
+        return found + size * np.sqrt(np.mean(np.square(found))) * random.standard_normal(found.shape)
+
+    return off
+
+
+def planned(form: str) -> Plan:
+    """Of a golden form, with every bit of its bounds."""
+    memory = dict(memory="exponential", tolerance=1e-3, horizon=100_000) if form.startswith("exp") else {}
+    stability._inverse.cache_clear()
+    return build_plan(read_controller(CONTROLLER), arithmetic(form), **memory)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_other_transforms_make_the_same_plan(form, monkeypatch):
+    """Of a Fourier transform every library makes another last digit; norms are rounded up for that."""
+    here = planned(form)
+    monkeypatch.setattr(stability, "fftconvolve", noisy(scipy_signal.fftconvolve, 1e-14))
+    varied = {name: noisy(getattr(scipy_signal, name), 1e-14) for name in ("fftconvolve", "lfilter")}
+    monkeypatch.setattr(discrete, "signal", SimpleNamespace(**varied))
+    there = planned(form)
+    stability._inverse.cache_clear()
+    assert there.error_bound == here.error_bound and there.proofs == here.proofs and there == here
+
+
+def test_a_design_does_not_hold_the_noise_of_its_simulation(monkeypatch):
+    """K_o follows from settling times that were found, a roll-off's time from the crossover aimed at."""
+    rig, measure, guess = linear_rig(*SECOND_ORDER), tuning.measure_step, tuning._guess
+    here = design(rig, overshoot=5.0)
+    random = np.random.default_rng(2)
+
+    def off(output, *rest):
+        return measure(output + 1e-12 * np.ptp(output) * random.standard_normal(output.shape), *rest)
+
+    monkeypatch.setattr(tuning, "measure_step", off)
+    monkeypatch.setattr(tuning, "_guess", lambda bench: guess(bench) * (1.0 + 1e-13))
+    there = design(rig, overshoot=5.0)
+    assert any("roll-off" in note for note in here.notes)
+    assert controller_text(there.controller) == controller_text(here.controller)
+    assert there.schedule == here.schedule
