@@ -16,7 +16,7 @@ import pytest
 
 from focgen.cli.main import main
 from focgen.output import write_files
-from tests.c_code import STRICT, compiler, run
+from tests.c_code import STRICT, compiler, run, tool
 
 FORMS = ("f64", "f32", "q31", "q15", "exp_f32", "exp_q31")
 EXPONENTIAL = ["--memory", "exponential", "--tolerance", "1e-3", "--horizon", "100000"]
@@ -42,8 +42,8 @@ def generated(form: str, out: Path) -> dict[str, bytes]:
 
 
 def without_digests(files: dict[str, bytes]) -> bytes:
-    """The manifest's text with its digests, which are those of the folder's own ``files``, left out: a change of
-    the runtime is none of the generator."""
+    """The manifest's text with its digests, which are those of the folder's own ``files``, left out: a change
+    of the runtime is none of the generator."""
     text = files["manifest.json"].decode()
     for name, digest in json.loads(text)["inputs"].items():
         assert digest == hashlib.sha256(files[name]).hexdigest(), name
@@ -120,7 +120,7 @@ def test_the_header_serves_cpp(tmp_path):
         "-o",
         tmp_path / "x.o",
     )
-    assert "finger_q31_init" in run("nm", tmp_path / "x.o").split()
+    assert "finger_q31_init" in run(tool("nm"), tmp_path / "x.o").split()
 
 
 @pytest.mark.parametrize("form", FORMS)

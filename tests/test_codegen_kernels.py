@@ -21,7 +21,7 @@ from focgen.plan.scenario import to_raw
 from focgen.verification.compare import compare
 from focgen.verification.folder import read_folder
 from focgen.verification.host import Library
-from tests.c_code import STRICT, compiler, run
+from tests.c_code import SANITISERS, STRICT, compiler, run, tool
 from tests.conftest import paper_controller
 from tests.controllers import random_controller, random_scenario
 
@@ -132,7 +132,7 @@ def test_resets_and_tracks_at_any_step_of_a_group(seed, tmp_path):
 
 def test_no_undefined_behaviour(tmp_path):
     """The same under the sanitizers of gcc, run as a program."""
-    plans = planned([1, 12, 25], [64, 100, 129])
+    command, plans = compiler("gcc", *SANITISERS), planned([1, 12, 25], [64, 100, 129])
     for plan in plans:
         kernels = Kernels(CORES[plan.arithmetic])
         write_files(tmp_path, folder_files(plan, b"", kernels=kernels))
@@ -143,9 +143,8 @@ def test_no_undefined_behaviour(tmp_path):
             f"(void){name}_step(&s, ({name}_sig)((k * 7919) % 30000), ({name}_sig)(k % 11 * 900){sched}); }}"
             " return 0; }\n"
         )
-        sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
         sources = [tmp_path / f"{name}_main.c", tmp_path / f"{name}.c"]
-        run(*compiler("gcc"), "-std=c99", "-O1", *sanitize, *sources, "-o", tmp_path / name)
+        run(*command, "-std=c99", "-O1", *SANITISERS, *sources, "-o", tmp_path / name)
         run(tmp_path / name)
 
 
@@ -180,7 +179,7 @@ def test_what_it_costs_is_in_the_manifest(arithmetic, tmp_path):
     sizes = made.manifest["sizes"]
     assert int(run(tmp_path / "size.exe")) == sizes["state_bytes"]
     run(*compiler("gcc"), "-std=c99", "-O0", "-c", tmp_path / "finger.c", "-o", tmp_path / "x.o")
-    tables = [line.split() for line in run("nm", "-S", tmp_path / "x.o").splitlines() if " r " in line]
+    tables = [line.split() for line in run(tool("nm"), "-S", tmp_path / "x.o").splitlines() if " r " in line]
     assert sum(int(bytes_, 16) for _, bytes_, _, _ in tables) == sizes["table_bytes"]
     sums = made.manifest["kernels"]["sums"]
     assert set(sums) == set(named_sums(made.plan))

@@ -15,7 +15,7 @@ from focgen.control.files import controller_text, read_controller
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.resources import shipped
-from tests.c_code import EXACT, STRICT, compiler, run
+from tests.c_code import EXACT, SANITISERS, STRICT, compiler, cross_compiler, run, tool
 from tests.controllers import seed_controller
 
 FINGER = Path(__file__).parent / "golden" / "finger.toml"
@@ -30,7 +30,7 @@ def folder_of(arithmetic: str, out: Path, name: str = "finger") -> Path:
 
 def wanted(thing: Path) -> set[str]:
     """The symbols an object file leaves open."""
-    return set(run("nm", "-u", thing).replace("U ", " ").split())
+    return set(run(tool("nm"), "-u", thing).replace("U ", " ").split())
 
 
 @pytest.mark.parametrize("level", ["-O0", "-O2", "-Os"])
@@ -40,7 +40,7 @@ def test_nothing_is_left_to_link(arithmetic, level, tmp_path):
     folder = folder_of(arithmetic, tmp_path)
     run(*compiler("gcc"), "-std=c99", level, "-c", folder / "finger.c", "-o", folder / "x.o")
     assert wanted(folder / "x.o") <= MEMORY
-    defined = [line.split()[1:] for line in run("nm", "--defined-only", folder / "x.o").splitlines()]
+    defined = [line.split()[1:] for line in run(tool("nm"), "--defined-only", folder / "x.o").splitlines()]
     public = {name for kind, name in defined if kind.isupper() and kind not in "R"}
     assert public == {f"finger_{verb}" for verb in ("init", "reset", "step", "track", "flags")}
     assert all(kind in "TtRr" for kind, _ in defined), "nothing that can be written to"
@@ -107,7 +107,7 @@ def test_the_state_is_as_large_as_the_manifest_says(arithmetic, tmp_path):
     run(*compiler("gcc"), "-std=c99", folder / "size.c", "-o", folder / "size.exe")
     assert int(run(folder / "size.exe")) == size["state_bytes"]
     run(*compiler("gcc"), "-std=c99", "-O0", "-c", folder / "finger.c", "-o", folder / "x.o")
-    tables = [line.split() for line in run("nm", "-S", folder / "x.o").splitlines() if " r " in line]
+    tables = [line.split() for line in run(tool("nm"), "-S", folder / "x.o").splitlines() if " r " in line]
     assert sum(int(bytes_, 16) for _, bytes_, _, _ in tables) == size["table_bytes"]
 
 
@@ -167,14 +167,13 @@ def test_no_input_leads_to_undefined_behaviour(arithmetic, tmp_path):
     ctype = {"f64": "double", "f32": "float", "q31": "int32_t", "q15": "int16_t"}[arithmetic]
     top, bottom = _ENDS[ctype]
     (folder / "wild.c").write_text(_WILD % {"top": top, "bottom": bottom, "some": _SOME[ctype]})
-    sanitisers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     program = folder / "wild.exe"
     run(
-        *compiler("gcc"),
+        *compiler("gcc", *SANITISERS),
         "-std=c99",
         "-O1",
         "-g",
-        *sanitisers,
+        *SANITISERS,
         folder / "wild.c",
         folder / "finger.c",
         "-o",
@@ -246,10 +245,11 @@ def test_every_table_and_every_pointer_to_one_is_marked_for_flash(tmp_path):
 
 def test_on_avr_the_tables_stay_in_flash(tmp_path):
     folder = folder_of("q15", tmp_path)
-    avr = [*compiler("avr-gcc"), "-mmcu=atmega2560", "-std=gnu99", "-Os", "-Wall", "-Wextra", "-Werror"]
+    flags = ["-mmcu=atmega2560", "-std=gnu99", "-Os", "-Wall", "-Wextra", "-Werror"]
+    avr = [*cross_compiler("avr-gcc", *flags), *flags]
     run(*avr, "-c", folder / "finger.c", "-o", folder / "x.o")
-    tables = [line for line in run("avr-nm", folder / "x.o").splitlines() if "finger_numerator" in line]
-    sections = run("avr-objdump", "-h", folder / "x.o")
+    tables = [line for line in run(tool("avr-nm"), folder / "x.o").splitlines() if "finger_numerator" in line]
+    sections = run(tool("avr-objdump"), "-h", folder / "x.o")
     assert (
         tables
         and ".progmem" in sections

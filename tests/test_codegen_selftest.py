@@ -19,7 +19,7 @@ from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.verification.verify import verify
-from tests.c_code import EXACT, STRICT, compiler, run
+from tests.c_code import EXACT, FUSED, STRICT, compiler, fusing, run, tool
 from tests.conftest import paper_controller
 from tests.controllers import random_controller
 from tests.test_verification_mutations import filter_controller
@@ -94,19 +94,16 @@ def test_clang_agrees(sound, name, arithmetic):
 @pytest.fixture(scope="module")
 def fma() -> list[str]:
     """What makes the compiler of this machine fuse products and sums."""
-    if "fma" in Path("/proc/cpuinfo").read_text().split():
-        return ["-mfma"]
-    if "aarch64" in run("uname", "-m"):
-        return []
-    pytest.skip("this processor has no fused multiply-add")
+    return fusing()
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 @pytest.mark.parametrize("arithmetic", ["f32", "f64"])
 @pytest.mark.parametrize("cc", ["gcc", "clang"])
 def test_contraction_is_noticed(sound, name, arithmetic, cc, fma):
-    folder, command = sound / f"{name}_{arithmetic}", compiler(cc)
-    assert results(folder, [name], command, "-O2", "-ffp-contract=fast", *fma) != [0]
+    fast = ["-O2", "-ffp-contract=fast", *fma]
+    folder, command = sound / f"{name}_{arithmetic}", compiler(cc, *fast, source=FUSED)
+    assert results(folder, [name], command, *fast) != [0]
     assert results(folder, [name], command, *EXACT, *fma) == [0]
 
 
@@ -119,14 +116,14 @@ def test_fast_math_is_noticed(sound, name, arithmetic, cc):
 
 def test_the_default_of_gcc_is_noticed(sound, fma):
     """Its own dialect contracts; -std=c99 does not."""
-    folder = sound / "spba_f32"
-    assert results(folder, ["spba"], compiler("gcc"), "-std=gnu11", "-O2", *fma) != [0]
+    folder, flags = sound / "spba_f32", ["-std=gnu11", "-O2", *fma]
+    assert results(folder, ["spba"], compiler("gcc", *flags, source=FUSED), *flags) != [0]
 
 
 def test_integers_need_no_flag(sound):
     for arithmetic in ("q31", "q15"):
-        folder = sound / f"spba_{arithmetic}"
-        assert results(folder, ["spba"], compiler("gcc"), "-Ofast", "-march=native") == [0]
+        folder, flags = sound / f"spba_{arithmetic}", ["-Ofast", "-march=native"]
+        assert results(folder, ["spba"], compiler("gcc", *flags), *flags) == [0]
 
 
 # ------------------------------------------------------------------------------------------ what it covers
@@ -266,7 +263,8 @@ def test_the_manifest_says_what_it_takes(sound):
         entry = json.loads((folder / "manifest.json").read_text())["selftest"]
         assert f"SELFTEST_STEPS {entry['steps']}u" in (folder / "spba_selftest.h").read_text()
         run(*compiler("gcc"), "-std=c99", "-O0", "-c", folder / "spba_selftest.c", "-o", folder / "x.o")
-        tables = [line.split() for line in run("nm", "-S", folder / "x.o").splitlines() if " r " in line]
+        symbols = run(tool("nm"), "-S", folder / "x.o").splitlines()
+        tables = [line.split() for line in symbols if " r " in line]
         assert sum(int(size, 16) for _, size, _, _ in tables) == entry["table_bytes"]
 
 

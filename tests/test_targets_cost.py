@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 
 import numpy as np
@@ -19,6 +18,7 @@ from focgen.targets.steps import step_costs
 from focgen.targets.toolchains import EXACT, toolchains
 from focgen.verification.costs import REMEMBERED, cost
 from focgen.verification.folder import read_folder
+from tests.c_code import cross_compiler, tool
 from tests.conftest import paper_controller
 from tests.test_targets_verify import ZIG, piece
 
@@ -97,8 +97,7 @@ def test_bytes_of_25_more_taps(folders):
 
 def test_flash_is_what_the_toolchain_says(folders):
     """arm-none-eabi-size of the object, where it is installed."""
-    if shutil.which("arm-none-eabi-size") is None:
-        pytest.skip("arm-none-eabi-size is not on this machine")
+    tool("arm-none-eabi-size")
     from focgen.targets.cost import object_sizes
     from focgen.targets.toolchains import compile_object
 
@@ -126,8 +125,7 @@ def test_the_stack_that_is_used_is_the_stack_that_is_told(folders, name):
 
 def test_frames_are_those_of_the_compiler(folders, tmp_path):
     """GCC's -fstack-usage, where it is installed."""
-    if shutil.which("arm-none-eabi-gcc") is None:
-        pytest.skip("arm-none-eabi-gcc is not on this machine")
+    cross_compiler("arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-fstack-usage")
     for name in ("cortex-m0plus", "cortex-m3", "cortex-m4"):
         chain = next(c for c in toolchains(core(name)) if "gcc" in c.name)
         for read in folders.values():

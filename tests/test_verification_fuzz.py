@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 
 import pytest
 
-from tests.proofs.fuzz import fuzz
+from tests.proofs.fuzz import fuzz, missing
 from tests.proofs.spread import generated
 
 FAULTS = {
@@ -21,8 +20,8 @@ FAULTS = {
 
 
 def target(folder: Path, arithmetic: str):
-    if not shutil.which("clang"):
-        pytest.skip("clang with libFuzzer is not on this machine")
+    if lacks := missing():
+        pytest.skip(lacks)
     return generated(folder, "inverse", arithmetic, 6)
 
 

@@ -133,7 +133,7 @@ def _rolled_off(inversion: Inversion, crossover: float) -> Inversion:
     lags = math.ceil(excess - 1e-9)
     if lags < 1:
         return inversion
-    time = float(f"{1.0 / (FILTER_RATIO * crossover):.6g}")  # the crossover comes from a search: six digits hold
+    time = float(f"{1.0 / (FILTER_RATIO * crossover):.6g}")  # of a searched crossover six digits are certain
     lag = TransferFunction([(1.0, 0.0)], [(time, 1.0), (1.0, 0.0)])
     filtered = transfer
     for _ in range(lags):

@@ -105,7 +105,8 @@ class _Error:
         parts = self.weights.copy()
         for _ in range(m):
             parts *= self.poles - 1.0
-        values = elementary.total(parts[:, None] * elementary.powers(self.poles, np.maximum(lags - 1.0 - m, 0.0)))
+        powers = elementary.powers(self.poles, np.maximum(lags - 1.0 - m, 0.0))
+        values = elementary.total(parts[:, None] * powers)
         return np.where(lags == 0, 1.0, values) if m == 0 else values
 
     def differences(self, m: int, lags: np.ndarray) -> np.ndarray:

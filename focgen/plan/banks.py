@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.fractional.elementary import exact_sum
 from focgen.plan.blocks import SPARE, finest_exponent
 from focgen.plan.formats import Interval, Word, integer, limit, weighted
 from focgen.plan.memory import Speed, by_speed
@@ -129,13 +130,13 @@ def drive_error(made: Sum) -> float:
     D is off by its own rounding and by the mean of those before, at most a count in all; and by what the
     shift of a·D adds to L.
     """
-    return sum(_each_error(bank) for bank in made.banks) / made.total.lsb
+    return exact_sum([_each_error(bank) for bank in made.banks]) / made.total.lsb
 
 
 def _each_error(bank: Bank) -> float:
     """In units of the history."""
     late = 0.5 * bank.state.lsb if bank.rate_shift else 0.0
-    return sum(abs(c) * (bank.drive.lsb + late / q) for c, q in zip(bank.values, bank.real_rates))
+    return exact_sum([abs(c) * (bank.drive.lsb + late / q) for c, q in zip(bank.values, bank.real_rates)])
 
 
 # ------------------------------------------------------------------------------------------------ floating

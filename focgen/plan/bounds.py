@@ -56,7 +56,7 @@ def error_bound(plan: Plan, tables: Tables) -> ErrorBound:
     parts = {cause: g * value for cause, value in v.static.items()}
     parts["gain"] = gain_error * (account.reach + v.total)
     parts["product"] = account.product_error(g * account.reach)
-    static = sum(parts.values()) * _SLACK
+    static = exact_sum([*parts.values()]) * _SLACK
     growth, ceiling = g * v.growth * _SLACK, g * v.ceiling * _SLACK
     operator = static + ceiling
     _refuse_meaningless(plan, parts, g * account.reach)
@@ -93,7 +93,7 @@ class FilteredError:
     @property
     def total(self) -> float:
         """All of it."""
-        return sum(self.static.values()) + self.ceiling
+        return exact_sum([*self.static.values()]) + self.ceiling
 
 
 class _Account:
@@ -128,9 +128,8 @@ class _Account:
         exact, size = table.weights[first:], table.size[first:]
         lags = np.arange(first, first + len(exact))
         taps = l1(np.array(made.values) - exact) + exact_sum(self.recursion(lags) * size)
-        return taps + 2.0 * sum(
-            abs(c - w) + 16.0 * _DOUBLE * abs(w) for c, w in zip(_mode_weights(made), _exact_weights(table))
-        )
+        held, exact = np.array(_mode_weights(made)), np.array(_exact_weights(table))
+        return taps + 2.0 * exact_sum(np.abs(held - exact) + 16.0 * _DOUBLE * np.abs(exact))
 
     def recursion(self, lags: np.ndarray) -> np.ndarray:
         """Relative error of a double's weights by the recursion of eq. (11), the reference's, in 4 roundings
@@ -180,7 +179,7 @@ class _Fixed(_Account):
         static = {
             "inputs": self.N * self.input_error,
             "weights": self.M * self.weight_error(plan.direct, tables.direct) * self.E,
-            "inner": self.M * sum(inner.static.values()),
+            "inner": self.M * exact_sum([*inner.static.values()]),
         }
         if plan.feedback is None:
             static["rounding"] = rounding + 0.5 * plan.filtered.lsb * bool(plan.narrow)
@@ -269,7 +268,8 @@ class _Floating(_Account):
         here = self.u * (1.0 + gamma(count, self.u)) * (exact_sum(partial) + float(partial[-1]))
         there = gamma(count, _DOUBLE) * l1(table.weights)
         taps = 1.01 * (here + there) * largest + count * self.tiny * (1.0 + largest)
-        return taps + sum(self.bank_error(bank, float(partial[-1])) for bank in made.banks) * largest
+        banks = [self.bank_error(bank, float(partial[-1])) for bank in made.banks]
+        return taps + exact_sum(banks) * largest
 
     def bank_error(self, bank: Bank, before: float) -> float:
         """Of a bank, for a history of at most 1, here and in the reference, which has no compensation.
@@ -300,7 +300,7 @@ class _Floating(_Account):
         static = {
             "inputs": self.N * self.input_error,
             "weights": self.M * self.weight_error(plan.direct, tables.direct) * self.E,
-            "inner": self.M * sum(inner.static.values()),
+            "inner": self.M * exact_sum([*inner.static.values()]),
         }
         if plan.feedback is None:
             static["rounding"] = rounding if plan.inner else direct

@@ -104,7 +104,8 @@ def _check_at_rest(plan: Plan, folded: Tables) -> None:
         (plan.direct, folded.direct, form.direct, 1.0),
         (plan.inner and plan.inner.rest, folded.rest, form.rest, half_step),
     ):
-        meant = sum(abs(t.coefficient) for t in terms if t.order == 0.0) * factor / abs(folded.normaliser)
+        constants = [abs(t.coefficient) for t in terms if t.order == 0.0]
+        meant = math.fsum(constants) * factor / abs(folded.normaliser)
         if made is not None and abs(math.fsum(made.values) - table.total) > 0.5 * meant > 0.0:
             what = f"the weights of {plan.arithmetic} lose the gain at rest: the highest order outweighs it"
             raise PlanError(plan.name, what, "choose q31, f32 or f64, or a longer sample_time")

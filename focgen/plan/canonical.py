@@ -63,7 +63,7 @@ class Realisation:
     @property
     def steady_gain(self) -> float:
         """What a constant e gives at rest with infinite memory and the inner integral at 0."""
-        return sum(t.coefficient for t in self.direct if t.order == 0.0) / self.constant
+        return exact_sum([t.coefficient for t in self.direct if t.order == 0.0]) / self.constant
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def _whole(order: float) -> float:
 def normaliser(controller: Controller) -> float:
     """The denominator's coefficient of the present sample, which all weights are divided by."""
     h = controller.sample_time
-    return sum(t.coefficient * power(h, -t.order) for t in realise(controller).den)
+    return exact_sum([t.coefficient * power(h, -t.order) for t in realise(controller).den])
 
 
 def tables(controller: Controller, length: int) -> Tables:
@@ -204,7 +204,7 @@ def tail_l1(terms: Polynomial, step: float, length: int) -> float:
     The weights of one order have one sign from lag β + 1 on and sum to zero in all (to 1 for order 0), so a
     tail's sum of magnitudes is the magnitude of the partial sum of eq. (11)'s weights before it.
     """
-    return sum(abs(t.coefficient) * power(step, -t.order) * _tail(t.order, length) for t in terms)
+    return exact_sum([abs(t.coefficient) * power(step, -t.order) * _tail(t.order, length) for t in terms])
 
 
 def _tail(order: float, length: int) -> float:

@@ -229,7 +229,7 @@ def _noise(made: Filter, own: Inverse) -> float:
     """What rounding can add to v, in counts of v."""
     sums = [made.feedback.table] + ([made.direct] if made.direct else [])
     aligned = sum(len(s.blocks) + len(s.banks) for s in sums) + 1
-    drives = sum(drive_error(s) for s in sums) * 2.0**-made.narrow
+    drives = math.fsum(drive_error(s) for s in sums) * 2.0**-made.narrow
     carried = own.norm_after(np.array([1.0, -1.0]))
     at_reset = 2.0 * max(1.0, own.norm * (1.0 + math.fsum(made.feedback.table.values)))
     return 0.5 * carried + own.norm * (0.5 * aligned * 2.0**-made.narrow + drives) + at_reset

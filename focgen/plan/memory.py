@@ -121,7 +121,7 @@ def exponential_tables(controller: Controller, memories: tuple[ExponentialMemory
 def _folded(terms: Polynomial, step: float, memories: dict[float, ExponentialMemory]) -> Table:
     """Whole orders, and lag 0 of the others with their differences, as taps."""
     count = max(math.ceil(t.order) for t in terms)
-    each = np.array([t.coefficient * power(step, -t.order) * _differences(math.ceil(t.order), count) for t in terms])
+    each = [t.coefficient * power(step, -t.order) * _differences(math.ceil(t.order), count) for t in terms]
     taps, size = total(each), total(np.abs(each))
     keep = int(np.flatnonzero(size)[-1]) + 1
     modes = tuple(_modes(t, step, memories[t.order]) for t in terms if t.order in memories)

@@ -69,7 +69,7 @@ def response_of(
         return Response(taps)
     whole = sum((m.response(lags) for m in modes), np.zeros(lags + 1))
     whole[: len(taps)] += taps
-    return Response(whole, sum(m.left_out(lags) for m in modes))
+    return Response(whole, exact_sum([m.left_out(lags) for m in modes]))
 
 
 def _powers(base: float, count: int) -> np.ndarray:

@@ -191,7 +191,7 @@ def rounding_reach(plan: Plan, own) -> float:
     unit = plan.wide.lsb / plan.filtered.lsb
     sums = [s for s in (plan.direct, plan.feedback.table) if s]
     rounded = [b for s in sums for b in (*s.blocks, *s.banks) if b.align]
-    each = 0.5 * unit * (len(rounded) + bool(plan.inner)) + unit * sum(map(drive_error, sums))
+    each = 0.5 * unit * (len(rounded) + bool(plan.inner)) + unit * math.fsum(map(drive_error, sums))
     carried = 0.5 * own.norm_after(np.array([1.0, -1.0]))
     return own.norm * each + carried + reset_error(plan) * max(1.0, own.norm * at_rest(plan))
 

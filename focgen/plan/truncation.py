@@ -7,7 +7,7 @@ horizon and once for ever: Σ |∇^m (h_j − g_j)| for each term.
 from __future__ import annotations
 
 from focgen.control.controller import Controller
-from focgen.fractional.elementary import power
+from focgen.fractional.elementary import exact_sum, power
 from focgen.fractional.transfer import Polynomial
 from focgen.plan.canonical import Realisation, Tables, folded, inner_limits, realise, tail_l1
 from focgen.plan.gains import largest_gain
@@ -49,11 +49,9 @@ def _left_out(plan: Plan, terms: Polynomial, past_horizon: bool) -> float:
     if not plan.exponential:
         return tail_l1(terms, plan.sample_time, plan.length)
     proved = {memory.order: memory.certificate for memory in plan.memories}
-    return sum(
-        abs(t.coefficient) * power(plan.sample_time, -t.order) * proved[t.order].output_error(1.0, past_horizon)
-        for t in terms
-        if t.order in proved
-    )
+    h, own = plan.sample_time, [t for t in terms if t.order in proved]
+    errors = [proved[t.order].output_error(1.0, past_horizon) for t in own]
+    return exact_sum([abs(t.coefficient) * power(h, -t.order) * error for t, error in zip(own, errors)])
 
 
 def _recursive_truncation(

@@ -20,6 +20,7 @@ from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.manifest import flags
 from focgen.codegen.state import members
 from focgen.plan.model import Plan
+from tests.c_code import lacking
 from tests.proofs.harness import inside, reachable
 from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
 
@@ -31,6 +32,10 @@ CASES = [
     *(("all", a, _AHEAD, Kernels(target)) for target, a in KERNELS),
 ]
 """What is fuzzed: a controller, its arithmetic and length, and its form of the sums."""
+_EMPTY = """#include <stddef.h>
+#include <stdint.h>
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) { return data && size > 1000u ? 1 : 0; }
+"""
 _DEFAULT = 600.0  # seconds in all
 
 
@@ -134,6 +139,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *at, size_t size)
 """
 
 
+def missing() -> str:
+    """What fuzzing lacks on this machine: clang, its libFuzzer, the sanitisers' runtimes; empty where nothing."""
+    if not shutil.which("clang"):
+        return "clang is not on this machine (Debian: apt install clang)"
+    reason = lacking(("clang",), tuple(FLAGS), _EMPTY, "-runs=1")
+    where = "not on this machine (Debian: apt install libclang-rt-dev)"
+    return reason and f"clang's libFuzzer or its sanitisers' runtimes are {where}: {reason}"
+
+
 def fuzz(plan: Plan, folder: Path, seconds: float, seed: int = 1, kernels: Kernels = PORTABLE) -> Fuzzed:
     """Build the target of a plan whose C is in ``folder`` and run it for so long."""
     (folder / "target.c").write_text(target(plan, kernels))
@@ -158,8 +172,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.proofs.fuzz", description=main.__doc__)
     parser.add_argument("--seconds", type=float, default=_DEFAULT, help="in all (default: 600)")
     seconds = parser.parse_args().seconds
-    if not shutil.which("clang"):
-        print("fuzzing needs clang with libFuzzer, which is not on this machine (Debian: apt install clang)")
+    if lacks := missing():
+        print(f"nothing is fuzzed: {lacks}")
         return 1
     results = []
     for name, arithmetic, length, kernels in CASES:
