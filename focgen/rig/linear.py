@@ -151,7 +151,9 @@ def _discrete_between(
 
 
 def _by_pulse(transfer: TransferFunction, a: np.ndarray, h: float, held: bool, share: float):
-    """The same from the first samples of the exact response to a pulse, which repeated poles do not trouble."""
+    """The same from the first samples of the exact response to a pulse, which repeated poles do not
+    trouble.
+    """
     late = Convolution(transfer, h, "zero" if held else "linear", (1.0 - share) * h)
     pulse = late.run(np.eye(1, len(a) + 2, 1)[0])[1:]
     return np.convolve(a, pulse)[: len(a) + 1], a

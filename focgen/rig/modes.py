@@ -101,7 +101,7 @@ def respond(
 
 
 def between(x: np.ndarray, rest: np.ndarray, h: float, modes: Modes, share: float) -> np.ndarray:
-    """The response to ``x`` (n,) not at the samples but at the ``share`` 0 … 1 of the way from the one before.
+    """The response to ``x`` (n,) at the ``share``, 0 … 1, of the way to each sample from the one before.
 
     What a mode was a sample ago decays over that share, which is one more factor of its input; the rest is
     the answer to the straight line since.
