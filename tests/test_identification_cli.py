@@ -175,9 +175,13 @@ def test_missing_files_are_refused(tmp_path, capsys):
     assert "absent.csv" in refused(["identify", log, "--rig", rig, "--unseen", absent], tmp_path, capsys)
 
 
-def test_logs_without_a_step_are_refused(tmp_path, capsys):
-    line = refused(["identify", str(SINES), "--rig", str(RIG)], tmp_path, capsys)
-    assert "none is a step" in line
+def test_sines_determine_the_model_as_well(tmp_path, capsys):
+    """The maker's actuator unloads at 0.4 times its speed, so that T lies between its two."""
+    argv = ["identify", str(SINES), "--rig", str(RIG), "--out", str(tmp_path / "new.toml"), "--no-integer", "--json"]
+    assert main(argv) == 0
+    payload = json.loads(capsys.readouterr().out)
+    assert 1.32 < payload["rig"]["T"] < 1.32 / 0.4 and set(payload["gof"]) == {"fom", "rig"}
+    assert payload["gof"]["rig"]["mean"] > 0.9 and payload["rig"]["initial_steps"] == {}
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, check_determined, with_stages
 from focgen.logs.experiment import Experiment
+from focgen.logs.notes import listed
 from focgen.logs.read import read_logs
 from focgen.output import write_file
 from focgen.rig.engine import STAGES
@@ -111,6 +112,9 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
     warnings = warnings_of(excitations, fit, fits, failed, quality)
+    between = [x.name for x in excitations if is_step(x) and x.between]
+    if between:
+        told += (f"{listed(between)}: steps between two levels; each K is the mean slope of K(p) p on its step",)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 

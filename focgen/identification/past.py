@@ -18,6 +18,8 @@ from focgen.identification.kernel import Kernels
 from focgen.identification.noise import residual_model
 
 MOST_STEPS = 3
+_WHITE = 0.25  # effective samples a sample: what is left above it is noise, below it likely a misfit
+_ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit
 _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
 
 
@@ -79,7 +81,7 @@ def asks_for_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
     model = residual_model(residual - basis @ np.linalg.lstsq(basis, residual, rcond=1e-6)[0])
     white = lfilter(model.a, [1.0], np.column_stack([residual, basis]), axis=0)[len(model.a) - 1 :]
     gained, free = _gain(white / np.sqrt(model.variance), reach)
-    return gained > 2.0 * free + _ASKED and _worth(residual, made[best_time(residual, made)]) > _ASKED
+    return gained > 2.0 * free + _ASKED and _worth_it(residual, made[best_time(residual, made)])
 
 
 def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
@@ -92,9 +94,10 @@ def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
     return float(share @ (singular.T @ rows[:, 0]) ** 2), float(np.sum(share))
 
 
-def _worth(residual: np.ndarray, column: np.ndarray) -> float:
-    """What one column takes off a residual, over the variance of what is left, in effective samples."""
+def _worth_it(residual: np.ndarray, column: np.ndarray) -> bool:
+    """Whether one column takes enough off a residual, over the variance of what is left, in effective samples."""
     basis = np.column_stack([np.ones(len(residual)), column])
     left = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
     taken = float(np.var(residual)) / max(float(np.var(left)), 1e-300) - 1.0
-    return taken * residual_model(left).effective
+    effective = residual_model(left).effective
+    return taken * effective > (_ASKED if effective > _WHITE * len(residual) else _ASKED_OF_MISFIT)
