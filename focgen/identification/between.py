@@ -49,6 +49,10 @@ class Course:
         """The first ``count`` powers alone."""
         return Course(*(None if part is None else part[:count] for part in vars(self).values()))
 
+    def until(self, count: int) -> Course:
+        """The first ``count`` samples alone."""
+        return Course(*(None if part is None else part[:, :count] for part in vars(self).values()))
+
 
 def noise_level(values: np.ndarray) -> float:
     """The standard deviation of a signal's white noise (n,), from its sixth differences; robust to jumps."""
