@@ -58,6 +58,8 @@ def identify(
     Raises LogError, RigError or FitError; nothing is written then.
     """
     check_degree(gain_degree)
+    if not stages:
+        raise FitError("--stages", "names no stage", f"give one or more of {', '.join(STAGES)}")
     for stage in stages:
         check_choice("--stages", stage, STAGES, FitError)
     nominal = rig if isinstance(rig, Rig) else read_rig(rig)
@@ -70,9 +72,10 @@ def identify(
         result = _actuator(experiments, others, new, gain_degree, delay, integer)
     else:
         result = Identification((), None, new, {}, {}, (), ())
+    result = replace(result, stages=found)
     warnings = doubts(nominal, experiments) + result.warnings
-    notes = remarks_of(experiments, nominal, result, found) + told + result.notes
-    result = replace(result, warnings=warnings, notes=notes, stages=found)
+    notes = remarks_of(experiments, nominal, result) + told + result.notes
+    result = replace(result, warnings=warnings, notes=notes)
     if out is not None:
         write_file(out, rig_text(result.rig), (*logs, rig, *unseen))
     return result
@@ -115,6 +118,10 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     between = [x.name for x in excitations if is_step(x) and x.between]
     if between:
         told += (f"{listed(between)}: steps between two levels; each K is the mean slope of K(p) p on its step",)
+    begun = [x.name for x in excitations if not x.rest_shown]
+    if begun:
+        verb = "begins with its step" if len(begun) == 1 else "each begin with their step"
+        told += (f"{listed(begun)} {verb}: taken as at rest at 0 before",)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 
