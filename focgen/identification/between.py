@@ -20,7 +20,8 @@ _SMALL = 0.02  # of the reach: a smaller change is no jump
 _SEEN = 5.0  # standard deviations: a bend below is noise
 _POINTS = (6, 4)  # of a polynomial; the second where a jump or the log's end leaves no room for the first
 _OFF_MIDDLE = 3.0  # a polynomial off the middle has to have a highest difference so much smaller
-_OF_FOURTH = 70.0**0.5  # standard deviation of white noise's fourth difference
+_ORDER = 6  # of the difference that noise is told from a signal by
+_OF_SIXTH = 924.0**0.5  # standard deviation of white noise's sixth difference
 _NORMAL = 0.6745  # median of |x| of the normal distribution
 
 
@@ -48,12 +49,16 @@ class Course:
         """The first ``count`` powers alone."""
         return Course(*(None if part is None else part[:count] for part in vars(self).values()))
 
+    def until(self, count: int) -> Course:
+        """The first ``count`` samples alone."""
+        return Course(*(None if part is None else part[:, :count] for part in vars(self).values()))
+
 
 def noise_level(values: np.ndarray) -> float:
-    """The standard deviation of a signal's white noise (n,), from its fourth differences; robust to jumps."""
-    if len(values) < 5:
+    """The standard deviation of a signal's white noise (n,), from its sixth differences; robust to jumps."""
+    if len(values) <= _ORDER:
         return 0.0
-    return float(np.median(np.abs(np.diff(values, 4)))) / _NORMAL / _OF_FOURTH
+    return float(np.median(np.abs(np.diff(values, _ORDER)))) / _NORMAL / _OF_SIXTH
 
 
 def jumps_of(values: np.ndarray) -> np.ndarray:

@@ -73,7 +73,7 @@ def _unsure(excitations: Sequence[Excitation], fit: FractionalFit, misfit: float
 
 
 def _singles(fits: Sequence[ExperimentFit], failed: Sequence[str], misfit: float | None) -> list[str]:
-    wide = [f.name for f in fits if any(_half(f, key) > _WIDE for key in ("K", "T", "alpha"))]
+    wide = [f.name for f in fits if f.step and any(_half(f, key) > _WIDE for key in ("K", "T", "alpha"))]
     said = []
     if wide:
         remedy = "" if misfit else "; hold steps longer or lower the noise for Table I"

@@ -15,8 +15,8 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
-from focgen.identification.past import MOST_STEPS, Past, asks_for_past, best_time, columns, times
-from focgen.identification.problem import Point, Problem, delay_reach, starts
+from focgen.identification.past import MOST_STEPS, SHOWS, Past, asks_for_past, best_time, columns, times
+from focgen.identification.problem import Point, Problem, delay_reach, shortened, starts
 
 _ROUNDS = 60  # of Levenberg–Marquardt
 _DAMPED, _STIFF, _FREE = 1e-3, 1e9, 1e-9  # damping: at first, at most, at least
@@ -92,9 +92,10 @@ def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) ->
         known = point.x[problem.of_past[i]]
         begun += [*known][: past.steps if past else 0]
         if past and past.steps > len(known):
-            grid = times(len(x))
-            made = columns(x, problem.kernels(point.x, i, past=True), grid, 1)[0]
-            left = x.measured - problem.simulated(point)[i]
+            start = x.beginning(SHOWS)
+            grid = times(start)
+            made = columns(start, problem.kernels_for(start, point.x, start.stepped.count), grid, 1)[0]
+            left = (x.measured - problem.simulated(point)[i])[: len(start)]
             begun += [np.log(grid[best_time(left, made)] + 1.0)] * (past.steps - len(known))
     penalties = _long_run(problem, point)
     for _ in range(2):
@@ -105,9 +106,10 @@ def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) ->
 
 
 def _searched(problem: Problem) -> Point:
-    """The best of the fits from the better starts of the coarse grid."""
-    runs = [_descended(problem, start) for start in starts(problem)]
-    return min(runs, key=lambda point: point.cost)
+    """The best of the fits from the better starts of the coarse grid; found on the beginning of long logs."""
+    few = shortened(problem)
+    best = min((_descended(few, start) for start in starts(few)), key=lambda point: point.cost)
+    return best if few is problem else _descended(problem, best.x)
 
 
 def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Point:
@@ -147,11 +149,13 @@ def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, re
     x, known = problem.experiments[i], problem.pasts[i]
     if known is None and np.std(left) <= _EXACT * x.spread:
         return None
-    made = columns(x, problem.kernels(point.x, i, past=True), times(len(x)), 1)[0]
-    if known is not None and not asks_for_past(x.measured - problem.from_rest(point, i), made, reach):
+    start = x.beginning(SHOWS)
+    n = len(start)
+    made = columns(start, problem.kernels_for(start, point.x, start.stepped.count), times(start), 1)[0]
+    if known is not None and not asks_for_past((x.measured - problem.from_rest(point, i))[:n], made, reach):
         return None
     steps = known.steps if known else 0
-    more = steps < MOST_STEPS and np.std(left) > _EXACT * x.spread and asks_for_past(left, made, reach)
+    more = steps < MOST_STEPS and np.std(left) > _EXACT * x.spread and asks_for_past(left[:n], made, reach)
     return Past(steps + 1, reach) if more else known
 
 

@@ -104,6 +104,7 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     excitations = [x.with_powers(degree + 1) for x in excitations]
     fit = fit_fractional(excitations, delay)
     check_determined(excitations, fit)
+    excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
     joint = _joint(excitations, fit, fits)
     new = replace(

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from focgen.identification.excitation import LOOKED_BACK, Excitation
+from focgen.identification.excitation import Excitation
 from focgen.identification.kernel import Kernels
 from focgen.identification.noise import residual_model
 
 MOST_STEPS = 3
+SHOWS = 20_000  # first samples that show whether there was a past
 _WHITE = 0.25  # effective samples a sample: what is left above it is noise, below it likely a misfit
 _ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit
 _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
@@ -34,19 +35,12 @@ class Past:
 
 def latest(x: Excitation) -> float:
     """The longest time before the first sample that a past is looked for, samples."""
-    return float(LOOKED_BACK * len(x) - 2)
+    return float(x.looked_back - 2)
 
 
-def times(count: int) -> np.ndarray:
-    """A coarse grid of times before the first of ``count`` samples, in samples."""
-    powers = 2 ** np.arange(int(np.log2(LOOKED_BACK * count)))
-    return np.concatenate([[0], powers]).astype(float)
-
-
-def fine_times(count: int) -> np.ndarray:
-    """The same with four times an octave."""
-    most = np.log2(LOOKED_BACK * count - 2.0)
-    return np.concatenate([[0.0], 2.0 ** np.arange(0.0, most, 0.25)])
+def times(x: Excitation, octave: int = 1) -> np.ndarray:
+    """A grid of times before the first sample, in samples, so many an ``octave``."""
+    return np.concatenate([[0.0], 2.0 ** np.arange(0.0, np.log2(latest(x)), 1.0 / octave)])
 
 
 def columns(x: Excitation, kernels: Kernels, when: np.ndarray, rows: int = 3) -> np.ndarray:
