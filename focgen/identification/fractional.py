@@ -15,7 +15,7 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
-from focgen.identification.past import MOST_STEPS, SHOWS, Past, asks_for_past, best_time, columns, times
+from focgen.identification.past import EXACT, MOST_STEPS, SHOWS, Past, asks_for_past, best_time, columns, times
 from focgen.identification.problem import Point, Problem, delay_reach, shortened, starts
 
 _ROUNDS = 60  # of Levenberg–Marquardt
@@ -23,7 +23,6 @@ _DAMPED, _STIFF, _FREE = 1e-3, 1e9, 1e-9  # damping: at first, at most, at least
 _STILL = 1e-10  # largest step, in units of log τ, α and samples, at which a fit has converged
 _FLAT = 1e-13  # relative fall of the cost, likewise
 _RECONSIDERED = 3  # times that the pasts are chosen anew
-_EXACT = 1e-4  # of the spread: what is left below shows no past
 _EDGE = 1e-6  # distance of α from its bounds
 _WHITENED = 15  # times that model and noise model are fitted in turn
 _SEARCHED_ANEW = 3  # of these times the fit begins at the coarse grid, too: the biased one may be far off
@@ -147,7 +146,7 @@ def _pasts_asked_for(problem: Problem, point: Point) -> tuple[Past | None, ...]:
 
 def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, reach: float) -> Past | None:
     x, known = problem.experiments[i], problem.pasts[i]
-    if known is None and np.std(left) <= _EXACT * x.spread:
+    if known is None and np.std(left) <= EXACT * x.spread:
         return None
     start = x.beginning(SHOWS)
     n = len(start)
@@ -155,7 +154,7 @@ def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, re
     if known is not None and not asks_for_past((x.measured - problem.from_rest(point, i))[:n], made, reach):
         return None
     steps = known.steps if known else 0
-    more = steps < MOST_STEPS and np.std(left) > _EXACT * x.spread and asks_for_past(left[:n], made, reach)
+    more = steps < MOST_STEPS and np.std(left) > EXACT * x.spread and asks_for_past(left[:n], made, reach)
     return Past(steps + 1, reach) if more else known
 
 
@@ -219,7 +218,7 @@ def _with_intervals(problem: Problem, point: Point, spread, models) -> Fractiona
     half = {
         "T": float(wide(slope @ spread @ slope)),
         "alpha": float(wide(spread[1, 1])),
-        "delay": float(wide(spread[2, 2])) if problem.delay_free else 0.0,
+        "delay": problem.step * float(wide(spread[2, 2])) if problem.delay_free else 0.0,
         "gain": wide(np.diag(spread)[gains]),
     }
     if len(problem.experiments) == 1:

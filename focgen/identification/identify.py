@@ -16,6 +16,7 @@ from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
 from focgen.identification.initial import answer_from_its_past
 from focgen.identification.model import ExperimentFit, Identification, Joint, Unseen
+from focgen.identification.past import leaves_more
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.reach import seen_ranges
 from focgen.identification.remarks import remarks_of
@@ -130,7 +131,8 @@ def _prepared(experiment: Experiment, rig: Rig, powers: int) -> Excitation:
     """The experiment with what was before its first sample: the input it shows there for ever, or none where the
     log begins with the step itself.
 
-    The second is taken where it fits better and no further past is asked for.
+    The second is taken where it leaves no more than the first with the past that this asks for. That past may stand
+    for a step at the first sample as well, so it has to explain more than a misfit would.
     """
     candidates = [prepare(experiment, rig, powers, before) for before in possible_rests(experiment)]
     if len(candidates) == 1:
@@ -138,10 +140,14 @@ def _prepared(experiment: Experiment, rig: Rig, powers: int) -> Excitation:
     rest, zero = candidates
     try:
         begun = fit_fractional([zero.with_powers(1)])
-        rested = fit_fractional([rest.with_powers(1)], pasts=[None])
+        rested = fit_fractional([rest.with_powers(1)])
     except FitError:
         return rest
-    better = gof(zero.measured, begun.simulated[0]) > gof(rest.measured, rested.simulated[0])
+    left = [rest.measured - fit.simulated[0] for fit in (begun, rested)]
+    if rested.pasts[0] is None:
+        better = bool(np.std(left[0]) < np.std(left[1]))
+    else:
+        better = not leaves_more(left[0], left[1], rest.spread)
     return zero if better and begun.pasts[0] is None else rest
 
 
