@@ -15,7 +15,17 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
-from focgen.identification.past import EXACT, MOST_STEPS, SHOWS, Past, asks_for_past, best_time, columns, times
+from focgen.identification.past import (
+    EXACT,
+    MOST_STEPS,
+    SHOWS,
+    Past,
+    asks_for_past,
+    best_time,
+    columns,
+    leaves_more,
+    times,
+)
 from focgen.identification.problem import Point, Problem, delay_reach, shortened, starts
 
 _ROUNDS = 60  # of Levenberg–Marquardt
@@ -78,6 +88,8 @@ def fit_fractional(
         if asked == problem.pasts:
             break
         problem, best = _with_pasts(problem, best, asked)
+    if pasts is None:
+        problem, best = _tried_with_pasts(problem, best)
     if any(x.reference is not None for x in experiments):
         problem, best = _whitened(problem, best)
     _check(experiments, best)
@@ -102,6 +114,44 @@ def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) ->
         point = _descended(problem, problem.inside(np.array(begun)))
         penalties, begun = _long_run(problem, point), point.x
     return problem, point
+
+
+def _tried_with_pasts(problem: Problem, point: Point) -> tuple[Problem, Point]:
+    """The fit with a past in experiments that asked for none, where it leaves far less of them.
+
+    T and alpha that have given way to a transient leave little that a past could take off beside them.
+    """
+    reach, before = _reach(problem), _left(problem, point)
+    tried = [
+        past or (Past(1, reach) if len(x) <= SHOWS and _may_have_past(left, x) else None)
+        for x, past, left in zip(problem.experiments, problem.pasts, before)
+    ]
+    if tuple(tried) == problem.pasts:
+        return problem, point
+    other, trial = _with_pasts(problem, point, tried)
+    kept = tuple(
+        past if past is None or known or leaves_more(left, after, x.spread) else None
+        for x, past, known, left, after in zip(
+            problem.experiments, tried, problem.pasts, before, _left(other, trial)
+        )
+    )
+    if kept == problem.pasts:
+        return problem, point
+    return (other, trial) if kept == other.pasts else _with_pasts(problem, point, kept)
+
+
+def _may_have_past(left: np.ndarray, x: Excitation) -> bool:
+    """Whether what is left is no white noise: that shows no past."""
+    return bool(np.std(left) > EXACT * x.spread) and residual_model(left).effective < 0.5 * len(left)
+
+
+def _left(problem: Problem, point: Point) -> list[np.ndarray]:
+    """What the model leaves of each experiment, (n,)."""
+    return [x.measured - made for x, made in zip(problem.experiments, problem.simulated(point))]
+
+
+def _reach(problem: Problem) -> float:
+    return max(float(np.ptp(x.measured)) for x in problem.experiments)
 
 
 def _searched(problem: Problem) -> Point:
@@ -136,11 +186,9 @@ def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Po
 
 def _pasts_asked_for(problem: Problem, point: Point) -> tuple[Past | None, ...]:
     """The pasts with a step more where the data ask for it, and without where they do not."""
-    reach = max(float(np.ptp(x.measured)) for x in problem.experiments)
-    made = problem.simulated(point)
+    reach = _reach(problem)
     return tuple(
-        _past_asked_for(problem, point, i, x.measured - made[i], reach)
-        for i, x in enumerate(problem.experiments)
+        _past_asked_for(problem, point, i, left, reach) for i, left in enumerate(_left(problem, point))
     )
 
 
