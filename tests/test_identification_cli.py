@@ -166,6 +166,11 @@ def test_a_degree_that_makes_no_sense_is_refused(tmp_path, capsys, degree):
     assert "gain-degree" in refused(argv, tmp_path, capsys)
 
 
+def test_no_stage_at_all_is_refused(tmp_path, capsys):
+    argv = ["identify", str(STEPS), "--rig", str(RIG), "--stages", ""]
+    assert "--stages: names no stage; give one or more of" in refused(argv, tmp_path, capsys)
+
+
 def test_missing_files_are_refused(tmp_path, capsys):
     log, rig, absent = str(STEPS), str(RIG), str(EXAMPLES / "absent.csv")
     assert "absent.csv" in refused(["identify", absent, "--rig", rig], tmp_path, capsys)

@@ -333,3 +333,45 @@ def test_an_offset_that_is_there_is_found_without_a_rest():
     assert all(f.offset != 0.0 for f in fit.integer) and not any(
         "shows no offset" in note for note in found.notes
     )
+
+
+def later(log: Experiment, begin: float) -> Experiment:
+    """The log from ``begin`` s on, as if nothing had been recorded before."""
+    first = int(round(begin / log.sample_time))
+    return Experiment(log.name, log.sample_time, {role: values[first:] for role, values in log.signals.items()})
+
+
+def test_the_interval_of_a_dead_time_is_in_seconds():
+    """0.113 s at 20 ms a sample: the estimates scatter as widely as their intervals say."""
+    late, found, half = 0.113, [], []
+    for seed in range(20):
+        log = step_log(seconds=21.0)
+        noise = 0.02 * K * LEVEL * np.random.default_rng(seed).normal(size=len(log))
+        curvature = K * LEVEL * exact_step(0.02, len(log), 1.0 + late) + noise
+        fit = fit_fractional([prepare(Experiment("late", 0.02, {**log.signals, "curvature": curvature}), paper_rig())], True)
+        found.append(fit.delay)
+        half.append(fit.half["delay"])
+    spread = float(np.std(found))
+    assert abs(np.mean(found) - late) < spread and 0.6 < 1.96 * spread / np.mean(half) < 1.6
+
+
+def test_a_log_that_is_shown_but_not_fitted_may_begin_in_a_transient():
+    log = step_log(release=21.0)
+    found = module.identify([log], paper_rig(), gain_degree=0, unseen=[later(log, 3.0)], integer=False)
+    assert found.unseen[0].gof > 0.99
+
+
+def test_an_input_that_is_up_at_first_has_stepped_there_only_where_the_answer_begins_there():
+    rng = np.random.default_rng(1)
+    log = step_log(release=21.0, noise=0.01 * K * LEVEL * rng.normal(size=2050))
+    assert module._prepared(later(log, 1.0), paper_rig(), 1).before == 0.0
+    assert module._prepared(later(log, 3.0), paper_rig(), 1).before == pytest.approx(LEVEL)
+
+
+def test_a_misfit_is_not_blamed_on_short_holds():
+    """An output that wanders by itself: no holding of steps helps."""
+    log = step_log(release=21.0)
+    wandering = np.cumsum(np.random.default_rng(2).normal(size=len(log)))
+    with pytest.raises(FitError) as raised:
+        module.identify([Experiment("w", 0.02, {**log.signals, "curvature": wandering})], paper_rig(), integer=False)
+    assert "hold" not in raised.value.remedy and "columns" in raised.value.remedy

@@ -15,7 +15,17 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
-from focgen.identification.past import MOST_STEPS, SHOWS, Past, asks_for_past, best_time, columns, times
+from focgen.identification.past import (
+    EXACT,
+    MOST_STEPS,
+    SHOWS,
+    Past,
+    asks_for_past,
+    best_time,
+    columns,
+    leaves_more,
+    times,
+)
 from focgen.identification.problem import Point, Problem, delay_reach, shortened, starts
 
 _ROUNDS = 60  # of Levenberg–Marquardt
@@ -23,7 +33,6 @@ _DAMPED, _STIFF, _FREE = 1e-3, 1e9, 1e-9  # damping: at first, at most, at least
 _STILL = 1e-10  # largest step, in units of log τ, α and samples, at which a fit has converged
 _FLAT = 1e-13  # relative fall of the cost, likewise
 _RECONSIDERED = 3  # times that the pasts are chosen anew
-_EXACT = 1e-4  # of the spread: what is left below shows no past
 _EDGE = 1e-6  # distance of α from its bounds
 _WHITENED = 15  # times that model and noise model are fitted in turn
 _SEARCHED_ANEW = 3  # of these times the fit begins at the coarse grid, too: the biased one may be far off
@@ -79,6 +88,8 @@ def fit_fractional(
         if asked == problem.pasts:
             break
         problem, best = _with_pasts(problem, best, asked)
+    if pasts is None:
+        problem, best = _tried_with_pasts(problem, best)
     if any(x.reference is not None for x in experiments):
         problem, best = _whitened(problem, best)
     _check(experiments, best)
@@ -103,6 +114,44 @@ def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) ->
         point = _descended(problem, problem.inside(np.array(begun)))
         penalties, begun = _long_run(problem, point), point.x
     return problem, point
+
+
+def _tried_with_pasts(problem: Problem, point: Point) -> tuple[Problem, Point]:
+    """The fit with a past in experiments that asked for none, where it leaves far less of them.
+
+    T and alpha that have given way to a transient leave little that a past could take off beside them.
+    """
+    reach, before = _reach(problem), _left(problem, point)
+    tried = [
+        past or (Past(1, reach) if len(x) <= SHOWS and _may_have_past(left, x) else None)
+        for x, past, left in zip(problem.experiments, problem.pasts, before)
+    ]
+    if tuple(tried) == problem.pasts:
+        return problem, point
+    other, trial = _with_pasts(problem, point, tried)
+    kept = tuple(
+        past if past is None or known or leaves_more(left, after, x.spread) else None
+        for x, past, known, left, after in zip(
+            problem.experiments, tried, problem.pasts, before, _left(other, trial)
+        )
+    )
+    if kept == problem.pasts:
+        return problem, point
+    return (other, trial) if kept == other.pasts else _with_pasts(problem, point, kept)
+
+
+def _may_have_past(left: np.ndarray, x: Excitation) -> bool:
+    """Whether what is left is no white noise: that shows no past."""
+    return bool(np.std(left) > EXACT * x.spread) and residual_model(left).effective < 0.5 * len(left)
+
+
+def _left(problem: Problem, point: Point) -> list[np.ndarray]:
+    """What the model leaves of each experiment, (n,)."""
+    return [x.measured - made for x, made in zip(problem.experiments, problem.simulated(point))]
+
+
+def _reach(problem: Problem) -> float:
+    return max(float(np.ptp(x.measured)) for x in problem.experiments)
 
 
 def _searched(problem: Problem) -> Point:
@@ -137,17 +186,15 @@ def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Po
 
 def _pasts_asked_for(problem: Problem, point: Point) -> tuple[Past | None, ...]:
     """The pasts with a step more where the data ask for it, and without where they do not."""
-    reach = max(float(np.ptp(x.measured)) for x in problem.experiments)
-    made = problem.simulated(point)
+    reach = _reach(problem)
     return tuple(
-        _past_asked_for(problem, point, i, x.measured - made[i], reach)
-        for i, x in enumerate(problem.experiments)
+        _past_asked_for(problem, point, i, left, reach) for i, left in enumerate(_left(problem, point))
     )
 
 
 def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, reach: float) -> Past | None:
     x, known = problem.experiments[i], problem.pasts[i]
-    if known is None and np.std(left) <= _EXACT * x.spread:
+    if known is None and np.std(left) <= EXACT * x.spread:
         return None
     start = x.beginning(SHOWS)
     n = len(start)
@@ -155,7 +202,7 @@ def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, re
     if known is not None and not asks_for_past((x.measured - problem.from_rest(point, i))[:n], made, reach):
         return None
     steps = known.steps if known else 0
-    more = steps < MOST_STEPS and np.std(left) > _EXACT * x.spread and asks_for_past(left[:n], made, reach)
+    more = steps < MOST_STEPS and np.std(left) > EXACT * x.spread and asks_for_past(left[:n], made, reach)
     return Past(steps + 1, reach) if more else known
 
 
@@ -219,7 +266,7 @@ def _with_intervals(problem: Problem, point: Point, spread, models) -> Fractiona
     half = {
         "T": float(wide(slope @ spread @ slope)),
         "alpha": float(wide(spread[1, 1])),
-        "delay": float(wide(spread[2, 2])) if problem.delay_free else 0.0,
+        "delay": problem.step * float(wide(spread[2, 2])) if problem.delay_free else 0.0,
         "gain": wide(np.diag(spread)[gains]),
     }
     if len(problem.experiments) == 1:

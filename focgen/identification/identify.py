@@ -16,6 +16,7 @@ from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
 from focgen.identification.initial import answer_from_its_past
 from focgen.identification.model import ExperimentFit, Identification, Joint, Unseen
+from focgen.identification.past import leaves_more
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.reach import seen_ranges
 from focgen.identification.remarks import remarks_of
@@ -58,6 +59,8 @@ def identify(
     Raises LogError, RigError or FitError; nothing is written then.
     """
     check_degree(gain_degree)
+    if not stages:
+        raise FitError("--stages", "names no stage", f"give one or more of {', '.join(STAGES)}")
     for stage in stages:
         check_choice("--stages", stage, STAGES, FitError)
     nominal = rig if isinstance(rig, Rig) else read_rig(rig)
@@ -70,9 +73,10 @@ def identify(
         result = _actuator(experiments, others, new, gain_degree, delay, integer)
     else:
         result = Identification((), None, new, {}, {}, (), ())
+    result = replace(result, stages=found)
     warnings = doubts(nominal, experiments) + result.warnings
-    notes = remarks_of(experiments, nominal, result, found) + told + result.notes
-    result = replace(result, warnings=warnings, notes=notes, stages=found)
+    notes = remarks_of(experiments, nominal, result) + told + result.notes
+    result = replace(result, warnings=warnings, notes=notes)
     if out is not None:
         write_file(out, rig_text(result.rig), (*logs, rig, *unseen))
     return result
@@ -116,6 +120,10 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     between = [x.name for x in excitations if is_step(x) and x.between]
     if between:
         told += (f"{listed(between)}: steps between two levels; each K is the mean slope of K(p) p on its step",)
+    begun = [x.name for x in excitations if not x.rest_shown]
+    if begun:
+        verb = "begins with its step" if len(begun) == 1 else "each begin with their step"
+        told += (f"{listed(begun)} {verb}: taken as at rest at 0 before",)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 
@@ -123,7 +131,8 @@ def _prepared(experiment: Experiment, rig: Rig, powers: int) -> Excitation:
     """The experiment with what was before its first sample: the input it shows there for ever, or none where the
     log begins with the step itself.
 
-    The second is taken where it fits better and no further past is asked for.
+    The second is taken where it leaves no more than the first with the past that this asks for. That past may stand
+    for a step at the first sample as well, so it has to explain more than a misfit would.
     """
     candidates = [prepare(experiment, rig, powers, before) for before in possible_rests(experiment)]
     if len(candidates) == 1:
@@ -131,10 +140,14 @@ def _prepared(experiment: Experiment, rig: Rig, powers: int) -> Excitation:
     rest, zero = candidates
     try:
         begun = fit_fractional([zero.with_powers(1)])
-        rested = fit_fractional([rest.with_powers(1)], pasts=[None])
+        rested = fit_fractional([rest.with_powers(1)])
     except FitError:
         return rest
-    better = gof(zero.measured, begun.simulated[0]) > gof(rest.measured, rested.simulated[0])
+    left = [rest.measured - fit.simulated[0] for fit in (begun, rested)]
+    if rested.pasts[0] is None:
+        better = bool(np.std(left[0]) < np.std(left[1]))
+    else:
+        better = not leaves_more(left[0], left[1], rest.spread)
     return zero if better and begun.pasts[0] is None else rest
 
 

@@ -21,6 +21,7 @@ MOST_STEPS = 3
 SHOWS = 20_000  # first samples that show whether there was a past
 _WHITE = 0.25  # effective samples a sample: what is left above it is noise, below it likely a misfit
 _ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit
+EXACT = 1e-4  # of the spread: what is left below shows no past
 _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
 
 
@@ -95,3 +96,12 @@ def _worth_it(residual: np.ndarray, column: np.ndarray) -> bool:
     taken = float(np.var(residual)) / max(float(np.var(left)), 1e-300) - 1.0
     effective = residual_model(left).effective
     return taken * effective > (_ASKED if effective > _WHITE * len(residual) else _ASKED_OF_MISFIT)
+
+
+def leaves_more(residual: np.ndarray, other: np.ndarray, spread: float) -> bool:
+    """Whether a residual (n,) holds more than the ``other``, by as much as a past has to take off a misfit;
+    ``spread``: the measured signal's."""
+    if np.std(residual) <= EXACT * spread:
+        return False
+    taken = float(np.var(residual)) / max(float(np.var(other)), 1e-300) - 1.0
+    return taken * residual_model(other).effective > _ASKED_OF_MISFIT
