@@ -92,7 +92,7 @@ def fit_fractional(
         problem, best = _tried_with_pasts(problem, best)
     if any(x.reference is not None for x in experiments):
         problem, best = _whitened(problem, best)
-    _check(experiments, best)
+    _check(problem, best)
     return _finished(problem, best)
 
 
@@ -212,13 +212,16 @@ def _long_run(problem: Problem, point: Point) -> list[float]:
     return [m.variance / float(np.sum(m.a)) ** 2 for m in models]
 
 
-def _check(experiments: Sequence[Excitation], best: Point) -> None:
-    names = ", ".join(e.name for e in experiments)
+def _check(problem: Problem, best: Point) -> None:
+    names = ", ".join(e.name for e in problem.experiments)
     if not (np.all(np.isfinite(best.x)) and np.isfinite(best.cost)):
         raise FitError(names, "the fit does not converge", "look at the log")
     if not Problem.ALPHAS[0] + _EDGE < best.x[1] < Problem.ALPHAS[1] - _EDGE:
         what = f"the best order is at the edge of (0, 2): {best.x[1]:.3g}"
         raise FitError(names, what, "the log does not show such dynamics; look at its columns and its time")
+    if problem.delay_free and best.x[2] >= problem.latest:
+        what = f"the best dead time is the longest that is looked for, {problem.delay_at(best.x):.3g} s"
+        raise FitError(names, what, "record for four times the dead time; look at the logs' clocks")
 
 
 def _whitened(problem: Problem, point: Point) -> tuple[Problem, Point]:

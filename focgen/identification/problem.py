@@ -59,8 +59,9 @@ class _Local:
 class Problem:
     """Experiments that share T, α, K(p) and the dead time, each scaled by its own spread so that all weigh alike.
 
-    ``x`` is (log τ, α), then the dead time in samples where it is ``delay_free``, then log(θ + 1), θ in samples,
-    of every step of a past. ``pasts``: an unknown past for each experiment, or None for a begin at rest;
+    ``x`` is (log τ, α), then the dead time in samples of the first experiment where it is ``delay_free``, then
+    log(θ + 1), θ in samples, of every step of a past. ``pasts``: an unknown past for each experiment, or None for
+    a begin at rest;
     ``penalties``: the variance (scaled) that weighs a past's prior against the data. ``whitening``: for each
     experiment the autoregressive filter [1, a₁, …] that makes its residual white, None where it is taken as it is.
     """
@@ -338,10 +339,11 @@ def _best_delay(problem: Problem, log_tau: float, alpha: float) -> tuple[float, 
 
 
 def _cost_of(problem: Problem, made: list[np.ndarray], lag: int) -> float:
-    """The sum of squares where each response comes ``lag`` samples later."""
+    """The sum of squares where each response comes ``lag`` samples of the first experiment later."""
     parts = []
     for i, (run, response, w) in enumerate(zip(problem.experiments, made, problem.weights)):
-        late = np.hstack([np.zeros((len(response), lag)), response])[:, : len(run)]
+        by = round(lag * problem.step / run.step)
+        late = np.hstack([np.zeros((len(response), by)), response])[:, : len(run)]
         local = problem.local(i)
         parts.append(_triangle(local.without(problem.white(i, w * np.vstack([late, run.measured])))))
     triangle = _triangle(np.vstack(parts).T)
