@@ -348,7 +348,8 @@ def test_the_interval_of_a_dead_time_is_in_seconds():
         log = step_log(seconds=21.0)
         noise = 0.02 * K * LEVEL * np.random.default_rng(seed).normal(size=len(log))
         curvature = K * LEVEL * exact_step(0.02, len(log), 1.0 + late) + noise
-        fit = fit_fractional([prepare(Experiment("late", 0.02, {**log.signals, "curvature": curvature}), paper_rig())], True)
+        delayed = Experiment("late", 0.02, {**log.signals, "curvature": curvature})
+        fit = fit_fractional([prepare(delayed, paper_rig())], True)
         found.append(fit.delay)
         half.append(fit.half["delay"])
     spread = float(np.std(found))
@@ -372,6 +373,7 @@ def test_a_misfit_is_not_blamed_on_short_holds():
     """An output that wanders by itself: no holding of steps helps."""
     log = step_log(release=21.0)
     wandering = np.cumsum(np.random.default_rng(2).normal(size=len(log)))
+    wanders = Experiment("w", 0.02, {**log.signals, "curvature": wandering})
     with pytest.raises(FitError) as raised:
-        module.identify([Experiment("w", 0.02, {**log.signals, "curvature": wandering})], paper_rig(), integer=False)
+        module.identify([wanders], paper_rig(), integer=False)
     assert "hold" not in raised.value.remedy and "columns" in raised.value.remedy

@@ -22,6 +22,7 @@ SHOWS = 20_000  # first samples that show whether there was a past
 _WHITE = 0.25  # effective samples a sample: what is left above it is noise, below it likely a misfit
 _ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit
 EXACT = 1e-4  # of the spread: what is left below shows no past
+_HALVED = 1.0  # times what is left in the other: a misfit alone takes off less beside a past
 _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
 
 
@@ -99,9 +100,9 @@ def _worth_it(residual: np.ndarray, column: np.ndarray) -> bool:
 
 
 def leaves_more(residual: np.ndarray, other: np.ndarray, spread: float) -> bool:
-    """Whether a residual (n,) holds more than the ``other``, by as much as a past has to take off a misfit;
-    ``spread``: the measured signal's."""
+    """Whether a residual (n,) holds more than the ``other``, twice its sum of squares and as much as a past has
+    to take off a misfit; ``spread``: the measured signal's."""
     if np.std(residual) <= EXACT * spread:
         return False
     taken = float(np.var(residual)) / max(float(np.var(other)), 1e-300) - 1.0
-    return taken * residual_model(other).effective > _ASKED_OF_MISFIT
+    return taken > _HALVED and taken * residual_model(other).effective > _ASKED_OF_MISFIT
