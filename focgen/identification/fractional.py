@@ -15,7 +15,7 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
-from focgen.identification.past import MOST_STEPS, Past, asks_for_past, best_time, columns, times
+from focgen.identification.past import MOST_STEPS, Past, asks_for_past, best_time, columns, suggests_past, times, worth_it
 from focgen.identification.problem import Point, Problem, delay_reach, starts
 
 _ROUNDS = 60  # of Levenberg–Marquardt
@@ -74,11 +74,8 @@ def fit_fractional(
     best = _searched(problem)
     if pasts is not None and any(pasts):
         problem, best = _with_pasts(problem, best, pasts)
-    for _ in range(_RECONSIDERED if pasts is None else 0):
-        asked = _pasts_asked_for(problem, best)
-        if asked == problem.pasts:
-            break
-        problem, best = _with_pasts(problem, best, asked)
+    if pasts is None:
+        problem, best = _with_pasts_asked_for(problem, best)
     if any(x.reference is not None for x in experiments):
         problem, best = _whitened(problem, best)
     _check(problem, best)
@@ -133,26 +130,52 @@ def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Po
     return point
 
 
-def _pasts_asked_for(problem: Problem, point: Point) -> tuple[Past | None, ...]:
-    """The pasts with a step more where the data ask for it, and without where they do not."""
+def _with_pasts_asked_for(problem: Problem, point: Point) -> tuple[Problem, Point]:
+    """The fit with the pasts that its data ask for.
+
+    A past is tried wherever one is suggested, and stays where the fit that has it cannot do without: parameters
+    that are off for want of a past hide how much it explains.
+    """
+    for _ in range(_RECONSIDERED):
+        tried = _changed(problem, point, _grown)
+        if tried[0] is problem:
+            break
+        without = problem.residuals(point)
+        kept = _changed(*tried, lambda *at: _kept(*at, without[at[2]]))
+        if kept[0].pasts == problem.pasts:
+            break
+        problem, point = kept
+    return problem, point
+
+
+def _changed(problem: Problem, point: Point, rule) -> tuple[Problem, Point]:
+    """The fit with each experiment's past by ``rule``."""
     reach = max(float(np.ptp(x.measured)) for x in problem.experiments)
-    made = problem.simulated(point)
-    return tuple(
-        _past_asked_for(problem, point, i, x.measured - made[i], reach)
-        for i, x in enumerate(problem.experiments)
-    )
+    pasts = tuple(rule(problem, point, i, reach) for i in range(len(problem.experiments)))
+    return (problem, point) if pasts == problem.pasts else _with_pasts(problem, point, pasts)
 
 
-def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, reach: float) -> Past | None:
+def _grown(problem: Problem, point: Point, i: int, reach: float) -> Past | None:
+    """The past of experiment ``i`` with a step more where one is suggested."""
     x, known = problem.experiments[i], problem.pasts[i]
-    if known is None and np.std(left) <= _EXACT * x.spread:
+    left = x.measured - problem.simulated(point)[i]
+    steps = known.steps if known else 0
+    if steps == MOST_STEPS or np.std(left) <= _EXACT * x.spread:
+        return known
+    made = columns(x, problem.kernels(point.x, i, past=True), times(len(x)), 1)[0]
+    wanted = asks_for_past if known else suggests_past
+    return Past(steps + 1, reach) if wanted(left, made, reach) else known
+
+
+def _kept(problem: Problem, point: Point, i: int, reach: float, without: np.ndarray) -> Past | None:
+    """The past of experiment ``i``, None where what it explains does not ask for it, or the fit that was
+    ``without`` it leaves little more."""
+    x, known = problem.experiments[i], problem.pasts[i]
+    if known is None:
         return None
     made = columns(x, problem.kernels(point.x, i, past=True), times(len(x)), 1)[0]
-    if known is not None and not asks_for_past(x.measured - problem.from_rest(point, i), made, reach):
-        return None
-    steps = known.steps if known else 0
-    more = steps < MOST_STEPS and np.std(left) > _EXACT * x.spread and asks_for_past(left, made, reach)
-    return Past(steps + 1, reach) if more else known
+    worth = worth_it(without, problem.residuals(point)[i])
+    return known if worth and asks_for_past(x.measured - problem.from_rest(point, i), made, reach) else None
 
 
 def _long_run(problem: Problem, point: Point) -> list[float]:
