@@ -23,8 +23,9 @@ from focgen.identification.past import (
     asks_for_past,
     best_time,
     columns,
-    leaves_more,
+    suggests_past,
     times,
+    worth_it,
 )
 from focgen.identification.problem import Point, Problem, delay_reach, shortened, starts
 
@@ -83,13 +84,8 @@ def fit_fractional(
     best = _searched(problem)
     if pasts is not None and any(pasts):
         problem, best = _with_pasts(problem, best, pasts)
-    for _ in range(_RECONSIDERED if pasts is None else 0):
-        asked = _pasts_asked_for(problem, best)
-        if asked == problem.pasts:
-            break
-        problem, best = _with_pasts(problem, best, asked)
     if pasts is None:
-        problem, best = _tried_with_pasts(problem, best)
+        problem, best = _with_pasts_asked_for(problem, best)
     if any(x.reference is not None for x in experiments):
         problem, best = _whitened(problem, best)
     _check(problem, best)
@@ -103,55 +99,16 @@ def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) ->
         known = point.x[problem.of_past[i]]
         begun += [*known][: past.steps if past else 0]
         if past and past.steps > len(known):
-            start = x.beginning(SHOWS)
-            grid = times(start)
-            made = columns(start, problem.kernels_for(start, point.x, start.stepped.count), grid, 1)[0]
-            left = (x.measured - problem.simulated(point)[i])[: len(start)]
-            begun += [np.log(grid[best_time(left, made)] + 1.0)] * (past.steps - len(known))
+            made = _pasts_of(problem, point, x)
+            left = (x.measured - problem.simulated(point)[i])[: made.shape[1]]
+            time = times(x.beginning(SHOWS))[best_time(left, made)]
+            begun += [np.log(time + 1.0)] * (past.steps - len(known))
     penalties = _long_run(problem, point)
     for _ in range(2):
         problem = Problem(problem.experiments, pasts, problem.delay_free, problem.delay, penalties)
         point = _descended(problem, problem.inside(np.array(begun)))
         penalties, begun = _long_run(problem, point), point.x
     return problem, point
-
-
-def _tried_with_pasts(problem: Problem, point: Point) -> tuple[Problem, Point]:
-    """The fit with a past in experiments that asked for none, where it leaves far less of them.
-
-    T and alpha that have given way to a transient leave little that a past could take off beside them.
-    """
-    reach, before = _reach(problem), _left(problem, point)
-    tried = [
-        past or (Past(1, reach) if len(x) <= SHOWS and _may_have_past(left, x) else None)
-        for x, past, left in zip(problem.experiments, problem.pasts, before)
-    ]
-    if tuple(tried) == problem.pasts:
-        return problem, point
-    other, trial = _with_pasts(problem, point, tried)
-    kept = tuple(
-        past if past is None or known or leaves_more(left, after, x.spread) else None
-        for x, past, known, left, after in zip(
-            problem.experiments, tried, problem.pasts, before, _left(other, trial)
-        )
-    )
-    if kept == problem.pasts:
-        return problem, point
-    return (other, trial) if kept == other.pasts else _with_pasts(problem, point, kept)
-
-
-def _may_have_past(left: np.ndarray, x: Excitation) -> bool:
-    """Whether what is left is no white noise: that shows no past."""
-    return bool(np.std(left) > EXACT * x.spread) and residual_model(left).effective < 0.5 * len(left)
-
-
-def _left(problem: Problem, point: Point) -> list[np.ndarray]:
-    """What the model leaves of each experiment, (n,)."""
-    return [x.measured - made for x, made in zip(problem.experiments, problem.simulated(point))]
-
-
-def _reach(problem: Problem) -> float:
-    return max(float(np.ptp(x.measured)) for x in problem.experiments)
 
 
 def _searched(problem: Problem) -> Point:
@@ -184,26 +141,59 @@ def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Po
     return point
 
 
-def _pasts_asked_for(problem: Problem, point: Point) -> tuple[Past | None, ...]:
-    """The pasts with a step more where the data ask for it, and without where they do not."""
-    reach = _reach(problem)
-    return tuple(
-        _past_asked_for(problem, point, i, left, reach) for i, left in enumerate(_left(problem, point))
-    )
+def _with_pasts_asked_for(problem: Problem, point: Point) -> tuple[Problem, Point]:
+    """The fit with the pasts that its data ask for.
+
+    A past is tried wherever one is suggested, and stays where the fit that has it cannot do without: parameters
+    that are off for want of a past hide how much it explains.
+    """
+    for _ in range(_RECONSIDERED):
+        tried = _changed(problem, point, _grown)
+        if tried[0] is problem:
+            break
+        without = problem.residuals(point)
+        kept = _changed(*tried, lambda *at: _kept(*at, without[at[2]]))
+        if kept[0].pasts == problem.pasts:
+            break
+        problem, point = kept
+    return problem, point
 
 
-def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, reach: float) -> Past | None:
+def _changed(problem: Problem, point: Point, rule) -> tuple[Problem, Point]:
+    """The fit with each experiment's past by ``rule``."""
+    reach = max(float(np.ptp(x.measured)) for x in problem.experiments)
+    pasts = tuple(rule(problem, point, i, reach) for i in range(len(problem.experiments)))
+    return (problem, point) if pasts == problem.pasts else _with_pasts(problem, point, pasts)
+
+
+def _grown(problem: Problem, point: Point, i: int, reach: float) -> Past | None:
+    """The past of experiment ``i`` with a step more where one is suggested."""
     x, known = problem.experiments[i], problem.pasts[i]
-    if known is None and np.std(left) <= EXACT * x.spread:
-        return None
-    start = x.beginning(SHOWS)
-    n = len(start)
-    made = columns(start, problem.kernels_for(start, point.x, start.stepped.count), times(start), 1)[0]
-    if known is not None and not asks_for_past((x.measured - problem.from_rest(point, i))[:n], made, reach):
-        return None
+    left = x.measured - problem.simulated(point)[i]
     steps = known.steps if known else 0
-    more = steps < MOST_STEPS and np.std(left) > EXACT * x.spread and asks_for_past(left[:n], made, reach)
-    return Past(steps + 1, reach) if more else known
+    if steps == MOST_STEPS or np.std(left) <= EXACT * x.spread:
+        return known
+    made = _pasts_of(problem, point, x)
+    wanted = asks_for_past if known else suggests_past
+    return Past(steps + 1, reach) if wanted(left[: made.shape[1]], made, reach) else known
+
+
+def _pasts_of(problem: Problem, point: Point, x: Excitation) -> np.ndarray:
+    """What steps at a grid of times before an experiment leave of its first samples, (times, n)."""
+    start = x.beginning(SHOWS)
+    return columns(start, problem.kernels_for(start, point.x, start.stepped.count), times(start), 1)[0]
+
+
+def _kept(problem: Problem, point: Point, i: int, reach: float, without: np.ndarray) -> Past | None:
+    """The past of experiment ``i``, None where what it explains does not ask for it, or the fit that was
+    ``without`` it leaves little more."""
+    x, known = problem.experiments[i], problem.pasts[i]
+    if known is None:
+        return None
+    made = _pasts_of(problem, point, x)
+    alone = (x.measured - problem.from_rest(point, i))[: made.shape[1]]
+    worth = worth_it(without, problem.residuals(point)[i])
+    return known if worth and asks_for_past(alone, made, reach) else None
 
 
 def _long_run(problem: Problem, point: Point) -> list[float]:

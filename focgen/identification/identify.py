@@ -16,7 +16,7 @@ from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
 from focgen.identification.initial import answer_from_its_past
 from focgen.identification.model import ExperimentFit, Identification, Joint, Unseen
-from focgen.identification.past import leaves_more
+from focgen.identification.past import worth_it
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.reach import seen_ranges
 from focgen.identification.remarks import remarks_of
@@ -100,7 +100,7 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     """The identification of the actuator; ``rig`` has the regulator and the sensor it is seen through."""
     if rig.delays.actuator and not delay:
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
-    excitations = [_prepared(e, rig, degree + 1) for e in experiments]
+    excitations = _prepared(experiments, rig, degree + 1)
     degree, told = feasible_degree(excitations, degree)
     excitations = [x.with_powers(degree + 1) for x in excitations]
     fit = fit_fractional(excitations, delay)
@@ -127,28 +127,31 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 
-def _prepared(experiment: Experiment, rig: Rig, powers: int) -> Excitation:
-    """The experiment with what was before its first sample: the input it shows there for ever, or none where the
-    log begins with the step itself.
+def _prepared(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[Excitation]:
+    """The experiments with what was before their first samples: the input they show there for ever, or none where
+    a log begins with the step itself.
 
-    The second is taken where it leaves no more than the first with the past that this asks for. That past may stand
-    for a step at the first sample as well, so it has to explain more than a misfit would.
+    The second is taken where it needs no further past, and the fit of all experiments leaves little less with the
+    first, whatever pasts that asks for.
     """
-    candidates = [prepare(experiment, rig, powers, before) for before in possible_rests(experiment)]
-    if len(candidates) == 1:
-        return candidates[0]
-    rest, zero = candidates
+    ways = [possible_rests(e) for e in experiments]
+    rest, zero = ([prepare(e, rig, powers, way[k]) for e, way in zip(experiments, ways)] for k in (0, -1))
+    if all(len(way) == 1 for way in ways):
+        return rest
     try:
-        begun = fit_fractional([zero.with_powers(1)])
-        rested = fit_fractional([rest.with_powers(1)])
+        begun, rested = _fitted(zero), _fitted(rest)
     except FitError:
         return rest
-    left = [rest.measured - fit.simulated[0] for fit in (begun, rested)]
-    if rested.pasts[0] is None:
-        better = bool(np.std(left[0]) < np.std(left[1]))
-    else:
-        better = not leaves_more(left[0], left[1], rest.spread)
-    return zero if better and begun.pasts[0] is None else rest
+    chosen = []
+    for i, (late, early) in enumerate(zip(zero, rest)):
+        left = [x.measured - fit.simulated[i] for x, fit in ((late, begun), (early, rested))]
+        chosen.append(late if begun.pasts[i] is None and not worth_it(*left) else early)
+    return chosen
+
+
+def _fitted(excitations: list[Excitation]) -> FractionalFit:
+    degree, _ = feasible_degree(excitations, excitations[0].powers - 1)
+    return fit_fractional([x.with_powers(degree + 1) for x in excitations])
 
 
 def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[ExperimentFit]) -> Joint:
@@ -176,7 +179,7 @@ def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[Experim
 
 def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
     """Logs beside what the identified rig makes of their input, each from the initial state that it asks for."""
-    made = [_prepared(e, rig, len(rig.actuator.gain)) for e in experiments]
+    made = [_prepared([e], rig, len(rig.actuator.gain))[0] for e in experiments]
     return tuple(
         Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
         for x, y in ((x, answer_from_its_past(x, rig.actuator, rig.delays.actuator)) for x in made)
