@@ -15,7 +15,16 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
-from focgen.identification.past import MOST_STEPS, Past, asks_for_past, best_time, columns, suggests_past, times, worth_it
+from focgen.identification.past import (
+    MOST_STEPS,
+    Past,
+    asks_for_past,
+    best_time,
+    columns,
+    suggests_past,
+    times,
+    worth_it,
+)
 from focgen.identification.problem import Point, Problem, delay_reach, starts
 
 _ROUNDS = 60  # of Levenberg–Marquardt
