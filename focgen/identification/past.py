@@ -22,7 +22,8 @@ SHOWS = 20_000  # first samples that show whether there was a past
 _WHITE = 0.25  # effective samples a sample: what is left above it is noise, below it likely a misfit
 _OLDER = 0.5  # of the reach: a level that was held an octave earlier differs by about so much
 _AT_LEAST = 3.0  # effective samples
-_ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit
+_ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit …
+_HALVED = 1.0  # … and variance, over what it leaves
 EXACT = 1e-4  # of the spread: what is left below shows no past
 _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
 
@@ -120,7 +121,10 @@ def _explains(residual: np.ndarray, column: np.ndarray) -> bool:
 
 
 def worth_it(before: np.ndarray, after: np.ndarray) -> bool:
-    """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples."""
+    """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples; by half where
+    what is left is likely a misfit."""
     taken = float(np.var(before)) / max(float(np.var(after)), 1e-300) - 1.0
     effective = max(residual_model(after).effective, _AT_LEAST)
-    return taken * effective > (_ASKED if effective > _WHITE * len(after) else _ASKED_OF_MISFIT)
+    if effective > _WHITE * len(after):
+        return taken * effective > _ASKED
+    return taken > _HALVED and taken * effective > _ASKED_OF_MISFIT
