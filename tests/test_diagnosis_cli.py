@@ -114,4 +114,4 @@ def test_the_controller_departs_by_what_was_done_to_it(tmp_path, capsys, effect)
         "regimes": {},
     }
     assert [c["effect"] for f in said["causes"] for c in f["candidates"]] == [effect]
-    assert "of its departure from the ideal one" in capsys.readouterr().out
+    assert "of its departure from the described controller" in capsys.readouterr().out
