@@ -53,6 +53,15 @@ class Explanation:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
 
+    def kept_by(self, given: Rig, refitted: Rig) -> bool:
+        """Whether the refit of its own parameters is part of the rig ``refitted``."""
+        stages = self.segment.stages
+        return any(
+            getattr(a, stage) != getattr(b, stage)
+            for a, b in ((given, refitted), (given.delays, refitted.delays))
+            for stage in stages
+        )
+
 
 def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
     """Every form that may act in this segment. In a rig of one stage every family may, but of those that
@@ -96,10 +105,10 @@ def _much_left(base: Fit) -> bool:
 def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     """The segment's problem without effects."""
     scales = references(rig, segment, logs)
-    stage = owner(rig) if owner(rig) in segment.stages else None
+    freely = owner(rig) if owner(rig) in segment.stages else None
     load, response = (scales.levels["load"], scales.levels["response"])
     slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
-    return Problem(segment, Own(rig, stage, load, response), scales, slack=slack)
+    return Problem(segment, Own(rig, segment.stages, freely, load, response), scales, slack=slack)
 
 
 def explain(
@@ -115,7 +124,7 @@ def explain(
     ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``:
     whether the input could be freed of its noise.
     """
-    problem = _gauged(_held(rig, segment, logs))
+    problem = _widened(_gauged(_held(rig, segment, logs)))
     clues, guests = clues_for(segment, rig), guests_in(segment, rig)
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
@@ -175,12 +184,22 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 
 
 def _gauged(problem: Problem) -> Problem:
-    """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. A
-    stage with parameters of its own has a gain."""
-    if len(problem.own_start) or not _seems_more(problem, problem.nominal()):
+    """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. Where
+    a stage has a gain of its own, that is part of it."""
+    if problem.own.has_gain or not _seems_more(problem, problem.nominal()):
         return problem
     gauged = replace(problem, gauge=_GAUGE)
     return problem if _seems_more(gauged, gauged.nominal()) else gauged
+
+
+def _widened(problem: Problem) -> Problem:
+    """The problem with a stage faster, or of another gain, than three times the uncertainty of what was given
+    allows, where that is all there is: no effect stands for it."""
+    ground = _ground(problem, problem.nominal())
+    if not problem.own.beyond(ground.vector) or not _shows_more(ground):
+        return problem
+    wide = replace(problem, own=replace(problem.own, wide=True))
+    return problem if _seems_more(wide, wide.nominal()) else wide
 
 
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
@@ -190,7 +209,15 @@ def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[
 
 def _seems_more(base: Problem, vector: np.ndarray) -> bool:
     """Whether inputs foretell something of the residual, or it is slower or less steady than noise is."""
-    ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
+    return _shows_more(_ground(base, vector))
+
+
+def _ground(base: Problem, vector: np.ndarray) -> Fit:
+    return fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
+
+
+def _shows_more(ground: Fit) -> bool:
+    base = ground.problem
     left, response = ground.residual(), base.references.clocks["response"]
     found = disturbance(left, base.segment.run.h, response)
     return found.swings or found.hums or found.bursts or ground.foretold > _TELLING

@@ -65,8 +65,7 @@ class Problem:
 
     def __post_init__(self):
         self.own_start = self.own.start()
-        has_offset = self.own.stage == "actuator" and len(self.own_start) > 0
-        zero = [] if has_offset else [_ZERO]
+        zero = [] if self.own.has_offset else [_ZERO]
         self.gauges = [*zero, self.gauge] if self.gauge else zero
         self.nuisances = 1 + len(self.gauges) + self.segment.unsure.shape[1]
 
@@ -106,6 +105,16 @@ class Problem:
     def nominal(self) -> np.ndarray:
         """The vector of the rig as given, without the clues' entries."""
         return np.r_[self.own_start, np.zeros(self.nuisances)]
+
+    @cached_property
+    def known(self) -> tuple[np.ndarray, np.ndarray]:
+        """What every entry is expected to be beforehand, and how well that is known: 1/variance."""
+        own = self.own.precision
+        return np.pad(self.own_start, (0, self._count - len(own))), np.pad(own, (0, self._count - len(own)))
+
+    @property
+    def _count(self) -> int:
+        return self.head + sum(len(clue.form.parameters) for clue in self.clues)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
@@ -148,7 +157,7 @@ class Problem:
 
     def rig(self, vector: np.ndarray) -> Rig:
         """The rig with the vector's own parameters."""
-        return self.own.rig_with(vector[: len(self.own_start)])
+        return self.own.put(self.own.rig, vector[: len(self.own_start)])
 
     def placed(self, vector: np.ndarray) -> tuple[Placed, ...]:
         """The clues as effects of a chain."""
