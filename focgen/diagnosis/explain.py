@@ -19,7 +19,7 @@ from focgen.diagnosis.scales import references
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.segments import Segment, is_single, owner
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import library
+from focgen.rig.effects import Effect, library
 from focgen.rig.engine import fits_in
 from focgen.rig.model import Rig
 
@@ -68,11 +68,11 @@ def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
     share a formula only the one at home there."""
     if not is_single(rig):
         return [
-            Clue(e.name, form, e.stage)
+            Clue(e.name, form, stage)
             for e in library().values()
-            if e.stage in segment.stages
+            if (stage := _place(e, segment))
             for form in e.forms
-            if fits_in(form, e.stage, rig)
+            if fits_in(form, stage, rig)
         ]
     stage, found = owner(rig), {}
     for effect in sorted(library().values(), key=lambda e: e.stage != stage):
@@ -80,6 +80,14 @@ def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
             if fits_in(form, stage, rig):
                 found.setdefault(form.act, Clue(effect.name, form, stage))
     return list(found.values())
+
+
+def _place(effect: Effect, segment: Segment) -> str | None:
+    """Where a family is looked for: at home, or where it may be anywhere, in any stage: logs of stages that are
+    merged do not tell which."""
+    if effect.stage in segment.stages:
+        return effect.stage
+    return segment.stages[0] if effect.anywhere else None
 
 
 def guests_in(segment: Segment, rig: Rig) -> list[Clue]:

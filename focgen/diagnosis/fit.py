@@ -129,7 +129,7 @@ def fit(
 
 def _cost(problem: Problem, vector: np.ndarray, sse: float, count: int) -> float:
     """The sum of squares that would be as unlikely alone as this one with these own parameters."""
-    return sse * float(np.exp(2.0 * problem.own.unlikely(vector) / max(count, 1)))
+    return sse * float(np.exp(2.0 * problem.unlikely(vector) / max(count, 1)))
 
 
 def jacobian(

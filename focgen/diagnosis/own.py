@@ -77,12 +77,8 @@ class Own:
         """Nats against own parameters this far from those given."""
         count = len(self._first)
         free = self._free.doubt(vector[:count]) if count else 0.0
-        return free + self.unlikely(vector)
-
-    def unlikely(self, vector: np.ndarray) -> float:
-        """The part of it that is the normal prior's."""
-        first, count = len(self._first), len(self.precision)
-        return 0.5 * float(self.precision[first:] @ vector[first:count] ** 2)
+        logs = vector[count : len(self.precision)]
+        return free + 0.5 * float(self.precision[count:] @ logs**2)
 
     def beyond(self, vector: np.ndarray) -> bool:
         """Whether a factor stands at an end that it could pass if it were ``wide``."""

@@ -16,6 +16,7 @@ from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.model import Rig
 
 _ZERO = 0.03  # of the level: an offset that is no fault
+_ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
 _OFF = 3.0  # standard deviations that an input may be off in each way
 
 
@@ -109,12 +110,14 @@ class Problem:
     @cached_property
     def known(self) -> tuple[np.ndarray, np.ndarray]:
         """What every entry is expected to be beforehand, and how well that is known: 1/variance."""
-        own = self.own.precision
-        return np.pad(self.own_start, (0, self._count - len(own))), np.pad(own, (0, self._count - len(own)))
+        own, aligned = self.own.precision, (self.slack * _ALIGNED) ** -2.0
+        rest = self.head - len(own) - 1 + sum(len(clue.form.parameters) for clue in self.clues)
+        return np.pad(self.own_start, (0, 1 + rest)), np.r_[own, aligned, np.zeros(rest)]
 
-    @property
-    def _count(self) -> int:
-        return self.head + sum(len(clue.form.parameters) for clue in self.clues)
+    def unlikely(self, vector: np.ndarray) -> float:
+        """Nats against ``vector`` for what is known beforehand."""
+        expected, precision = self.known
+        return 0.5 * float(precision @ (vector - expected) ** 2)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
