@@ -38,15 +38,15 @@ def named(diagnosis):
     return [[c.effect for c in f.candidates] for f in diagnosis.causes]
 
 
-@pytest.mark.parametrize("roles", [BOTH, PRESSURE, NEITHER])
 @pytest.mark.parametrize(
-    "off",
+    "off, roles",
     [
-        {"sensor": (1.03, 1.0)},
-        {"regulator": (0.97, 1.0)},
-        {"regulator": (1.0, 1.1)},
-        {"sensor": (1.0, 0.8)},
-        {"regulator": (1.02, 1.15), "sensor": (0.98, 0.85)},
+        ({"sensor": (1.03, 1.0)}, BOTH),
+        ({"regulator": (0.97, 1.0)}, BOTH),
+        ({"regulator": (1.0, 1.1)}, BOTH),
+        ({"sensor": (1.0, 0.8)}, BOTH),
+        ({"regulator": (1.02, 1.15), "sensor": (0.98, 0.85)}, PRESSURE),
+        ({"regulator": (1.02, 1.15), "sensor": (0.98, 0.85)}, NEITHER),
     ],
     ids=str,
 )
@@ -95,7 +95,8 @@ def test_the_note_tells_an_actuator_far_from_what_was_given():
     assert found.verdict == "parameters"
     assert any("actuator's T by +8" in note for note in found.notes)
     sure = Uncertainty(actuator=Relative(0.2, 0.3, 0.1))
-    assert not any("actuator's T" in n for n in diagnose(replace(RIG, uncertainty=sure), session(1, T=2.4)).notes)
+    found = diagnose(replace(RIG, uncertainty=sure), session(1, T=2.4))
+    assert found.verdict == "parameters" and not any("actuator's T" in note for note in found.notes)
 
 
 def test_a_refit_never_leaves_the_output_worse():
@@ -114,7 +115,8 @@ def test_what_the_data_do_not_show_stays_where_it_was():
     """Under noise that hides everything a time factor is known as well as before, and no better."""
     slow = [log for log in session(1, roles=()) if log.name == "stairs"]
     problem = problem_of(RIG, make(slow, "command", "output"), slow)
-    loud = replace(problem.segment, y=problem.segment.y + np.random.default_rng(0).normal(0, 1.0, len(slow[0])))
+    noise = np.random.default_rng(0).normal(0, 1.0, len(slow[0]))
+    loud = replace(problem.segment, y=problem.segment.y + noise)
     found = fit(replace(problem, segment=loud), problem.nominal(), WHITE)
     first = len(problem.own_start) - 2
     assert [(f.stage, f.kind) for f in problem.own.factors] == [("regulator", "time"), ("sensor", "time")]

@@ -84,7 +84,8 @@ def test_gauges_that_disagree_by_a_little_are_no_fault(role, off):
 def test_gauges_of_a_stage_that_is_absent_agree_to_a_percent(off, fault):
     """Without a regulator the rig says that the pressure is the command."""
     bare = replace(RIG, regulator=UNITY, signals=replace(RIG.signals, pressure="p"))
-    logs = [replace(log, signals={**log.signals, "command": log["pressure"] * (1 + off)}) for log in session(1)]
+    commands = [{"command": log["pressure"] * (1 + off)} for log in session(1)]
+    logs = [replace(log, signals=log.signals | c) for log, c in zip(session(1), commands, strict=True)]
     assert bool(diagnose(bare, logs).causes) == fault
 
 

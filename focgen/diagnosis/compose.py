@@ -47,7 +47,8 @@ def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experi
     beside = [e.best for e in explanations if e.best.problem.clues]
     alone = [e.best for e in explanations if not e.best.problem.clues]
     refitted = _closest(given, [e.nominal for e in explanations], (), logs)
-    return Rigs(refitted, _closest(_moved(given, beside), alone, placed, logs) if placed else refitted, placed)
+    fitted = _closest(_moved(given, beside), alone, placed, logs) if placed else refitted
+    return Rigs(refitted, fitted, placed)
 
 
 def _closest(rig: Rig, fits: Sequence[Fit], placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:

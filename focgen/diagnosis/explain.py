@@ -14,6 +14,7 @@ from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.leftover import Leftover, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
+from focgen.diagnosis.realign import realigned
 from focgen.diagnosis.rivals import Cause, doubted, left_out
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.search import Ranking, evidence, rank
@@ -83,8 +84,8 @@ def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
 
 
 def _place(effect: Effect, segment: Segment) -> str | None:
-    """Where a family is looked for: at home, or where it may be anywhere, in any stage: logs of stages that are
-    merged do not tell which."""
+    """Where a family is looked for: at home, or where it may be anywhere in the first stage: logs of stages
+    that are merged do not tell which."""
     if effect.stage in segment.stages:
         return effect.stage
     return segment.stages[0] if effect.anywhere else None
@@ -140,7 +141,7 @@ def explain(
     asked = Asked(threshold, trusted, converter, only is not None)
     rankings, clues = _grown(problem, given, clues, guests, asked)
     weighing = Weighing(rankings[-1].ar)
-    best = _dropped(rankings[-1].base, weighing, threshold)
+    best = realigned(_dropped(rankings[-1].base, weighing, threshold), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     best, causes = doubted(best, nominal, rankings, clues, weighing)
     if converter is not None:

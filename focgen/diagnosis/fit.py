@@ -40,6 +40,11 @@ class Fit:
         return self.problem.own.doubt(self.vector)
 
     @cached_property
+    def cost(self) -> float:
+        """What the fit was to make least: the sum of squares, and what is known beforehand."""
+        return _cost(self.problem, self.vector, self.sse, len(self.innovations))
+
+    @cached_property
     def weighed(self) -> np.ndarray:
         """The residual (n,) by trust, as a share of the output's level."""
         return self.problem.weighed(self.vector)
@@ -90,8 +95,8 @@ def fit(
     tolerance: float = 1e-3,
     known: np.ndarray | None = None,
 ) -> Fit:
-    """The likeliest vector within the problem's bounds, from ``start``: least squares, weighed against what is
-    known of own parameters beforehand; stops when the gain is below ``tolerance`` nats.
+    """The likeliest vector within the problem's bounds, from ``start``: least squares, weighed against what
+    is known beforehand; stops when the gain is below ``tolerance`` nats.
 
     ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a
     little off. Otherwise the rows ahead of the clues' own are made anew only every third time, for they

@@ -1,4 +1,4 @@
-"""How far a refit moved the rig's own parameters, said where it is further than their uncertainty lets expect."""
+"""How far a refit moved the rig's own parameters: said where their uncertainty lets expect less."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _SLACK = 1e-4  # of a number: what stands at the end of its range is not beyond 
 def far_moves(given: Rig, refitted: Rig) -> tuple[str, ...]:
     """A line for each number that the refit moved by more than three times its uncertainty."""
     return tuple(
-        f"the refit moves the {stage}'s {what} by {100 * moved:+.3g} %, more than three times its uncertainty "
-        f"of {100 * known:.3g} %"
+        f"the refit moves the {stage}'s {what} by {100 * moved:+.3g} %, more than three times its "
+        f"uncertainty of {100 * known:.3g} %"
         for stage, what, moved, known in _moves(given, refitted)
         if abs(moved) > WITHIN * known + _SLACK
     )
