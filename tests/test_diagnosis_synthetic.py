@@ -82,10 +82,10 @@ def test_gauges_that_disagree_by_a_little_are_no_fault(role, off):
 
 @pytest.mark.parametrize("off, fault", [(0.008, False), (0.03, True)])
 def test_gauges_of_a_stage_that_is_absent_agree_to_a_percent(off, fault):
-    """Without a regulator the rig says that the pressure is the command."""
-    bare = replace(RIG, regulator=UNITY, signals=replace(RIG.signals, pressure="p"))
-    commands = [{"command": log["pressure"] * (1 + off)} for log in session(1)]
-    logs = [replace(log, signals=log.signals | c) for log, c in zip(session(1), commands, strict=True)]
+    """Without a sensor the rig says that the output is the curvature; another camera reads it."""
+    bare = replace(RIG, sensor=UNITY)
+    read = [log["curvature"] * (1 + off) for log in session(2)]
+    logs = [replace(a, signals={**a.signals, "output": y}) for a, y in zip(session(1), read, strict=True)]
     assert bool(diagnose(bare, logs).causes) == fault
 
 
