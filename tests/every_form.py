@@ -24,7 +24,7 @@ WISHES = {"example": [], "fastest": ["--overshoot", "10"]}
 
 
 def make(folder: Path) -> None:
-    """Every golden form, poles of 16 bits and of all their bits, and designs of the example rig with their C."""
+    """Every golden form, poles of 16 and of all their bits, and designs of the example rig with their C."""
     for form, how in {**{form: options(form) for form in FORMS}, **FURTHER}.items():
         done(["generate", str(CONTROLLER), "--out", str(folder / form), *how])
     for name, wish in WISHES.items():

@@ -77,8 +77,9 @@ def test_short_memory(length, begins):
 
 def test_a_long_memory_is_found_in_a_long_log():
     ref, meas = (np.tile(part, 10) for part in inputs())
-    u = ideal(CONTROLLER, Scenario(ref[None], meas[None]), 5000).u[0]
-    found = running(CONTROLLER, [log_of(u, ref, meas)])
+    stated = replace(CONTROLLER, length=20000)
+    u = ideal(stated, Scenario(ref[None], meas[None]), 5000).u[0]
+    found = running(stated, [log_of(u, ref, meas)])
     assert effects(found) == [["short_memory"]]
     assert found.causes[0][0].value == pytest.approx(5000, rel=0.05)
 
@@ -88,6 +89,27 @@ def test_a_memory_that_outlasts_most_of_the_log_is_an_infinite_one():
     stated = replace(CONTROLLER, length=1300)
     u = ideal(stated, Scenario(ref[None], meas[None]), 1300).u[0]
     assert not running(stated, [log_of(u, ref, meas)]).causes
+
+
+@pytest.mark.parametrize("length", [20, 50, 137])
+def test_what_the_file_says_itself_is_no_departure(length):
+    """A stated memory, a longer one than stated, and stated arithmetic; a shorter one than stated is one."""
+    ref, meas = inputs()
+    stated = replace(CONTROLLER, length=length)
+    u = ideal(stated, Scenario(ref[None], meas[None]), length).u[0]
+    assert not running(stated, [log_of(u, ref, meas)]).causes
+    assert not running(stated, [log_of(command()[0], ref, meas)]).causes
+    shorter = ideal(stated, Scenario(ref[None], meas[None]), length // 2).u[0]
+    found = running(stated, [log_of(shorter, ref, meas)])
+    assert effects(found) == [["short_memory"]] and found.causes[0][0].value == pytest.approx(length // 2, abs=2)
+
+
+def test_stated_arithmetic_is_no_departure():
+    ref, meas = inputs()
+    plan = build_plan(CONTROLLER, "q15")
+    u = physical_trace(plan, execute(plan, to_raw(plan, Scenario(ref[None], meas[None])))).u[0]
+    assert not running(replace(CONTROLLER, arithmetic="q15"), [log_of(u, ref, meas)]).causes
+    assert running(replace(CONTROLLER, arithmetic="f64"), [log_of(u, ref, meas)]).causes
 
 
 def test_fixed_point():

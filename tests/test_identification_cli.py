@@ -166,6 +166,11 @@ def test_a_degree_that_makes_no_sense_is_refused(tmp_path, capsys, degree):
     assert "gain-degree" in refused(argv, tmp_path, capsys)
 
 
+def test_no_stage_at_all_is_refused(tmp_path, capsys):
+    argv = ["identify", str(STEPS), "--rig", str(RIG), "--stages", ""]
+    assert "--stages: names no stage; give one or more of" in refused(argv, tmp_path, capsys)
+
+
 def test_missing_files_are_refused(tmp_path, capsys):
     log, rig, absent = str(STEPS), str(RIG), str(EXAMPLES / "absent.csv")
     assert "absent.csv" in refused(["identify", absent, "--rig", rig], tmp_path, capsys)
@@ -175,9 +180,13 @@ def test_missing_files_are_refused(tmp_path, capsys):
     assert "absent.csv" in refused(["identify", log, "--rig", rig, "--unseen", absent], tmp_path, capsys)
 
 
-def test_logs_without_a_step_are_refused(tmp_path, capsys):
-    line = refused(["identify", str(SINES), "--rig", str(RIG)], tmp_path, capsys)
-    assert "none is a step" in line
+def test_sines_determine_the_model_as_well(tmp_path, capsys):
+    """The maker's actuator unloads at 0.4 times its speed, so that T lies between its two."""
+    argv = ["identify", str(SINES), "--rig", str(RIG), "--out", str(tmp_path / "new.toml"), "--no-integer", "--json"]
+    assert main(argv) == 0
+    payload = json.loads(capsys.readouterr().out)
+    assert 1.32 < payload["rig"]["T"] < 1.32 / 0.4 and set(payload["gof"]) == {"fom", "rig"}
+    assert payload["gof"]["rig"]["mean"] > 0.9 and payload["rig"]["initial_steps"] == {}
 
 
 @pytest.mark.parametrize(

@@ -398,6 +398,7 @@ def test_a_measured_pump_fills_faster_than_it_vents(open_data):
     assert not fit.up_down.one_line_will_do
     assert 2.2 < fit.up_down.rising[0] < 2.9 and 5.4 < fit.up_down.falling[0] < 6.2  # 63 % times, as measured
     assert fit.up_down.gof > 0.94
+    assert all(made[0] < 3.0 for made in fit.simulated)  # at rest at first: kPa, an offset and no more
     assert any("cannot do both" in note and "valve_asymmetry" in note for note in fit.notes)
 
 

@@ -1,4 +1,4 @@
-"""The worst within a rig's uncertainty: by hand, against the rig in that corner, and never better than given."""
+"""The worst within a rig's uncertainty: by hand, against the rig in a corner, never better than given."""
 
 import itertools
 import json
@@ -40,8 +40,8 @@ def integral(gain=GAIN):
 
 
 def by_hand(gain, dead_time):
-    """Phase margin (°), gain margin (dB) and delay margin (s) of y_k = u_(k−n−1), u = gain ∫ by the trapezoidal
-    rule and a sample late: its phase is −90° − (n + 2) ωh."""
+    """Phase margin (°), gain margin (dB) and delay margin (s) of y_k = u_(k−n−1), u = gain ∫ by the
+    trapezoidal rule and a sample late: its phase is −90° − (n + 2) ωh."""
     late_by = round(dead_time / H) + 2
     crossover = 2.0 / H * math.atan(gain * H / 2.0)
     limit = 2.0 / H * math.tan(math.pi / 4 / late_by)

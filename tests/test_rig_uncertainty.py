@@ -28,9 +28,8 @@ def test_the_defaults_are_those_of_the_documentation(tmp_path):
 
 def test_what_is_given_takes_the_place_of_its_default_only(tmp_path):
     found = read(tmp_path, "[uncertainty]\nactuator = { alpha = 0.03 }\nsensor = { gain = 0, time = 0.5 }\n")
-    assert found.uncertainty == Uncertainty(
-        actuator=Relative(0.2, 0.2, 0.03), sensor=Relative(0.0, 0.5)
-    )
+    expected = Uncertainty(actuator=Relative(0.2, 0.2, 0.03), sensor=Relative(0.0, 0.5))
+    assert found.uncertainty == expected
 
 
 def test_it_is_written_only_where_given(tmp_path):
@@ -96,7 +95,8 @@ def test_a_rig_that_is_known_has_no_corners():
 def test_a_rig_that_is_not_off_is_the_rig():
     late = replace(paper_rig(), delays=Delays(0.1, 0.2, 0.3))
     assert moved(late, EXACT) == late
-    plain = replace(late, actuator=LinearActuator(TransferFunction([(1.0, 0.0)], [(1.0, 0.7), (1.0, 0.0)]), 0.5))
+    slow = TransferFunction([(1.0, 0.0)], [(1.0, 0.7), (1.0, 0.0)])
+    plain = replace(late, actuator=LinearActuator(slow, 0.5))
     assert moved(plain, EXACT) == plain
 
 
@@ -126,6 +126,7 @@ def test_an_actuator_keeps_its_form():
 
 
 def test_gains_multiply():
-    factor, besides = without_gain(Uncertainty(Relative(0.1, 0.2), Relative(0.2, 0.3, 0.1), Relative(-0.5, 0.1)))
+    off = Uncertainty(Relative(0.1, 0.2), Relative(0.2, 0.3, 0.1), Relative(-0.5, 0.1))
+    factor, besides = without_gain(off)
     assert factor == pytest.approx(1.1 * 1.2 * 0.5)
     assert besides == Uncertainty(Relative(0.0, 0.2), Relative(0.0, 0.3, 0.1), Relative(0.0, 0.1))

@@ -6,9 +6,10 @@ import argparse
 
 from focgen.cli.outcome import Outcome
 from focgen.diagnosis.diagnose import diagnose
-from focgen.diagnosis.model import Diagnosis
 from focgen.errors import FocgenError
 from focgen.progress import led_by
+from focgen.report.diagnosis_summary import diagnosis_text, units_of_rig
+from focgen.rig.files import read_rig
 
 HELP = "where the gap to the real rig lies, which effect causes it, and how far it shrinks"
 
@@ -62,37 +63,4 @@ def run(args: argparse.Namespace) -> Outcome:
         found = diagnose(
             args.rig, args.logs, args.out, args.controller, args.first, args.last, args.bootstrap
         )
-    return Outcome(found, in_words(found, args.out))
-
-
-def in_words(found: Diagnosis, out: str) -> str:
-    """The diagnosis for people."""
-    lines = [
-        f"verdict: {found.verdict}",
-        f"stage: {found.where.stage or 'cannot be told'}" + (" (inferred)" if found.where.inferred else ""),
-    ]
-    for cause in found.causes:
-        names = ", ".join(f"{c.effect} {100 * c.confidence:.0f} %" for c in cause.candidates)
-        whole = "its departure from the ideal one" if cause.stage == "controller" else "the gap"
-        lines.append(f"  {cause.stage}: {names}; {100 * cause.shrink:.0f} % of {whole}")
-    gap = found.gap
-    lines.append(
-        f"gap of {gap.unit}: {gap.as_given:.4g} as given, {gap.refitted:.4g} refitted, "
-        f"{gap.explained:.4g} explained, {gap.floor:.4g} noise"
-    )
-    lines.append(
-        f"GOF: {gap.gof['as given']:.3f} as given, {gap.gof['refitted']:.3f} refitted, "
-        f"{gap.gof['explained']:.3f} explained, of a possible {gap.gof['possible']:.3f}"
-    )
-    if found.shrink is not None:
-        low, high = found.shrink_interval
-        lines.append(
-            f"promised for new experiments: {100 * found.shrink:.0f} % of what could be explained "
-            f"({100 * low:.0f} to {100 * high:.0f} %)"
-        )
-    for place, what in found.unexplained.items():
-        lines.append(f"unexplained, {place}: depends on {', '.join(what['depends_on'])}")
-    if found.next_experiment:
-        lines.append(f"next experiment: {found.next_experiment.what}, for {found.next_experiment.why}")
-    lines += [f"warning: {w}" for w in found.warnings] + [f"note: {n}" for n in found.notes]
-    return "\n".join([*lines, f"written to {out}"])
+    return Outcome(found, diagnosis_text(found, units_of_rig(read_rig(args.rig)), args.out))

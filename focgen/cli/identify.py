@@ -63,6 +63,12 @@ def _stages(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
+def _next(complete: bool, args: Namespace) -> str:
+    if complete:
+        return f"next: focgen design {args.out} --out controller.toml"
+    return f"next: focgen identify LOG --rig {args.out} --out NEW_RIG, for the actuator"
+
+
 def run(args: Namespace) -> Outcome:
     given = (*args.logs, args.rig, *args.unseen)
     check_apart([args.out], given)
@@ -89,5 +95,5 @@ def run(args: Namespace) -> Outcome:
         text += f"pictures in {args.report}\n"
     else:
         write_file(args.out, rig_text(found.rig), given)
-    text += f"next: focgen design {args.out} --out controller.toml"
+    text += _next(found.rig.actuator is not None, args)
     return Outcome(identification_payload(found) | {"new_rig": args.out}, text)

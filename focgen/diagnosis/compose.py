@@ -33,7 +33,8 @@ class Rigs:
         entry = "command" if all("command" in log for log in logs) else "pressure"
         x = np.concatenate([np.asarray(log[entry], float) for log in logs])
         first = "regulator" if entry == "command" else "actuator"
-        Chain(self.fitted, self.placed).run(x, first, "sensor", session(logs), entry == "command", left=left)
+        run = session(logs, entry)
+        Chain(self.fitted, self.placed).run(x, first, "sensor", run, entry == "command", left=left)
         clock = max(log.start + len(log) * log.sample_time for log in logs)
         return replace(self.fitted, effects=effect_tables(self.placed, left, clock))
 

@@ -13,6 +13,7 @@ from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.carried import carried
 from focgen.diagnosis.explain import Explanation, clues_for, explain
+from focgen.diagnosis.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
 from focgen.diagnosis.segments import cuts, make
@@ -62,12 +63,12 @@ def diagnose(
     if out is not None:
         check_apart((Path(out) / name for name in WRITTEN), given)
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
-    logs = _usable(experiments(rig, logs, first, last))
+    logs = begun_session(rig, _usable(experiments(rig, logs, first, last)))
     ran = running(read_controller(controller), logs) if controller is not None else None
     explanations = explain_all(rig, logs, THRESHOLD, only, bootstrap)
-    rigs, diagnosis, evidence = verdict.reach(
-        rig, logs, compose.compose(rig, explanations, logs), explanations, ran, only is not None
-    )
+    rigs = compose.compose(rig, explanations, logs)
+    logs = begun_with(rigs, logs)
+    rigs, diagnosis, evidence = verdict.reach(rig, logs, rigs, explanations, ran, only is not None)
     diagnosis = replace(diagnosis, warnings=doubts(rig, logs))
     if out is not None:
         from focgen.diagnosis.write import write
@@ -106,7 +107,7 @@ def explain_all(
     is explained anew."""
     roles, x, found, trusted = cuts(logs), None, [], True
     for entry, exit in zip(roles, roles[1:]):
-        segment = make(logs, entry, exit, x, carried(found[-1]) if found else None)
+        segment = loosened(rig, make(logs, entry, exit, x, carried(found[-1]) if found else None))
         say(f"{entry} to {exit}")
         e = explain(rig, segment, logs, threshold, only, trusted)
         if draws > 1 and e.causes and only is None:

@@ -15,7 +15,6 @@ import numpy as np
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import clues_for, problem_of
 from focgen.diagnosis.menu import menu
-from focgen.diagnosis.scales import response_time
 from focgen.diagnosis.segments import cuts, make
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run, library
@@ -23,6 +22,7 @@ from focgen.rig.engine import Chain
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.rig.replay import experiments
+from focgen.rig.response import response_time
 
 ALIKE = 0.9  # cosine beyond which two effects cannot be told apart
 HIDDEN = 0.1  # surviving share below which an effect hides in the nominal parameters

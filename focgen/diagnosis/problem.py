@@ -53,7 +53,7 @@ class Problem:
     The vector: the rig's own parameters, the nuisances (the alignment of input and output, at most ``slack``
     samples; where nothing of the segment has an offset of its own, one, and its gauge's error, at most
     ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in standard
-    deviations), then every clue's parameters, all of order one.
+    deviations; how far the begins of experiments are, likewise), then every clue's parameters, all of order one.
     """
 
     segment: Segment
@@ -68,7 +68,12 @@ class Problem:
         self.own_start = self.own.start()
         zero = [] if self.own.has_offset else [_ZERO]
         self.gauges = [*zero, self.gauge] if self.gauge else zero
-        self.nuisances = 1 + len(self.gauges) + self.segment.unsure.shape[1]
+        self.nuisances = 1 + len(self.gauges) + self.ways
+
+    @property
+    def ways(self) -> int:
+        """In how many ways input and begins may be off."""
+        return self.segment.unsure.shape[1] + self.segment.loose.shape[1]
 
     @cached_property
     def excitation(self) -> Excitation:
@@ -122,7 +127,7 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
         low, high = self.own.bounds()
-        nuisance = [self.slack, *self.gauges, *[_OFF] * self.segment.unsure.shape[1]]
+        nuisance = [self.slack, *self.gauges, *[_OFF] * self.ways]
         low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
         for clue in self.clues:
             for p in clue.form.parameters:
@@ -170,10 +175,12 @@ class Problem:
         """The segment's output (n,), in the log's units."""
         chain = Chain(self.rig(vector), self.placed(vector), self.memory)
         own, segment = len(self.own_start), self.segment
-        gauges, off = np.split(vector[own + 1 : self.head], [len(self.gauges)])
+        ends = np.cumsum([len(self.gauges), segment.unsure.shape[1]])
+        gauges, off, begun = np.split(vector[own + 1 : self.head], ends)
         x = self._entered(float(vector[own]), off)
         made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held)
-        return self._read(made, *gauges)
+        made = self._read(made, *gauges)
+        return made + segment.loose @ begun if np.any(begun) else made
 
     def _read(self, made: np.ndarray, zero: float = 0.0, gauge: float = 0.0) -> np.ndarray:
         """What is read of a signal by gauges off by so much."""

@@ -1,4 +1,4 @@
-"""The ideal controller run on what the logs say that the running one saw.
+"""The controller as described run on what the logs say that the running one saw.
 
 Nobody logs what a controller held when the log began, nor whether the log's rows are its samples. Each of the
 few ways there are is tried, and the one taken whose commands come closest to those logged.
@@ -26,7 +26,7 @@ _SLOWER = 1.4  # times the controller's sample time: rows this far apart are not
 class Replayed:
     """``scenarios``: what the controller saw, by experiment, two lanes each: from nothing, and as if the
     first error had been for ever; ``commands`` (n,): what it was logged to answer; ``length``: the memory
-    length of the ideal one, None for infinite memory."""
+    length of the one it is compared with, None for infinite memory, else the controller's own."""
 
     controller: Controller
     scenarios: tuple[Scenario, ...]
@@ -78,8 +78,7 @@ def _ways(controller: Controller, logs: Sequence[Experiment]) -> Iterator[Replay
         parts = [_samples(controller, log, rows) for log in logs]
         seen = tuple(_scenario(controller, log, p) for log, p in zip(logs, parts))
         commands = tuple(p["command"] for p in parts)
-        lasting = controller.length >= LASTING * max(map(len, commands))
-        for length in [None] + [controller.length] * lasting:
+        for length in (None, controller.length):  # a memory that is stated is no departure, nor is a longer one
             yield Replayed(controller, seen, commands, length)
 
 

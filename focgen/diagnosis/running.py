@@ -1,4 +1,4 @@
-"""The controller's stage: how the running one departs from the ideal one, from closed-loop logs.
+"""The controller's stage: how the running one departs from the one that its file describes, from closed-loop logs.
 
 The controller is replayed on the logged reference and measurement. What it should have commanded is compared
 with the logged command; what a shorter memory, coarser arithmetic or an output limit would have commanded
@@ -32,6 +32,7 @@ _NEARLY = 0.9  # of it: nothing is left for another
 _ROUNDED = 1.5  # counts: a departure that only the output's rounding makes stays within
 _TIED = 1.5  # times what the best cause leaves unexplained: who leaves less may be the cause as well
 _RESOLVED = 5e-5  # of the command's range: departures below are the log's resolution
+_BIT = 1.0  # bits: words of about the stated length are those
 _STEADY = 0.2  # what a departure that stays counts beside one from sample to sample
 _STAYS = 5  # samples at one end of what the command runs over: there may be a limit
 
@@ -62,7 +63,7 @@ _Suspect = tuple[Departure, list[np.ndarray]]
 
 
 def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
-    """Compare the logged command with the ideal controller's.
+    """Compare the logged command with the described controller's.
 
     Raises ControllerError where the logs lack reference or command, a scheduling signal, or samples.
     """
@@ -79,7 +80,14 @@ def running(controller: Controller, logs: Sequence[Experiment]) -> Running:
     found = _explained(replay) if resolved else []
     counted = _counted(replay, found)
     tied = (counted,) if counted is not None else _tied(found)
+    tied = tuple(d for d in tied if not _stated(controller, d))
     return Running(departure, bool(resolved), (*stamps, tied) if tied else stamps)
+
+
+def _stated(controller: Controller, departure: Departure) -> bool:
+    """Whether the controller's own file says as much: arithmetic of these words is no departure from it."""
+    own = {"q15": 16, "q31": 32}.get(controller.arithmetic)
+    return departure.effect == "fixed_point" and own is not None and departure.value >= own - _BIT
 
 
 def _closed(log: Experiment) -> bool:
@@ -135,7 +143,7 @@ def _suspects(replay: Replayed) -> Iterator[_Suspect]:
 
 
 def _forgetful(replay: Replayed) -> Iterator[_Suspect]:
-    """Shorter memories: a few lengths, then ever closer ones about the best of them."""
+    """Memories shorter than the stated one: a few lengths, then ever closer ones about the best of them."""
     made: dict[int, list[np.ndarray]] = {}
     left: dict[int, float] = {}
 
@@ -145,9 +153,8 @@ def _forgetful(replay: Replayed) -> Iterator[_Suspect]:
             left[n] = replay.departure(made[n])
         return sorted(left)
 
-    most = max(LASTING * max(map(len, replay.commands)), _LEAST)
-    even = map(int, np.geomspace(_LEAST, most, _LENGTHS))
-    lengths = tried(n for n in (*even, replay.controller.length) if n <= most)
+    most = max(min(LASTING * max(map(len, replay.commands)), replay.controller.length - 1), _LEAST)
+    lengths = tried(map(int, np.geomspace(_LEAST, most, _LENGTHS)))
     for _ in range(_HALVINGS):
         at = lengths.index(min(left, key=left.get))
         beside = lengths[max(at - 1, 0) : at + 2]

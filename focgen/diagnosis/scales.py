@@ -9,9 +9,9 @@ import numpy as np
 from focgen.diagnosis.problem import References
 from focgen.diagnosis.segments import Segment
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
 from focgen.rig.model import Rig
+from focgen.rig.response import response_time
 
 
 def references(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> References:
@@ -64,14 +64,3 @@ def clocks(rig: Rig, logs: Sequence[Experiment]) -> dict[str, float]:
     begin = min(log.start for log in logs)
     session = max(log.start + len(log) * log.sample_time for log in logs) - begin
     return {"response": response_time(rig, h, record), "record": record, "session": session, "sample": h}
-
-
-def response_time(rig: Rig, h: float, record: float) -> float:
-    """When the nominal chain's response to a step passes 63 % of its value at a third of the record, in s."""
-    count = int(min(max(record / h / 3, 20), 20_000))
-    span = max(record / 3 / count, h)
-    run = Run.of([count + 1], [0.0], span)
-    y = Chain(rig).run(np.r_[0.0, np.ones(count)], "regulator", "sensor", run)
-    y = y - y[0]
-    passed = np.abs(y) >= 0.63 * abs(y[-1])
-    return float(np.clip(span * max(int(np.argmax(passed)), 1), 3 * h, record / 3))

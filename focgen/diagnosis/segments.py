@@ -27,7 +27,8 @@ class Segment:
     beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has no part in:
     the reference in a closed loop, else the input; ``led``: whether it is a reference; ``closed``: whether a
     loop was closed around the rig. ``unsure`` (n, k): ways in which an input that was simulated may be off, a
-    standard deviation each."""
+    standard deviation each. ``loose`` (n, k): what the output would be off by, were experiments to begin a
+    little otherwise than ``run`` says, in the output's unit."""
 
     entry: str
     exit: str
@@ -42,6 +43,7 @@ class Segment:
     led: bool
     closed: bool
     unsure: np.ndarray
+    loose: np.ndarray
 
     @cached_property
     def level_in(self) -> float:
@@ -81,14 +83,15 @@ class Segment:
         kept = np.concatenate(
             [first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)]
         )
-        x, y, trust, asked, clock, unsure = (
+        x, y, trust, asked, clock, unsure, loose = (
             v[kept].reshape(sum(counts), factor, *v.shape[1:]).mean(axis=1)
-            for v in (self.x, self.y, self.trust, self.asked, self.run.clock, self.unsure)
+            for v in (self.x, self.y, self.trust, self.asked, self.run.clock, self.unsure, self.loose)
         )
         rest = np.zeros(len(x), np.uint8)
         rest[np.cumsum([0, *counts[:-1]])] = 1
         run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
-        return replace(self, x=x, y=y, trust=trust, asked=asked, run=run, held=False, unsure=unsure)
+        thin = replace(self, x=x, y=y, trust=trust, asked=asked, run=run, held=False)
+        return replace(thin, unsure=unsure, loose=loose)
 
     def parts(self, signal: np.ndarray) -> list[np.ndarray]:
         """``signal`` (n, …) by experiment."""
@@ -122,9 +125,10 @@ def between(entry: str, exit: str) -> tuple[str, ...]:
     return order[order.index(_ENTERS[entry]) : order.index(_LEAVES[exit]) + 1]
 
 
-def session(logs: Sequence[Experiment]) -> Run:
-    """The run that the logs are."""
-    return Run.of([len(log) for log in logs], [log.start for log in logs], logs[0].sample_time)
+def session(logs: Sequence[Experiment], entry: str) -> Run:
+    """The run that the logs are, where the signal ``entry`` is its input."""
+    begins = [log.before(entry) for log in logs]
+    return Run.of([len(log) for log in logs], [log.start for log in logs], logs[0].sample_time, begins)
 
 
 def joined(logs: Sequence[Experiment], role: str) -> np.ndarray:
@@ -153,7 +157,7 @@ def make(
         between(entry, exit),
         x,
         y,
-        session(logs),
+        session(logs, entry),
         entry == "command",
         names,
         trust,
@@ -161,6 +165,7 @@ def make(
         any(led),
         any(closed),
         unsure[:, _felt(unsure, x, y)],
+        np.zeros((len(x), 0)),
     )
 
 

@@ -18,9 +18,11 @@ _NEAR = 4.0  # standard deviations: a neighbour of a jump moves less than this â
 _QUIET = 0.1  # â€¦ or less than this share of the jump
 _SMALL = 0.02  # of the reach: a smaller change is no jump
 _SEEN = 5.0  # standard deviations: a bend below is noise
+_ROUNDING = 1e-14  # of the largest value: a bend below is rounding
 _POINTS = (6, 4)  # of a polynomial; the second where a jump or the log's end leaves no room for the first
 _OFF_MIDDLE = 3.0  # a polynomial off the middle has to have a highest difference so much smaller
-_OF_FOURTH = 70.0**0.5  # standard deviation of white noise's fourth difference
+_ORDER = 6  # of the difference that noise is told from a signal by
+_OF_SIXTH = 924.0**0.5  # standard deviation of white noise's sixth difference
 _NORMAL = 0.6745  # median of |x| of the normal distribution
 
 
@@ -48,12 +50,16 @@ class Course:
         """The first ``count`` powers alone."""
         return Course(*(None if part is None else part[:count] for part in vars(self).values()))
 
+    def until(self, count: int) -> Course:
+        """The first ``count`` samples alone."""
+        return Course(*(None if part is None else part[:, :count] for part in vars(self).values()))
+
 
 def noise_level(values: np.ndarray) -> float:
-    """The standard deviation of a signal's white noise (n,), from its fourth differences; robust to jumps."""
-    if len(values) < 5:
+    """The standard deviation of a signal's white noise (n,), from its sixth differences; robust to jumps."""
+    if len(values) <= _ORDER:
         return 0.0
-    return float(np.median(np.abs(np.diff(values, 4)))) / _NORMAL / _OF_FOURTH
+    return float(np.median(np.abs(np.diff(values, _ORDER)))) / _NORMAL / _OF_SIXTH
 
 
 def jumps_of(values: np.ndarray) -> np.ndarray:
@@ -110,6 +116,7 @@ def _smoothest(values: np.ndarray, jumps: np.ndarray, points: int, noise: float)
     jumped = np.concatenate([[0], crossed])
     whole = jumped[points - 1 :] == jumped[: n - points + 1]
     highest = np.abs(np.diff(windows, points - 1, axis=1)[:, 0])
+    least_seen = max(_SEEN * noise, _ROUNDING * float(np.abs(values).max()))
     least = np.full(n, np.inf)
     bends, twists = np.zeros(n), np.zeros(n)
     for ahead in range(points - 1):  # samples of the polynomial ahead of the one that begins
@@ -120,7 +127,7 @@ def _smoothest(values: np.ndarray, jumps: np.ndarray, points: int, noise: float)
         better = size < least
         made = np.zeros((2, n))
         made[:, ahead + 1 : ahead + 1 + len(windows)] = weights @ windows.T
-        seen = np.abs(made) > _SEEN * noise * np.linalg.norm(weights, axis=1)[:, None]
+        seen = np.abs(made) > least_seen * np.linalg.norm(weights, axis=1)[:, None]
         least = np.where(better, size, least)
         bends = np.where(better, made[0] * seen[0], bends)
         twists = np.where(better, made[1] * seen[1], twists)

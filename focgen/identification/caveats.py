@@ -6,19 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.identification.between import noise_level
 from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.model import ExperimentFit
 from focgen.identification.single import is_step
-from focgen.identification.sure import relative_halves
+from focgen.identification.sure import misfit_of, relative_halves, times_text
 from focgen.logs.notes import listed
 
 _FALL = 0.5  # of the step: the input comes nearer to 0 by at least this in a release
 _WIDE = 0.3  # of a parameter: an interval wider than this says little
 _WORSE = 0.01  # of GOF: by so much more a rig is visibly worse than the single fits
-_MISFIT = 3.0  # times the noise of the readings: what is left is more than noise
-_LEFT = 0.05  # of the spread: what is left below is of no concern
 
 
 def warnings_of(
@@ -29,8 +26,8 @@ def warnings_of(
     quality: dict[str, dict[str, float]],
 ) -> tuple[str, ...]:
     """The warnings that apply, most important first. ``failed``: experiments that have no fit of their own."""
-    misfit = _misfit(excitations, fit)
-    found = _rig_is_worse(fits, quality) or ([_MODEL_SHORT.format(misfit)] if misfit else [])
+    misfit = misfit_of(excitations, fit)
+    found = _rig_is_worse(fits, quality) or ([_model_short(misfit, fit)] if misfit else [])
     found += _unsure(excitations, fit, misfit)
     found += _singles(fits, failed, misfit)
     if all(is_step(x) for x in excitations) and not any(_releases(x) for x in excitations):
@@ -46,10 +43,12 @@ def warnings_of(
     return tuple(found)
 
 
-_MODEL_SHORT = (
-    "the model leaves {:.1f} times the noise of the readings: something that it does not have, such as "
-    "hysteresis, another speed of unloading, or drift; `focgen diagnose` names it"
-)
+def _model_short(misfit: float, fit: FractionalFit) -> str:
+    late = "" if "delay" in fit.half and fit.half["delay"] else "a dead time (--delay), "
+    return (
+        f"the model leaves {times_text(misfit)} the noise of the readings: something that it does not have, such "
+        f"as {late}hysteresis, another speed of unloading, or drift; `focgen diagnose` names it"
+    )
 
 
 def _rig_is_worse(fits: Sequence[ExperimentFit], quality: dict[str, dict[str, float]]) -> list[str]:
@@ -64,17 +63,6 @@ def _rig_is_worse(fits: Sequence[ExperimentFit], quality: dict[str, dict[str, fl
     ]
 
 
-def _misfit(excitations: Sequence[Excitation], fit: FractionalFit) -> float | None:
-    """What is left over the noise of the readings, where it is much more."""
-    ratios = []
-    for x, made in zip(excitations, fit.simulated):
-        left, noise = float(np.std(x.measured - made)), noise_level(x.measured)
-        if left > _LEFT * x.spread and noise > 0.0:
-            ratios.append(left / noise)
-    worst = float(np.median(ratios)) if ratios else 0.0
-    return worst if worst > _MISFIT else None
-
-
 def _unsure(excitations: Sequence[Excitation], fit: FractionalFit, misfit: float | None) -> list[str]:
     wide = {k: h for k, h in relative_halves(excitations, fit).items() if h > _WIDE}
     if not wide:
@@ -85,13 +73,15 @@ def _unsure(excitations: Sequence[Excitation], fit: FractionalFit, misfit: float
 
 
 def _singles(fits: Sequence[ExperimentFit], failed: Sequence[str], misfit: float | None) -> list[str]:
-    wide = [f.name for f in fits if any(_half(f, key) > _WIDE for key in ("K", "T", "alpha"))]
+    wide = [f.name for f in fits if f.step and any(_half(f, key) > _WIDE for key in ("K", "T", "alpha"))]
     said = []
     if wide:
         remedy = "" if misfit else "; hold steps longer or lower the noise for Table I"
-        said.append(f"{listed(wide)}: K, T or alpha known to ±{_WIDE:.0%} or worse by itself{remedy}")
+        own = "by itself" if len(wide) == 1 else "by themselves"
+        said.append(f"{listed(wide)}: K, T or alpha known to ±{_WIDE:.0%} or worse {own}{remedy}")
     if failed:
-        said.append(f"{listed(failed)}: K, T and alpha not determined by itself, and not in Table I")
+        own = "by itself" if len(failed) == 1 else "by themselves"
+        said.append(f"{listed(failed)}: K, T and alpha not determined {own}, and not in Table I")
     return said
 
 

@@ -23,7 +23,7 @@ _SURELY = 0.8  # of the samples before it is away: the last ones may be its begi
 _SEVERAL = 10  # samples whose mean is a better rest than the first of them
 _DRIFT = 3.0  # standard errors of a slope: what is steeper does not rest
 _FEWEST = 30  # samples
-LOOKED_BACK = 4  # lengths of an experiment: how far before it its past is looked for
+_LOOKED_BACK, _FARTHEST = 4, 80_000  # how far before an experiment its past is looked for: its lengths, samples
 _FOLLOWED = 8  # first samples of a moving input that a line is drawn through where they are noisy
 
 
@@ -101,9 +101,21 @@ class Excitation:
     @cached_property
     def stepped(self) -> Driven:
         """A drive that steps to 1 at the first sample and stays for as long as pasts are looked back to."""
-        ones = np.ones((1, (LOOKED_BACK + 1) * len(self)))
+        ones = np.ones((1, len(self) + self.looked_back))
         course = course_of(ones, np.zeros(ones.shape[1], bool), held=True)
         return Driven(course if self.sensor == UNITY else through(self.sensor, course, self.step))
+
+    @property
+    def looked_back(self) -> int:
+        """How far before the first sample a past is looked for, samples."""
+        return min(_LOOKED_BACK * len(self), _FARTHEST)
+
+    def beginning(self, count: int) -> Excitation:
+        """The first ``count`` samples alone."""
+        if count >= len(self):
+            return self
+        parts = {"pressure": self.pressure[:count], "measured": self.measured[:count]}
+        return replace(self, **parts, course=self.course.until(count))
 
     @property
     def sensor_gain(self) -> float:
@@ -133,18 +145,22 @@ class Driven:
         """The response of each power to each of the first ``rows`` kernels; shape (rows, powers, count)."""
         n, late = self.count, kernels.late
         total = np.zeros((rows, len(self.course.values), n))
-        spectrum = 0.0
-        for kind, part in self._parts.items():
-            if part is not None:
-                kernel = getattr(kernels, kind)[:rows, : n - 1]
-                spectrum = spectrum + fft.rfft(kernel, self.size)[:, None, :] * part
-        if np.ndim(spectrum):
-            total[:, :, 1:] = fft.irfft(spectrum, self.size)[:, :, : n - 1]
+        for row in range(rows):  # one at a time: a long log's spectra are large
+            total[row, :, 1:] = self._convolved(kernels, row)
         if self.course.jumps_at_first:
             total += kernels.steps[:rows, None, :n] * self.course.jumps[None, :, :1]
         if late:
             total = np.concatenate([np.zeros_like(total[:, :, :late]), total[:, :, :-late]], axis=2)
         return total[:, :, :count]
+
+    def _convolved(self, kernels: Kernels, row: int) -> np.ndarray | float:
+        """Each power's response to one row of the kernels, from the second sample on."""
+        spectrum = 0.0
+        for kind, part in self._parts.items():
+            if part is not None:
+                kernel = getattr(kernels, kind)[row, : self.count - 1]
+                spectrum = spectrum + fft.rfft(kernel, self.size) * part
+        return fft.irfft(spectrum, self.size)[:, : self.count - 1] if np.ndim(spectrum) else 0.0
 
 
 def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | None = None) -> Excitation:

@@ -15,15 +15,25 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
-from focgen.identification.past import MOST_STEPS, Past, asks_for_past, best_time, columns, times
-from focgen.identification.problem import Point, Problem, delay_reach, starts
+from focgen.identification.past import (
+    EXACT,
+    MOST_STEPS,
+    SHOWS,
+    Past,
+    asks_for_past,
+    best_time,
+    columns,
+    suggests_past,
+    times,
+    worth_it,
+)
+from focgen.identification.problem import Point, Problem, delay_reach, shortened, starts
 
 _ROUNDS = 60  # of Levenberg–Marquardt
 _DAMPED, _STIFF, _FREE = 1e-3, 1e9, 1e-9  # damping: at first, at most, at least
 _STILL = 1e-10  # largest step, in units of log τ, α and samples, at which a fit has converged
 _FLAT = 1e-13  # relative fall of the cost, likewise
 _RECONSIDERED = 3  # times that the pasts are chosen anew
-_EXACT = 1e-4  # of the spread: what is left below shows no past
 _EDGE = 1e-6  # distance of α from its bounds
 _WHITENED = 15  # times that model and noise model are fitted in turn
 _SEARCHED_ANEW = 3  # of these times the fit begins at the coarse grid, too: the biased one may be far off
@@ -74,14 +84,11 @@ def fit_fractional(
     best = _searched(problem)
     if pasts is not None and any(pasts):
         problem, best = _with_pasts(problem, best, pasts)
-    for _ in range(_RECONSIDERED if pasts is None else 0):
-        asked = _pasts_asked_for(problem, best)
-        if asked == problem.pasts:
-            break
-        problem, best = _with_pasts(problem, best, asked)
+    if pasts is None:
+        problem, best = _with_pasts_asked_for(problem, best)
     if any(x.reference is not None for x in experiments):
         problem, best = _whitened(problem, best)
-    _check(experiments, best)
+    _check(problem, best)
     return _finished(problem, best)
 
 
@@ -92,10 +99,10 @@ def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) ->
         known = point.x[problem.of_past[i]]
         begun += [*known][: past.steps if past else 0]
         if past and past.steps > len(known):
-            grid = times(len(x))
-            made = columns(x, problem.kernels(point.x, i, past=True), grid, 1)[0]
-            left = x.measured - problem.simulated(point)[i]
-            begun += [np.log(grid[best_time(left, made)] + 1.0)] * (past.steps - len(known))
+            made = _pasts_of(problem, point, x)
+            left = (x.measured - problem.simulated(point)[i])[: made.shape[1]]
+            time = times(x.beginning(SHOWS))[best_time(left, made)]
+            begun += [np.log(time + 1.0)] * (past.steps - len(known))
     penalties = _long_run(problem, point)
     for _ in range(2):
         problem = Problem(problem.experiments, pasts, problem.delay_free, problem.delay, penalties)
@@ -105,9 +112,10 @@ def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) ->
 
 
 def _searched(problem: Problem) -> Point:
-    """The best of the fits from the better starts of the coarse grid."""
-    runs = [_descended(problem, start) for start in starts(problem)]
-    return min(runs, key=lambda point: point.cost)
+    """The best of the fits from the better starts of the coarse grid; found on the beginning of long logs."""
+    few = shortened(problem)
+    best = min((_descended(few, start) for start in starts(few)), key=lambda point: point.cost)
+    return best if few is problem else _descended(problem, best.x)
 
 
 def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Point:
@@ -133,26 +141,59 @@ def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Po
     return point
 
 
-def _pasts_asked_for(problem: Problem, point: Point) -> tuple[Past | None, ...]:
-    """The pasts with a step more where the data ask for it, and without where they do not."""
+def _with_pasts_asked_for(problem: Problem, point: Point) -> tuple[Problem, Point]:
+    """The fit with the pasts that its data ask for.
+
+    A past is tried wherever one is suggested, and stays where the fit that has it cannot do without: parameters
+    that are off for want of a past hide how much it explains.
+    """
+    for _ in range(_RECONSIDERED):
+        tried = _changed(problem, point, _grown)
+        if tried[0] is problem:
+            break
+        without = problem.residuals(point)
+        kept = _changed(*tried, lambda *at: _kept(*at, without[at[2]]))
+        if kept[0].pasts == problem.pasts:
+            break
+        problem, point = kept
+    return problem, point
+
+
+def _changed(problem: Problem, point: Point, rule) -> tuple[Problem, Point]:
+    """The fit with each experiment's past by ``rule``."""
     reach = max(float(np.ptp(x.measured)) for x in problem.experiments)
-    made = problem.simulated(point)
-    return tuple(
-        _past_asked_for(problem, point, i, x.measured - made[i], reach)
-        for i, x in enumerate(problem.experiments)
-    )
+    pasts = tuple(rule(problem, point, i, reach) for i in range(len(problem.experiments)))
+    return (problem, point) if pasts == problem.pasts else _with_pasts(problem, point, pasts)
 
 
-def _past_asked_for(problem: Problem, point: Point, i: int, left: np.ndarray, reach: float) -> Past | None:
+def _grown(problem: Problem, point: Point, i: int, reach: float) -> Past | None:
+    """The past of experiment ``i`` with a step more where one is suggested."""
     x, known = problem.experiments[i], problem.pasts[i]
-    if known is None and np.std(left) <= _EXACT * x.spread:
-        return None
-    made = columns(x, problem.kernels(point.x, i, past=True), times(len(x)), 1)[0]
-    if known is not None and not asks_for_past(x.measured - problem.from_rest(point, i), made, reach):
-        return None
+    left = x.measured - problem.simulated(point)[i]
     steps = known.steps if known else 0
-    more = steps < MOST_STEPS and np.std(left) > _EXACT * x.spread and asks_for_past(left, made, reach)
-    return Past(steps + 1, reach) if more else known
+    if steps == MOST_STEPS or np.std(left) <= EXACT * x.spread:
+        return known
+    made = _pasts_of(problem, point, x)
+    wanted = asks_for_past if known else suggests_past
+    return Past(steps + 1, reach) if wanted(left[: made.shape[1]], made, reach) else known
+
+
+def _pasts_of(problem: Problem, point: Point, x: Excitation) -> np.ndarray:
+    """What steps at a grid of times before an experiment leave of its first samples, (times, n)."""
+    start = x.beginning(SHOWS)
+    return columns(start, problem.kernels_for(start, point.x, start.stepped.count), times(start), 1)[0]
+
+
+def _kept(problem: Problem, point: Point, i: int, reach: float, without: np.ndarray) -> Past | None:
+    """The past of experiment ``i``, None where what it explains does not ask for it, or the fit that was
+    ``without`` it leaves little more."""
+    x, known = problem.experiments[i], problem.pasts[i]
+    if known is None:
+        return None
+    made = _pasts_of(problem, point, x)
+    alone = (x.measured - problem.from_rest(point, i))[: made.shape[1]]
+    worth = worth_it(without, problem.residuals(point)[i])
+    return known if worth and asks_for_past(alone, made, reach) else None
 
 
 def _long_run(problem: Problem, point: Point) -> list[float]:
@@ -161,13 +202,16 @@ def _long_run(problem: Problem, point: Point) -> list[float]:
     return [m.variance / float(np.sum(m.a)) ** 2 for m in models]
 
 
-def _check(experiments: Sequence[Excitation], best: Point) -> None:
-    names = ", ".join(e.name for e in experiments)
+def _check(problem: Problem, best: Point) -> None:
+    names = ", ".join(e.name for e in problem.experiments)
     if not (np.all(np.isfinite(best.x)) and np.isfinite(best.cost)):
         raise FitError(names, "the fit does not converge", "look at the log")
     if not Problem.ALPHAS[0] + _EDGE < best.x[1] < Problem.ALPHAS[1] - _EDGE:
         what = f"the best order is at the edge of (0, 2): {best.x[1]:.3g}"
         raise FitError(names, what, "the log does not show such dynamics; look at its columns and its time")
+    if problem.delay_free and best.x[2] >= problem.latest:
+        what = f"the best dead time is the longest that is looked for, {problem.delay_at(best.x):.3g} s"
+        raise FitError(names, what, "record for four times the dead time; look at the logs' clocks")
 
 
 def _whitened(problem: Problem, point: Point) -> tuple[Problem, Point]:
@@ -215,7 +259,7 @@ def _with_intervals(problem: Problem, point: Point, spread, models) -> Fractiona
     half = {
         "T": float(wide(slope @ spread @ slope)),
         "alpha": float(wide(spread[1, 1])),
-        "delay": float(wide(spread[2, 2])) if problem.delay_free else 0.0,
+        "delay": problem.step * float(wide(spread[2, 2])) if problem.delay_free else 0.0,
         "gain": wide(np.diag(spread)[gains]),
     }
     if len(problem.experiments) == 1:

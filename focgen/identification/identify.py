@@ -16,6 +16,7 @@ from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
 from focgen.identification.initial import answer_from_its_past
 from focgen.identification.model import ExperimentFit, Identification, Joint, Unseen
+from focgen.identification.past import worth_it
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.reach import seen_ranges
 from focgen.identification.remarks import remarks_of
@@ -23,6 +24,7 @@ from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, check_determined, with_stages
 from focgen.logs.experiment import Experiment
+from focgen.logs.notes import listed
 from focgen.logs.read import read_logs
 from focgen.output import write_file
 from focgen.rig.engine import STAGES
@@ -57,6 +59,8 @@ def identify(
     Raises LogError, RigError or FitError; nothing is written then.
     """
     check_degree(gain_degree)
+    if not stages:
+        raise FitError("--stages", "names no stage", f"give one or more of {', '.join(STAGES)}")
     for stage in stages:
         check_choice("--stages", stage, STAGES, FitError)
     nominal = rig if isinstance(rig, Rig) else read_rig(rig)
@@ -69,9 +73,10 @@ def identify(
         result = _actuator(experiments, others, new, gain_degree, delay, integer)
     else:
         result = Identification((), None, new, {}, {}, (), ())
+    result = replace(result, stages=found)
     warnings = doubts(nominal, experiments) + result.warnings
-    notes = remarks_of(experiments, nominal, result, found) + told + result.notes
-    result = replace(result, warnings=warnings, notes=notes, stages=found)
+    notes = remarks_of(experiments, nominal, result) + told + result.notes
+    result = replace(result, warnings=warnings, notes=notes)
     if out is not None:
         write_file(out, rig_text(result.rig), (*logs, rig, *unseen))
     return result
@@ -95,11 +100,12 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     """The identification of the actuator; ``rig`` has the regulator and the sensor it is seen through."""
     if rig.delays.actuator and not delay:
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
-    excitations = [_prepared(e, rig, degree + 1) for e in experiments]
+    excitations = _prepared(experiments, rig, degree + 1)
     degree, told = feasible_degree(excitations, degree)
     excitations = [x.with_powers(degree + 1) for x in excitations]
     fit = fit_fractional(excitations, delay)
     check_determined(excitations, fit)
+    excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
     joint = _joint(excitations, fit, fits)
     new = replace(
@@ -111,26 +117,41 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
     warnings = warnings_of(excitations, fit, fits, failed, quality)
+    between = [x.name for x in excitations if is_step(x) and x.between]
+    if between:
+        told += (f"{listed(between)}: steps between two levels; each K is the mean slope of K(p) p on its step",)
+    begun = [x.name for x in excitations if not x.rest_shown]
+    if begun:
+        verb = "begins with its step" if len(begun) == 1 else "each begin with their step"
+        told += (f"{listed(begun)} {verb}: taken as at rest at 0 before",)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 
-def _prepared(experiment: Experiment, rig: Rig, powers: int) -> Excitation:
-    """The experiment with what was before its first sample: the input it shows there for ever, or none where the
-    log begins with the step itself.
+def _prepared(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[Excitation]:
+    """The experiments with what was before their first samples: the input they show there for ever, or none where
+    a log begins with the step itself.
 
-    The second is taken where it fits better and no further past is asked for.
+    The second is taken where it needs no further past, and the fit of all experiments leaves little less with the
+    first, whatever pasts that asks for.
     """
-    candidates = [prepare(experiment, rig, powers, before) for before in possible_rests(experiment)]
-    if len(candidates) == 1:
-        return candidates[0]
-    rest, zero = candidates
+    ways = [possible_rests(e) for e in experiments]
+    rest, zero = ([prepare(e, rig, powers, way[k]) for e, way in zip(experiments, ways)] for k in (0, -1))
+    if all(len(way) == 1 for way in ways):
+        return rest
     try:
-        begun = fit_fractional([zero.with_powers(1)])
-        rested = fit_fractional([rest.with_powers(1)], pasts=[None])
+        begun, rested = _fitted(zero), _fitted(rest)
     except FitError:
         return rest
-    better = gof(zero.measured, begun.simulated[0]) > gof(rest.measured, rested.simulated[0])
-    return zero if better and begun.pasts[0] is None else rest
+    chosen = []
+    for i, (late, early) in enumerate(zip(zero, rest)):
+        left = [x.measured - fit.simulated[i] for x, fit in ((late, begun), (early, rested))]
+        chosen.append(late if begun.pasts[i] is None and not worth_it(*left) else early)
+    return chosen
+
+
+def _fitted(excitations: list[Excitation]) -> FractionalFit:
+    degree, _ = feasible_degree(excitations, excitations[0].powers - 1)
+    return fit_fractional([x.with_powers(degree + 1) for x in excitations])
 
 
 def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[ExperimentFit]) -> Joint:
@@ -158,7 +179,7 @@ def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[Experim
 
 def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
     """Logs beside what the identified rig makes of their input, each from the initial state that it asks for."""
-    made = [_prepared(e, rig, len(rig.actuator.gain)) for e in experiments]
+    made = [_prepared([e], rig, len(rig.actuator.gain))[0] for e in experiments]
     return tuple(
         Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
         for x, y in ((x, answer_from_its_past(x, rig.actuator, rig.delays.actuator)) for x in made)

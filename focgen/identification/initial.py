@@ -8,10 +8,9 @@ import numpy as np
 
 from focgen.identification.excitation import Excitation
 from focgen.identification.kernel import kernels
-from focgen.identification.past import MOST_STEPS, asks_for_past, best_time, columns, fine_times, times
+from focgen.identification.past import EXACT, MOST_STEPS, asks_for_past, best_time, columns, times
 from focgen.rig.model import Actuator
 
-_EXACT = 1e-4  # of the spread: what is left below shows no past
 
 
 def answer_from_its_past(x: Excitation, actuator: Actuator, delay: float = 0.0) -> np.ndarray:
@@ -27,10 +26,10 @@ def answer_from_its_past(x: Excitation, actuator: Actuator, delay: float = 0.0) 
     chosen: list[np.ndarray] = []
     long = kernels(*at, x.stepped.count, delay + x.late)
     reach = float(np.ptp(x.measured))
-    while len(chosen) < MOST_STEPS and np.std(left) > _EXACT * x.spread:
-        if not asks_for_past(left, columns(x, long, times(len(x)), 1)[0], reach):
+    while len(chosen) < MOST_STEPS and np.std(left) > EXACT * x.spread:
+        if not asks_for_past(left, columns(x, long, times(x), 1)[0], reach):
             break
-        grid = columns(x, long, fine_times(len(x)), 1)[0]
+        grid = columns(x, long, times(x, 4), 1)[0]
         chosen.append(grid[best_time(left, grid)])
         left = _without(x.measured - made, chosen)
     return x.measured - left + left.mean()

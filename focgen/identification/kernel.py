@@ -65,7 +65,7 @@ class Kernels:
         return _curved(*self._at, self.means, self._part)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=3)
 def kernels(log_tau: float, alpha: float, step: float, count: int, delay: float = 0.0) -> Kernels:
     """The :class:`Kernels`, kept for the next call."""
     return Kernels(log_tau, alpha, step, count, delay)

@@ -13,11 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from focgen.identification.excitation import LOOKED_BACK, Excitation
+from focgen.identification.excitation import Excitation
 from focgen.identification.kernel import Kernels
 from focgen.identification.noise import residual_model
 
 MOST_STEPS = 3
+SHOWS = 20_000  # first samples that show whether there was a past
+_WHITE = 0.25  # effective samples a sample: what is left above it is noise, below it likely a misfit
+_AT_LEAST = 3.0  # effective samples
+_ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit
+EXACT = 1e-4  # of the spread: what is left below shows no past
 _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
 
 
@@ -32,19 +37,12 @@ class Past:
 
 def latest(x: Excitation) -> float:
     """The longest time before the first sample that a past is looked for, samples."""
-    return float(LOOKED_BACK * len(x) - 2)
+    return float(x.looked_back - 2)
 
 
-def times(count: int) -> np.ndarray:
-    """A coarse grid of times before the first of ``count`` samples, in samples."""
-    powers = 2 ** np.arange(int(np.log2(LOOKED_BACK * count)))
-    return np.concatenate([[0], powers]).astype(float)
-
-
-def fine_times(count: int) -> np.ndarray:
-    """The same with four times an octave."""
-    most = np.log2(LOOKED_BACK * count - 2.0)
-    return np.concatenate([[0.0], 2.0 ** np.arange(0.0, most, 0.25)])
+def times(x: Excitation, octave: int = 1) -> np.ndarray:
+    """A grid of times before the first sample, in samples, so many an ``octave``."""
+    return np.concatenate([[0.0], 2.0 ** np.arange(0.0, np.log2(latest(x)), 1.0 / octave)])
 
 
 def columns(x: Excitation, kernels: Kernels, when: np.ndarray, rows: int = 3) -> np.ndarray:
@@ -68,18 +66,26 @@ def best_time(residual: np.ndarray, made: np.ndarray) -> int:
 
 
 def asks_for_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
-    """Whether what a fit leaves, (n,), asks for a past with columns like ``made`` (times, n).
+    """Whether what the right model leaves, (n,), asks for a past with columns like ``made`` (times, n).
 
-    The χ² that such a past takes off the whitened residual is compared with the number of free values that the
-    data really determine (Akaike's criterion), and a margin. What a model that is not quite true leaves is no
-    stationary noise, though. So the best single step has to take off enough of the residual itself, too, counted
-    in as many samples as its rest is worth.
+    The χ² that such a past takes off the whitened residual has to tell it from noise, see :func:`suggests_past`.
+    What a model that is not quite true leaves is no stationary noise, though. So the best single step has to take
+    off enough of the residual itself, too, counted in as many samples as its rest is worth.
+    """
+    return suggests_past(residual, made, reach) and _explains(residual, made[best_time(residual, made)])
+
+
+def suggests_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
+    """Whether a past is worth trying: parameters that were fitted without one leave something else than the past.
+
+    The χ² that it takes off the whitened residual is compared with the number of free values that the data really
+    determine (Akaike's criterion), and a margin.
     """
     basis = np.vstack([np.ones(len(residual)), made]).T
     model = residual_model(residual - basis @ np.linalg.lstsq(basis, residual, rcond=1e-6)[0])
     white = lfilter(model.a, [1.0], np.column_stack([residual, basis]), axis=0)[len(model.a) - 1 :]
     gained, free = _gain(white / np.sqrt(model.variance), reach)
-    return gained > 2.0 * free + _ASKED and _worth(residual, made[best_time(residual, made)]) > _ASKED
+    return gained > 2.0 * free + _ASKED
 
 
 def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
@@ -92,9 +98,14 @@ def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
     return float(share @ (singular.T @ rows[:, 0]) ** 2), float(np.sum(share))
 
 
-def _worth(residual: np.ndarray, column: np.ndarray) -> float:
-    """What one column takes off a residual, over the variance of what is left, in effective samples."""
+def _explains(residual: np.ndarray, column: np.ndarray) -> bool:
+    """Whether one column takes enough off a residual, (n,) each."""
     basis = np.column_stack([np.ones(len(residual)), column])
-    left = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
-    taken = float(np.var(residual)) / max(float(np.var(left)), 1e-300) - 1.0
-    return taken * residual_model(left).effective
+    return worth_it(residual, residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0])
+
+
+def worth_it(before: np.ndarray, after: np.ndarray) -> bool:
+    """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples."""
+    taken = float(np.var(before)) / max(float(np.var(after)), 1e-300) - 1.0
+    effective = max(residual_model(after).effective, _AT_LEAST)
+    return taken * effective > (_ASKED if effective > _WHITE * len(after) else _ASKED_OF_MISFIT)

@@ -16,7 +16,9 @@ _LONGEST = 60.0  # |log τ|, τ in s
 _DELAYS = 0.25  # of the shortest experiment: dead times are looked for up to here
 _NUDGE = 0.02  # of a sample: for the derivative by the dead time
 _GRID_ALPHAS, _GRID_TAUS = (0.5, 0.9, 1.4), 8
-_GRID_SAMPLES = 30_000  # samples that the coarse grid looks at
+_SEARCHED, _FEWEST = 60_000, 4000  # samples that the search looks at: of all experiments, of each at least
+_RESPONDS = 0.3  # of an experiment's spread: its beginning shows a response
+_BLOCK = 50_000  # rows that are decomposed at once
 _SECOND = 4.0  # times the best cost: a start of another order is tried up to here
 
 
@@ -57,8 +59,9 @@ class _Local:
 class Problem:
     """Experiments that share T, α, K(p) and the dead time, each scaled by its own spread so that all weigh alike.
 
-    ``x`` is (log τ, α), then the dead time in samples where it is ``delay_free``, then log(θ + 1), θ in samples,
-    of every step of a past. ``pasts``: an unknown past for each experiment, or None for a begin at rest;
+    ``x`` is (log τ, α), then the dead time in samples of the first experiment where it is ``delay_free``, then
+    log(θ + 1), θ in samples, of every step of a past. ``pasts``: an unknown past for each experiment, or None for
+    a begin at rest;
     ``penalties``: the variance (scaled) that weighs a past's prior against the data. ``whitening``: for each
     experiment the autoregressive filter [1, a₁, …] that makes its residual white, None where it is taken as it is.
     """
@@ -117,12 +120,14 @@ class Problem:
         """The dead time in s."""
         return float(x[2]) * self.step if self.delay_free else self.delay
 
-    def kernels(self, x: np.ndarray, i: int, nudge: float = 0.0, past: bool | None = None) -> Kernels:
-        """The kernels of experiment ``i``; ``nudge``: samples added to the dead time; ``past``: long enough for
-        the columns of one."""
+    def kernels(self, x: np.ndarray, i: int, nudge: float = 0.0) -> Kernels:
+        """The kernels of experiment ``i``; ``nudge``: samples added to the dead time."""
         run = self.experiments[i]
-        past = self.pasts[i] is not None if past is None else past
-        count = run.stepped.count if past else len(run)
+        count = run.stepped.count if self.pasts[i] is not None else len(run)
+        return self.kernels_for(run, x, count, nudge)
+
+    def kernels_for(self, run: Excitation, x: np.ndarray, count: int, nudge: float = 0.0) -> Kernels:
+        """The kernels of so many samples."""
         delay = max(self.delay_at(x) + nudge * self.step, 0.0) + run.late
         return kernels(float(x[0]), float(x[1]), run.step, count, delay)
 
@@ -190,14 +195,12 @@ class Problem:
         return _Local(*np.linalg.qr(np.vstack([self.white(i, made).T, prior])), past.steps)
 
     def _kept(self, what: str, i: int, x: np.ndarray, make):
-        """What was made for the last two trials."""
-        kept = self._store.setdefault((what, i), {})
+        """What was made for the last trial."""
         key = x.tobytes()
-        if key not in kept:
-            while len(kept) > 1:
-                del kept[next(iter(kept))]
-            kept[key] = make()
-        return kept[key]
+        if self._store.get((what, i), (None,))[0] != key:
+            self._store.pop((what, i), None)  # before the new one takes its memory
+            self._store[what, i] = key, make()
+        return self._store[what, i][1]
 
     # -- derivatives ----------------------------------------------------------------------------------------
 
@@ -290,27 +293,29 @@ def delay_reach(experiments: Sequence[Excitation]) -> float:
 
 
 def _triangle(columns: np.ndarray) -> np.ndarray:
-    """R of the QR decomposition of columns (k, n)."""
-    return np.linalg.qr(columns.T, mode="r")
+    """R of the QR decomposition of columns (k, n), a block of rows after the other."""
+    n = columns.shape[1]
+    parts = [np.linalg.qr(columns[:, i : i + _BLOCK].T, mode="r") for i in range(0, n, _BLOCK)]
+    return parts[0] if len(parts) == 1 else np.linalg.qr(np.vstack(parts), mode="r")
 
 
 def starts(problem: Problem) -> list[np.ndarray]:
     """The best point of a coarse grid, and the best of another order where it comes near."""
-    few = _fewer(problem)
-    found = sorted((_best_of_order(few, alpha) for alpha in _GRID_ALPHAS), key=lambda each: each[0])
+    found = sorted((_best_of_order(problem, alpha) for alpha in _GRID_ALPHAS), key=lambda each: each[0])
     return [x for cost, x in found[:2] if cost <= _SECOND * found[0][0]]
 
 
-def _fewer(problem: Problem) -> Problem:
-    """The problem with as many experiments as the grid looks at, each from rest."""
-    total, count = 0, 0
-    for x in problem.experiments:
-        total += len(x)
-        if count and total > _GRID_SAMPLES:
-            break
-        count += 1
-    chosen, seen = problem.experiments[:count], problem.whitening[:count]
-    return Problem(chosen, (None,) * count, problem.delay_free, problem.delay, whitening=seen)
+def shortened(problem: Problem) -> Problem:
+    """The problem with no more than the first samples of long experiments, each from rest; itself where it is
+    short, or where those first samples show no response."""
+    if sum(map(len, problem.experiments)) <= _SEARCHED:
+        return problem
+    count = max(_SEARCHED // len(problem.experiments), _FEWEST)
+    chosen = [x.beginning(count) for x in problem.experiments]
+    if any(x.spread < _RESPONDS * whole.spread for x, whole in zip(chosen, problem.experiments)):
+        return problem
+    none = (None,) * len(chosen)
+    return Problem(chosen, none, problem.delay_free, problem.delay, whitening=problem.whitening)
 
 
 def _best_of_order(problem: Problem, alpha: float) -> tuple[float, np.ndarray]:
@@ -334,10 +339,11 @@ def _best_delay(problem: Problem, log_tau: float, alpha: float) -> tuple[float, 
 
 
 def _cost_of(problem: Problem, made: list[np.ndarray], lag: int) -> float:
-    """The sum of squares where each response comes ``lag`` samples later."""
+    """The sum of squares where each response comes ``lag`` samples of the first experiment later."""
     parts = []
     for i, (run, response, w) in enumerate(zip(problem.experiments, made, problem.weights)):
-        late = np.hstack([np.zeros((len(response), lag)), response])[:, : len(run)]
+        by = round(lag * problem.step / run.step)
+        late = np.hstack([np.zeros((len(response), by)), response])[:, : len(run)]
         local = problem.local(i)
         parts.append(_triangle(local.without(problem.white(i, w * np.vstack([late, run.measured])))))
     triangle = _triangle(np.vstack(parts).T)

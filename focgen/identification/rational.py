@@ -54,9 +54,9 @@ SHAPES = tuple(Shape(*kind, delayed) for kind in _KINDS for delayed in (False, T
 class Record:
     """One experiment made ready: ``drive`` and ``measured`` (n,), ``hold`` "zero" or "linear".
 
-    ``drive`` is the input from its first value on, and the stage's state there is free. Where ``rests`` it
+    ``drive`` is the input from its first value on, and the stage was at rest there. Where ``rests`` it
     is the whole input of a log that begins with its step: the stage was at rest at 0 before. Where ``moves``
-    the stage is not known to have been at rest at the first sample.
+    the stage is not known to have been at rest at the first sample, and its state there is free.
     """
 
     name: str
@@ -177,16 +177,15 @@ Rows = list[tuple[np.ndarray, np.ndarray]]
 def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> Rows:
     """What every record is a sum of: its own rows (·, n), and those whose weights all records share (·, n).
 
-    Shared are the response of unit gain and, with a zero, its derivative per sample. Its own are an offset,
-    the free response of the state at the first sample, and that to another input before the first sample.
+    Shared are the response of unit gain and, with a zero, its derivative per sample. Its own are an offset
+    and, where it moves at the first sample, the free response of the state there and that to another input before.
     """
     delay = delay_of(shape, x)
     if not shape.poles:
         return [(_own_of_gain(r, delay), _static(r, delay)[None]) for r in records]
     made = discretise(shape.poles, x, delay, records[0].hold)
     own = np.array(_own(shape, made, max(map(len, records))))
-    free = 1 + shape.poles
-    counts = [1 if r.rests else len(own) if r.moves else free for r in records]
+    counts = [len(own) if r.moves else 1 for r in records]
     return [(own[:count, : len(r)], _shared(shape, made, r)) for count, r in zip(counts, records)]
 
 

@@ -5,21 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from focgen.identification.model import Identification
-from focgen.identification.stages import StageFit
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed, notes_of
 from focgen.rig.model import UNITY, LinearActuator, Rig
 
-_INPUTS = {"pressure": "measured pressure", "command": "command through the regulator"}
-_OUTPUTS = {"curvature": "curvature", "output": "output through the sensor"}
 
-
-def remarks_of(
-    experiments: Sequence[Experiment], nominal: Rig, found: Identification, stages: dict[str, StageFit]
-) -> tuple[str, ...]:
+def remarks_of(experiments: Sequence[Experiment], nominal: Rig, found: Identification) -> tuple[str, ...]:
     """The notes, those on the logs first."""
     said = [*notes_of(experiments)]
-    for fit in stages.values():
+    for fit in found.stages.values():
         said += fit.notes
     said += _pasts(found)
     said += _singles(found)
@@ -28,14 +22,24 @@ def remarks_of(
             "the rig's actuator was a transfer function; the identified one is K(p) p through "
             "1/(T s^alpha + 1)"
         )
-    said += _taken_for_one(experiments, nominal, stages)
+    said += _taken_for_one(experiments, found)
     said += [
-        f"driven by the {_INPUTS[driven]}, fitted to the {_OUTPUTS[fitted]}"
+        f"driven by the {_input(driven, found.rig)}, fitted to the {_output(fitted, found.rig)}"
         for driven, fitted in sorted({(f.driven_by, f.fitted) for f in found.experiments})
     ]
     if found.joint and found.joint.closed_loop:
         said.append("closed loop: fitted with a model of the noise, so that feedback brings no bias")
     return tuple(said)
+
+
+def _input(role: str, rig: Rig) -> str:
+    if role == "pressure":
+        return "measured pressure"
+    return "command" if rig.regulator == UNITY else "command through the regulator"
+
+
+def _output(role: str, rig: Rig) -> str:
+    return "output through the sensor" if role == "output" and rig.sensor != UNITY else role
 
 
 def _pasts(found: Identification) -> list[str]:
@@ -54,12 +58,12 @@ def _singles(found: Identification) -> list[str]:
     return [f"{listed(bare)} {verb} no offset: integer-order models have none"]
 
 
-def _taken_for_one(experiments: Sequence[Experiment], nominal: Rig, stages: dict[str, StageFit]) -> list[str]:
+def _taken_for_one(experiments: Sequence[Experiment], found: Identification) -> list[str]:
     """Stages that both ends of are logged, and that the rig does not have."""
     said = []
     for stage, ends in (("regulator", ("command", "pressure")), ("sensor", ("curvature", "output"))):
         logged = any(all(role in e for role in ends) for e in experiments)
-        if stage not in stages and getattr(nominal, stage) == UNITY and logged:
+        if stage not in found.stages and getattr(found.rig, stage) == UNITY and logged:
             said.append(
                 f"no [{stage}] in the rig: it is taken for 1, though {ends[0]} and {ends[1]} are logged; "
                 f"--stages {stage},actuator identifies it"

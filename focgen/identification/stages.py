@@ -1,8 +1,9 @@
 """Regulator and sensor identified from their own signals, as rational stages with a dead time.
 
 The regulator runs from ``command``, held between samples, to ``pressure``; the sensor from ``curvature``,
-straight between samples, to ``output``. One stage is fitted to all experiments, each with an offset and an
-initial state of its own. Of the shapes tried the simplest that explains the data is taken.
+straight between samples, to ``output``. One stage is fitted to all experiments, each with an offset of its
+own, and with an initial state where it does not begin at rest. Of the shapes tried the simplest that explains
+the data is taken.
 """
 
 from __future__ import annotations

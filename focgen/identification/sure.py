@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.errors import FitError
+from focgen.identification.between import noise_level
 from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.stages import StageFit
@@ -16,12 +17,14 @@ from focgen.rig.model import Relative, Uncertainty
 _NOTHING = 1.0  # of a parameter: half an interval that says nothing
 _LEAST = 0.01  # of a parameter: no rig is known better from one session
 _DIGITS = 3
+_MISFIT = 3.0  # times the noise of the readings: what is left is more than noise
+_LEFT = 0.05  # of the spread: what is left below is of no concern
+_HARDLY = 10.0  # times a parameter: an interval wider than this has no number
 
 _RECORD = {
     "T": "hold a step, and its release, for ten times the response time",
     "alpha": "hold a step, and its release, for ten times the response time",
     "K": "let the input move: steps to several levels and back to 0",
-    "delay": "sample faster, or leave --delay out",
 }
 
 
@@ -30,9 +33,31 @@ def check_determined(excitations: Sequence[Excitation], fit: FractionalFit) -> N
     worst = max(relative_halves(excitations, fit).items(), key=lambda item: item[1])
     if not worst[1] < _NOTHING:
         names = ", ".join(x.name for x in excitations)
-        wide = f"to ±{worst[1]:.0%}" if np.isfinite(worst[1]) else "not at all"
-        what = f"these logs determine {worst[0]} {wide}, so there is no model to write"
-        raise FitError(names, what, _RECORD[worst[0]])
+        what = f"these logs determine {worst[0]} to ±{worst[1]:.0%} only"
+        what = what if worst[1] < _HARDLY else f"these logs do not determine {worst[0]}"
+        remedy = "leave --delay out, or " if fit.half["delay"] else ""
+        if misfit := misfit_of(excitations, fit):
+            what += f", and the best model leaves {times_text(misfit)} the noise of the readings"
+            remedy += "look at the columns, and keep with --from and --to what follows this input alone"
+        else:
+            remedy += _RECORD[worst[0]]
+        raise FitError(names, f"{what}: there is no model to write", remedy)
+
+
+def misfit_of(excitations: Sequence[Excitation], fit: FractionalFit) -> float | None:
+    """How many times the noise of the readings a fit leaves; None where that is little."""
+    ratios = []
+    for x, made in zip(excitations, fit.simulated):
+        left, noise = float(np.std(x.measured - made)), noise_level(x.measured)
+        if left > _LEFT * x.spread and noise > 0.0:
+            ratios.append(left / noise)
+    worst = float(np.median(ratios)) if ratios else 0.0
+    return worst if worst > _MISFIT else None
+
+
+def times_text(ratio: float) -> str:
+    """A ratio in words: "4.5 times", "96 times"."""
+    return f"{ratio:.{1 if ratio < 10.0 else 0}f} times"
 
 
 def relative_halves(excitations: Sequence[Excitation], fit: FractionalFit) -> dict[str, float]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
+
+from focgen.logs.begin import REST, Begin
 
 ROLES = ("command", "pressure", "curvature", "output", "reference")
 
@@ -19,7 +21,8 @@ class Experiment:
     was taken ``k * sample_time`` seconds after ``start``. ``start`` is the session's time of sample 0 in s,
     ``raw_time`` the logged time stamps (m,) in s before any resampling, ``rows`` the signals (m,) at those
     where they were resampled, ``notes`` what was done to the log. ``continues``: the rig ran just before,
-    in samples that are missing or cut out, so that the state in which it begins is unknown.
+    in samples that are missing or cut out, so that the state in which it begins is unknown. ``begins``: by
+    role, what a signal was before the first sample; others were at rest at 0.
     """
 
     name: str
@@ -30,8 +33,10 @@ class Experiment:
     notes: tuple[str, ...] = ()
     rows: Mapping[str, np.ndarray] | None = None
     continues: bool = False
+    begins: Mapping[str, Begin] = field(default_factory=dict)
 
     def __post_init__(self):
+        object.__setattr__(self, "begins", MappingProxyType(dict(self.begins)))
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
         if self.rows is not None:
             object.__setattr__(self, "rows", MappingProxyType(dict(self.rows)))
@@ -44,6 +49,10 @@ class Experiment:
 
     def __getitem__(self, role: str) -> np.ndarray:
         return self.signals[role]
+
+    def before(self, role: str) -> Begin:
+        """What the signal of a role was before the first sample."""
+        return self.begins.get(role, REST)
 
     @property
     def time(self) -> np.ndarray:
@@ -59,7 +68,8 @@ class Experiment:
         cut = {role: values[keep] for role, values in self.signals.items()}
         time, rows = self._rows_between(lo, hi)
         start = self.start + begin * self.sample_time
-        return replace(self, signals=cut, start=start, raw_time=time, rows=rows)
+        begins = self.begins if begin == 0 else {}
+        return replace(self, signals=cut, start=start, raw_time=time, rows=rows, begins=begins)
 
     def _rows_between(self, low: float, high: float):
         """The raw time stamps and rows from ``low`` to ``high`` (s since the first)."""

@@ -4,8 +4,8 @@ between.
 The command is held over a sample; the regulator answers exactly. Its pressure goes through K(p)p at every
 substep, the result is taken as straight within a substep, and actuator and sensor answer that exactly,
 however fractional they are. So the only error is that of the straight lines, O(substep²);
-:func:`substeps` bounds it. Dead times pass through K(p)p unchanged, so all of them act at the end of the chain,
-where they are exact: the pressure that enters K(p)p is never late, the one that is measured is.
+:func:`substeps` bounds it. Dead times pass through K(p)p unchanged, so all of them act at the end of the
+chain, where they are exact: the pressure that enters K(p)p is never late, the one that is measured is.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class Chain:
     """Responses sampled for a loop of ``samples`` samples of ``sample_time`` s, each in ``substeps`` parts.
 
     ``pressure`` (samples, substeps + 1, 1): from the held command to the pressure at the substeps of the
-    sample, both ends included, without the regulator's delay; where it has one, a last row more is the pressure
-    with it at the sample's end. ``output`` and ``curvature`` (samples, 1, substeps + 1): from K(p)p there
+    sample, both ends included, without the regulator's delay; where it has one, a last row more is the
+    pressure with it at the sample's end. ``output`` and ``curvature`` (samples, 1, substeps + 1): from K(p)p there
     to the sensor's output and the curvature at the sample's end.
     """
 
@@ -105,8 +105,8 @@ def _held(stage: TransferFunction, sample_time: float, samples: int, parts: int)
 def _pressure(
     stage: TransferFunction, sample_time: float, samples: int, parts: int, delay: float
 ) -> np.ndarray:
-    """Return :func:`_held`, and with a ``delay`` (s) one more row: the output that much later, at the sample's
-    end.
+    """Return :func:`_held`, and with a ``delay`` (s) one more row: the output that much later, at the
+    sample's end.
     """
     inside = _held(stage, sample_time, samples, parts)
     if not delay:

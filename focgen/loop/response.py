@@ -23,8 +23,8 @@ from focgen.rig.model import Actuator, Rig
 
 _ALIASES = 40  # pairs of side bands summed one by one
 LOW = 1e-5  # of the sampling frequency: where the curves begin
-_LERCH = 0.2  # spacing in ln t: the rule's own error is about exp(−π²/spacing)
 _HIGH = 1e3  # of the same: where the continuous ones end
+_LERCH = 0.2  # spacing in ln t: the rule's own error is about exp(−π²/spacing)
 
 
 def chain_transfer(rig: Rig) -> TransferFunction:
@@ -42,7 +42,7 @@ def slope_at(rig: Rig, pressure: float) -> float:
 
 
 def side_bands(sample_time: float, omega) -> np.ndarray:
-    """The frequencies that sampling brings to ``omega`` (n,), rad/s, (81, n); those beyond are summed at once."""
+    """The frequencies that sampling brings to ``omega`` (n,), rad/s, (81, n): all but those far beyond."""
     bands = np.arange(-_ALIASES, _ALIASES + 1)[:, None]
     return np.asarray(omega, dtype=float) + 2.0 * math.pi / sample_time * bands
 

@@ -222,8 +222,10 @@ class _Trial:
                 raise DesignError("--duration", f"is {duration:g} s", f"give {2 * h:g} … {_MOST * h:g} s")
             return math.ceil(duration / h)
         speeds = [m.crossover_rad_s for m in self.margins if math.isfinite(m.crossover_rad_s)]
+        if not speeds:
+            return _UNKNOWN
         late = math.ceil(self.rig.delays.total / h)
-        return min(max(math.ceil(_SETTLINGS / min(speeds) / h) + late, _FEWEST), _MOST) if speeds else _UNKNOWN
+        return min(max(math.ceil(_SETTLINGS / min(speeds) / h) + late, _FEWEST), _MOST)
 
     def result(self, duration: float | None, notes: tuple[str, ...]) -> Simulation:
         count = self.samples(duration)

@@ -129,8 +129,8 @@ class _Search:
 
 
 def _certain(found: float) -> float:
-    """Round to six digits, as many as a schedule is written with. Settling times in simulation, and the levels
-    that follow from them, agree to ten or more between processors: six are the same on all."""
+    """Round to six digits, as many as a schedule is written with. Settling times in simulation, and the
+    levels that follow from them, agree to ten or more between processors: six are the same on all."""
     return float(f"{found:.6g}")
 
 

@@ -9,11 +9,14 @@ import numpy as np
 from focgen.control.units import unit_of
 from focgen.identification.model import ExperimentFit, Identification, Joint
 from focgen.identification.stages import StageFit
-from focgen.report.identification_summary import model_label
+from focgen.report.identification_summary import driving_role, gain_unit, model_label
 from focgen.report.style import COLOURS, CYCLE, GREY, figure, png, with_unit
 
+_RUNS = tuple(colour for colour in CYCLE if colour != COLOURS["ideal"])  # of runs: models are drawn over them
 _COMPARED = ("iom_1p", "iom_2p1z", "iom_3p2z")
 _LISTED = 16  # experiments in one column of a legend
+_JUMP = 0.5  # of an input's reach: it jumps where a single sample changes it by so much
+_LETTERS = 60  # in a row below an axis
 _LAST = 0.5  # of a swinging log: the part drawn as loops, when the start has died away
 
 
@@ -26,8 +29,8 @@ def identification_pictures(found: Identification) -> dict[str, bytes]:
     pictures |= {"gof.png": _gof(found), "fits.png": _fits(found), "models.png": _models(found)}
     if sum(fit.step for fit in found.experiments) > 1:
         pictures["parameters.png"] = _parameters(found)
-    if any(log.swings for log in found.unseen) or any(not fit.step for fit in found.experiments):
-        pictures["loops.png"] = _loops(found)
+    if swings := _swings(found):
+        pictures["loops.png"] = _loops(found, swings)
     return pictures
 
 
@@ -35,7 +38,7 @@ def _stage(found: Identification, fit: StageFit) -> bytes:
     """What leaves a stage, measured and as identified, run by run."""
     with figure(1, 1, size=(7.0, 3.4)) as (fig, axes):
         for i, (time, measured, simulated) in enumerate(fit.traces):
-            axes.plot(time, measured, color=CYCLE[i % len(CYCLE)], lw=0.8, label=fit.names[i])
+            axes.plot(time, measured, color=_RUNS[i % len(_RUNS)], lw=0.8, label=fit.names[i])
             axes.plot(time, simulated, color=COLOURS["ideal"], lw=1.0)
         axes.set_xlabel("time (s)")
         axes.set_ylabel(_named(found, {"regulator": "pressure", "sensor": "output"}[fit.stage]))
@@ -56,25 +59,27 @@ def _gof(found: Identification) -> bytes:
                 [max(found.gof[model][n], 0.0) for n in names],
                 width,
                 label=model_label(model),
-                color=CYCLE[i % len(CYCLE)],
+                color=GREY if model == "rig" else CYCLE[i % len(CYCLE)],
             )
-        axes.set_xticks(range(len(names)), names)
+        crowded = sum(map(len, names)) > _LETTERS
+        axes.set_xticks(range(len(names)), names, rotation=90 if crowded else 0)
         axes.set_ylabel("goodness of fit")
         lowest = min(found.gof[model][n] for model in models for n in names)
         axes.set_ylim(max(0.0, np.floor(10.0 * lowest - 0.5) / 10.0), 1.0)
         axes.set_title("Fractional and integer-order models (Table I)")
-        axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.1))
+        axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.34 if crowded else -0.1))
         return png(fig)
 
 
 def _fits(found: Identification) -> bytes:
     with figure(1, 1, size=(7.0, 3.6)) as (fig, axes):
         for i, fit in enumerate(found.experiments):
-            axes.plot(fit.time, fit.measured, color=CYCLE[i % len(CYCLE)], lw=0.8, label=fit.name)
-            axes.plot(fit.time, fit.simulated, color=COLOURS["ideal"], lw=1.0)
+            axes.plot(fit.time, fit.measured, color=_RUNS[i % len(_RUNS)], lw=0.8, label=fit.name)
+            axes.plot(fit.time, fit.simulated, color=COLOURS["ideal"], lw=0.9, ls=":")
+            axes.plot(fit.time, found.joint.simulated[fit.name], color=COLOURS["ideal"], lw=1.0)
         axes.set_xlabel("time (s)")
         axes.set_ylabel(_named(found, found.experiments[0].fitted))
-        axes.set_title("Measured (colour) and fractional model (black)")
+        axes.set_title("Measured (colour), the rig (black), each experiment's own model (dotted)")
         _legend_beside(axes, [fit.measured[-1] for fit in found.experiments])
         return png(fig)
 
@@ -96,15 +101,6 @@ def _legend_beside(axes, ends) -> None:
 def _named(found: Identification, role: str, ahead: str = "") -> str:
     """A signal's name, with ``ahead`` before it, and the unit that its column tells."""
     return with_unit(ahead + role, unit_of(getattr(found.rig.signals, role)))
-
-
-def _gain_unit(found: Identification) -> str:
-    """The unit of K, as far as the columns tell it."""
-    fit, signals = found.experiments[0], found.rig.signals
-    above, below = unit_of(getattr(signals, fit.fitted)), unit_of(getattr(signals, fit.driven_by))
-    if not above or not below:
-        return ""
-    return f"1/({above[2:]} {below})" if above.startswith("1/") else f"{above}/{below}"
 
 
 def _models(found: Identification) -> bytes:
@@ -132,7 +128,7 @@ def _candidates(fit: ExperimentFit):
 def _parameters(found: Identification) -> bytes:
     """Fig. 7 with intervals."""
     steps = [fit for fit in found.experiments if fit.step]
-    labels = (with_unit("K", _gain_unit(found)), r"T ($\mathrm{s}^\alpha$)", "α")
+    labels = (with_unit("K", gain_unit(found)), r"T ($\mathrm{s}^\alpha$)", "α")
     with figure(3, 1, size=(7.0, 6.6), sharex=True) as (fig, axes):
         for ax, key in zip(axes, ("K", "T", "alpha")):
             _draw_each(ax, steps, key)
@@ -142,7 +138,7 @@ def _parameters(found: Identification) -> bytes:
             ax.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
             ax.set_ylabel(label)
             ax.legend(loc="upper left", ncols=2)
-        axes[-1].set_xlabel(_named(found, steps[0].driven_by, "level of the "))
+        axes[-1].set_xlabel(_named(found, driving_role(found), "level of the "))
         axes[0].set_title("Parameters of the fractional model over the level")
         return png(fig)
 
@@ -168,14 +164,19 @@ def _draw_joint(axes, joint: Joint, levels: Sequence[float]) -> None:
         ax.axhline(value, color=COLOURS["ideal"], label=f"all together: {value:.4g}, 95 % interval", zorder=1)
 
 
-def _loops(found: Identification) -> bytes:
-    """Fig. 8: output over input, logged and as the identified rig has it."""
+def _swings(found: Identification) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+    """Name, input, measured and simulated output of what swings; an input that jumps draws no loops."""
     swings = [(u.name, u.pressure, u.measured, u.simulated) for u in found.unseen if u.swings]
     swings += [
         (f.name, f.pressure, f.measured, found.joint.simulated[f.name])
         for f in found.experiments
         if not f.step
     ]
+    return [each for each in swings if np.abs(np.diff(each[1])).max() < _JUMP * np.ptp(each[1])]
+
+
+def _loops(found: Identification, swings: list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]) -> bytes:
+    """Fig. 8: output over input, logged and as the identified rig has it."""
     columns = min(4, len(swings))
     rows = -(-len(swings) // columns)
     with figure(
@@ -187,7 +188,7 @@ def _loops(found: Identification) -> bytes:
             ax.plot(pressure[late], simulated[late], color=COLOURS["model"], lw=0.9, label="identified rig")
             ax.set_title(name)
         for ax in axes[-1]:
-            ax.set_xlabel(_named(found, "pressure"))
+            ax.set_xlabel(_named(found, driving_role(found)))
         axes[0, 0].set_ylabel(_named(found, found.experiments[0].fitted))
         axes[0, 0].legend(loc="upper left")
         return png(fig)

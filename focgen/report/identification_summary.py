@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
+from focgen.control.units import unit_of
 from focgen.identification.model import ExperimentFit, Identification, Joint
 from focgen.identification.stages import StageFit
 from focgen.report.page import TableOf, text_table
+from focgen.report.style import with_unit
+from focgen.rig.model import UNITY
 from focgen.tomlfile import terms_of
 
 _DECIMALS = 7  # more are written with an exponent
@@ -98,9 +101,28 @@ def parameter_table(found: Identification) -> TableOf:
     ]
     joint = found.joint
     rows.append(("all together", "", "", _pm(joint.T, joint.ci95["T"]), _pm(joint.alpha, joint.ci95["alpha"])))
+    level, gain = with_unit("level", _driving_unit(found)), with_unit("K", gain_unit(found))
     return TableOf(
-        ("experiment", "level", "K", "T (s^alpha)", "alpha"), tuple(rows), "K / (T s^alpha + 1), ± 95 %"
+        ("experiment", level, gain, "T (s^alpha)", "alpha"), tuple(rows), "K / (T s^alpha + 1), ± 95 %"
     )
+
+
+def driving_role(found: Identification) -> str:
+    """What drives the actuator: the command only where no regulator makes a pressure of it."""
+    role = found.experiments[0].driven_by
+    return "pressure" if found.rig.regulator != UNITY else role
+
+
+def _driving_unit(found: Identification) -> str:
+    return unit_of(getattr(found.rig.signals, driving_role(found)))
+
+
+def gain_unit(found: Identification) -> str:
+    """The unit of K, as far as the columns tell it."""
+    above, below = unit_of(getattr(found.rig.signals, found.experiments[0].fitted)), _driving_unit(found)
+    if not above or not below:
+        return ""
+    return f"1/({above[2:]} {below})" if above.startswith("1/") else f"{above}/{below}"
 
 
 def _pm(value: float, span: tuple[float, float]) -> str:
@@ -115,11 +137,10 @@ def _pm(value: float, span: tuple[float, float]) -> str:
 def gain_text(found: Identification) -> str:
     """K(p) with its intervals, R² where it is more than a constant, and the dead time where there is one."""
     powers = ("", " p", *(f" p^{i}" for i in range(2, len(found.joint.gain))))
-    terms = " + ".join(
-        f"({_pm(g, span)}){power}"
-        for g, span, power in zip(found.joint.gain, found.joint.ci95["gain"], powers)
-    )
-    known = found.joint.gain_r2 is not None and len(found.joint.gain) > 1
+    each = [_pm(g, span) for g, span in zip(found.joint.gain, found.joint.ci95["gain"])]
+    terms = " + ".join(f"({text}){power}" for text, power in zip(each, powers)) if len(each) > 1 else each[0]
+    steps = sum(fit.step for fit in found.experiments)
+    known = found.joint.gain_r2 is not None and 1 < len(each) < steps
     r2 = f",  R² of the single fits = {found.joint.gain_r2:.4f}" if known else ""
     span = found.joint.ci95.get("delay")
     late = f"\ndead time = {_pm(found.joint.delay, span)} s" if span else ""

@@ -1,6 +1,26 @@
 """The rig: regulator → actuator → sensor, its file, and its simulation."""
 
 from focgen.rig.files import read_rig, write_rig
-from focgen.rig.model import Actuator, LinearActuator, Ranges, Rig, Signals
+from focgen.rig.model import (
+    Actuator,
+    Delays,
+    LinearActuator,
+    Ranges,
+    Relative,
+    Rig,
+    Signals,
+    Uncertainty,
+)
 
-__all__ = ["Actuator", "LinearActuator", "Ranges", "Rig", "Signals", "read_rig", "write_rig"]
+__all__ = [
+    "Actuator",
+    "Delays",
+    "LinearActuator",
+    "Ranges",
+    "Relative",
+    "Rig",
+    "Signals",
+    "Uncertainty",
+    "read_rig",
+    "write_rig",
+]

@@ -18,23 +18,25 @@ _ENDS = (-1.0, 1.0)
 def corners(rig: Rig) -> tuple[Uncertainty, ...]:
     """Every combination of the ends of what is uncertain and makes a difference, the rig as given first.
 
-    The gains of the stages multiply in a loop, so of their combinations only the lowest and the highest product
-    are looked at.
+    The gains of the stages multiply in a loop, so of their combinations only the lowest and the highest
+    product are looked at.
     """
     sizes = {stage: _uncertain(rig, stage) for stage in STAGES}
     moves = [(stage, key) for stage in STAGES for key in ("time", "alpha") if getattr(sizes[stage], key)]
     ends = _ENDS if any(size.gain for size in sizes.values()) else (0.0,)
-    found = (
-        Uncertainty(**{stage: _signed(sizes[stage], gain, dict(zip(moves, signs)), stage) for stage in STAGES})
-        for gain in ends
-        for signs in product(_ENDS, repeat=len(moves))
-    )
-    return tuple(dict.fromkeys((EXACT, *found)))
+    found = [EXACT]
+    for gain in ends:
+        for signs in product(_ENDS, repeat=len(moves)):
+            found.append(_corner(sizes, gain, dict(zip(moves, signs))))
+    return tuple(dict.fromkeys(found))
 
 
-def _signed(size: Relative, gain: float, signs: dict, stage: str) -> Relative:
-    times, orders = (signs.get((stage, key), 0.0) for key in ("time", "alpha"))
-    return Relative(gain * size.gain, times * size.time, orders * size.alpha)
+def _corner(sizes: dict[str, Relative], gain: float, signs: dict[tuple[str, str], float]) -> Uncertainty:
+    def end(stage: str, size: Relative) -> Relative:
+        time, alpha = (signs.get((stage, key), 0.0) for key in ("time", "alpha"))
+        return Relative(gain * size.gain, time * size.time, alpha * size.alpha)
+
+    return Uncertainty(**{stage: end(stage, size) for stage, size in sizes.items()})
 
 
 def _uncertain(rig: Rig, stage: str) -> Relative:

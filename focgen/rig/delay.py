@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from focgen.fractional.delay import split_delay
+from focgen.rig import kernels
 
 
 def shifted(x: np.ndarray, rest: np.ndarray, whole: int) -> np.ndarray:
-    """``x`` (n,) later by ``whole`` samples; zero before, wherever ``rest`` (n,) is true anew."""
+    """``x`` (n,) later by ``whole`` samples, anew wherever ``rest`` (n,) is not 0; before it is zero, or where
+    ``rest`` is ``BALANCED`` what it is at first."""
     y = np.zeros_like(x)
     firsts = np.flatnonzero(rest).tolist()
     for first, last in zip(firsts, [*firsts[1:], len(x)]):
+        if rest[first] == kernels.BALANCED:
+            y[first : min(first + whole, last)] = x[first]
         y[first + whole : last] = x[first : max(last - whole, first)]
     return y
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from focgen.rig import linear
+from focgen.rig.begun import past_of, with_past
 from focgen.rig.effects import SLOTS, Form, Run
 from focgen.rig.model import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.modes import UNCHANGED, Dynamics, respond
@@ -88,6 +89,8 @@ class Chain:
         """
         if left is not None:
             left[:] = [{} for _ in self.placed]
+        if run.begins:
+            return self._begun(x, first, last, run, held, tap, left)
         begin, end = STAGES.index(first), STAGES.index(last)
         for stage in STAGES[begin : end + 1]:
             for number, (key, act, placed) in enumerate(self.steps(stage, held and stage == first)):
@@ -97,6 +100,15 @@ class Chain:
             if tap is not None:
                 tap[stage] = x
         return x
+
+    def _begun(self, x, first, last, run: Run, held, tap, left) -> np.ndarray:
+        """The same with what was before each experiment put ahead of it, and cut off again."""
+        x = self._once("past", run.begins, x, with_past, run)
+        long, kept = past_of(run)
+        y = self.run(x, first, last, long, held, tap, left)
+        if tap is not None:
+            tap.update({stage: made[kept] for stage, made in tap.items()})
+        return y[kept]
 
     def _once(self, place, key, x, act, run: Run) -> np.ndarray:
         if self.remember is None:

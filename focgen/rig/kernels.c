@@ -1,7 +1,10 @@
 /* The loops of the chain simulator that Python would be too slow for: a session, sample by sample.
- * `n` samples of `x` give `n` samples of `y`. rest[k] is not 0 where an experiment begins: there a loop starts at rest.
+ * `n` samples of `x` give `n` samples of `y`. rest[k] is not 0 where an experiment begins: there a loop starts at rest at 0,
+ * or, where it is BALANCED, in equilibrium with x[k] as if that had been held for ever; a loop of friction comes to it from 0.
  */
 #include <math.h>
+
+enum { BALANCED = 2 };
 
 /* Sum of first-order modes, input linear between samples (first-order hold), and one complex mode pair.
  * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
@@ -16,6 +19,15 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
         if (rest[k]) {
             for (int i = 0; i < m; i++) z[i] = 0.0;
             zr = zi = past = last = 0.0;
+            if (rest[k] == BALANCED) {
+                double dr = 1.0 - pair[0], di = -pair[1], br = pair[2] + pair[4], bi = pair[3] + pair[5], size = dr * dr + di * di;
+                double gr = (br * dr + bi * di) / size, gi = (bi * dr - br * di) / size, gain = through + gr;
+                for (int i = 0; i < m; i++) gain += (b0[i] + b1[i]) / (1.0 - a[i]);
+                double beyond = (gain * x[k] - place) / (1.0 + gain * stiffness);
+                past = stiffness > 0.0 && beyond > 0.0 ? x[k] - stiffness * beyond : x[k];
+                for (int i = 0; i < m; i++) z[i] = (b0[i] + b1[i]) / (1.0 - a[i]) * past;
+                zr = gr * past, zi = gi * past, last = gain * past;
+            }
         }
         double now = x[k], sum = 0.0;
         int down = switching && fabs(now) < fabs(last);
@@ -47,7 +59,7 @@ void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, co
 {
     double now = 0.0, past = 0.0;
     for (int k = 0; k < n; k++) {
-        if (rest[k]) now = past = 0.0;
+        if (rest[k]) now = past = rest[k] == BALANCED ? x[k] : 0.0;
         const double *c = 0.5 * (past + x[k]) > now ? up : down;
         now = c[0] * now + c[1] * past + c[2] * x[k];
         past = x[k];
@@ -61,7 +73,7 @@ void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest
 {
     double now = 0.0, past = 0.0, step = h / sub;
     for (int k = 0; k < n; k++) {
-        if (rest[k]) now = past = 0.0;
+        if (rest[k]) now = past = rest[k] == BALANCED ? x[k] : 0.0;
         for (int j = 0; j < sub; j++) {
             double to = past + (x[k] - past) * (j + 1.0) / sub, gap = to - now;
             double root = sqrt(fabs(gap) * scale), share;
@@ -80,7 +92,7 @@ void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, d
     double now = 0.0, past = 0.0, step = h / sub, most = rate * step;
     double keep = tau > 0.0 ? -expm1(-step / tau) : 1.0;
     for (int k = 0; k < n; k++) {
-        if (rest[k]) now = past = 0.0;
+        if (rest[k]) now = past = rest[k] == BALANCED ? x[k] : 0.0;
         for (int j = 0; j < sub; j++) {
             double to = past + (x[k] - past) * (j + 1.0) / sub, move = keep * (to - now);
             if (soft) move = most * tanh(move / most);
@@ -147,7 +159,7 @@ void focgen_power_creep(int n, const double *x, double *y, const unsigned char *
 {
     double z = 0.0, past = 0.0, left = power - 1.0;
     for (int k = 0; k < n; k++) {
-        if (rest[k]) z = past = 0.0;
+        if (rest[k]) z = past = rest[k] == BALANCED ? x[k] : 0.0;
         double held = 0.5 * (past + x[k]), e = (held - z) / scale, size = fabs(e);
         double slower = size > 0.0 ? pow(1.0 + left * h / tau * pow(size, left), -1.0 / left) : 1.0;
         z = held - scale * e * slower;
@@ -156,12 +168,19 @@ void focgen_power_creep(int n, const double *x, double *y, const unsigned char *
     }
 }
 
-/* Rational filter of order `m` in direct form: y = sum b_i x[k-i] - sum a_i y[k-i], a_0 = 1; w holds the delays. */
+/* Rational filter of order `m` in direct form: y = sum b_i x[k-i] - sum a_i y[k-i], a_0 = 1; w holds the delays.
+ * One that integrates (the sum of a is no more than rounding) is in equilibrium with 0 only. */
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *a,
                    double *w)
 {
     for (int k = 0; k < n; k++) {
         if (rest[k]) for (int i = 0; i <= m; i++) w[i] = 0.0;
+        if (rest[k] == BALANCED) {
+            double up = 0.0, down = 0.0, size = 0.0;
+            for (int i = 0; i <= m; i++) up += b[i], down += a[i], size += fabs(a[i]);
+            double still = fabs(down) > 1e-14 * size ? up / down * x[k] : 0.0;
+            for (int i = m; i >= 1 && still != 0.0; i--) w[i - 1] = b[i] * x[k] - a[i] * still + (i < m ? w[i] : 0.0);
+        }
         double out = b[0] * x[k] + w[0];
         for (int i = 1; i <= m; i++) w[i - 1] = b[i] * x[k] - a[i] * out + (i < m ? w[i] : 0.0);
         y[k] = out;

@@ -1,8 +1,9 @@
 """The compiled loops of the chain simulator (``kernels.c``), as functions of arrays.
 
 The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
-behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), true where an experiment
-begins and the loop starts at rest; it returns a new array of shape (n,).
+behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), 1 where an experiment begins
+and the loop starts at rest at 0, BALANCED where it starts in equilibrium with that sample, as if that had been
+held for ever, and else 0; it returns a new array of shape (n,).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 
+BALANCED = 2
 _SOURCE = Path(__file__).with_name("kernels.c")
 _DECLARATIONS = """
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,

@@ -11,7 +11,7 @@ from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import kernels
 from focgen.rig.delay import delayed, shifted
-from focgen.rig.modes import Modes, between, fractional_lag, hold, respond
+from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
 
@@ -53,8 +53,15 @@ def _at_samples(transfer, x, rest, h: float, duration: float, held: bool) -> np.
     if lag:
         gain, T, alpha = lag
         return gain * respond(x, rest, h, T, alpha, duration)
-    rows, pair, through = _tables(transfer, h, 2.0 ** np.ceil(np.log2(duration)))
-    return kernels.modes(x, rest, *rows, pair, through, switching=False)
+    longest = 2.0 ** np.ceil(np.log2(duration))
+    rows, pair, through = _tables(transfer, h, longest)
+    made = kernels.modes(x, rest, *rows, pair, through, switching=False)
+    return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
+
+
+def _missing(transfer: TransferFunction, modes: Modes) -> float:
+    """The gain at rest that its modes lack; none where it integrates."""
+    return transfer.dc_gain - modes.gain if np.isfinite(transfer.dc_gain) else 0.0
 
 
 def _between(transfer, x, rest, h: float, duration: float, held: bool, share: float) -> np.ndarray:
@@ -64,8 +71,10 @@ def _between(transfer, x, rest, h: float, duration: float, held: bool, share: fl
     lag, longest = single_lag(transfer), 2.0 ** np.ceil(np.log2(duration))
     if lag:
         gain, T, alpha = lag
-        return gain * between(x, rest, h, fractional_lag(T, alpha, h, longest), share)
-    return between(x, rest, h, _fractional(transfer, h, longest), share)
+        modes = fractional_lag(T, alpha, h, longest)
+        return gain * settled(between(x, rest, h, modes, share), x, rest, 1.0 - modes.gain)
+    modes = _fractional(transfer, h, longest)
+    return settled(between(x, rest, h, modes, share), x, rest, _missing(transfer, modes))
 
 
 def oscillator(
@@ -151,7 +160,9 @@ def _discrete_between(
 
 
 def _by_pulse(transfer: TransferFunction, a: np.ndarray, h: float, held: bool, share: float):
-    """The same from the first samples of the exact response to a pulse, which repeated poles do not trouble."""
+    """The same from the first samples of the exact response to a pulse, which repeated poles do not
+    trouble.
+    """
     late = Convolution(transfer, h, "zero" if held else "linear", (1.0 - share) * h)
     pulse = late.run(np.eye(1, len(a) + 2, 1)[0])[1:]
     return np.convolve(a, pulse)[: len(a) + 1], a

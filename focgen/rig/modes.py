@@ -32,6 +32,11 @@ class Modes:
     residue: complex
     through: float
 
+    @property
+    def gain(self) -> float:
+        """Of what is held for as long as the slowest mode takes."""
+        return self.through + float(np.sum(self.weights / self.rates)) - (self.residue / self.pole).real
+
 
 @dataclass(frozen=True)
 class Dynamics:
@@ -91,17 +96,29 @@ def respond(
         whole, part = split_delay(delay, h)
         if part:
             modes = fractional_lag(T, alpha, h, 2.0 ** np.ceil(np.log2(duration)))
-            return shifted(between(x, rest, h, modes, 1.0 - part), rest, whole)
+            made = settled(between(x, rest, h, modes, 1.0 - part), x, rest, 1.0 - modes.gain)
+            return shifted(made, rest, whole)
     if delay:
         return delayed(respond(x, rest, h, T, alpha, duration, dynamics), rest, h, delay)
-    unloading = dynamics.unloading
-    a, b0, b1, pair, through = tables(T, alpha, h, 2.0 ** np.ceil(np.log2(duration)), unloading)
+    unloading, longest = dynamics.unloading, 2.0 ** np.ceil(np.log2(duration))
+    a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
-    return kernels.modes(x, rest, a, b0, b1, pair, through, switching, dynamics.place, dynamics.stiffness)
+    made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, dynamics.place, dynamics.stiffness)
+    return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
+
+
+def settled(made: np.ndarray, x: np.ndarray, rest: np.ndarray, missing: float) -> np.ndarray:
+    """The response (n,) with what modes too slow to move, of gain ``missing``, keep of an input held for ever
+    before an experiment."""
+    if not np.any(rest == kernels.BALANCED):
+        return made
+    firsts = np.flatnonzero(rest)
+    kept = missing * x[firsts] * (rest[firsts] == kernels.BALANCED)
+    return made + np.repeat(kept, np.diff([*firsts, len(x)]))
 
 
 def between(x: np.ndarray, rest: np.ndarray, h: float, modes: Modes, share: float) -> np.ndarray:
-    """The response to ``x`` (n,) not at the samples but at the ``share`` 0 … 1 of the way from the one before.
+    """The response to ``x`` (n,) at the ``share``, 0 … 1, of the way to each sample from the one before.
 
     What a mode was a sample ago decays over that share, which is one more factor of its input; the rest is
     the answer to the straight line since.

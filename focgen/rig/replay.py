@@ -15,6 +15,7 @@ from focgen.logs.read import read_logs
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed
 from focgen.rig.files import read_rig
+from focgen.rig.initial import begun
 from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
 
@@ -56,6 +57,7 @@ def replay(
     """
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
     logs = experiments(rig, logs, first, last)
+    logs = begun(rig, logs, placed_in(rig))
     simulated = simulate_session(rig, logs)
     results = {log.name: _compared(log, made) for log, made in zip(logs, simulated)}
     made = {log.name: made for log, made in zip(logs, simulated)}
@@ -84,7 +86,8 @@ def simulate_session(
     clock = session_end(rig) if continues else 0.0
     begin = min(log.start for log in logs)
     ahead = clock if begin < clock else 0.0
-    run = Run.of([len(log) for log in logs], [log.start + ahead for log in logs], logs[0].sample_time)
+    starts, begins = [log.start + ahead for log in logs], [log.before(entry) for log in logs]
+    run = Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins)
     tap: dict[str, np.ndarray] = {}
     x = np.concatenate([np.asarray(log[entry], float) for log in logs])
     first = "regulator" if entry == "command" else "actuator"

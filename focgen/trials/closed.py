@@ -199,10 +199,3 @@ def logged(trace: Trace, flags, noise_y, seen_y, seen_p, reference, recorder: Re
         "output": seen_y[at],
         "noise": noise_y[at],
     }
-
-
-def file_of(controller: Controller, fault: Fault, rng) -> Controller:
-    """The controller as its file states it: a short memory is sometimes stated, sometimes not."""
-    if fault.length and rng.random() < 0.5:
-        return replace(controller, length=fault.length)
-    return controller

@@ -15,7 +15,6 @@ from focgen.trials.closed import (
     Loop,
     draw_controller,
     draw_fault,
-    file_of,
     logged,
 )
 from focgen.trials.forms import Spans
@@ -68,7 +67,7 @@ def make_closed_case(assignment: Assignment, signals: str, rng: np.random.Genera
     rig = believed(assignment, stage.rig, rng)
     if recorder.one_file:
         rig = replace(rig, signals=replace(rig.signals, run="run"))
-    return Case(rig, logs[:count], logs[count:], recorder, label, file_of(controller, fault, rng))
+    return Case(rig, logs[:count], logs[count:], recorder, label, controller)
 
 
 def _set_up(signals: str, rng) -> tuple[Stage, list[np.ndarray]]:

@@ -140,7 +140,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *at, size_t size)
 
 
 def missing() -> str:
-    """What fuzzing lacks on this machine: clang, its libFuzzer, the sanitisers' runtimes; empty where nothing."""
+    """What fuzzing lacks here: clang, its libFuzzer, the sanitisers' runtimes; empty where nothing."""
     if not shutil.which("clang"):
         return "clang is not on this machine (Debian: apt install clang)"
     reason = lacking(("clang",), tuple(FLAGS), _EMPTY, "-runs=1")

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from focgen.logs.begin import Begin
+
 _POINTS = 5  # parameters: a form of more is a curve through points
 STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
@@ -54,9 +56,10 @@ LARGEST = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)
 class Run:
     """A session being simulated, its experiments one after the other in every array of shape (n,).
 
-    ``h`` in s; ``rest`` (n,) is true at each experiment's first sample; ``clock`` (n,) is the session's time
-    in s; ``duration`` of the longest experiment in s; ``carried``: what of an effect outlived an earlier
-    session.
+    ``h`` in s; ``rest`` (n,) is 0 but at each experiment's first sample: 1 where the rig comes from rest at
+    0, 2 where it comes from equilibrium with that sample's input; ``clock`` (n,) is the session's time in s;
+    ``duration`` of the longest experiment in s; ``carried``: what of an effect outlived an earlier session.
+    ``begins``: what the input was before each experiment, in its order; none where all come from rest.
     """
 
     h: float
@@ -64,6 +67,7 @@ class Run:
     clock: np.ndarray
     duration: float
     carried: Mapping[str, float] = field(default_factory=dict)
+    begins: tuple[Begin, ...] = ()
 
     @property
     def spans(self) -> list[tuple[int, int]]:
@@ -72,12 +76,15 @@ class Run:
         return list(zip(firsts, [*firsts[1:], len(self.rest)]))
 
     @classmethod
-    def of(cls, lengths: Sequence[int], starts: Sequence[float], h: float) -> Run:
+    def of(
+        cls, lengths: Sequence[int], starts: Sequence[float], h: float, begins: Sequence[Begin] = ()
+    ) -> Run:
         """The run of experiments of ``lengths`` samples beginning at ``starts`` s on the session's clock."""
         rest = np.zeros(sum(lengths), np.uint8)
         rest[np.cumsum([0, *lengths[:-1]])] = 1
         clock = np.concatenate([s + h * np.arange(n) for n, s in zip(lengths, starts)])
-        return cls(h, rest, clock, max(lengths) * h)
+        begins = () if all(b.at_rest for b in begins) else tuple(begins)
+        return cls(h, rest, clock, max(lengths) * h, begins=begins)
 
 
 Act = Callable[[np.ndarray, tuple[float, ...], Run], Any]

@@ -1,0 +1,41 @@
+"""What a signal was before the first sample of a log: the state that a rig begins in, told by its input."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Begin:
+    """A signal before the first sample: ``levels`` (k,) in its unit, the first held for ever, each up to
+    ``ago`` (k − 1,) s before that sample, latest last, and the last level up to it.
+
+    >>> Begin((0.0, 1.5), (3.0,))  # stepped from 0 to 1.5, 3 s before the log begins
+    Begin(levels=(0.0, 1.5), ago=(3.0,))
+    """
+
+    levels: tuple[float, ...] = (0.0,)
+    ago: tuple[float, ...] = ()
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing ever happened before."""
+        return self.levels == (0.0,)
+
+    def samples(self, h: float) -> np.ndarray:
+        """The signal every ``h`` s up to the sample before the first, from where it was constant for ever; at
+        least one.
+
+        A step between two samples is a ramp of ``h`` about its time, so that the samples move with it evenly.
+        """
+        count = int(np.ceil(max(self.ago, default=0.0) / h + 0.5))
+        before = np.arange(count, 0, -1, dtype=float)
+        found = np.full(count, float(self.levels[-1]))
+        for earlier, later, ago in zip(self.levels, self.levels[1:], self.ago):
+            found += (earlier - later) * np.clip(before - ago / h + 0.5, 0.0, 1.0)
+        return found
+
+
+REST = Begin()

@@ -1,0 +1,120 @@
+"""A diagnosis in a few sentences: where, which, how far, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from focgen.control.units import unit_of
+from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found
+from focgen.rig.model import Rig
+
+_SHOWN = 3  # parameters of an effect
+_SURE = 1.0  # of a value: an interval that is wider says nothing of its size
+_LOGGED = ("command", "pressure", "curvature", "output")
+_MEANS = (
+    "A confidence is a probability, measured on the simulated rigs of docs/diagnosis.md: of names given at 90 % "
+    "there, nine in ten are right."
+)
+
+
+def units_of_rig(rig: Rig) -> dict[str, str]:
+    """The unit of each signal as far as its column tells it; the curvature's is the output's where it has none."""
+    units = {role: unit_of(getattr(rig.signals, role)) for role in _LOGGED}
+    return units | {"curvature": units["curvature"] or units["output"]}
+
+
+def diagnosis_text(found: Diagnosis, units: Mapping[str, str], out: str) -> str:
+    """The diagnosis for people; ``units`` by role, ``out`` the folder it is written to."""
+    lines = [_where(found), *_which(found, units), _how_far(found, units), *_next(found)]
+    lines += [f"warning: {w}" for w in found.warnings] + [f"note: {n}" for n in found.notes]
+    return "\n".join([*lines, f"written to {out}"])
+
+
+def _where(found: Diagnosis) -> str:
+    where, share = found.where, found.where.share
+    if found.verdict == "none":
+        return "Where: nowhere; what is left does not depend on what was done to the rig."
+    if where.stage is None:
+        return "Where: these logs do not tell the stage."
+    how = "inferred from the dynamics, not from its own signals" if where.inferred else "seen in its own signals"
+    part = f" with {share[where.stage]:.0%} of the gap" if share.get(where.stage) else ""
+    return f"Where: the {where.stage}{part}, {how}."
+
+
+def _which(found: Diagnosis, units: Mapping[str, str]) -> list[str]:
+    if found.verdict == "parameters":
+        return [f"Which: no effect; the rig's own numbers were off, and {found.refitted_rig} has better ones."]
+    if found.verdict == "none":
+        return ["Which: no effect."]
+    said = [_cause(cause, units) for cause in found.causes]
+    said += [_unexplained(place, what, found) for place, what in found.unexplained.items()]
+    return [f"Which: {said[0]}" if said else "Which: none that is known.", *(f"  also: {one}" for one in said[1:])] + (
+        [_MEANS] if found.causes else []
+    )
+
+
+def _cause(cause: Found, units: Mapping[str, str]) -> str:
+    best, *others = cause.candidates
+    whole = "its departure from the described controller" if cause.stage == "controller" else "the gap"
+    size = _size(best, units)
+    rivals = f"; it may as well be {_listed(others)}" if others else ""
+    return (
+        f"{best.effect} in the {cause.stage}{size}, {best.confidence:.0%} confident, "
+        f"{cause.shrink:.0%} of {whole}{rivals}."
+    )
+
+
+def _listed(candidates: list[Candidate]) -> str:
+    return ", ".join(f"{c.effect} ({c.confidence:.0%})" for c in candidates)
+
+
+def _size(candidate: Candidate, units: Mapping[str, str]) -> str:
+    """The parameters that are known, with the log's units."""
+    known = [_value(name, e, units) for name, e in candidate.parameters.items() if name != "scale" and _is_known(e)]
+    return f" ({', '.join(known[:_SHOWN])})" if known else ""
+
+
+def _is_known(estimate: Estimate) -> bool:
+    low, high = estimate.ci95
+    return 0.5 * (high - low) < _SURE * abs(estimate.value)
+
+
+def _value(name: str, estimate: Estimate, units: Mapping[str, str]) -> str:
+    unit = estimate.unit
+    for role in _LOGGED:
+        unit = unit.replace(f"{role} unit", units.get(role) or f"{role} unit")
+    half = 0.5 * (estimate.ci95[1] - estimate.ci95[0])
+    return f"{name} {estimate.value:.3g} ± {half:.1g} {unit}".rstrip()
+
+
+def _unexplained(place: str, what: Mapping, found: Diagnosis) -> str:
+    """What is left, what it goes with, and the family that comes nearest."""
+    parts = [part for part in what.get("depends_on", ()) if part != "nothing"]
+    parts += ["slow swings that no input foretells"] * bool(what.get("slow_swings"))
+    left = f"something in the {place} that no effect of the library explains"
+    on = f"; it goes with {', '.join(parts)}" if parts else ""
+    near = min(found.fits, key=lambda fit: fit.error, default=None)
+    nearest = f"; nearest is {near.effect}, which by itself leaves {near.error:.0%} of it" if near else ""
+    return f"{left}{on}{nearest}."
+
+
+def _how_far(found: Diagnosis, units: Mapping[str, str]) -> str:
+    gap, unit = found.gap, units.get("output") or found.gap.unit
+    text = (
+        f"How far: the output is off by {gap.as_given:.3g} {unit} as given, {gap.refitted:.3g} with its own numbers "
+        f"refitted, {gap.explained:.3g} with what was found; the noise is {gap.floor:.3g}."
+    )
+    if found.shrink is None:
+        return text
+    low, high = found.shrink_interval
+    return (
+        f"{text} For new experiments {found.shrink:.0%} ({low:.0%} to {high:.0%}) of what can be explained will go."
+    )
+
+
+def _next(found: Diagnosis) -> list[str]:
+    if found.next_experiment:
+        return [f"Next: record {found.next_experiment.what}, for {found.next_experiment.why}."]
+    if found.verdict in ("named", "set"):
+        return [f"Next: check the promise on a new log, `focgen replay {found.augmented_rig} LOG`."]
+    return []

@@ -1,0 +1,277 @@
+"""The state in which each experiment begins, estimated where its data ask for it.
+
+The state is told by what the input was before the first sample. Tried are, from the simplest on: a rest at
+0; the first level held for ever; a step to it from rest at 0, at an unknown time; the same from an unknown
+level; two steps from rest. A further unknown has to earn its place (Schwarz's criterion, on as many samples
+as the residual's correlation leaves). And none is tried where the first samples are those of a rig at rest:
+there it cannot have moved yet, whatever its parameters are, so that a past shows, and a misfit does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.logs.begin import REST, Begin
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run
+from focgen.rig.engine import STAGES, Chain, Placed
+from focgen.rig.model import LinearActuator, Rig
+from focgen.rig.response import response_time
+
+NOTE = "begins away from rest: the state that it starts from is estimated"
+ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
+LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
+_ROLES = ("command", "pressure", "curvature", "output")
+_SEEN = 40.0  # response times from the beginning that are looked at,
+_LEAST = 200  # and samples
+_LONGEST = 20.0  # response times before the first sample: a step is looked for up to here
+_TIMES = 10  # of a step, on the first grid
+_FIRST = 5  # samples that tell what the input was last, and where the output began
+_ROUNDS = 8  # of Gauss-Newton
+_DAMPED, _STEP = 1e-3, 1e-3  # its damping at first, and its steps for derivatives
+_FALLEN = 1e-4  # of the cost: less is no descent
+_APART = 5.0  # standard errors by which the first samples have to be off from rest
+_OFFSET = 4.0  # times better than any past: then a rest with an offset of any size is what there is
+_NOTHING = 0.06  # of the input's largest magnitude: what counts as 0
+_BEYOND = 0.2  # of it: by so much earlier levels may leave the input's range
+_SHOWN = 0.3  # of a response time at 0: what is shorter shows no decay
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What a past has to show. ``off``: by what share of a signal's largest magnitude the first samples are
+    off from rest; ``mended``: what part of that a past may leave at most, and ``surely``: so little that it
+    rules a rest out where they are off by more than ``far``; ``offset``: shares up to there are no past;
+    ``nats``: twice the evidence."""
+
+    off: float
+    mended: float
+    surely: float
+    far: float
+    offset: float
+    nats: float
+
+
+_DRIVEN = _Asked(0.02, 0.7, 0.5, 0.15, 0.05, 0.0)
+_IDLE = _Asked(0.05, 0.35, 0.0, np.inf, np.inf, 12.0)
+"""At an input of 0 nothing but a past moves the rig; but a drift or an offset holds it off, too."""
+
+
+def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
+    """The experiments, each with what every signal that enters a stage was before, where the data ask for
+    it.
+
+    ``placed``: effects in the rig. A rig that integrates has no equilibrium to begin from: its experiments
+    are returned as they are.
+    """
+    if not all(map(len, logs)) or any(not np.isfinite(gain) for gain in _gains(rig)):
+        return tuple(logs)
+    scales = _Scales.of(rig, logs)
+    entries = [role for role in ENTERS if role in scales.sizes and scales.behind(role)]
+    return tuple(_begun(rig, log, placed, entries, scales) for log in logs)
+
+
+@dataclass(frozen=True)
+class _Scales:
+    """Of a session: by role a signal's ``ranges`` with 0 in it and ``sizes``, its largest magnitude;
+    ``pace``: the rig's response time, s."""
+
+    ranges: Mapping[str, tuple[float, float]]
+    sizes: Mapping[str, float]
+    pace: float
+
+    @classmethod
+    def of(cls, rig: Rig, logs: Sequence[Experiment]) -> _Scales:
+        ranges = {role: _range(logs, role) for role in _ROLES if all(role in log for log in logs)}
+        sizes = {role: max(-low, high) or 1.0 for role, (low, high) in ranges.items()}
+        longest = max(len(log) * log.sample_time for log in logs)
+        return cls(ranges, sizes, response_time(rig, logs[0].sample_time, longest))
+
+    def behind(self, entry: str) -> dict[str, str]:
+        """The measured signals behind an input, by the stage that they leave."""
+        stages = STAGES[STAGES.index(ENTERS[entry]) :]
+        return {stage: LEAVES[stage] for stage in stages if LEAVES[stage] in self.sizes}
+
+
+def _range(logs: Sequence[Experiment], role: str) -> tuple[float, float]:
+    ends = [(float(np.min(log[role])), float(np.max(log[role]))) for log in logs]
+    return min(0.0, *(low for low, _ in ends)), max(0.0, *(high for _, high in ends))
+
+
+def _begun(rig: Rig, log: Experiment, placed, entries, scales: _Scales) -> Experiment:
+    if len(log) < 2 * _FIRST or not all(np.all(np.isfinite(log[role])) for role in scales.sizes):
+        return log
+    found = {entry: _Setting(rig, log, entry, placed, scales).chosen() for entry in entries}
+    found = {entry: begin for entry, begin in found.items() if not begin.at_rest}
+    notes = tuple(note for note in log.notes if note != NOTE)
+    return replace(log, begins=found, notes=(*notes, NOTE) if found else notes)
+
+
+def _gains(rig: Rig) -> list[float]:
+    """The stages' gains at rest."""
+    actuator = [rig.actuator.dynamics.dc_gain] if isinstance(rig.actuator, LinearActuator) else []
+    return [rig.regulator.dc_gain, *actuator, rig.sensor.dc_gain]
+
+
+@dataclass(frozen=True, eq=False)
+class _Try:
+    """A begin with so many ``free`` numbers, and what it leaves (n, signals) of the signals, in shares of
+    their largest magnitude: ``raw``, and ``left`` less an offset, the later the less it counts."""
+
+    begin: Begin
+    free: int
+    raw: np.ndarray
+    left: np.ndarray
+
+    @property
+    def cost(self) -> float:
+        return float(np.sum(self.left**2))
+
+    @property
+    def first(self) -> np.ndarray:
+        """How far the first samples are off (signals,)."""
+        return np.abs(self.raw[:_FIRST].mean(axis=0))
+
+
+class _Setting:
+    """One experiment, the rig, and what is measured behind the ``entry``."""
+
+    def __init__(self, rig: Rig, log: Experiment, entry: str, placed: Sequence[Placed], scales: _Scales):
+        self.chain, self.entry, self.h = Chain(rig, tuple(placed)), entry, log.sample_time
+        pace, self.reach = scales.pace, scales.sizes[entry]
+        self.range = [end / self.reach for end in scales.ranges[entry]]
+        self.n = n = min(len(log), max(int(_SEEN * pace / self.h), _LEAST))
+        self.longest = max(_LONGEST * pace, 20.0 * self.h)
+        self.roles = scales.behind(entry)
+        self.stages = ENTERS[entry], list(self.roles)[-1]
+        self.x, self.start = np.asarray(log[entry], float)[:n], log.start
+        self.units = [scales.sizes[r] for r in self.roles.values()]
+        measured = (np.asarray(log[role], float)[:n] for role in self.roles.values())
+        self.y = np.stack([y / unit for y, unit in zip(measured, self.units)], axis=1)
+        self.level = float(self.x[0] if entry == "command" else np.mean(self.x[:_FIRST]))
+        self.counts = (pace / (pace + np.arange(n) * self.h))[:, None]
+        self.asked, self.shown = _DRIVEN, True
+        if abs(self.level) < _NOTHING * self.reach:
+            still = self._still()
+            self.asked, self.shown = _IDLE, still >= max(_SHOWN * pace / self.h, 2 * _FIRST)
+            self.counts[max(still, 1) :] = 0.0
+
+    def _still(self) -> int:
+        """For how many samples the input stays what it was at first."""
+        moved = np.abs(self.x - self.level) > _NOTHING * self.reach
+        return int(np.argmax(moved)) if moved.any() else self.n
+
+    def at(self, begin: Begin, free: int) -> _Try:
+        """What a begin leaves, ``free`` numbers of which are fitted."""
+        run = Run.of([self.n], [self.start], self.h, [begin])
+        tap: dict[str, np.ndarray] = {}
+        self.chain.run(self.x, *self.stages, run, self.entry == "command", tap)
+        made = [tap[stage] / unit for stage, unit in zip(self.roles, self.units)]
+        raw = self.y - np.stack(made, axis=1)
+        return _Try(begin, free, raw, self._counted(raw, self.asked.offset))
+
+    def _counted(self, raw: np.ndarray, offset: float) -> np.ndarray:
+        """What is left (n, signals) less an offset of so much at most, the later the less it counts."""
+        mean = (raw * self.counts**2).sum(axis=0) / (self.counts**2).sum()
+        return (raw - np.clip(mean, -offset, offset)) * self.counts
+
+    def chosen(self) -> Begin:
+        """The begin that the data ask for."""
+        rest, asked = self.at(REST, 0), self.asked
+        noise = np.array([_white(y) for y in self.y.T])
+        moved = rest.first > np.maximum(_APART * noise / np.sqrt(_FIRST), asked.off)
+        if not moved.any() or not self.shown:
+            return REST
+        off = lambda t: float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))  # noqa: E731
+        tries = [t for t in self.tries() if off(t) < asked.mended]
+        if not tries:
+            return REST
+        sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
+        if sure and self._offset_explains(rest, tries):
+            return REST
+        return _likeliest(tries if sure else [rest, *tries], asked.nats).begin
+
+    def _offset_explains(self, rest: _Try, tries: Sequence[_Try]) -> bool:
+        """Whether a rest, with an offset of any size, is much better than any past without one."""
+        left = self._counted(rest.raw, np.inf)
+        return _OFFSET * float(np.sum(left**2)) < min(t.cost for t in tries)
+
+    # -- candidates, from the simplest on -------------------------------------------------------------------
+
+    def tries(self) -> list[_Try]:
+        """The best of each kind of begin but a rest."""
+        held = self.at(Begin((self.level,)), 0)
+        grid = np.geomspace(self.h, self.longest, _TIMES)
+        stepped = [self.at(Begin((0.0, self.level), (float(t),)), 1) for t in grid]
+        best = min(stepped, key=lambda each: each.cost)
+        one = self._descended([np.log(best.begin.ago[0])], self._stepped)
+        from_level = self._descended([np.log(one.begin.ago[0]), 0.0], self._stepped)
+        later, level = np.log(from_level.begin.ago[0]), from_level.begin.levels[0] / self.reach
+        two = self._descended([later, level, later + 1.0], self._twice)
+        return [held, one, from_level, two]
+
+    def _stepped(self, x: np.ndarray) -> Begin:
+        earlier = float(x[1]) * self.reach if len(x) > 1 else 0.0
+        return Begin((earlier, self.level), (float(np.exp(x[0])),))
+
+    def _twice(self, x: np.ndarray) -> Begin:
+        late, early = float(np.exp(x[0])), float(np.exp(max(x[2], x[0])))
+        return Begin((0.0, float(x[1]) * self.reach, self.level), (early, late))
+
+    def _descended(self, x, begin) -> _Try:
+        """Gauss-Newton on log times and levels, damped where it fails."""
+        low, high = self._bounds(len(x))
+        x = np.clip(np.array(x, float), low, high)
+        now, damping = self.at(begin(x), len(x)), _DAMPED
+        for _ in range(_ROUNDS):
+            moved = [self.at(begin(x + _STEP * e), 0).left - now.left for e in np.eye(len(x))]
+            slope = np.stack([m.ravel() for m in moved], axis=1) / _STEP
+            trial_x = np.clip(x - _step(slope, now.left.ravel(), damping), low, high)
+            trial = self.at(begin(trial_x), len(x))
+            if trial.cost >= now.cost:
+                damping *= 30.0
+                continue
+            fallen = now.cost - trial.cost
+            x, now, damping = trial_x, trial, damping * 0.1
+            if fallen < _FALLEN * now.cost:
+                break
+        return now
+
+    def _bounds(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Of the log time of a step, the level before, and the log time of an earlier step."""
+        first, last = np.log([self.h, self.longest])
+        rows = [(first, last), (self.range[0] - _BEYOND, self.range[1] + _BEYOND), (first, last)]
+        low, high = np.array(rows[:count]).T
+        return low, high
+
+
+def _step(slope: np.ndarray, left: np.ndarray, damping: float) -> np.ndarray:
+    normal = slope.T @ slope
+    weight = damping * np.diag(normal) + 1e-9 * np.trace(normal) + 1e-300
+    return np.clip(np.linalg.solve(normal + np.diag(weight), slope.T @ left), -1.0, 1.0)
+
+
+def _likeliest(tries: Sequence[_Try], nats: float) -> _Try:
+    """The try of highest evidence (Schwarz's criterion); any but a rest needs so many more."""
+    count = _effective(min(tries, key=lambda t: t.cost).left)
+    asked = lambda t: t.free * np.log(count) + (not t.begin.at_rest) * nats  # noqa: E731
+    return min(tries, key=lambda t: count * np.log(max(t.cost, 1e-300)) + asked(t))
+
+
+def _effective(left: np.ndarray) -> float:
+    """How many samples a residual (n, signals) is worth, by its correlation from one to the next."""
+    count = 0.0
+    for part in left.T:
+        part = part - part.mean()
+        size = float(part @ part)
+        rho = float(part[1:] @ part[:-1]) / size if size else 0.0
+        count += len(part) * (1.0 - rho) / (1.0 + rho)
+    return max(count, 2.0)
+
+
+def _white(y: np.ndarray) -> float:
+    """The standard deviation of what is white of a signal (n,)."""
+    return float(1.4826 * np.median(np.abs(np.diff(y, 2))) / np.sqrt(6.0)) if len(y) > 4 else 0.0
