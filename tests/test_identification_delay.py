@@ -1,4 +1,4 @@
-"""The dead time of the actuator: found with an interval that holds it, whatever the input does; and none where none is."""
+"""The dead time of the actuator: found with an interval that holds it, whatever the input does."""
 
 import json
 

@@ -23,7 +23,7 @@ _SURELY = 0.8  # of the samples before it is away: the last ones may be its begi
 _SEVERAL = 10  # samples whose mean is a better rest than the first of them
 _DRIFT = 3.0  # standard errors of a slope: what is steeper does not rest
 _FEWEST = 30  # samples
-_LOOKED_BACK, _FARTHEST = 4, 80_000  # how far before an experiment its past is looked for: its lengths, samples
+_LOOKED_BACK, _FARTHEST = 2, 80_000  # how far before an experiment its past is looked for: its lengths, samples
 _FOLLOWED = 8  # first samples of a moving input that a line is drawn through where they are noisy
 
 
@@ -36,7 +36,7 @@ class Excitation:
     m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1 where the curvature is.
     ``rest_shown``: whether the log begins before the first step, so that it shows the output's zero.
     ``reference`` (n,) where a loop was closed. ``late``: the nominal dead time of the stages that it is seen through,
-    s.
+    s. ``begins_up``: whether the input was held away from 0 ahead of the first sample.
     """
 
     name: str
@@ -53,6 +53,7 @@ class Excitation:
     rest_shown: bool = True
     reference: np.ndarray | None = None
     late: float = 0.0
+    begins_up: bool = False
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -195,6 +196,7 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
         before is None,
         _varying_reference(experiment),
         rig.delays.regulator * (role == "command") + rig.delays.sensor * (fitted == "output"),
+        abs(level_before) > _AT_REST * float(np.abs(pressure).max()),
     )
 
 

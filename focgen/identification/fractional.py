@@ -8,7 +8,7 @@ Pereyra, 1973). The search begins at the best points of a coarse grid.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from focgen.identification.past import (
     asks_for_past,
     best_time,
     columns,
-    suggests_past,
+    older_times,
+    suggestion,
     times,
     worth_it,
 )
@@ -33,7 +34,8 @@ _ROUNDS = 60  # of Levenberg–Marquardt
 _DAMPED, _STIFF, _FREE = 1e-3, 1e9, 1e-9  # damping: at first, at most, at least
 _STILL = 1e-10  # largest step, in units of log τ, α and samples, at which a fit has converged
 _FLAT = 1e-13  # relative fall of the cost, likewise
-_RECONSIDERED = 3  # times that the pasts are chosen anew
+_TRIALS = 4  # steps of a past that are tried, an experiment
+_ROUGHLY = 1e-4  # largest step at which a trial has converged
 _EDGE = 1e-6  # distance of α from its bounds
 _WHITENED = 15  # times that model and noise model are fitted in turn
 _SEARCHED_ANEW = 3  # of these times the fit begins at the coarse grid, too: the biased one may be far off
@@ -83,7 +85,7 @@ def fit_fractional(
     problem = Problem(experiments, (None,) * len(experiments), free, fixed)
     best = _searched(problem)
     if pasts is not None and any(pasts):
-        problem, best = _with_pasts(problem, best, pasts)
+        problem, best = _with_pasts(problem, best, pasts, _STILL)
     if pasts is None:
         problem, best = _with_pasts_asked_for(problem, best)
     if any(x.reference is not None for x in experiments):
@@ -92,8 +94,10 @@ def fit_fractional(
     return _finished(problem, best)
 
 
-def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) -> tuple[Problem, Point]:
-    """The fit with these pasts, begun at the times that explain most; their prior weighed by what is left."""
+def _with_pasts(
+    problem: Problem, point: Point, pasts: Sequence[Past | None], still: float
+) -> tuple[Problem, Point]:
+    """The fit with these pasts, new steps begun at the times that explain most, and older ones allowed for."""
     begun = [*point.x[: problem.core]]
     for i, (x, past) in enumerate(zip(problem.experiments, pasts)):
         known = point.x[problem.of_past[i]]
@@ -103,12 +107,21 @@ def _with_pasts(problem: Problem, point: Point, pasts: Sequence[Past | None]) ->
             left = (x.measured - problem.simulated(point)[i])[: made.shape[1]]
             time = times(x.beginning(SHOWS))[best_time(left, made)]
             begun += [np.log(time + 1.0)] * (past.steps - len(known))
-    penalties = _long_run(problem, point)
     for _ in range(2):
+        penalties = _long_run(problem, point)
         problem = Problem(problem.experiments, pasts, problem.delay_free, problem.delay, penalties)
-        point = _descended(problem, problem.inside(np.array(begun)))
-        penalties, begun = _long_run(problem, point), point.x
+        point = _descended(problem, problem.inside(np.array(begun)), still)
+        pasts, begun = _with_older(problem, point), point.x
     return problem, point
+
+
+def _with_older(problem: Problem, point: Point) -> tuple[Past | None, ...]:
+    """The pasts with what may have been before their first step."""
+    found = []
+    for i, (x, past) in enumerate(zip(problem.experiments, problem.pasts)):
+        when = np.exp(point.x[problem.of_past[i]]) - 1.0
+        found.append(past and replace(past, older=older_times(x, when)))
+    return tuple(found)
 
 
 def _searched(problem: Problem) -> Point:
@@ -118,7 +131,7 @@ def _searched(problem: Problem) -> Point:
     return best if few is problem else _descended(problem, best.x)
 
 
-def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Point:
+def _descended(problem: Problem, start: np.ndarray, still: float = _STILL, rounds: int = _ROUNDS) -> Point:
     """Levenberg–Marquardt on the searched parameters, the linear ones projected out."""
     point, damping = problem.at(start), _DAMPED
     for _ in range(rounds):
@@ -136,64 +149,70 @@ def _descended(problem: Problem, start: np.ndarray, rounds: int = _ROUNDS) -> Po
             return point
         fallen = point.cost - trial.cost
         point, damping = trial, max(damping / 10.0, _FREE)
-        if moved <= _STILL or fallen <= _FLAT * point.cost:
+        if moved <= still or fallen <= _FLAT * point.cost:
             return point
     return point
 
 
 def _with_pasts_asked_for(problem: Problem, point: Point) -> tuple[Problem, Point]:
-    """The fit with the pasts that its data ask for.
+    """The fit with the pasts that its data ask for, one step after the other, the most suggested first.
 
-    A past is tried wherever one is suggested, and stays where the fit that has it cannot do without: parameters
-    that are off for want of a past hide how much it explains.
+    A step is tried wherever one is suggested, and stays where the fit that has it cannot do without: parameters that
+    are off for want of a past hide how much it explains.
     """
-    for _ in range(_RECONSIDERED):
-        tried = _changed(problem, point, _grown)
-        if tried[0] is problem:
+    reach = _reach(problem)
+    held = [Past(0, reach, older_times(x, np.empty(0))) if x.begins_up else None for x in problem.experiments]
+    if any(held):
+        problem, point = _with_pasts(problem, point, held, _ROUGHLY)
+    refused: set[int] = set()
+    for _ in range(_TRIALS * len(problem.experiments)):
+        i = _most_wanting(problem, point, refused)
+        if i is None:
             break
-        without = problem.residuals(point)
-        kept = _changed(*tried, lambda *at: _kept(*at, without[at[2]]))
-        if kept[0].pasts == problem.pasts:
-            break
-        problem, point = kept
-    return problem, point
+        other, trial = _with_one_more(problem, point, i)
+        if _worth(problem, point, other, trial, i):
+            problem, point, refused = other, trial, set()
+        else:
+            refused.add(i)
+    return (problem, _descended(problem, point.x)) if any(problem.pasts) else (problem, point)
 
 
-def _changed(problem: Problem, point: Point, rule) -> tuple[Problem, Point]:
-    """The fit with each experiment's past by ``rule``."""
-    reach = max(float(np.ptp(x.measured)) for x in problem.experiments)
-    pasts = tuple(rule(problem, point, i, reach) for i in range(len(problem.experiments)))
-    return (problem, point) if pasts == problem.pasts else _with_pasts(problem, point, pasts)
+def _most_wanting(problem: Problem, point: Point, refused: set[int]) -> int | None:
+    """The experiment whose residual suggests another step of its past most; None where none does."""
+    wants = {}
+    for i, (x, made) in enumerate(zip(problem.experiments, problem.simulated(point))):
+        known, left = problem.pasts[i], x.measured - made
+        if i in refused or (known and known.steps == MOST_STEPS) or np.std(left) <= EXACT * x.spread:
+            continue
+        pasts = _pasts_of(problem, point, x)
+        wants[i] = suggestion(left[: pasts.shape[1]], pasts, _reach(problem))
+    best = max(wants, key=wants.get, default=None)
+    return best if best is not None and wants[best] > 0.0 else None
 
 
-def _grown(problem: Problem, point: Point, i: int, reach: float) -> Past | None:
-    """The past of experiment ``i`` with a step more where one is suggested."""
-    x, known = problem.experiments[i], problem.pasts[i]
-    left = x.measured - problem.simulated(point)[i]
-    steps = known.steps if known else 0
-    if steps == MOST_STEPS or np.std(left) <= EXACT * x.spread:
-        return known
-    made = _pasts_of(problem, point, x)
-    wanted = asks_for_past if known else suggests_past
-    return Past(steps + 1, reach) if wanted(left[: made.shape[1]], made, reach) else known
+def _with_one_more(problem: Problem, point: Point, i: int) -> tuple[Problem, Point]:
+    """The fit with a step more in the past of experiment ``i``."""
+    pasts = list(problem.pasts)
+    pasts[i] = Past((pasts[i].steps if pasts[i] else 0) + 1, _reach(problem))
+    return _with_pasts(problem, point, pasts, _ROUGHLY)
+
+
+def _worth(problem: Problem, point: Point, other: Problem, trial: Point, i: int) -> bool:
+    """Whether a step more in experiment ``i`` explains something that is no misfit."""
+    x, made = problem.experiments[i], _pasts_of(other, trial, problem.experiments[i])
+    alone = (x.measured - other.from_rest(trial, i))[: made.shape[1]]
+    fell = worth_it(problem.residuals(point)[i], other.residuals(trial)[i])
+    return fell and trial.cost < point.cost and asks_for_past(alone, made, _reach(problem))
+
+
+def _reach(problem: Problem) -> float:
+    return max(float(np.ptp(x.measured)) for x in problem.experiments)
 
 
 def _pasts_of(problem: Problem, point: Point, x: Excitation) -> np.ndarray:
     """What steps at a grid of times before an experiment leave of its first samples, (times, n)."""
     start = x.beginning(SHOWS)
     return columns(start, problem.kernels_for(start, point.x, start.stepped.count), times(start), 1)[0]
-
-
-def _kept(problem: Problem, point: Point, i: int, reach: float, without: np.ndarray) -> Past | None:
-    """The past of experiment ``i``, None where what it explains does not ask for it, or the fit that was
-    ``without`` it leaves little more."""
-    x, known = problem.experiments[i], problem.pasts[i]
-    if known is None:
-        return None
-    made = _pasts_of(problem, point, x)
-    alone = (x.measured - problem.from_rest(point, i))[: made.shape[1]]
-    worth = worth_it(without, problem.residuals(point)[i])
-    return known if worth and asks_for_past(alone, made, reach) else None
 
 
 def _long_run(problem: Problem, point: Point) -> list[float]:

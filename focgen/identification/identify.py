@@ -172,7 +172,7 @@ def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[Experim
         }
         | ({"delay": span(fit.delay, fit.half["delay"])} if fit.half["delay"] else {}),
         simulated=dict(zip(names, fit.simulated)),
-        pasts={name: past for name, past in zip(names, fit.pasts) if past is not None},
+        pasts={name: past for name, past in zip(names, fit.pasts) if past is not None and past.steps},
         closed_loop=fit.closed_loop,
     )
 

@@ -20,8 +20,10 @@ from focgen.identification.noise import residual_model
 MOST_STEPS = 3
 SHOWS = 20_000  # first samples that show whether there was a past
 _WHITE = 0.25  # effective samples a sample: what is left above it is noise, below it likely a misfit
+_OLDER = 0.5  # of the reach: a level that was held an octave earlier differs by about so much
 _AT_LEAST = 3.0  # effective samples
-_ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit
+_ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit …
+_HALVED = 1.0  # … and variance, over what it leaves
 EXACT = 1e-4  # of the spread: what is left below shows no past
 _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
 
@@ -29,10 +31,21 @@ _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from wh
 @dataclass(frozen=True)
 class Past:
     """A number of ``steps`` at unknown times, whose sizes are normal with standard deviation ``reach``, output
-    units."""
+    units.
+
+    What was before the first of them is not known either: at ``older`` times, samples before the first sample,
+    further steps are allowed for, half as large. They are smooth by now, and only widen the intervals. An experiment
+    that begins at a held level has them even where no step is found.
+    """
 
     steps: int
     reach: float
+    older: tuple[float, ...] = ()
+
+    @property
+    def reaches(self) -> np.ndarray:
+        """Of every step, the older ones last, (steps + older,)."""
+        return self.reach * np.repeat([1.0, _OLDER], [self.steps, len(self.older)])
 
 
 def latest(x: Excitation) -> float:
@@ -43,6 +56,12 @@ def latest(x: Excitation) -> float:
 def times(x: Excitation, octave: int = 1) -> np.ndarray:
     """A grid of times before the first sample, in samples, so many an ``octave``."""
     return np.concatenate([[0.0], 2.0 ** np.arange(0.0, np.log2(latest(x)), 1.0 / octave)])
+
+
+def older_times(x: Excitation, when: np.ndarray) -> tuple[float, ...]:
+    """Octaves before the earliest of the times ``when``, from the first sample on where there is none; samples."""
+    first = 2.0 * (float(np.max(when)) + 1.0) if len(when) else 1.0
+    return tuple(first * 2.0**k for k in range(max(0, int(np.ceil(np.log2(latest(x) / first))))))
 
 
 def columns(x: Excitation, kernels: Kernels, when: np.ndarray, rows: int = 3) -> np.ndarray:
@@ -68,24 +87,21 @@ def best_time(residual: np.ndarray, made: np.ndarray) -> int:
 def asks_for_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
     """Whether what the right model leaves, (n,), asks for a past with columns like ``made`` (times, n).
 
-    The χ² that such a past takes off the whitened residual has to tell it from noise, see :func:`suggests_past`.
+    The χ² that such a past takes off the whitened residual has to tell it from noise, see :func:`suggestion`.
     What a model that is not quite true leaves is no stationary noise, though. So the best single step has to take
     off enough of the residual itself, too, counted in as many samples as its rest is worth.
     """
-    return suggests_past(residual, made, reach) and _explains(residual, made[best_time(residual, made)])
+    return suggestion(residual, made, reach) > 0.0 and _explains(residual, made[best_time(residual, made)])
 
 
-def suggests_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
-    """Whether a past is worth trying: parameters that were fitted without one leave something else than the past.
-
-    The χ² that it takes off the whitened residual is compared with the number of free values that the data really
-    determine (Akaike's criterion), and a margin.
-    """
+def suggestion(residual: np.ndarray, made: np.ndarray, reach: float) -> float:
+    """The χ² that a past takes off the whitened residual, beyond what as many free values as the data really
+    determine take off by chance (Akaike's criterion), and a margin."""
     basis = np.vstack([np.ones(len(residual)), made]).T
     model = residual_model(residual - basis @ np.linalg.lstsq(basis, residual, rcond=1e-6)[0])
     white = lfilter(model.a, [1.0], np.column_stack([residual, basis]), axis=0)[len(model.a) - 1 :]
     gained, free = _gain(white / np.sqrt(model.variance), reach)
-    return gained > 2.0 * free + _ASKED
+    return gained - 2.0 * free - _ASKED
 
 
 def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
@@ -105,7 +121,10 @@ def _explains(residual: np.ndarray, column: np.ndarray) -> bool:
 
 
 def worth_it(before: np.ndarray, after: np.ndarray) -> bool:
-    """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples."""
+    """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples; by half where
+    what is left is likely a misfit."""
     taken = float(np.var(before)) / max(float(np.var(after)), 1e-300) - 1.0
     effective = max(residual_model(after).effective, _AT_LEAST)
-    return taken * effective > (_ASKED if effective > _WHITE * len(after) else _ASKED_OF_MISFIT)
+    if effective > _WHITE * len(after):
+        return taken * effective > _ASKED
+    return taken > _HALVED and taken * effective > _ASKED_OF_MISFIT

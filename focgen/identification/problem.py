@@ -169,14 +169,18 @@ class Problem:
         return self._kept("responses", i, x[: self.core], make)
 
     def _columns(self, x: np.ndarray, i: int) -> np.ndarray:
-        """Rows × steps × n of the past, the last row by log(θ + 1)."""
-        when = np.exp(x[self.of_past[i]]) - 1.0
+        """Rows × steps × n of the past, older ones last, the last row by log(θ + 1)."""
+        when = self.when(x, i)
         make = lambda: columns(self.experiments[i], self.kernels(x, i), when)  # noqa: E731
         return self._kept("past", i, np.append(x[: self.core], when), make)
 
     def local(self, i: int) -> _Local:
         """The offset of an experiment that begins at rest."""
         return self._kept("at rest", i, np.empty(0), lambda: self._made_local(np.empty(0), i, True))
+
+    def when(self, x: np.ndarray, i: int) -> np.ndarray:
+        """The times of all steps of an experiment's past, samples before its first one."""
+        return np.concatenate([np.exp(x[self.of_past[i]]) - 1.0, self.pasts[i].older])
 
     def _local(self, x: np.ndarray, i: int, offset: bool = True) -> _Local:
         make = lambda: self._made_local(x, i, offset)  # noqa: E731
@@ -190,9 +194,9 @@ class Problem:
             sizes = np.linalg.norm(basis, axis=0)
             return _Local(basis / sizes, np.diag(sizes), 0)
         made = np.vstack([*made, w * self._columns(x, i)[0]])
-        prior = np.zeros((past.steps, len(made)))
-        prior[:, int(offset) :] = np.sqrt(self.penalties[i]) / past.reach * np.eye(past.steps)
-        return _Local(*np.linalg.qr(np.vstack([self.white(i, made).T, prior])), past.steps)
+        prior = np.zeros((len(past.reaches), len(made)))
+        prior[:, int(offset) :] = np.diag(np.sqrt(self.penalties[i]) / past.reaches)
+        return _Local(*np.linalg.qr(np.vstack([self.white(i, made).T, prior])), len(prior))
 
     def _kept(self, what: str, i: int, x: np.ndarray, make):
         """What was made for the last trial."""
@@ -213,7 +217,8 @@ class Problem:
         if self.delay_free:
             slopes = np.vstack([slopes, self._by_delay(point, i)])
         if self.pasts[i] is not None:
-            slopes = np.vstack([slopes, self._columns(x, i)[3] * point.amounts[i][:, None]])
+            late, count = self._columns(x, i)[3], self.pasts[i].steps
+            slopes = np.vstack([slopes, late[:count] * point.amounts[i][:count, None]])
         return self.white(i, w * slopes)
 
     def _own(self, i: int) -> np.ndarray:
@@ -230,14 +235,13 @@ class Problem:
             made = self.kernels(point.x, i, nudge)
             value = point.gain @ run.respond(made, 1)[0]
             if self.pasts[i] is not None:
-                when = np.exp(point.x[self.of_past[i]]) - 1.0
-                value = value + point.amounts[i] @ columns(run, made, when, 1)[0]
+                value = value + point.amounts[i] @ columns(run, made, self.when(point.x, i), 1)[0]
             ends.append(value)
         return (ends[0] - ends[1]) / (_NUDGE + low)
 
     def jacobians(self, point: Point, offset: bool = False) -> list[np.ndarray]:
         """Derivatives of each experiment's scaled output by x and gain, (n + prior rows, parameters), its local
-        columns projected out; ``offset``: the offset is the last column instead.
+        columns and those of its noise model projected out; ``offset``: the offset is the last column instead.
         """
         found = []
         for i, x in enumerate(self.experiments):
@@ -246,8 +250,21 @@ class Problem:
             rows = [slopes, self.white(i, w * self._responses(point.x, i)[0])]
             if offset:
                 rows.append(self.white(i, np.full((1, len(x)), w)))
-            found.append(self._local(point.x, i, not offset).without(np.vstack(rows)).T)
+            alone = self._local(point.x, i, not offset).without(np.vstack(rows)).T
+            found.append(self._without_noise_model(point, i, alone))
         return found
+
+    def _without_noise_model(self, point: Point, i: int, rows: np.ndarray) -> np.ndarray:
+        """Rows without what the whitening filter's own coefficients can make up for: in a closed loop they answer
+        the same disturbance as the model."""
+        if self.whitening[i] is None:
+            return rows
+        residual, n = self.residuals(point)[i], len(self.experiments[i])
+        order = len(self.whitening[i]) - 1
+        past = np.zeros((len(rows), order))
+        for k in range(1, order + 1):
+            past[order:n, k - 1] = residual[order - k : n - k]
+        return rows - past @ np.linalg.lstsq(past, rows, rcond=1e-10)[0] if order else rows
 
     def projected_slope(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
         """The derivative of the projected residual by ``x``, and that residual, compressed to a few rows."""

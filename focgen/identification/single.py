@@ -69,7 +69,7 @@ def _experiment_fit(x: Excitation, fit: FractionalFit, integer: tuple[IntegerFit
         simulated=fit.simulated[0],
         integer=integer,
         step=is_step(x),
-        past=fit.pasts[0] is not None,
+        past=fit.pasts[0] is not None and fit.pasts[0].steps > 0,
     )
 
 
