@@ -67,14 +67,17 @@ def session(
     cap=np.inf,
     camera=1.0,
     roles=("pressure", "curvature"),
+    regulator=(1.0, 0.12),
+    sensor=(1.0, 1 / 6.0),
 ):
     """Experiments of a rig with one of these effects: ``delay`` samples, ``vent`` slower s, dead ``zone``,
     ``slip`` (a Maxwell element of dry friction, share), a ``bend`` of the sensor, a ``drift`` of the gain a
-    second, a ``cap`` that the pressure's effect nears, bar. ``camera``: how much noisier the curvature is.
+    second, a ``cap`` that the pressure's effect nears, bar. ``camera``: how much noisier the curvature is;
+    ``regulator``, ``sensor``: the gain, times that of ``RIG``, and the time constant, s.
     """
     rng, logs, start = np.random.default_rng(seed), [], 0.0
     for name, u in commands().items():
-        p = _lag(0.1 * np.r_[np.zeros(delay), u][: len(u)], 0.12)
+        p = _lag(0.1 * regulator[0] * np.r_[np.zeros(delay), u][: len(u)], regulator[1])
         if vent:
             p = _lag(p, 1e-2, vent)
         load = np.maximum(p - zone, 0.0)
@@ -82,7 +85,7 @@ def session(
         clock = start + H * np.arange(len(u))
         drive = (gain[0] + gain[1] * load) * load * (1 + drift * clock)
         kappa = _fractional(_friction(drive, slip), T, alpha)
-        y = _lag(kappa + bend * kappa**2, 1 / 6.0)
+        y = sensor[0] * _lag(kappa + bend * kappa**2, sensor[1])
         signals = {"command": u, "pressure": p, "curvature": kappa, "output": y}
         for role, size in (("pressure", 0.18), ("curvature", 0.011 * camera), ("output", 0.011)):
             signals[role] = signals[role] + _noise(rng, len(u)) * noise * size

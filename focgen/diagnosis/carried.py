@@ -23,7 +23,8 @@ def carried(e: Explanation) -> np.ndarray:
     now = innovations(problem, vector, weighing)
     low, high = problem.bounds()
     rows = jacobian(problem, vector, now, weighing, low, high)  # the fit's own are of an earlier vector
-    spread = _spread(products(rows), float(np.mean(now**2)))
+    variance = float(np.mean(now**2))
+    spread = _spread(products(rows) + variance * np.diag(problem.known[1]), variance)
     made = problem.simulate(vector)
     moved = [problem.simulate(vector + STEP * direction) - made for direction in spread.T]
     ways = np.stack(moved, axis=1) / STEP

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from focgen.diagnosis.explain import Explanation
+from focgen.diagnosis.fit import Fit
 from focgen.diagnosis.segments import session
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import Chain, Placed
@@ -38,24 +40,37 @@ class Rigs:
 
 
 def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> Rigs:
-    """Own parameters from the segment that has them, effects from all. Where that refit brings the output no
-    closer, because the gap lies in a stage that is not refitted, the refitted rig keeps the parameters
-    given."""
-    refitted = fitted = rig
-    placed: list[Placed] = []
-    for e in explanations:
-        problem = e.best.problem
-        if problem.own.stage is not None and len(problem.own_start):
-            refitted, fitted = e.nominal.problem.rig(e.nominal.vector), problem.rig(e.best.vector)
-        placed += problem.placed(e.best.vector)
-    refitted, fitted, given = (replace(r, effects=()) for r in (refitted, fitted, rig))
-    if len(explanations) > 1 and _gap(refitted, logs) > _gap(given, logs):
-        refitted = given
-    return Rigs(refitted, fitted, tuple(placed))
+    """Own parameters and effects from all segments. Each was fitted by itself: where the output of the whole
+    chain comes no closer by it, as where what one stage's refit makes up for is mended in another, segments
+    keep what was given; those with effects keep what was fitted beside them."""
+    given = replace(rig, effects=())
+    placed = tuple(p for e in explanations for p in e.best.problem.placed(e.best.vector))
+    beside = [e.best for e in explanations if e.best.problem.clues]
+    alone = [e.best for e in explanations if not e.best.problem.clues]
+    refitted = _closest(given, [e.nominal for e in explanations], (), logs)
+    fitted = _closest(_moved(given, beside), alone, placed, logs) if placed else refitted
+    return Rigs(refitted, fitted, placed)
 
 
-def _gap(rig: Rig, logs: Sequence[Experiment]) -> float:
-    return mean_square(logs, simulated(rig, (), logs))
+def _closest(rig: Rig, fits: Sequence[Fit], placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
+    """The rig with the own parameters of all ``fits`` where that brings the output closer, else of those that
+    bring it closest."""
+    fits = [f for f in fits if len(f.problem.own_start)]
+    every = _moved(rig, fits)
+    if not fits or _gap(every, placed, logs) <= _gap(rig, placed, logs):
+        return every
+    some = [_moved(rig, part) for n in range(len(fits)) for part in combinations(fits, n)]
+    return min(some, key=lambda r: _gap(r, placed, logs))
+
+
+def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
+    for f in fits:
+        rig = f.problem.own.put(rig, f.vector[: len(f.problem.own_start)])
+    return rig
+
+
+def _gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> float:
+    return mean_square(logs, simulated(rig, placed, logs))
 
 
 def simulated(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> list[dict[str, np.ndarray]]:

@@ -14,12 +14,13 @@ from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.leftover import Leftover, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
+from focgen.diagnosis.realign import realigned
 from focgen.diagnosis.rivals import Cause, doubted, left_out
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.segments import Segment, is_single, owner
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import library
+from focgen.rig.effects import Effect, library
 from focgen.rig.engine import fits_in
 from focgen.rig.model import Rig
 
@@ -53,17 +54,26 @@ class Explanation:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
 
+    def kept_by(self, given: Rig, refitted: Rig) -> bool:
+        """Whether the refit of its own parameters is part of the rig ``refitted``."""
+        stages = self.segment.stages
+        return any(
+            getattr(a, stage) != getattr(b, stage)
+            for a, b in ((given, refitted), (given.delays, refitted.delays))
+            for stage in stages
+        )
+
 
 def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
     """Every form that may act in this segment. In a rig of one stage every family may, but of those that
     share a formula only the one at home there."""
     if not is_single(rig):
         return [
-            Clue(e.name, form, e.stage)
+            Clue(e.name, form, stage)
             for e in library().values()
-            if e.stage in segment.stages
+            if (stage := _place(e, segment))
             for form in e.forms
-            if fits_in(form, e.stage, rig)
+            if fits_in(form, stage, rig)
         ]
     stage, found = owner(rig), {}
     for effect in sorted(library().values(), key=lambda e: e.stage != stage):
@@ -71,6 +81,14 @@ def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
             if fits_in(form, stage, rig):
                 found.setdefault(form.act, Clue(effect.name, form, stage))
     return list(found.values())
+
+
+def _place(effect: Effect, segment: Segment) -> str | None:
+    """Where a family is looked for: at home, or where it may be anywhere in the first stage: logs of stages
+    that are merged do not tell which."""
+    if effect.stage in segment.stages:
+        return effect.stage
+    return segment.stages[0] if effect.anywhere else None
 
 
 def guests_in(segment: Segment, rig: Rig) -> list[Clue]:
@@ -96,10 +114,10 @@ def _much_left(base: Fit) -> bool:
 def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     """The segment's problem without effects."""
     scales = references(rig, segment, logs)
-    stage = owner(rig) if owner(rig) in segment.stages else None
+    freely = owner(rig) if owner(rig) in segment.stages else None
     load, response = (scales.levels["load"], scales.levels["response"])
     slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
-    return Problem(segment, Own(rig, stage, load, response), scales, slack=slack)
+    return Problem(segment, Own(rig, segment.stages, freely, load, response), scales, slack=slack)
 
 
 def explain(
@@ -115,7 +133,7 @@ def explain(
     ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``:
     whether the input could be freed of its noise.
     """
-    problem = _gauged(_held(rig, segment, logs))
+    problem = _widened(_gauged(_held(rig, segment, logs)))
     clues, guests = clues_for(segment, rig), guests_in(segment, rig)
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
@@ -123,7 +141,7 @@ def explain(
     asked = Asked(threshold, trusted, converter, only is not None)
     rankings, clues = _grown(problem, given, clues, guests, asked)
     weighing = Weighing(rankings[-1].ar)
-    best = _dropped(rankings[-1].base, weighing, threshold)
+    best = realigned(_dropped(rankings[-1].base, weighing, threshold), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     best, causes = doubted(best, nominal, rankings, clues, weighing)
     if converter is not None:
@@ -175,12 +193,22 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 
 
 def _gauged(problem: Problem) -> Problem:
-    """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. A
-    stage with parameters of its own has a gain."""
-    if len(problem.own_start) or not _seems_more(problem, problem.nominal()):
+    """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. Where
+    a stage has a gain of its own, that is part of it."""
+    if problem.own.has_gain or not _seems_more(problem, problem.nominal()):
         return problem
     gauged = replace(problem, gauge=_GAUGE)
     return problem if _seems_more(gauged, gauged.nominal()) else gauged
+
+
+def _widened(problem: Problem) -> Problem:
+    """The problem with a stage faster, or of another gain, than three times the uncertainty of what was given
+    allows, where that is all there is: no effect stands for it."""
+    ground = _ground(problem, problem.nominal())
+    if not problem.own.beyond(ground.vector) or not _shows_more(ground):
+        return problem
+    wide = replace(problem, own=replace(problem.own, wide=True))
+    return problem if _seems_more(wide, wide.nominal()) else wide
 
 
 def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[Clue]:
@@ -190,7 +218,15 @@ def _worth_trying(base: Problem, vector: np.ndarray, clues: list[Clue]) -> list[
 
 def _seems_more(base: Problem, vector: np.ndarray) -> bool:
     """Whether inputs foretell something of the residual, or it is slower or less steady than noise is."""
-    ground = fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
+    return _shows_more(_ground(base, vector))
+
+
+def _ground(base: Problem, vector: np.ndarray) -> Fit:
+    return fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
+
+
+def _shows_more(ground: Fit) -> bool:
+    base = ground.problem
     left, response = ground.residual(), base.references.clocks["response"]
     found = disturbance(left, base.segment.run.h, response)
     return found.swings or found.hums or found.bursts or ground.foretold > _TELLING

@@ -19,7 +19,8 @@ _STALE = 2  # iterations that rows of the Jacobian are kept for
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A fitted hypothesis: ``vector``, ``innovations`` (all experiments, one after the other), their
-    ``sse``, and the normal matrix ``information`` (J^T J of the innovations)."""
+    ``sse``, and the normal matrix ``information`` (J^T J of the innovations, and what is known beforehand in
+    the same unit)."""
 
     problem: Problem
     vector: np.ndarray
@@ -37,6 +38,11 @@ class Fit:
     def doubt(self) -> float:
         """Nats against its own parameters, for being far from those given."""
         return self.problem.own.doubt(self.vector)
+
+    @cached_property
+    def cost(self) -> float:
+        """What the fit was to make least: the sum of squares, and what is known beforehand."""
+        return _cost(self.problem, self.vector, self.sse, len(self.innovations))
 
     @cached_property
     def weighed(self) -> np.ndarray:
@@ -89,8 +95,8 @@ def fit(
     tolerance: float = 1e-3,
     known: np.ndarray | None = None,
 ) -> Fit:
-    """Least squares from ``start`` within the problem's bounds; stops when the gain is below ``tolerance``
-    nats.
+    """The likeliest vector within the problem's bounds, from ``start``: least squares, weighed against what
+    is known beforehand; stops when the gain is below ``tolerance`` nats.
 
     ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a
     little off. Otherwise the rows ahead of the clues' own are made anew only every third time, for they
@@ -100,26 +106,35 @@ def fit(
     vector = np.clip(start, low, high)
     now = innovations(problem, vector, weighing)
     sse, damping = float(now @ now), 1e-3
+    cost, (expected, precision) = _cost(problem, vector, sse, len(now)), problem.known
     normal, kept, age = np.eye(len(vector)), known, 0
     for _ in range(iterations):
         rows = jacobian(problem, vector, now, weighing, low, high, kept)
         product = products(np.vstack([rows, now]))
-        normal, slope = product[:-1, :-1], product[:-1, -1]
-        gained, before = False, sse
+        unit = sse / max(len(now), 1)  # a nat's worth of squares, twice
+        normal = product[:-1, :-1] + unit * np.diag(precision)
+        slope = product[:-1, -1] + unit * precision * (vector - expected)
+        gained, before = False, cost
         for _ in range(6):
             trial = np.clip(vector - _step(normal, slope, damping, vector, low, high), low, high)
             then = innovations(problem, trial, weighing)
-            if then @ then < sse:
-                vector, now, sse, gained = trial, then, float(then @ then), True
+            worth = _cost(problem, trial, float(then @ then), len(then))
+            if worth < cost:
+                vector, now, sse, cost, gained = trial, then, float(then @ then), worth, True
                 damping = max(damping * 0.2, 1e-9)
                 break
             damping *= 6.0
-        ended = not gained or 0.5 * len(now) * np.log(before / max(sse, 1e-300)) < tolerance
+        ended = not gained or 0.5 * len(now) * np.log(before / max(cost, 1e-300)) < tolerance
         if ended and (kept is None or known is not None):
             break
         age = 0 if ended or age >= _STALE else age + 1
         kept = known if known is not None else rows[: problem.head] if age else None
     return Fit(problem, vector, now, sse, normal)
+
+
+def _cost(problem: Problem, vector: np.ndarray, sse: float, count: int) -> float:
+    """The sum of squares that would be as unlikely alone as this one with these own parameters."""
+    return sse * float(np.exp(2.0 * problem.unlikely(vector) / max(count, 1)))
 
 
 def jacobian(

@@ -1,105 +1,95 @@
-"""The rig's own parameters, which a refit may move, as numbers of order one."""
+"""The rig's own parameters, which a refit may move, as one vector of numbers of order one.
+
+The actuator's, or those of the one stage there is, move freely. What was given of a regulator or a sensor was
+measured, or stands in a data sheet: its gain and its times move as a whole, and have a normal prior as wide
+as the rig's ``[uncertainty]``, so that what the data do not show stays where it was.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Actuator, LinearActuator, Rig
-
-_USUAL = 0.2  # relative deviation of own parameters from those given that surprises nobody
+from focgen.diagnosis.factors import Factor, factors
+from focgen.diagnosis.free import Free
+from focgen.rig.model import Rig
 
 
 @dataclass(frozen=True)
 class Own:
-    """Turns the own parameters of ``stage`` into a vector and back; levels are the segment's largest
-    magnitudes."""
+    """Turns the own parameters of a segment's ``stages`` into a vector and back: those of ``freely``, the
+    stage that is refitted freely, then a logarithm for each of the others' factors; levels are the segment's
+    largest magnitudes. ``wide``: what no effect stands for may go beyond three times its uncertainty;
+    ``held``: nothing moves."""
 
     rig: Rig
-    stage: str | None
+    stages: tuple[str, ...]
+    freely: str | None
     level_in: float
     level_out: float
+    wide: bool = False
+    held: bool = False
+
+    @cached_property
+    def _free(self) -> Free | None:
+        return Free(self.rig, self.freely, self.level_in, self.level_out) if self.freely else None
+
+    @cached_property
+    def factors(self) -> tuple[Factor, ...]:
+        """What moves as a whole."""
+        return tuple(factors(self.rig, self.stages, self.freely if len(self._first) else None))
+
+    @cached_property
+    def _first(self) -> np.ndarray:
+        return self._free.start() if self._free else np.zeros(0)
+
+    @property
+    def has_offset(self) -> bool:
+        """Whether there is an offset among them."""
+        return len(self._first) > 0 and self._free.has_offset
+
+    @property
+    def has_gain(self) -> bool:
+        """Whether there is a gain among them."""
+        return len(self._first) > 0 or any(f.kind == "gain" for f in self.factors)
 
     def start(self) -> np.ndarray:
         """The vector of the rig as given."""
-        if self.stage is None:
-            return np.zeros(0)
-        if self.stage != "actuator":
-            return self._from_transfer(getattr(self.rig, self.stage))
-        a = self.rig.actuator
-        if isinstance(a, Actuator):
-            gains = [g * self.level_in ** (i + 1) / self.level_out for i, g in enumerate(a.gain)]
-            return np.array([np.log(a.T), a.alpha, *gains, a.offset / self.level_out])
-        if isinstance(a, LinearActuator):
-            return np.r_[self._from_transfer(a.dynamics), a.offset / self.level_out]
-        return np.zeros(0)
+        return np.r_[self._first, np.zeros(len(self.factors))]
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds of the vector.
+        """Lower and upper bounds of the vector."""
+        if self.held:
+            return self.start(), self.start()
+        free = self._free.bounds() if self._free else (np.zeros(0), np.zeros(0))
+        ends = np.array([f.bounds(self.wide) for f in self.factors]).reshape(-1, 2).T
+        return np.r_[free[0], ends[0]], np.r_[free[1], ends[1]]
 
-        A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead
-        zone.
-        """
-        start = self.start()
-        low, high = start - 50.0, start + 50.0
-        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
-            low[0], high[0] = start[0] - 5.0, start[0] + 5.0
-            low[1], high[1] = 0.08, 1.9
-            if start[2] > 0.0:
-                low[2] = 0.0
-        elif self.stage is not None:
-            count = len(self._logs(self._transfer_of()))
-            low[:count], high[:count] = start[:count] - 8.0, start[:count] + 8.0
-        return low, high
+    @cached_property
+    def precision(self) -> np.ndarray:
+        """Of the normal prior about the rig as given: 1/variance of each number, 0 where it is free."""
+        known = np.array([f.uncertainty for f in self.factors])
+        return np.r_[np.zeros(len(self._first)), known**-2.0]
 
     def doubt(self, vector: np.ndarray) -> float:
-        """Nats against own parameters this far from those given. The owner identified them once: a tenth off
-        is usual, a factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a
-        guess; an offset is free."""
-        start = self.start()
-        if not len(start):
-            return 0.0
-        away, scale = vector[: len(start)] - start, np.full(len(start), _USUAL)
-        if self.stage == "actuator":
-            away = away[:-1]
-            scale = scale[:-1]
-        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
-            gains = np.abs(start[2:-1])
-            scale[1], scale[2:] = 0.5 * _USUAL * start[1], _USUAL * (gains + 0.1 * gains.sum() + 1e-12)
-        return float(np.sum(np.log1p((away / scale) ** 2)))
+        """Nats against own parameters this far from those given."""
+        count = len(self._first)
+        free = self._free.doubt(vector[:count]) if count else 0.0
+        logs = vector[count : len(self.precision)]
+        return free + 0.5 * float(self.precision[count:] @ logs**2)
 
-    def rig_with(self, vector: np.ndarray) -> Rig:
-        """The rig with its own parameters taken from ``vector``."""
-        if self.stage is None or not len(vector):
-            return self.rig
-        if self.stage != "actuator":
-            return replace(self.rig, **{self.stage: self._to_transfer(getattr(self.rig, self.stage), vector)})
-        a, v = self.rig.actuator, [float(value) for value in vector]
-        if isinstance(a, Actuator):
-            gains = tuple(g * self.level_out / self.level_in ** (i + 1) for i, g in enumerate(v[2:-1]))
-            return replace(
-                self.rig, actuator=Actuator(float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out)
-            )
-        dynamics = self._to_transfer(a.dynamics, vector[:-1])
-        return replace(self.rig, actuator=LinearActuator(dynamics, v[-1] * self.level_out))
+    def beyond(self, vector: np.ndarray) -> bool:
+        """Whether a factor stands at an end that it could pass if it were ``wide``."""
+        usual, wide = (np.array([f.bounds(w) for f in self.factors]).reshape(-1, 2) for w in (False, True))
+        logs = vector[len(self._first) : len(self.precision), None]
+        return bool(np.any((usual != wide) & (np.abs(logs - usual) < 1e-6)))
 
-    def _transfer_of(self) -> TransferFunction:
-        found = getattr(self.rig, self.stage)
-        return found.dynamics if self.stage == "actuator" else found
-
-    @staticmethod
-    def _logs(transfer: TransferFunction) -> list[float]:
-        """Coefficients but the denominator's last, which only scales the others."""
-        return [t.coefficient for t in (*transfer.num, *transfer.den[:-1])]
-
-    def _from_transfer(self, transfer: TransferFunction) -> np.ndarray:
-        return np.log(np.abs(self._logs(transfer)))
-
-    def _to_transfer(self, transfer: TransferFunction, vector: np.ndarray) -> TransferFunction:
-        moved = [np.sign(c) * np.exp(v) for c, v in zip(self._logs(transfer), vector)]
-        count = len(transfer.num)
-        num = [(float(c), t.order) for c, t in zip(moved, transfer.num)]
-        den = [(float(c), t.order) for c, t in zip(moved[count:], transfer.den)]
-        return TransferFunction(num, [*den, tuple(transfer.den[-1])])
+    def put(self, rig: Rig, vector: np.ndarray) -> Rig:
+        """``rig`` with the own parameters of these stages taken from ``vector``."""
+        count = len(self._first)
+        rig = self._free.put(rig, vector[:count]) if count else rig
+        for factor, logarithm in zip(self.factors, vector[count:]):
+            rig = factor.put(rig, float(logarithm))
+        return rig

@@ -16,6 +16,7 @@ from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.model import Rig
 
 _ZERO = 0.03  # of the level: an offset that is no fault
+_ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
 _OFF = 3.0  # standard deviations that an input may be off in each way
 
 
@@ -65,8 +66,7 @@ class Problem:
 
     def __post_init__(self):
         self.own_start = self.own.start()
-        has_offset = self.own.stage == "actuator" and len(self.own_start) > 0
-        zero = [] if has_offset else [_ZERO]
+        zero = [] if self.own.has_offset else [_ZERO]
         self.gauges = [*zero, self.gauge] if self.gauge else zero
         self.nuisances = 1 + len(self.gauges) + self.ways
 
@@ -112,6 +112,18 @@ class Problem:
         """The vector of the rig as given, without the clues' entries."""
         return np.r_[self.own_start, np.zeros(self.nuisances)]
 
+    @cached_property
+    def known(self) -> tuple[np.ndarray, np.ndarray]:
+        """What every entry is expected to be beforehand, and how well that is known: 1/variance."""
+        own, aligned = self.own.precision, (self.slack * _ALIGNED) ** -2.0
+        rest = self.head - len(own) - 1 + sum(len(clue.form.parameters) for clue in self.clues)
+        return np.pad(self.own_start, (0, 1 + rest)), np.r_[own, aligned, np.zeros(rest)]
+
+    def unlikely(self, vector: np.ndarray) -> float:
+        """Nats against ``vector`` for what is known beforehand."""
+        expected, precision = self.known
+        return 0.5 * float(precision @ (vector - expected) ** 2)
+
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
         low, high = self.own.bounds()
@@ -153,7 +165,7 @@ class Problem:
 
     def rig(self, vector: np.ndarray) -> Rig:
         """The rig with the vector's own parameters."""
-        return self.own.rig_with(vector[: len(self.own_start)])
+        return self.own.put(self.own.rig, vector[: len(self.own_start)])
 
     def placed(self, vector: np.ndarray) -> tuple[Placed, ...]:
         """The clues as effects of a chain."""

@@ -13,6 +13,7 @@ from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import Weighing, fit
 from focgen.diagnosis.floor import floor as noise_floor
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Evidence, Found, Gap, PlainFit
+from focgen.diagnosis.moves import far_moves
 from focgen.diagnosis.next_experiment import propose
 from focgen.diagnosis.rivals import Cause
 from focgen.diagnosis.running import Departure, Running
@@ -52,7 +53,7 @@ def reach(
     made, squares, floor, total = told.made, told.squares, told.floor, told.total
     found = _ordered([_found(e, c, told.rigs, logs, squares, floor, total) for e, c in told.causes])
     found += _departures(controller)
-    word = _word(found, unknown, explanations)
+    word = _word(found, unknown, [e for e in explanations if e.kept_by(rig, told.rigs.refitted)])
     shares = stage_shares(found, unknown, explanations)
     diagnosis = Diagnosis(
         word,
@@ -66,7 +67,7 @@ def reach(
         propose(logs, explanations, found),
         _description(unknown),
         (),
-        notes_of(logs),
+        (*notes_of(logs), *far_moves(rig, told.rigs.fitted if told.causes else told.rigs.refitted)),
         _plain_fits(explanations),
     )
     return told.rigs, diagnosis, Evidence(made, tuple(explanations))
@@ -170,11 +171,12 @@ def _word(found, unknown, explanations) -> str:
 
 def _moved(e: Explanation) -> bool:
     """Whether refitting the own parameters closed a gap beyond the noise."""
-    own = len(e.nominal.problem.own_start)
+    problem, weighing = e.nominal.problem, Weighing(e.ar)
+    own = len(problem.own_start)
     if not own:
         return False
-    weighing = Weighing(e.ar)
-    given = fit(e.nominal.problem, e.given, weighing, 0)
+    held = replace(problem, own=replace(problem.own, held=True))
+    given = fit(held, np.r_[e.given[:own], e.nominal.vector[own:]], weighing, 6)
     visible = np.mean(given.weighed**2) > 1.01 * np.mean(e.nominal.weighed**2)
     return bool(visible and nats(e.nominal, given) - 0.5 * own * np.log(len(given.innovations)) > _PARAMETERS)
 

@@ -5,9 +5,10 @@ noise, of the rig with the effect minus the same rig without it, as a share of t
 amplitude is found by bisection so that the gap is the severity's: low 3 %, mid 8 %, high 20 %, or the form's
 largest.
 
-*Surviving gap*: what is left of it, in the logged signals, once the own parameters of the rig (T, alpha, gain
-or num and den, offset) have been refitted: the projection off their sensitivities. Each signal is weighted by
-its noise. *Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more, both root
+*Surviving gap*: what is left of it, in the logged signals, once the own parameters of the rig have been
+refitted: the projection off their sensitivities. Those of the actuator (T, alpha, gain or num and den, offset)
+move freely, gain and times of regulator and sensor by three times their uncertainty. Each signal is weighted
+by its noise. *Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more, both root
 mean square.
 """
 
@@ -17,14 +18,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Actuator, LinearActuator, Rig
+from focgen.rig.corners import EXACT, moved
+from focgen.rig.model import UNITY, Actuator, LinearActuator, Relative, Rig
 from focgen.trials.forms import Drawn
 from focgen.trials.machine import Machine, Session, Setting
 
 SEVERITIES = {"low": 0.03, "mid": 0.08, "high": 0.20}
 VISIBLE = 0.3
+_USUAL = 3.0  # times the uncertainty of what was given: as far off is no fault
 _SIGNAL_OF = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 
 
@@ -85,15 +89,22 @@ def surviving(
     ``gap`` and ``noise`` (rms) carry the logged signals only.
     """
     base = trial.signals(rig)
+    moves = [*((*move, np.inf) for move in moved_rigs(rig)), *_scaled_rigs(rig)]
     columns = [
-        _stacked({n: (trial.signals(moved)[n] - base[n]) / step for n in gap}, noise)
-        for moved, step in moved_rigs(rig)
+        _stacked({n: (trial.signals(other)[n] - base[n]) / step for n in gap}, noise)
+        for other, step, _ in moves
     ]
     wish = _stacked(gap, noise)
-    matrix = np.stack(columns, axis=1)
-    matrix /= np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-    rest = wish - matrix @ np.linalg.lstsq(matrix, wish, rcond=1e-10)[0]
+    rest = wish - _refitted(np.stack(columns, axis=1), np.array([most for *_, most in moves]), wish)
     return {name: rms(part) for name, part in zip(gap, np.split(rest, len(gap)))}
+
+
+def _refitted(columns: np.ndarray, most: np.ndarray, wish: np.ndarray) -> np.ndarray:
+    """What comes closest to ``wish`` (n,) of ``columns`` (n, k), each at ``most`` (k,) times, either way."""
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    basis, upper = np.linalg.qr(columns / size)
+    times = lsq_linear(upper, basis.T @ wish, (-most * size, most * size), tol=1e-12).x
+    return basis @ (upper @ times)
 
 
 def _stacked(signals: dict[str, np.ndarray], noise: dict[str, float]) -> np.ndarray:
@@ -112,9 +123,20 @@ def moved_rigs(rig: Rig) -> Iterator[tuple[Rig, float]]:
             gain = [*actuator.gain[:i], g * (1 + small), *actuator.gain[i + 1 :]]
             yield replace(rig, actuator=replace(actuator, gain=tuple(gain))), small
     else:
-        for moved in _moved_linear(actuator, small):
-            yield replace(rig, actuator=moved), small
+        for other in _moved_linear(actuator, small):
+            yield replace(rig, actuator=other), small
     yield replace(rig, actuator=replace(actuator, offset=actuator.offset + 1.0)), 1.0
+
+
+def _scaled_rigs(rig: Rig) -> Iterator[tuple[Rig, float, float]]:
+    """The rig with gain or times of regulator or sensor a little larger, by how much, and by how much they may
+    be without being a fault."""
+    small = 1e-3
+    for stage in ("regulator", "sensor"):
+        known = getattr(rig.uncertainty, stage)
+        for off, most in ((Relative(small, 0.0), known.gain), (Relative(0.0, small), known.time)):
+            if getattr(rig, stage) != UNITY and most > 0.0:
+                yield moved(rig, replace(EXACT, **{stage: off})), small, _USUAL * most
 
 
 def _moved_linear(actuator: LinearActuator, small: float):

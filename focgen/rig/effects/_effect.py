@@ -146,8 +146,8 @@ Check = Callable[[Excitation], str | None]
 
 @dataclass(frozen=True)
 class Effect:
-    """A family. ``stage`` is the usual one, ``also`` others it may sit in. ``single``: nature has one form
-    only.
+    """A family. ``stage`` is the usual one, ``also`` others it may sit in, where those at home leave much;
+    ``anywhere``: it is at home in all. ``single``: nature has one form only.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
     ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone;
@@ -162,6 +162,7 @@ class Effect:
     needs: Check
     forms: Sequence[Form]
     also: tuple[str, ...] = ()
+    anywhere: bool = False
     single: bool = False
     noiselike: bool = False
     tonal: bool = False

@@ -40,6 +40,17 @@ def _spread_response(values, s):
     return 1.0 / ((tau * s) ** order + 1.0)
 
 
+def _partial_form(slot):
+    share = Parameter("share", lower=0.0, upper=1.0, starts=(0.3, 0.5), zero=0.0)
+    tau = Parameter("lag", time=1, lower=0.02, upper=20.0, starts=(0.2, 1.5), log=True)
+    return Form("partial", slot, (share, tau), _partial, response=_partial_response)
+
+
+def slower_forms(slot):
+    """Besides, a lag of a part of the signal: what makes a lag of a longer one."""
+    return [*forms(slot), _partial_form(slot)]
+
+
 def forms(slot):
     """One lag, and two equal ones, at ``slot``."""
     return [
@@ -51,11 +62,8 @@ def forms(slot):
 def deep_forms(slot):
     """Besides, a lag of a part of the signal only, and one with its times spread (Cole and Cole, J. Chem.
     Phys. 9, 1941), as where something has to soak in."""
-    share = Parameter("share", lower=0.0, upper=1.0, starts=(0.3, 0.5), zero=0.0)
-    tau = Parameter("lag", time=1, lower=0.02, upper=20.0, starts=(0.2, 1.5), log=True)
     order = Parameter("order", lower=0.4, upper=1.0, starts=(0.8,))
     return [
-        *forms(slot),
-        Form("partial", slot, (share, tau), _partial, response=_partial_response),
+        *slower_forms(slot),
         Form("spread", slot, (*_LAG, order), _spread, response=_spread_response),
     ]

@@ -10,5 +10,5 @@ EFFECT = Effect(
     reveals="steps in both directions: the same extra lag at every size of step",
     confused_with=("transport_delay", "valve_asymmetry", "flow_limit", "sensor_lag"),
     needs=lambda e: None if e.fastest < 1.0 else "no change of the input is fast beside the rig's response",
-    forms=_lags.forms("supply"),
+    forms=_lags.slower_forms("supply"),
 )

@@ -1,0 +1,107 @@
+"""The stage that a refit moves freely: the actuator, or the one stage of a rig, as numbers of order one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig.model import Actuator, LinearActuator, Rig
+
+_USUAL = 0.2  # relative deviation of own parameters from those given that surprises nobody
+
+
+@dataclass(frozen=True)
+class Free:
+    """Turns T, alpha, gain or num and den, and the offset, of ``stage`` into a vector and back; levels are
+    the segment's largest magnitudes."""
+
+    rig: Rig
+    stage: str
+    level_in: float
+    level_out: float
+
+    @property
+    def has_offset(self) -> bool:
+        """Whether its last number is an offset."""
+        return self.stage == "actuator" and self.rig.actuator is not None
+
+    def start(self) -> np.ndarray:
+        """The vector of the rig as given."""
+        if self.stage != "actuator":
+            return self._from_transfer(getattr(self.rig, self.stage))
+        a = self.rig.actuator
+        if isinstance(a, Actuator):
+            gains = [g * self.level_in ** (i + 1) / self.level_out for i, g in enumerate(a.gain)]
+            return np.array([np.log(a.T), a.alpha, *gains, a.offset / self.level_out])
+        if isinstance(a, LinearActuator):
+            return np.r_[self._from_transfer(a.dynamics), a.offset / self.level_out]
+        return np.zeros(0)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the vector.
+
+        A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead
+        zone.
+        """
+        start = self.start()
+        low, high = start - 50.0, start + 50.0
+        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
+            low[0], high[0] = start[0] - 5.0, start[0] + 5.0
+            low[1], high[1] = 0.08, 1.9
+            if start[2] > 0.0:
+                low[2] = 0.0
+        elif len(start):
+            count = len(self._logs(self._transfer_of()))
+            low[:count], high[:count] = start[:count] - 8.0, start[:count] + 8.0
+        return low, high
+
+    def doubt(self, vector: np.ndarray) -> float:
+        """Nats against own parameters this far from those given. The owner identified them once: a tenth off
+        is usual, a factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a
+        guess; an offset is free."""
+        start = self.start()
+        if not len(start):
+            return 0.0
+        away, scale = vector - start, np.full(len(start), _USUAL)
+        if self.stage == "actuator":
+            away = away[:-1]
+            scale = scale[:-1]
+        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
+            gains = np.abs(start[2:-1])
+            scale[1], scale[2:] = 0.5 * _USUAL * start[1], _USUAL * (gains + 0.1 * gains.sum() + 1e-12)
+        return float(np.sum(np.log1p((away / scale) ** 2)))
+
+    def put(self, rig: Rig, vector: np.ndarray) -> Rig:
+        """``rig`` with these parameters taken from ``vector``."""
+        if not len(vector):
+            return rig
+        if self.stage != "actuator":
+            return replace(rig, **{self.stage: self._to_transfer(getattr(self.rig, self.stage), vector)})
+        a, v = self.rig.actuator, [float(value) for value in vector]
+        if isinstance(a, Actuator):
+            gains = tuple(g * self.level_out / self.level_in ** (i + 1) for i, g in enumerate(v[2:-1]))
+            moved = Actuator(float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out)
+        else:
+            moved = LinearActuator(self._to_transfer(a.dynamics, vector[:-1]), v[-1] * self.level_out)
+        return replace(rig, actuator=moved)
+
+    def _transfer_of(self) -> TransferFunction:
+        found = getattr(self.rig, self.stage)
+        return found.dynamics if self.stage == "actuator" else found
+
+    @staticmethod
+    def _logs(transfer: TransferFunction) -> list[float]:
+        """Coefficients but the denominator's last, which only scales the others."""
+        return [t.coefficient for t in (*transfer.num, *transfer.den[:-1])]
+
+    def _from_transfer(self, transfer: TransferFunction) -> np.ndarray:
+        return np.log(np.abs(self._logs(transfer)))
+
+    def _to_transfer(self, transfer: TransferFunction, vector: np.ndarray) -> TransferFunction:
+        moved = [np.sign(c) * np.exp(v) for c, v in zip(self._logs(transfer), vector)]
+        count = len(transfer.num)
+        num = [(float(c), t.order) for c, t in zip(moved, transfer.num)]
+        den = [(float(c), t.order) for c, t in zip(moved[count:], transfer.den)]
+        return TransferFunction(num, [*den, tuple(transfer.den[-1])])
