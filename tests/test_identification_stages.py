@@ -303,7 +303,7 @@ def test_filling_and_venting_with_time_constants_of_their_own():
     assert abs(found.rising[0] - 2.7) <= found.rising[1] < 0.1
     assert abs(found.falling[0] - 5.8) <= found.falling[1] < 0.2
     assert fit.shape == "1p" and 2.7 < fit.parameters["T"][0] < 5.8
-    note = next(n for n in fit.notes if "valve_asymmetry" in n)
+    note = next(n for n in fit.notes if "the valve's asymmetry" in n)
     assert "fills in 2.7 s and vents in 5.8 s" in note
 
 
@@ -399,7 +399,7 @@ def test_a_measured_pump_fills_faster_than_it_vents(open_data):
     assert 2.2 < fit.up_down.rising[0] < 2.9 and 5.4 < fit.up_down.falling[0] < 6.2  # 63 % times, as measured
     assert fit.up_down.gof > 0.94
     assert all(made[0] < 3.0 for made in fit.simulated)  # at rest at first: kPa, an offset and no more
-    assert any("cannot do both" in note and "valve_asymmetry" in note for note in fit.notes)
+    assert any("cannot do both" in note and "the valve's asymmetry" in note for note in fit.notes)
 
 
 def test_a_measured_dead_time(open_data):

@@ -9,7 +9,7 @@ from focgen.identification.input_noise import attenuation
 from focgen.identification.shapes import MARGIN, Fitted
 
 _WORDS = {
-    "regulator": ("fills", "vents", "pressure", "valve_asymmetry"),
+    "regulator": ("fills", "vents", "pressure", "the valve's asymmetry"),
     "sensor": ("rises", "falls", "output", ""),
 }
 _MATERIAL = 0.005  # of a gain
