@@ -1,8 +1,8 @@
 """Logs of K(p) p through e^(−Ls)/(T s^α + 1), exact at every sample: truth for the identification.
 
 A power t^m/m! answers by t^m (1/m! − E_{α,m+1}(−t^α/T)), and e^(−ct) by Gauss–Legendre quadrature of the
-convolution with the impulse response, sample for sample; in the first one v = t^α takes the singularity at 0 away.
-Nothing here is shared with the identification.
+convolution with the impulse response, sample for sample; in the first one v = t^α takes the singularity at 0
+away. Nothing here is shared with the identification.
 """
 
 from __future__ import annotations
@@ -39,12 +39,16 @@ def power_answer(t: np.ndarray, m: int, of: Truth = Truth()) -> np.ndarray:
     """The answer (n,) at times ``t`` (n,) in s to t^m/m! that sets in at 0, a step or a ramp."""
     answer, after = np.zeros(len(t)), t > 1e-9
     late = t[after]
-    answer[after] = late**m * (1.0 / math.factorial(m) - mittag_leffler(of.alpha, m + 1.0, -(late**of.alpha) / of.T))
+    answer[after] = late**m * (
+        1.0 / math.factorial(m) - mittag_leffler(of.alpha, m + 1.0, -(late**of.alpha) / of.T)
+    )
     return answer
 
 
 @cache
-def decay_answer(rate: complex, step: float, count: int, of: Truth = Truth(), late: float = 0.0) -> np.ndarray:
+def decay_answer(
+    rate: complex, step: float, count: int, of: Truth = Truth(), late: float = 0.0
+) -> np.ndarray:
     """The answer (count,) at ``late`` + 0, h, 2h, … to e^(−rate t) that sets in at 0; 0 ≤ ``late`` < h, s."""
     alpha, T = of.alpha, of.T
     impulse = lambda v: mittag_leffler(alpha, alpha, -v / T) / (T * alpha)  # noqa: E731  of v = t^α
@@ -68,7 +72,9 @@ def _on_halves(function, end: float) -> complex:
     return np.sum(widths * (function(places.ravel()).reshape(places.shape) @ _WEIGHTS))
 
 
-def decaying(parts: dict[complex, complex], t: np.ndarray, of: Truth = Truth()) -> tuple[np.ndarray, np.ndarray]:
+def decaying(
+    parts: dict[complex, complex], t: np.ndarray, of: Truth = Truth()
+) -> tuple[np.ndarray, np.ndarray]:
     """Pressure Σ c e^(−rate t) from t = 0 on, 0 ahead, and its answer, both (n,) at uniform times ``t``."""
     drive: dict[complex, complex] = {0.0: 0.0j}
     for m, gain in enumerate(of.gain, 1):
@@ -89,7 +95,8 @@ def decaying(parts: dict[complex, complex], t: np.ndarray, of: Truth = Truth()) 
 
 
 def rise(level: float, tau: float, t: np.ndarray, of: Truth = Truth()) -> tuple[np.ndarray, np.ndarray]:
-    """A pressure that rises to ``level`` with time constant ``tau`` in s, and the answer; a step where it is 0."""
+    """A pressure that rises to ``level`` with time constant ``tau`` in s, and the answer; a step where it is
+    0."""
     if tau == 0.0:
         return level * (t >= -1e-9), of.K(level) * level * power_answer(t - of.delay, 0, of)
     return decaying({0.0: level, 1.0 / tau: -level}, t, of)
@@ -98,8 +105,8 @@ def rise(level: float, tau: float, t: np.ndarray, of: Truth = Truth()) -> tuple[
 def straight(
     knots: list[tuple[float, float]], t: np.ndarray, of: Truth = Truth()
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A pressure in straight lines through ``knots`` (s, pressure), at rest before the first and after the last,
-    and the answer beyond that rest; two knots at one time are a jump. K(p) is a line."""
+    """A pressure in straight lines through ``knots`` (s, pressure), at rest before the first and after the
+    last, and the answer beyond that rest; two knots at one time are a jump. K(p) is a line."""
     pressure, answer = np.full(len(t), float(knots[0][1])), np.zeros(len(t))
     p, slope = knots[0][1], 0.0
     for i, (when, q) in enumerate(knots):
@@ -130,4 +137,6 @@ def log_of(
         pressure = pressure + noise[0] * np.abs(pressure).max() * rng.normal(size=len(t))
         curvature = curvature + noise[1] * np.abs(curvature).max() * rng.normal(size=len(t))
     step = float(t[1] - t[0])
-    return Experiment(name, step, {"pressure": pressure, "curvature": curvature, "output": curvature, **signals})
+    return Experiment(
+        name, step, {"pressure": pressure, "curvature": curvature, "output": curvature, **signals}
+    )

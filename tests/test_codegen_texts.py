@@ -142,7 +142,9 @@ def test_a_name_that_cannot_be_one_is_refused_with_one_that_can(fault, name):
     assert check_name(suggestion(name), "here") == suggestion(name)
 
 
-ORDINARY = "spba loop1 torque signal_1 SIGMA island memory filter gain X M_1 index contact PRIx lag Int".split()
+ORDINARY = (
+    "spba loop1 torque signal_1 SIGMA island memory filter gain X M_1 index contact PRIx lag Int".split()
+)
 
 
 @pytest.mark.parametrize("name", ORDINARY)

@@ -101,7 +101,9 @@ def test_what_the_file_says_itself_is_no_departure(length):
     assert not running(stated, [log_of(command()[0], ref, meas)]).causes
     shorter = ideal(stated, Scenario(ref[None], meas[None]), length // 2).u[0]
     found = running(stated, [log_of(shorter, ref, meas)])
-    assert effects(found) == [["short_memory"]] and found.causes[0][0].value == pytest.approx(length // 2, abs=2)
+    assert effects(found) == [["short_memory"]] and found.causes[0][0].value == pytest.approx(
+        length // 2, abs=2
+    )
 
 
 def test_stated_arithmetic_is_no_departure():

@@ -182,7 +182,16 @@ def test_missing_files_are_refused(tmp_path, capsys):
 
 def test_sines_determine_the_model_as_well(tmp_path, capsys):
     """The maker's actuator unloads at 0.4 times its speed, so that T lies between its two."""
-    argv = ["identify", str(SINES), "--rig", str(RIG), "--out", str(tmp_path / "new.toml"), "--no-integer", "--json"]
+    argv = [
+        "identify",
+        str(SINES),
+        "--rig",
+        str(RIG),
+        "--out",
+        str(tmp_path / "new.toml"),
+        "--no-integer",
+        "--json",
+    ]
     assert main(argv) == 0
     payload = json.loads(capsys.readouterr().out)
     assert 1.32 < payload["rig"]["T"] < 1.32 / 0.4 and set(payload["gof"]) == {"fom", "rig"}

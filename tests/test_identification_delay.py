@@ -14,7 +14,7 @@ from focgen.identification.problem import Problem
 from focgen.logs.read import read_logs
 from focgen.rig.files import read_rig
 from tests.conftest import paper_rig
-from tests.exact_actuator import ALPHA, T, Truth, log_of, rise, straight
+from tests.exact_actuator import ALPHA, T, Truth, log_of, straight
 
 STEP = 0.02
 LEVELS = (0.1, 0.2)
@@ -30,7 +30,8 @@ def slow(p, t, of):
 
 
 def trials(course, delay: float, seeds: range):
-    """Errors of L, T, α over their half intervals, and the half interval of L in s; (seeds, 3) and (seeds,)."""
+    """Errors of L, T, α over their half intervals, and the half interval of L in s; (seeds, 3) and
+    (seeds,)."""
     t, of = STEP * np.arange(-50, 1100), Truth(delay=delay)
     clean, errors, halves = [course(p, t, of) for p in LEVELS], [], []
     for seed in seeds:
@@ -79,7 +80,7 @@ def test_a_dead_time_beyond_reach_is_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-# -- measured by others -----------------------------------------------------------------------------------------
+# -- measured by others ----------------------------------------------------------------------------
 
 DRYER = 'name = "dryer"\nsample_time = 0.08\n[signals]\ntime = "t_s"\ncommand = "u_V"\noutput = "y_V"\n'
 PUMP = """

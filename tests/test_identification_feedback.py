@@ -13,7 +13,9 @@ from tests.exact_actuator import ALPHA, T, power_answer
 STEP, COUNT, K = 0.05, 900, 0.5
 RIG = Rig("loop", STEP, Signals("t", "y", command="u", reference="r"), Actuator(T, ALPHA, (K,)))
 LOOPS = {"gentle": (2.0, 1.5), "brisk": (6.0, 6.0), "hot": (12.0, 15.0)}  # proportional, integral a second
-IMPULSES = np.diff(power_answer(STEP * np.arange(COUNT + 1), 0))  # what a command held for a sample adds, later
+IMPULSES = np.diff(
+    power_answer(STEP * np.arange(COUNT + 1), 0)
+)  # what a command held for a sample adds, later
 
 
 def closed_loop(seed: int, loop: str, pole: float, noise: float) -> dict[str, np.ndarray]:

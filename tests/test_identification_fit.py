@@ -103,7 +103,8 @@ def test_a_jump_stands_alone_and_above_the_noise():
 
 
 def test_between_samples_a_smooth_input_is_met_to_the_sixth_order():
-    """The area under it in each sample, beside a kink and across a jump; Simpson's rule on 200 parts is the truth."""
+    """The area under it in each sample, beside a kink and across a jump; Simpson's rule on 200 parts is the
+    truth."""
     h, places = 0.05, np.linspace(0.0, 1.0, 201)
     smooth = lambda t: np.sin(2.0 * t) + 2.0 * np.maximum(t - 1.5, 0.0) * np.exp(-t)  # noqa: E731
     time = h * np.arange(80)
@@ -219,9 +220,7 @@ def six_levels(**changes) -> list[Experiment]:
 def test_the_rig_has_the_line():
     found = module.identify(six_levels(), paper_rig())
     assert found.joint.gain == pytest.approx((0.0015, 0.345), rel=1e-5) and found.joint.gain_r2 > 1.0 - 1e-9
-    assert found.joint.T == pytest.approx(T, rel=1e-6) and found.joint.alpha == pytest.approx(
-        ALPHA, abs=1e-6
-    )
+    assert found.joint.T == pytest.approx(T, rel=1e-6) and found.joint.alpha == pytest.approx(ALPHA, abs=1e-6)
     assert found.gof["rig"]["mean"] > 0.9999
     assert any("positive steps only" in w for w in found.warnings)
     assert any("levels rise" in w for w in found.warnings)
@@ -294,7 +293,9 @@ def test_an_output_that_does_not_follow_the_input_is_no_model(tmp_path):
         log, noise = step_log(), np.random.default_rng(seed).normal(size=2050)
         signals = {"pressure": log["pressure"], "curvature": noise, "output": noise}
         with pytest.raises(FitError, match="determine|edge"):
-            module.identify([Experiment("noise", 0.02, signals)], paper_rig(), tmp_path / "new.toml", integer=False)
+            module.identify(
+                [Experiment("noise", 0.02, signals)], paper_rig(), tmp_path / "new.toml", integer=False
+            )
     assert not list(tmp_path.iterdir())
 
 
@@ -338,7 +339,9 @@ def test_an_offset_that_is_there_is_found_without_a_rest():
 def later(log: Experiment, begin: float) -> Experiment:
     """The log from ``begin`` s on, as if nothing had been recorded before."""
     first = int(round(begin / log.sample_time))
-    return Experiment(log.name, log.sample_time, {role: values[first:] for role, values in log.signals.items()})
+    return Experiment(
+        log.name, log.sample_time, {role: values[first:] for role, values in log.signals.items()}
+    )
 
 
 def test_the_interval_of_a_dead_time_is_in_seconds():

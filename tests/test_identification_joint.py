@@ -53,14 +53,15 @@ def test_the_truth_is_the_convolution_integral():
     assert ramp == pytest.approx(float(held + quad(lambda v: impulse(v) * moved(v), ends[1:])), rel=1e-10)
 
 
-# -- pressures that rise slowly ---------------------------------------------------------------------------------
+# -- pressures that rise slowly --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     "tau, near", [(0.0, 1e-9), (0.03, 5e-5), (0.05, 1e-6), (0.1, 1e-7), (0.5, 1e-8), (2.5, 1e-8), (5.0, 1e-8)]
 )
 def test_a_slow_pressure_gives_the_parameters_back(tau, near):
-    """At 10 ms; where the pressure rises within three samples the polynomials between them are what is left."""
+    """At 10 ms; where the pressure rises within three samples the polynomials between them are what is
+    left."""
     t = clock(0.01, 20.0)
     fit = fitted([log_of(f"{p}", t, rise(p, tau, t)) for p in (0.075, 0.125, 0.2)])
     assert abs(fit.T / T - 1.0) <= near and abs(fit.alpha - ALPHA) <= near
@@ -84,7 +85,7 @@ def test_the_rig_written_is_no_worse_than_the_single_fits(tau):
     assert min(found.gof["rig"].values()) > 0.9999
 
 
-# -- intervals --------------------------------------------------------------------------------------------------
+# -- intervals -------------------------------------------------------------------------------------
 
 
 def trials(tau: float, seeds: range, step: float, end: float, levels=LEVELS, noise=(0.004, 0.02)):
@@ -120,13 +121,14 @@ def test_intervals_cover_the_truth_over_many_sessions():
 
 
 def test_a_noisy_step_of_pressure_is_a_step():
-    """0.0007 bar of noise; read as a line from sample to sample, T would be 0.01 too large, and covered in 15 %."""
+    """0.0007 bar of noise; read as a line from sample to sample, T would be 0.01 too large, and covered in 15
+    %."""
     share = 0.0007 / 0.15
     errors, hits = trials(0.0, range(20), 0.01, 20.0, (0.15,), (share, 0.01))
     assert abs(errors[:, 0].mean()) < errors[:, 0].std() and hits[:, :2].mean() >= 0.85
 
 
-# -- any excitation ---------------------------------------------------------------------------------------------
+# -- any excitation --------------------------------------------------------------------------------
 
 
 def sine(t, seed):
@@ -180,7 +182,9 @@ def test_any_excitation_shows_the_parameters(course):
 def test_one_level_has_a_constant_gain_and_says_so():
     t = clock(0.02, 30.0)
     made = straight([(0.0, 0.0), (0.0, 0.15), (15.0, 0.15), (15.0, 0.0)], t)
-    found = identify([log_of("a", t, made, (0.001, 0.01), np.random.default_rng(0))], paper_rig(), integer=False)
+    found = identify(
+        [log_of("a", t, made, (0.001, 0.01), np.random.default_rng(0))], paper_rig(), integer=False
+    )
     (low, high) = found.joint.ci95["gain"][0]
     assert len(found.joint.gain) == 1 and low < Truth().K(0.15) < high
     assert any("1 distinct level: K(p) of degree 0, not 1" in note for note in found.notes)
@@ -196,7 +200,7 @@ def test_experiments_may_differ_in_length_and_sample_time():
         assert np.all(np.abs(errors) < 1.8 * halves) and halves[0] < 0.01
 
 
-# -- logs that begin in the middle ------------------------------------------------------------------------------
+# -- logs that begin in the middle -----------------------------------------------------------------
 
 
 def release_course(p: float) -> list[tuple[float, float]]:
@@ -243,7 +247,7 @@ def test_logs_cut_off_anywhere_tell_the_same(course, latest):
     assert count >= 90 and np.mean(np.abs(errors) <= 1.0) >= 0.9
 
 
-# -- what is no log of such a rig -------------------------------------------------------------------------------
+# -- what is no log of such a rig ------------------------------------------------------------------
 
 
 def refused(log: Experiment, folder) -> FitError:
@@ -272,7 +276,7 @@ def test_a_pulse_of_three_samples_in_noise_is_no_model(tmp_path):
     assert "hold a step" in str(refused(log_of("a", t, made, (0.0, 0.3), np.random.default_rng(0)), tmp_path))
 
 
-# -- long logs --------------------------------------------------------------------------------------------------
+# -- long logs -------------------------------------------------------------------------------------
 
 _LONG = """
 import resource, numpy as np

@@ -403,9 +403,9 @@ def test_a_measured_pump_fills_faster_than_it_vents(open_data):
 
 
 def test_a_measured_dead_time(open_data):
-    """Published models of this process begin with the input of three samples before. A held input takes one of
-    these itself, so the dead time lies between two samples and three; a first-order model, with a lag too few,
-    makes it longer."""
+    """Published models of this process begin with the input of three samples before. A held input takes one
+    of these itself, so the dead time lies between two samples and three; a first-order model, with a lag too
+    few, makes it longer."""
     table = read(open_data / "hair_dryer_delay.csv")
     log = Experiment("dryer", 0.08, {"command": table["u_V"], "pressure": table["y_V"]})
     fit = identify_stage([log], "regulator")

@@ -8,7 +8,6 @@ import pytest
 
 from focgen.control.controller import Controller, ControllerRanges
 from focgen.control.equilibrium import Equilibrium
-from focgen.control.margins import margins
 from focgen.fractional.delay import Delayed, split_delay
 from focgen.fractional.responses import step_response
 from focgen.fractional.simulation import Convolution

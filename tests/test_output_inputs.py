@@ -10,7 +10,7 @@ from focgen.cli.main import main
 from focgen.codegen.generate import generate
 from focgen.control.files import write_controller
 from focgen.errors import InputError
-from focgen.output import check_apart, write_file, write_files
+from focgen.output import check_apart, write_file
 from focgen.resources import shipped
 from tests.conftest import paper_controller
 

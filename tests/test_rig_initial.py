@@ -176,7 +176,9 @@ def test_a_moment_at_zero_tells_nothing():
     """A triangle that rises from the first sample on, on an output that falls back to where it rests."""
     log = session(seed=3, noise=0.01)[4]
     fading = 0.0022 * np.exp(-log.time / 0.4)
-    (told,) = begun(RIG, [Experiment("rise", H, {"command": log["command"], "output": log["output"] + fading})])
+    (told,) = begun(
+        RIG, [Experiment("rise", H, {"command": log["command"], "output": log["output"] + fading})]
+    )
     assert told.begins == {}
 
 

@@ -88,7 +88,9 @@ EDITED = {
     "a comment": ("spba.c", appended("spba.c")),
     "code at the end": (
         "spba.c",
-        appended("spba.c", "void abort(void);\n__attribute__((constructor)) static void x(void) { abort(); }"),
+        appended(
+            "spba.c", "void abort(void);\n__attribute__((constructor)) static void x(void) { abort(); }"
+        ),
     ),
     "a trigger": ("spba.c", replaced("spba.c", "unsigned flags = 0;", "unsigned flags = u == 123;")),
     "a coefficient in a comment": ("spba.h", replaced("spba.h", "1.32 s^0.6", "1.33 s^0.6")),
@@ -256,5 +258,3 @@ def test_a_study_counts_a_controller_of_any_name():
     plans = [build_plan(paper_controller(8, name=name), "q15") for name in ("spba", "../My loop; x")]
     named = [studied(plan, None) for plan in plans]
     assert named[0].flash_bytes == named[1].flash_bytes > 0 and named[1].note is None
-
-

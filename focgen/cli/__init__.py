@@ -4,7 +4,7 @@ run(args).
 
 import os
 
-# One thread for linear algebra unless told otherwise: its sums are short, and threads that wait for each other
-# take twice the time. Said before anything loads it.
+# One thread for linear algebra unless told otherwise: its sums are short, and threads that wait for each
+# other take twice the time. Said before anything loads it.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")

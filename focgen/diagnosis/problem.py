@@ -53,7 +53,8 @@ class Problem:
     The vector: the rig's own parameters, the nuisances (the alignment of input and output, at most ``slack``
     samples; where nothing of the segment has an offset of its own, one, and its gauge's error, at most
     ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in standard
-    deviations; how far the begins of experiments are, likewise), then every clue's parameters, all of order one.
+    deviations; how far the begins of experiments are, likewise), then every clue's parameters, all of order
+    one.
     """
 
     segment: Segment

@@ -78,7 +78,10 @@ def _ways(controller: Controller, logs: Sequence[Experiment]) -> Iterator[Replay
         parts = [_samples(controller, log, rows) for log in logs]
         seen = tuple(_scenario(controller, log, p) for log, p in zip(logs, parts))
         commands = tuple(p["command"] for p in parts)
-        for length in (None, controller.length):  # a memory that is stated is no departure, nor is a longer one
+        for length in (
+            None,
+            controller.length,
+        ):  # a memory that is stated is no departure, nor is a longer one
             yield Replayed(controller, seen, commands, length)
 
 

@@ -1,4 +1,5 @@
-"""The controller's stage: how the running one departs from the one that its file describes, from closed-loop logs.
+"""The controller's stage: how the running one departs from the one that its file describes, from closed-loop
+logs.
 
 The controller is replayed on the logged reference and measurement. What it should have commanded is compared
 with the logged command; what a shorter memory, coarser arithmetic or an output limit would have commanded

@@ -1,9 +1,9 @@
 """What an input does between its samples: jumps, straight lines and bends, read off the samples.
 
 A step of a gauge's noisy pressure is a step: the change stands alone and is far above the noise. Everything
-else is joined by curves, each from the polynomial through those six samples around it whose fifth difference is
-least (Harten's essentially non-oscillatory choice, J. Comput. Phys. 71, 1987), so that the kink where a pressure
-begins to rise spoils no neighbour. Where bends drown in noise the line is straight.
+else is joined by curves, each from the polynomial through those six samples around it whose fifth difference
+is least (Harten's essentially non-oscillatory choice, J. Comput. Phys. 71, 1987), so that the kink where a
+pressure begins to rise spoils no neighbour. Where bends drown in noise the line is straight.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Course:
     """An input as the dynamics see it; each (powers, n).
 
     ``values`` at the samples; ``jumps`` at a sample, the first one included; in the sample that ends at each
-    index (0 at the first): ``straight``, the change made in a line, and ``bends``, ``twists``, the coefficients
-    of x (x − 1) and x (x − 1)(2x − 1) beside it, None where there are none.
+    index (0 at the first): ``straight``, the change made in a line, and ``bends``, ``twists``, the
+    coefficients of x (x − 1) and x (x − 1)(2x − 1) beside it, None where there are none.
     """
 
     values: np.ndarray
@@ -108,8 +108,8 @@ def _bent(values: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _smoothest(values: np.ndarray, jumps: np.ndarray, points: int, noise: float):
-    """Where a polynomial through ``points`` samples crosses no jump, and both bends from the one whose highest
-    difference is least; (n,) each."""
+    """Where a polynomial through ``points`` samples crosses no jump, and both bends from the one whose
+    highest difference is least; (n,) each."""
     n = len(values)
     windows = np.lib.stride_tricks.sliding_window_view(values, points)
     crossed = np.cumsum(jumps[1:])  # jumps up to each sample
@@ -136,7 +136,8 @@ def _smoothest(values: np.ndarray, jumps: np.ndarray, points: int, noise: float)
 
 @cache
 def _weights(points: int, ahead: int) -> np.ndarray:
-    """What the samples −ahead … points − 1 − ahead weigh in the bend and the twist between 0 and 1; (2, points).
+    """What the samples −ahead … points − 1 − ahead weigh in the bend and the twist between 0 and 1; (2,
+    points).
 
     The bend c (x² − x) has the area of what the polynomial is below the straight line, c/6; the twist the
     difference of its second derivatives at both ends, 12 times its coefficient.

@@ -25,7 +25,8 @@ def warnings_of(
     failed: Sequence[str],
     quality: dict[str, dict[str, float]],
 ) -> tuple[str, ...]:
-    """The warnings that apply, most important first. ``failed``: experiments that have no fit of their own."""
+    """The warnings that apply, most important first. ``failed``: experiments that have no fit of their
+    own."""
     misfit = misfit_of(excitations, fit)
     found = _rig_is_worse(fits, quality) or ([_model_short(misfit, fit)] if misfit else [])
     found += _unsure(excitations, fit, misfit)
@@ -46,7 +47,8 @@ def warnings_of(
 def _model_short(misfit: float, fit: FractionalFit) -> str:
     late = "" if "delay" in fit.half and fit.half["delay"] else "a dead time (--delay), "
     return (
-        f"the model leaves {times_text(misfit)} the noise of the readings: something that it does not have, such "
+        f"the model leaves {times_text(misfit)} the noise of the readings: something that it does "
+        f"not have, such "
         f"as {late}hysteresis, another speed of unloading, or drift; `focgen diagnose` names it"
     )
 
@@ -57,8 +59,10 @@ def _rig_is_worse(fits: Sequence[ExperimentFit], quality: dict[str, dict[str, fl
         return []
     rig, single = (float(np.mean([quality[m][name] for name in own])) for m in ("rig", "fom"))
     return [
-        f"the rig reaches a GOF of {rig:.3f} where every experiment by itself reaches {single:.3f}: what differs "
-        "between them is not in one K(p), T and alpha, such as hysteresis, another speed of unloading, or drift; "
+        f"the rig reaches a GOF of {rig:.3f} where every experiment by itself reaches {single:.3f}: "
+        f"what differs "
+        "between them is not in one K(p), T and alpha, such as hysteresis, another speed of "
+        "unloading, or drift; "
         "`focgen diagnose` names it"
     ]
 

@@ -23,7 +23,10 @@ _SURELY = 0.8  # of the samples before it is away: the last ones may be its begi
 _SEVERAL = 10  # samples whose mean is a better rest than the first of them
 _DRIFT = 3.0  # standard errors of a slope: what is steeper does not rest
 _FEWEST = 30  # samples
-_LOOKED_BACK, _FARTHEST = 2, 80_000  # how far before an experiment its past is looked for: its lengths, samples
+_LOOKED_BACK, _FARTHEST = (
+    2,
+    80_000,
+)  # how far before an experiment its past is looked for: its lengths, samples
 _FOLLOWED = 8  # first samples of a moving input that a line is drawn through where they are noisy
 
 
@@ -32,11 +35,11 @@ class Excitation:
     """One experiment made ready: the input's powers as the dynamics see them, and the fitted signal.
 
     ``pressure`` (n,) is the input of the actuator, measured or through the regulator; ``before`` its constant
-    value ahead of the first sample; ``level`` the value it is stepped to. ``course`` holds pressure^m − before^m,
-    m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1 where the curvature is.
-    ``rest_shown``: whether the log begins before the first step, so that it shows the output's zero.
-    ``reference`` (n,) where a loop was closed. ``late``: the nominal dead time of the stages that it is seen through,
-    s. ``begins_up``: whether the input was held away from 0 ahead of the first sample.
+    value ahead of the first sample; ``level`` the value it is stepped to. ``course`` holds pressure^m −
+    before^m, m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1 where the curvature
+    is. ``rest_shown``: whether the log begins before the first step, so that it shows the output's zero.
+    ``reference`` (n,) where a loop was closed. ``late``: the nominal dead time of the stages that it is seen
+    through, s. ``begins_up``: whether the input was held away from 0 ahead of the first sample.
     """
 
     name: str
@@ -173,9 +176,7 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
     """
     _check(experiment)
     pressure, level_before, jumps, held, role = _input(experiment, rig, before)
-    course = course_of(
-        np.array([pressure**m - level_before**m for m in range(1, powers + 1)]), jumps, held
-    )
+    course = course_of(np.array([pressure**m - level_before**m for m in range(1, powers + 1)]), jumps, held)
     fitted = "curvature" if "curvature" in experiment else "output"
     sensor = rig.sensor if fitted == "output" else UNITY
     if sensor != UNITY:

@@ -1,8 +1,9 @@
-"""Levenberg–Marquardt fit of K(p) p through e^(−Ls)/(T s^α + 1), eq. (3), to one experiment or several at once.
+"""Levenberg–Marquardt fit of K(p) p through e^(−Ls)/(T s^α + 1), eq. (3), to one experiment or several at
+once.
 
-Only log τ, α and the dead time L are searched (T = τ^α): for each trial the coefficients of K(p), an offset an
-experiment and the amounts of an unknown past follow by linear least squares and are projected out (Golub and
-Pereyra, 1973). The search begins at the best points of a coarse grid.
+Only log τ, α and the dead time L are searched (T = τ^α): for each trial the coefficients of K(p), an offset
+an experiment and the amounts of an unknown past follow by linear least squares and are projected out (Golub
+and Pereyra, 1973). The search begins at the best points of a coarse grid.
 """
 
 from __future__ import annotations
@@ -78,8 +79,9 @@ def fit_fractional(
 ) -> FractionalFit:
     """Fit one K(p), T and α to all experiments, with an offset each.
 
-    ``delay``: whether a dead time is fitted, or its fixed value in s. ``pasts``: which experiments have an unknown
-    past; None: those whose data ask for it. Raises FitError where the data do not determine the parameters.
+    ``delay``: whether a dead time is fitted, or its fixed value in s. ``pasts``: which experiments have an
+    unknown past; None: those whose data ask for it. Raises FitError where the data do not determine the
+    parameters.
     """
     free, fixed = (delay, 0.0) if isinstance(delay, bool) else (False, float(delay))
     problem = Problem(experiments, (None,) * len(experiments), free, fixed)
@@ -97,7 +99,8 @@ def fit_fractional(
 def _with_pasts(
     problem: Problem, point: Point, pasts: Sequence[Past | None], still: float
 ) -> tuple[Problem, Point]:
-    """The fit with these pasts, new steps begun at the times that explain most, and older ones allowed for."""
+    """The fit with these pasts, new steps begun at the times that explain most, and older ones allowed
+    for."""
     begun = [*point.x[: problem.core]]
     for i, (x, past) in enumerate(zip(problem.experiments, pasts)):
         known = point.x[problem.of_past[i]]
@@ -157,8 +160,8 @@ def _descended(problem: Problem, start: np.ndarray, still: float = _STILL, round
 def _with_pasts_asked_for(problem: Problem, point: Point) -> tuple[Problem, Point]:
     """The fit with the pasts that its data ask for, one step after the other, the most suggested first.
 
-    A step is tried wherever one is suggested, and stays where the fit that has it cannot do without: parameters that
-    are off for want of a past hide how much it explains.
+    A step is tried wherever one is suggested, and stays where the fit that has it cannot do without:
+    parameters that are off for want of a past hide how much it explains.
     """
     reach = _reach(problem)
     held = [Past(0, reach, older_times(x, np.empty(0))) if x.begins_up else None for x in problem.experiments]
@@ -236,8 +239,9 @@ def _check(problem: Problem, best: Point) -> None:
 def _whitened(problem: Problem, point: Point) -> tuple[Problem, Point]:
     """The fit with a noise model for each closed loop, both estimated in turn until they agree.
 
-    In a closed loop the input answers the disturbance in the output. The prediction error of a model with the right
-    noise model is not correlated with inputs of the past, so the fit is not biased (Ljung, 1999, §13.4).
+    In a closed loop the input answers the disturbance in the output. The prediction error of a model with the
+    right noise model is not correlated with inputs of the past, so the fit is not biased (Ljung, 1999,
+    §13.4).
     """
     for turn in range(_WHITENED):
         before, models = point.x, [residual_model(part) for part in problem.residuals(point)]

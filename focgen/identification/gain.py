@@ -1,8 +1,8 @@
 """The gain as a polynomial of the pressure, K(p) = gain[0] + gain[1] p + …: what degree the logs can show.
 
-A step from p to q moves the drive K(p) p by its own K times q − p. So the K of a single fit is the drive's mean
-slope there: K(q) where it starts at 0, K(p) where it ends at 0, and everywhere linear in the polynomial's
-coefficients.
+A step from p to q moves the drive K(p) p by its own K times q − p. So the K of a single fit is the drive's
+mean slope there: K(q) where it starts at 0, K(p) where it ends at 0, and everywhere linear in the
+polynomial's coefficients.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ def distinct_levels(steps: np.ndarray) -> int:
 
 
 def r2_of_line(excitations: Sequence[Excitation], fits: Sequence[ExperimentFit], degree: int) -> float | None:
-    """R² of the polynomial of ``degree`` through the K of single fits of steps; None where there are fewer than
-    two, 1 where as many levels as coefficients leave no choice."""
+    """R² of the polynomial of ``degree`` through the K of single fits of steps; None where there are fewer
+    than two, 1 where as many levels as coefficients leave no choice."""
     ends = {x.name: x.ends for x in excitations}
     steps = np.array([ends[f.name] for f in fits if f.step])
     if len(steps) < 2:

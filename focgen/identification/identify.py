@@ -48,13 +48,13 @@ def identify(
     """Fit K(p) p through e^(−Ls)/(T s^α + 1), eq. (3) to (5), to all experiments at once.
 
     ``logs`` are paths or experiments of one session, ``first`` and ``last`` (s within each experiment) cut
-    them, ``gain_degree`` is the degree of K(p); where the logs show fewer levels than that needs, a lower one is
-    taken and said. The new rig is written to ``out``. The input is the measured pressure where logged, else the
-    command through the regulator; fitted is the curvature where logged, else the output through the sensor.
-    ``unseen`` are logs that the identified rig is shown against, but not fitted to. ``stages``: which of
-    regulator, actuator and sensor are identified, the first and the last from their own signals. ``delay``:
-    whether the actuator's dead time is fitted. ``integer``: whether integer-order models are fitted to each
-    experiment for comparison.
+    them, ``gain_degree`` is the degree of K(p); where the logs show fewer levels than that needs, a lower one
+    is taken and said. The new rig is written to ``out``. The input is the measured pressure where logged,
+    else the command through the regulator; fitted is the curvature where logged, else the output through the
+    sensor. ``unseen`` are logs that the identified rig is shown against, but not fitted to. ``stages``: which
+    of regulator, actuator and sensor are identified, the first and the last from their own signals.
+    ``delay``: whether the actuator's dead time is fitted. ``integer``: whether integer-order models are
+    fitted to each experiment for comparison.
 
     Raises LogError, RigError or FitError; nothing is written then.
     """
@@ -119,7 +119,9 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     warnings = warnings_of(excitations, fit, fits, failed, quality)
     between = [x.name for x in excitations if is_step(x) and x.between]
     if between:
-        told += (f"{listed(between)}: steps between two levels; each K is the mean slope of K(p) p on its step",)
+        told += (
+            f"{listed(between)}: steps between two levels; each K is the mean slope of K(p) p on its step",
+        )
     begun = [x.name for x in excitations if not x.rest_shown]
     if begun:
         verb = "begins with its step" if len(begun) == 1 else "each begin with their step"
@@ -128,11 +130,11 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
 
 
 def _prepared(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[Excitation]:
-    """The experiments with what was before their first samples: the input they show there for ever, or none where
-    a log begins with the step itself.
+    """The experiments with what was before their first samples: the input they show there for ever, or none
+    where a log begins with the step itself.
 
-    The second is taken where it needs no further past, and the fit of all experiments leaves little less with the
-    first, whatever pasts that asks for.
+    The second is taken where it needs no further past, and the fit of all experiments leaves little less with
+    the first, whatever pasts that asks for.
     """
     ways = [possible_rests(e) for e in experiments]
     rest, zero = ([prepare(e, rig, powers, way[k]) for e, way in zip(experiments, ways)] for k in (0, -1))
@@ -178,7 +180,8 @@ def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[Experim
 
 
 def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
-    """Logs beside what the identified rig makes of their input, each from the initial state that it asks for."""
+    """Logs beside what the identified rig makes of their input, each from the initial state that it asks
+    for."""
     made = [_prepared([e], rig, len(rig.actuator.gain))[0] for e in experiments]
     return tuple(
         Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
@@ -208,4 +211,3 @@ def _compared(excitations, fits: list[ExperimentFit], joint: Joint):
 
 def _with_mean(values: dict[str, float]) -> dict[str, float]:
     return {**values, "mean": float(np.mean(list(values.values())))} if values else {}
-

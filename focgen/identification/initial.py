@@ -12,10 +12,9 @@ from focgen.identification.past import EXACT, MOST_STEPS, asks_for_past, best_ti
 from focgen.rig.model import Actuator
 
 
-
 def answer_from_its_past(x: Excitation, actuator: Actuator, delay: float = 0.0) -> np.ndarray:
-    """The actuator's output (n,) for an experiment, with the offset that fits best, and from the initial state that
-    the data ask for; ``delay`` in s.
+    """The actuator's output (n,) for an experiment, with the offset that fits best, and from the initial
+    state that the data ask for; ``delay`` in s.
 
     The past is one step, or a few, at times on a grid: the one that takes off most, then the next.
     """

@@ -147,8 +147,8 @@ class _Projected:
         return np.clip(x, *self.edges)
 
     def basis(self, x: np.ndarray, stride: int = 1) -> np.ndarray:
-        """Responses to the input of s^zeros/den, …, 1/den, and 1 for an offset, at every ``stride``-th sample;
-        (samples, zeros + 1 or 2)."""
+        """Responses to the input of s^zeros/den, …, 1/den, and 1 for an offset, at every ``stride``-th
+        sample; (samples, zeros + 1 or 2)."""
         poles = _apart(_poles(self.poles, self.inside(x)))
         single = [_respond(p, self.experiment)[::stride] for p in poles]
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]

@@ -1,4 +1,5 @@
-"""Responses of e^(−Ls)/((τ s)^α + 1) to a step, with their derivatives in log τ and α, at every sample at once.
+"""Responses of e^(−Ls)/((τ s)^α + 1) to a step, with their derivatives in log τ and α, at every sample at
+once.
 
 Each is inverted from its own Laplace transform, so the derivatives are as exact as the response. For α > 1
 the pair of poles p = e^{±iπ/α}/τ leaves the negative real axis and is taken out in closed form.
@@ -33,10 +34,12 @@ _WEIGHTS = {  # of S(m − x) over the sample, as functions of x
 
 
 class Kernels:
-    """The kernels for ``count`` samples of ``step`` s and a ``delay`` ≥ 0 in s, each made when it is asked for.
+    """The kernels for ``count`` samples of ``step`` s and a ``delay`` ≥ 0 in s, each made when it is asked
+    for.
 
     Rows: the response, its derivatives in log τ and α. ``steps`` at 0, h, … and ``means``, ``bends``,
-    ``twists`` at h, 2h, …, each (3, count); ``late``: whole samples by which all of it is still to be delayed.
+    ``twists`` at h, 2h, …, each (3, count); ``late``: whole samples by which all of it is still to be
+    delayed.
     """
 
     def __init__(self, log_tau: float, alpha: float, step: float, count: int, delay: float = 0.0):

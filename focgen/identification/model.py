@@ -50,9 +50,9 @@ class Joint:
     """One K(p), T, alpha and dead time for all experiments: the actuator that is written.
 
     ``delay`` in s. ``ci95`` maps T, alpha, delay and gain to 95 % intervals. ``gain_r2`` is that of the line
-    through the single fits' K, None with fewer than two of them. ``simulated``, by experiment: its output, offset
-    and initial state included. ``pasts``: the experiments that began with an unknown past. ``closed_loop``:
-    whether a loop was closed, so that a noise model was fitted along.
+    through the single fits' K, None with fewer than two of them. ``simulated``, by experiment: its output,
+    offset and initial state included. ``pasts``: the experiments that began with an unknown past.
+    ``closed_loop``: whether a loop was closed, so that a noise model was fitted along.
     """
 
     T: float
@@ -84,8 +84,8 @@ class Identification:
 
     ``gof`` maps a model ("fom", "iom_1p", …, "rig" for the joint one) to experiment → GOF, with "mean";
     ``bic`` likewise for Schwarz's criterion (smaller is better). ``warnings``: what these logs cannot show.
-    ``unseen``: logs it was not fitted to. ``stages``: regulator and sensor, where asked for. ``joint`` is None
-    where the actuator was not.
+    ``unseen``: logs it was not fitted to. ``stages``: regulator and sensor, where asked for. ``joint`` is
+    None where the actuator was not.
     """
 
     experiments: tuple[ExperimentFit, ...]

@@ -1,9 +1,10 @@
 """The initial state: what an input before the first sample still does after it.
 
-The state that a fractional system starts from is its whole past. Here the past is a drive K(p) p that stepped once,
-or a few times, at unknown times before the first sample by unknown amounts within the drive's range. A step by a
-that was θ ago still lacks a (1 − S(t + θ)) of its way. A held level is such a past with θ = 0, a rest one without
-any step. More than a few steps are never needed: what they leave is ever smoother, so a few stand for many.
+The state that a fractional system starts from is its whole past. Here the past is a drive K(p) p that stepped
+once, or a few times, at unknown times before the first sample by unknown amounts within the drive's range. A
+step by a that was θ ago still lacks a (1 − S(t + θ)) of its way. A held level is such a past with θ = 0, a
+rest one without any step. More than a few steps are never needed: what they leave is ever smoother, so a few
+stand for many.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from wh
 
 @dataclass(frozen=True)
 class Past:
-    """A number of ``steps`` at unknown times, whose sizes are normal with standard deviation ``reach``, output
-    units.
+    """A number of ``steps`` at unknown times, whose sizes are normal with standard deviation ``reach``,
+    output units.
 
-    What was before the first of them is not known either: at ``older`` times, samples before the first sample,
-    further steps are allowed for, half as large. They are smooth by now, and only widen the intervals. An experiment
-    that begins at a held level has them even where no step is found.
+    What was before the first of them is not known either: at ``older`` times, samples before the first
+    sample, further steps are allowed for, half as large. They are smooth by now, and only widen the
+    intervals. An experiment that begins at a held level has them even where no step is found.
     """
 
     steps: int
@@ -59,7 +60,8 @@ def times(x: Excitation, octave: int = 1) -> np.ndarray:
 
 
 def older_times(x: Excitation, when: np.ndarray) -> tuple[float, ...]:
-    """Octaves before the earliest of the times ``when``, from the first sample on where there is none; samples."""
+    """Octaves before the earliest of the times ``when``, from the first sample on where there is none;
+    samples."""
     first = 2.0 * (float(np.max(when)) + 1.0) if len(when) else 1.0
     return tuple(first * 2.0**k for k in range(max(0, int(np.ceil(np.log2(latest(x) / first))))))
 
@@ -88,8 +90,8 @@ def asks_for_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
     """Whether what the right model leaves, (n,), asks for a past with columns like ``made`` (times, n).
 
     The χ² that such a past takes off the whitened residual has to tell it from noise, see :func:`suggestion`.
-    What a model that is not quite true leaves is no stationary noise, though. So the best single step has to take
-    off enough of the residual itself, too, counted in as many samples as its rest is worth.
+    What a model that is not quite true leaves is no stationary noise, though. So the best single step has to
+    take off enough of the residual itself, too, counted in as many samples as its rest is worth.
     """
     return suggestion(residual, made, reach) > 0.0 and _explains(residual, made[best_time(residual, made)])
 
@@ -105,8 +107,8 @@ def suggestion(residual: np.ndarray, made: np.ndarray, reach: float) -> float:
 
 
 def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
-    """χ² that the columns take off and their effective number; ``rows``: residual, offset, columns, in units of
-    the noise."""
+    """χ² that the columns take off and their effective number; ``rows``: residual, offset, columns, in units
+    of the noise."""
     mean = rows[:, 1] / np.linalg.norm(rows[:, 1])
     rows = rows - np.outer(mean, mean @ rows)
     singular, sizes, _ = np.linalg.svd(reach * rows[:, 2:], full_matrices=False)
@@ -121,8 +123,8 @@ def _explains(residual: np.ndarray, column: np.ndarray) -> bool:
 
 
 def worth_it(before: np.ndarray, after: np.ndarray) -> bool:
-    """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples; by half where
-    what is left is likely a misfit."""
+    """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples; by
+    half where what is left is likely a misfit."""
     taken = float(np.var(before)) / max(float(np.var(after)), 1e-300) - 1.0
     effective = max(residual_model(after).effective, _AT_LEAST)
     if effective > _WHITE * len(after):

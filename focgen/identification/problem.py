@@ -26,8 +26,8 @@ _SECOND = 4.0  # times the best cost: a start of another order is tried up to he
 class Point:
     """A trial ``x``, see :class:`Problem`, and what follows from it linearly.
 
-    ``gain`` (powers,); ``offsets``, and ``amounts`` of the past's steps, of each experiment; ``cost``: the sum of
-    squares, scaled.
+    ``gain`` (powers,); ``offsets``, and ``amounts`` of the past's steps, of each experiment; ``cost``: the
+    sum of squares, scaled.
     """
 
     x: np.ndarray
@@ -39,7 +39,8 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class _Local:
-    """What an experiment has for itself, an offset and a past: an orthonormal basis of it, prior rows below."""
+    """What an experiment has for itself, an offset and a past: an orthonormal basis of it, prior rows
+    below."""
 
     basis: np.ndarray
     triangle: np.ndarray
@@ -57,13 +58,15 @@ class _Local:
 
 
 class Problem:
-    """Experiments that share T, α, K(p) and the dead time, each scaled by its own spread so that all weigh alike.
+    """Experiments that share T, α, K(p) and the dead time, each scaled by its own spread so that all weigh
+    alike.
 
-    ``x`` is (log τ, α), then the dead time in samples of the first experiment where it is ``delay_free``, then
-    log(θ + 1), θ in samples, of every step of a past. ``pasts``: an unknown past for each experiment, or None for
-    a begin at rest;
+    ``x`` is (log τ, α), then the dead time in samples of the first experiment where it is ``delay_free``,
+    then log(θ + 1), θ in samples, of every step of a past. ``pasts``: an unknown past for each experiment, or
+    None for a begin at rest;
     ``penalties``: the variance (scaled) that weighs a past's prior against the data. ``whitening``: for each
-    experiment the autoregressive filter [1, a₁, …] that makes its residual white, None where it is taken as it is.
+    experiment the autoregressive filter [1, a₁, …] that makes its residual white, None where it is taken as
+    it is.
     """
 
     ALPHAS = (0.05, 1.95)
@@ -209,7 +212,8 @@ class Problem:
     # -- derivatives ----------------------------------------------------------------------------------------
 
     def _slopes(self, point: Point, i: int) -> np.ndarray:
-        """Derivatives of an experiment's scaled output by those of ``x`` that it depends on; see :meth:`_own`."""
+        """Derivatives of an experiment's scaled output by those of ``x`` that it depends on; see
+        :meth:`_own`."""
         x, w = point.x, self.weights[i]
         slopes = np.einsum("rmn,m->rn", self._responses(x, i)[1:], point.gain)
         if self.pasts[i] is not None:
@@ -240,8 +244,9 @@ class Problem:
         return (ends[0] - ends[1]) / (_NUDGE + low)
 
     def jacobians(self, point: Point, offset: bool = False) -> list[np.ndarray]:
-        """Derivatives of each experiment's scaled output by x and gain, (n + prior rows, parameters), its local
-        columns and those of its noise model projected out; ``offset``: the offset is the last column instead.
+        """Derivatives of each experiment's scaled output by x and gain, (n + prior rows, parameters), its
+        local columns and those of its noise model projected out; ``offset``: the offset is the last column
+        instead.
         """
         found = []
         for i, x in enumerate(self.experiments):
@@ -255,8 +260,8 @@ class Problem:
         return found
 
     def _without_noise_model(self, point: Point, i: int, rows: np.ndarray) -> np.ndarray:
-        """Rows without what the whitening filter's own coefficients can make up for: in a closed loop they answer
-        the same disturbance as the model."""
+        """Rows without what the whitening filter's own coefficients can make up for: in a closed loop they
+        answer the same disturbance as the model."""
         if self.whitening[i] is None:
             return rows
         residual, n = self.residuals(point)[i], len(self.experiments[i])

@@ -178,7 +178,8 @@ def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> Rows:
     """What every record is a sum of: its own rows (·, n), and those whose weights all records share (·, n).
 
     Shared are the response of unit gain and, with a zero, its derivative per sample. Its own are an offset
-    and, where it moves at the first sample, the free response of the state there and that to another input before.
+    and, where it moves at the first sample, the free response of the state there and that to another input
+    before.
     """
     delay = delay_of(shape, x)
     if not shape.poles:

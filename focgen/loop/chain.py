@@ -33,8 +33,8 @@ class Chain:
 
     ``pressure`` (samples, substeps + 1, 1): from the held command to the pressure at the substeps of the
     sample, both ends included, without the regulator's delay; where it has one, a last row more is the
-    pressure with it at the sample's end. ``output`` and ``curvature`` (samples, 1, substeps + 1): from K(p)p there
-    to the sensor's output and the curvature at the sample's end.
+    pressure with it at the sample's end. ``output`` and ``curvature`` (samples, 1, substeps + 1): from K(p)p
+    there to the sensor's output and the curvature at the sample's end.
     """
 
     rig: Rig

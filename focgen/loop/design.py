@@ -26,7 +26,7 @@ from focgen.loop.tuning import HORIZON, OVERSHOOT, Tuned, Wish, fastest, meeting
 from focgen.loop.worst import Worst, worst_case
 from focgen.output import check_apart, write_file
 from focgen.plan.build import build_plan
-from focgen.plan.model import LONGEST
+from focgen.plan.model import LONGEST, Plan
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 

@@ -12,13 +12,15 @@ _SHOWN = 3  # parameters of an effect
 _SURE = 1.0  # of a value: an interval that is wider says nothing of its size
 _LOGGED = ("command", "pressure", "curvature", "output")
 _MEANS = (
-    "A confidence is a probability, measured on the simulated rigs of docs/diagnosis.md: of names given at 90 % "
+    "A confidence is a probability, measured on the simulated rigs of docs/diagnosis.md: of names "
+    "given at 90 % "
     "there, nine in ten are right."
 )
 
 
 def units_of_rig(rig: Rig) -> dict[str, str]:
-    """The unit of each signal as far as its column tells it; the curvature's is the output's where it has none."""
+    """The unit of each signal as far as its column tells it; the curvature's is the output's where it has
+    none."""
     units = {role: unit_of(getattr(rig.signals, role)) for role in _LOGGED}
     return units | {"curvature": units["curvature"] or units["output"]}
 
@@ -36,21 +38,28 @@ def _where(found: Diagnosis) -> str:
         return "Where: nowhere; what is left does not depend on what was done to the rig."
     if where.stage is None:
         return "Where: these logs do not tell the stage."
-    how = "inferred from the dynamics, not from its own signals" if where.inferred else "seen in its own signals"
+    how = (
+        "inferred from the dynamics, not from its own signals"
+        if where.inferred
+        else "seen in its own signals"
+    )
     part = f" with {share[where.stage]:.0%} of the gap" if share.get(where.stage) else ""
     return f"Where: the {where.stage}{part}, {how}."
 
 
 def _which(found: Diagnosis, units: Mapping[str, str]) -> list[str]:
     if found.verdict == "parameters":
-        return [f"Which: no effect; the rig's own numbers were off, and {found.refitted_rig} has better ones."]
+        return [
+            f"Which: no effect; the rig's own numbers were off, and {found.refitted_rig} has better ones."
+        ]
     if found.verdict == "none":
         return ["Which: no effect."]
     said = [_cause(cause, units) for cause in found.causes]
     said += [_unexplained(place, what, found) for place, what in found.unexplained.items()]
-    return [f"Which: {said[0]}" if said else "Which: none that is known.", *(f"  also: {one}" for one in said[1:])] + (
-        [_MEANS] if found.causes else []
-    )
+    return [
+        f"Which: {said[0]}" if said else "Which: none that is known.",
+        *(f"  also: {one}" for one in said[1:]),
+    ] + ([_MEANS] if found.causes else [])
 
 
 def _cause(cause: Found, units: Mapping[str, str]) -> str:
@@ -70,7 +79,9 @@ def _listed(candidates: list[Candidate]) -> str:
 
 def _size(candidate: Candidate, units: Mapping[str, str]) -> str:
     """The parameters that are known, with the log's units."""
-    known = [_value(name, e, units) for name, e in candidate.parameters.items() if name != "scale" and _is_known(e)]
+    known = [
+        _value(name, e, units) for name, e in candidate.parameters.items() if name != "scale" and _is_known(e)
+    ]
     return f" ({', '.join(known[:_SHOWN])})" if known else ""
 
 
@@ -101,15 +112,15 @@ def _unexplained(place: str, what: Mapping, found: Diagnosis) -> str:
 def _how_far(found: Diagnosis, units: Mapping[str, str]) -> str:
     gap, unit = found.gap, units.get("output") or found.gap.unit
     text = (
-        f"How far: the output is off by {gap.as_given:.3g} {unit} as given, {gap.refitted:.3g} with its own numbers "
+        f"How far: the output is off by {gap.as_given:.3g} {unit} as given, {gap.refitted:.3g} with "
+        f"its own numbers "
         f"refitted, {gap.explained:.3g} with what was found; the noise is {gap.floor:.3g}."
     )
     if found.shrink is None:
         return text
     low, high = found.shrink_interval
-    return (
-        f"{text} For new experiments {found.shrink:.0%} ({low:.0%} to {high:.0%}) of what can be explained will go."
-    )
+    share = f"{found.shrink:.0%} ({low:.0%} to {high:.0%})"
+    return f"{text} For new experiments {share} of what can be explained will go."
 
 
 def _next(found: Diagnosis) -> list[str]:

@@ -21,8 +21,8 @@ _LAST = 0.5  # of a swinging log: the part drawn as loops, when the start has di
 
 
 def identification_pictures(found: Identification) -> dict[str, bytes]:
-    """Return PNG pictures by file name: ``loops.png`` only where a log swings, ``parameters.png`` where two are
-    steps, and those of a stage where it was identified."""
+    """Return PNG pictures by file name: ``loops.png`` only where a log swings, ``parameters.png`` where two
+    are steps, and those of a stage where it was identified."""
     pictures = {f"{name}.png": _stage(found, fit) for name, fit in found.stages.items()}
     if found.joint is None or not found.experiments:
         return pictures

@@ -55,7 +55,20 @@ def _stage(fit: StageFit) -> dict:
 
 
 def _experiment(fit: ExperimentFit) -> dict:
-    keys = ("name", "K", "T", "alpha", "ci95", "level", "offset", "gof", "fitted", "driven_by", "step", "past")
+    keys = (
+        "name",
+        "K",
+        "T",
+        "alpha",
+        "ci95",
+        "level",
+        "offset",
+        "gof",
+        "fitted",
+        "driven_by",
+        "step",
+        "past",
+    )
     return {key: getattr(fit, key) for key in keys} | {
         "integer": {f.name: {"num": f.num, "den": f.den, "offset": f.offset} for f in fit.integer}
     }
@@ -100,7 +113,9 @@ def parameter_table(found: Identification) -> TableOf:
         for fit in found.experiments
     ]
     joint = found.joint
-    rows.append(("all together", "", "", _pm(joint.T, joint.ci95["T"]), _pm(joint.alpha, joint.ci95["alpha"])))
+    rows.append(
+        ("all together", "", "", _pm(joint.T, joint.ci95["T"]), _pm(joint.alpha, joint.ci95["alpha"]))
+    )
     level, gain = with_unit("level", _driving_unit(found)), with_unit("K", gain_unit(found))
     return TableOf(
         ("experiment", level, gain, "T (s^alpha)", "alpha"), tuple(rows), "K / (T s^alpha + 1), ± 95 %"

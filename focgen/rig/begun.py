@@ -40,7 +40,8 @@ def _extended(run: Run) -> tuple[Run, np.ndarray]:
     rest = np.zeros(sum(whole), np.uint8)
     rest[starts] = [1 if begin == REST else BALANCED for begin in run.begins]
     clock = [
-        part for past, t in zip(pasts, _parts(run.clock, run))
+        part
+        for past, t in zip(pasts, _parts(run.clock, run))
         for part in (t[0] - h * np.arange(len(past), 0, -1), t)
     ]
     kept = [s + len(past) + np.arange(n) for s, past, n in zip(starts, pasts, lengths)]

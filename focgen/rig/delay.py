@@ -9,8 +9,8 @@ from focgen.rig import kernels
 
 
 def shifted(x: np.ndarray, rest: np.ndarray, whole: int) -> np.ndarray:
-    """``x`` (n,) later by ``whole`` samples, anew wherever ``rest`` (n,) is not 0; before it is zero, or where
-    ``rest`` is ``BALANCED`` what it is at first."""
+    """``x`` (n,) later by ``whole`` samples, anew wherever ``rest`` (n,) is not 0; before it is zero, or
+    where ``rest`` is ``BALANCED`` what it is at first."""
     y = np.zeros_like(x)
     firsts = np.flatnonzero(rest).tolist()
     for first, last in zip(firsts, [*firsts[1:], len(x)]):

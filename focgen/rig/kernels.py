@@ -2,8 +2,8 @@
 
 The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
 behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), 1 where an experiment begins
-and the loop starts at rest at 0, BALANCED where it starts in equilibrium with that sample, as if that had been
-held for ever, and else 0; it returns a new array of shape (n,).
+and the loop starts at rest at 0, BALANCED where it starts in equilibrium with that sample, as if that had
+been held for ever, and else 0; it returns a new array of shape (n,).
 """
 
 from __future__ import annotations

@@ -6,10 +6,10 @@ amplitude is found by bisection so that the gap is the severity's: low 3 %, mid 
 largest.
 
 *Surviving gap*: what is left of it, in the logged signals, once the own parameters of the rig have been
-refitted: the projection off their sensitivities. Those of the actuator (T, alpha, gain or num and den, offset)
-move freely, gain and times of regulator and sensor by three times their uncertainty. Each signal is weighted
-by its noise. *Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more, both root
-mean square.
+refitted: the projection off their sensitivities. Those of the actuator (T, alpha, gain or num and den,
+offset) move freely, gain and times of regulator and sensor by three times their uncertainty. Each signal is
+weighted by its noise. *Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more,
+both root mean square.
 """
 
 from __future__ import annotations
@@ -129,8 +129,8 @@ def moved_rigs(rig: Rig) -> Iterator[tuple[Rig, float]]:
 
 
 def _scaled_rigs(rig: Rig) -> Iterator[tuple[Rig, float, float]]:
-    """The rig with gain or times of regulator or sensor a little larger, by how much, and by how much they may
-    be without being a fault."""
+    """The rig with gain or times of regulator or sensor a little larger, by how much, and by how much they
+    may be without being a fault."""
     small = 1e-3
     for stage in ("regulator", "sensor"):
         known = getattr(rig.uncertainty, stage)

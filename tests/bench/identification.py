@@ -1,5 +1,5 @@
-"""One fit of K/(1.32 s^0.6 + 1) to 2000 samples at 10 ms, and a joint one of K(p) p to six runs of 4000: ours beside
-Levenberg–Marquardt around eq. (10)."""
+"""One fit of K/(1.32 s^0.6 + 1) to 2000 samples at 10 ms, and a joint one of K(p) p to six runs of 4000: ours
+beside Levenberg–Marquardt around eq. (10)."""
 
 import time
 
@@ -40,8 +40,8 @@ def start_of(runs: list[Excitation]) -> np.ndarray:
 
 
 def plain_fit(runs: list[Excitation], start: np.ndarray) -> np.ndarray:
-    """The gain's coefficients, T and α by scipy's Levenberg–Marquardt around the recursion of eq. (10), with the
-    whole past for memory; each run scaled by its spread.
+    """The gain's coefficients, T and α by scipy's Levenberg–Marquardt around the recursion of eq. (10), with
+    the whole past for memory; each run scaled by its spread.
     """
 
     def residual(parameters):
@@ -59,7 +59,8 @@ def plain_fit(runs: list[Excitation], start: np.ndarray) -> np.ndarray:
 
 
 def our_fit(runs: list[Excitation]) -> np.ndarray:
-    """The gain's coefficients, T and α, with offsets and all intervals; nothing is remembered from the last fit."""
+    """The gain's coefficients, T and α, with offsets and all intervals; nothing is remembered from the last
+    fit."""
     kernels.cache_clear()
     fit = fit_fractional([x.bare() for x in runs])
     return np.array([*fit.gain, fit.T, fit.alpha])
