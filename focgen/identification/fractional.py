@@ -29,7 +29,7 @@ from focgen.identification.past import (
     times,
     worth_it,
 )
-from focgen.identification.problem import Point, Problem, delay_reach, shortened, starts
+from focgen.identification.problem import Point, Problem, shortened, starts
 
 _ROUNDS = 60  # of Levenberg–Marquardt
 _DAMPED, _STIFF, _FREE = 1e-3, 1e9, 1e-9  # damping: at first, at most, at least
@@ -309,6 +309,3 @@ def _offset_variance(problem: Problem, point: Point, models) -> float:
         return float(sandwich(rows, models, problem.penalties)[-1, -1])
     except np.linalg.LinAlgError:
         return float("inf")
-
-
-__all__ = ["FractionalFit", "delay_reach", "fit_fractional"]
