@@ -26,7 +26,7 @@ from focgen.identification.sure import actuator_uncertainty, check_determined, w
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
 from focgen.logs.read import read_logs
-from focgen.output import write_file
+from focgen.output import check_apart, write_file
 from focgen.rig.engine import STAGES
 from focgen.rig.files import read_rig, rig_text
 from focgen.rig.model import Actuator, Rig
@@ -58,6 +58,8 @@ def identify(
 
     Raises LogError, RigError or FitError; nothing is written then.
     """
+    if out is not None:
+        check_apart([out], (*logs, rig, *unseen))
     check_degree(gain_degree)
     if not stages:
         raise FitError("--stages", "names no stage", f"give one or more of {', '.join(STAGES)}")
