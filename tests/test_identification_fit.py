@@ -380,3 +380,17 @@ def test_a_misfit_is_not_blamed_on_short_holds():
     with pytest.raises(FitError) as raised:
         module.identify([wanders], paper_rig(), integer=False)
     assert "hold" not in raised.value.remedy and "columns" in raised.value.remedy
+
+
+def test_a_log_that_only_relaxes_is_not_taken_for_driven():
+    """What a release left, beside a gauge's noise about 0: any gain would make a step of the first
+    reading."""
+    log = step_log(release=12.0)
+    rng = np.random.default_rng(3)
+    signals = {role: values[800:] for role, values in log.signals.items()}
+    signals["pressure"] = signals["pressure"] + 3e-4 * rng.normal(size=len(signals["pressure"]))
+    rests = Experiment("rests", 0.02, signals)
+    with pytest.raises(LogError, match="only its own noise moves"):
+        module.identify([rests], paper_rig(), integer=False)
+    found = module.identify([log, rests], paper_rig(), integer=False)
+    assert found.joint.T == pytest.approx(T, rel=1e-6) and any("rests: not used" in n for n in found.notes)

@@ -23,6 +23,7 @@ _SURELY = 0.8  # of the samples before it is away: the last ones may be its begi
 _SEVERAL = 10  # samples whose mean is a better rest than the first of them
 _DRIFT = 3.0  # standard errors of a slope: what is steeper does not rest
 _FEWEST = 30  # samples
+_NOISE = 12.0  # standard deviations: white noise alone does not spread so far in ten million samples
 _LOOKED_BACK, _FARTHEST = (
     2,
     80_000,
@@ -227,11 +228,26 @@ def _check(experiment: Experiment) -> None:
         raise LogError(
             experiment.name, f"has an output of {fitted[0]:g} throughout", "check the sensor and the column"
         )
-    role = "pressure" if "pressure" in experiment else "command"
-    if not np.any(experiment[role]):
-        raise LogError(
-            experiment.name, f"has a {role} of 0 throughout", "give a log in which the rig is driven"
-        )
+    if not is_driven(experiment):
+        role = "pressure" if "pressure" in experiment else "command"
+        what = "of 0 throughout" if not np.any(experiment[role]) else "that only its own noise moves"
+        raise LogError(experiment.name, f"has a {role} {what}", "give a log in which the rig is driven")
+
+
+def is_driven(experiment: Experiment) -> bool:
+    """Whether the input does anything: it is not 0 throughout, nor, measured, its own noise about one level.
+
+    What follows from a past alone shows no gain, and with a gain of any size a first reading's noise is a
+    step.
+    """
+    if "pressure" not in experiment:
+        return bool(np.any(experiment["command"]))
+    values = experiment["pressure"]
+    commanded = "command" in experiment and np.ptp(experiment["command"]) > 0.0
+    held_up = abs(float(np.median(values))) > _NOISE * noise_level(values)
+    return bool(np.any(values)) and (
+        commanded or held_up or float(np.ptp(values)) > _NOISE * noise_level(values)
+    )
 
 
 def _input(experiment: Experiment, rig: Rig, before: float | None):

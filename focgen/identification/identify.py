@@ -11,7 +11,7 @@ import numpy as np
 from focgen.errors import FitError, check_choice
 from focgen.identification.caveats import warnings_of
 from focgen.identification.digits import told_gain, told_value
-from focgen.identification.excitation import Excitation, possible_rests, prepare
+from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
 from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
 from focgen.identification.initial import answer_from_its_past
@@ -102,8 +102,11 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     """The identification of the actuator; ``rig`` has the regulator and the sensor it is seen through."""
     if rig.delays.actuator and not delay:
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
-    excitations = _prepared(experiments, rig, degree + 1)
+    driven = [e for e in experiments if is_driven(e)]
+    excitations = _prepared(driven or experiments, rig, degree + 1)
     degree, told = feasible_degree(excitations, degree)
+    if still := [e.name for e in experiments if not is_driven(e)]:
+        told += (f"{listed(still)}: not used, for the input rests throughout",)
     excitations = [x.with_powers(degree + 1) for x in excitations]
     fit = fit_fractional(excitations, delay)
     check_determined(excitations, fit)
