@@ -55,11 +55,10 @@ def _which(found: Diagnosis, units: Mapping[str, str]) -> list[str]:
     if found.verdict == "none":
         return ["Which: no effect."]
     said = [_cause(cause, units) for cause in found.causes]
-    said += [_unexplained(place, what, found) for place, what in found.unexplained.items()]
-    return [
-        f"Which: {said[0]}" if said else "Which: none that is known.",
-        *(f"  also: {one}" for one in said[1:]),
-    ] + ([_MEANS] if found.causes else [])
+    said += [_unexplained(place, what) for place, what in found.unexplained.items()]
+    first = f"Which: {said[0]}" if said else "Which: none that is known."
+    also = [f"  also: {one}" for one in said[1:]]
+    return [first, *also, *_nearest(found), *([_MEANS] if found.causes else [])]
 
 
 def _cause(cause: Found, units: Mapping[str, str]) -> str:
@@ -98,15 +97,20 @@ def _value(name: str, estimate: Estimate, units: Mapping[str, str]) -> str:
     return f"{name} {estimate.value:.3g} ± {half:.1g} {unit}".rstrip()
 
 
-def _unexplained(place: str, what: Mapping, found: Diagnosis) -> str:
-    """What is left, what it goes with, and the family that comes nearest."""
+def _unexplained(place: str, what: Mapping) -> str:
+    """What is left, and what it goes with."""
     parts = [part for part in what.get("depends_on", ()) if part != "nothing"]
     parts += ["slow swings that no input foretells"] * bool(what.get("slow_swings"))
-    left = f"something in the {place} that no effect of the library explains"
     on = f"; it goes with {', '.join(parts)}" if parts else ""
+    return f"something from {place} that no effect of the library explains{on}."
+
+
+def _nearest(found: Diagnosis) -> list[str]:
+    """The family that comes nearest where something is left unexplained."""
     near = min(found.fits, key=lambda fit: fit.error, default=None)
-    nearest = f"; nearest is {near.effect}, which by itself leaves {near.error:.0%} of it" if near else ""
-    return f"{left}{on}{nearest}."
+    if near is None or not found.unexplained:
+        return []
+    return [f"  nearest: {near.effect}, which by itself leaves {near.error:.0%} of the error where it acts."]
 
 
 def _how_far(found: Diagnosis, units: Mapping[str, str]) -> str:
