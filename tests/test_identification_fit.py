@@ -16,7 +16,7 @@ from focgen.identification.between import course_of, jumps_of
 from focgen.identification.excitation import prepare
 from focgen.identification.fractional import fit_fractional
 from focgen.identification.integer import SHAPES, fit_integer_models
-from focgen.identification.kernel import step_means, step_responses
+from focgen.identification.kernel import kernels
 from focgen.identification.gain import secants_of
 from focgen.identification.quality import gof
 from focgen.logs.experiment import Experiment
@@ -302,8 +302,8 @@ def test_an_output_that_does_not_follow_the_input_is_no_model(tmp_path):
 def test_kernels_stay_finite_where_a_pole_dies_within_a_sample():
     """Levenberg–Marquardt wanders to such time constants; a warning would be an error here."""
     for log_tau in (-12.0, -40.0, -60.0):
-        for kernel in (step_responses, step_means):
-            response = kernel(log_tau, 1.4, 0.05, 50)[0]
+        made = kernels(log_tau, 1.4, 0.05, 50)
+        for response in (made.steps[0], made.means[0]):
             assert np.all(np.isfinite(response)) and response[1:] == pytest.approx(1.0, abs=1e-4)
 
 

@@ -104,9 +104,7 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
     driven = [e for e in experiments if is_driven(e)]
     excitations = _prepared(driven or experiments, rig, degree + 1)
-    degree, told = feasible_degree(excitations, degree)
-    if still := [e.name for e in experiments if not is_driven(e)]:
-        told += (f"{listed(still)}: not used, for the input rests throughout",)
+    degree, lowered = feasible_degree(excitations, degree)
     excitations = [x.with_powers(degree + 1) for x in excitations]
     fit = fit_fractional(excitations, delay)
     check_determined(excitations, fit)
@@ -122,16 +120,23 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
     warnings = warnings_of(excitations, fit, fits, failed, quality)
-    between = [x.name for x in excitations if is_step(x) and x.between]
-    if between:
-        told += (
-            f"{listed(between)}: steps between two levels; each K is the mean slope of K(p) p on its step",
-        )
-    begun = [x.name for x in excitations if not x.rest_shown]
-    if begun:
-        verb = "begins with its step" if len(begun) == 1 else "each begin with their step"
-        told += (f"{listed(begun)} {verb}: taken as at rest at 0 before",)
+    told = lowered + _told(experiments, excitations)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
+
+
+def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:
+    """What the experiments were taken for."""
+    told, used = [], {x.name for x in excitations}
+    if still := [e.name for e in experiments if e.name not in used]:
+        told.append(f"{listed(still)}: not used, for the input rests throughout")
+    if between := [x.name for x in excitations if is_step(x) and x.between]:
+        told.append(
+            f"{listed(between)}: steps between two levels; each K is the mean slope of K(p) p on its step"
+        )
+    if begun := [x.name for x in excitations if not x.rest_shown]:
+        verb = "begins with its step" if len(begun) == 1 else "each begin with their step"
+        told.append(f"{listed(begun)} {verb}: taken as at rest at 0 before")
+    return tuple(told)
 
 
 def _prepared(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[Excitation]:

@@ -74,16 +74,6 @@ def kernels(log_tau: float, alpha: float, step: float, count: int, delay: float 
     return Kernels(log_tau, alpha, step, count, delay)
 
 
-def step_responses(log_tau: float, alpha: float, step: float, count: int) -> np.ndarray:
-    """Return S, ∂S/∂log τ, ∂S/∂α at 0, h, … (count − 1) h, shape (3, count)."""
-    return _steps(log_tau, alpha, step, count, 0.0)
-
-
-def step_means(log_tau: float, alpha: float, step: float, count: int) -> np.ndarray:
-    """Return the means of S, ∂S/∂log τ, ∂S/∂α over [(j − 1) h, j h], j = 1 … count, shape (3, count)."""
-    return _means(log_tau, alpha, step, count, 0.0)
-
-
 def _steps(log_tau: float, alpha: float, step: float, count: int, part: float) -> np.ndarray:
     """S at (j − part) h, j = 0 … count − 1; 0 ahead of 0."""
     grid = log_grid(max(count - 1, 1))
