@@ -66,6 +66,7 @@ def diagnose(
     logs = begun_session(rig, _usable(experiments(rig, logs, first, last)))
     ran = running(read_controller(controller), logs) if controller is not None else None
     explanations = explain_all(rig, logs, THRESHOLD, only, bootstrap)
+    rig = explanations[0].told(rig)
     rigs = compose.compose(rig, explanations, logs)
     logs = begun_with(rigs, logs)
     rigs, diagnosis, evidence = verdict.reach(rig, logs, rigs, explanations, ran, only is not None)

@@ -9,6 +9,7 @@ import tomlkit
 
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
 from focgen.output import write_file
 from focgen.rig.model import (
     UNITY,
@@ -44,6 +45,7 @@ def read_rig(path: str | Path) -> Rig:
         effects=_effects(top),
         delays=delays,
         uncertainty=_uncertainty(top.table("uncertainty")),
+        between=_between(top.table("signals")),
     )
     top.done()
     return rig
@@ -59,12 +61,24 @@ def _signals(top: Table) -> Signals:
     for role in ("time", "output"):
         table.required(role)
         required[role] = table.text(role)
+    table.text("between")
     table.done()
     if found["command"] is None and found["pressure"] is None:
         raise table.fail(None, "has neither 'command' nor 'pressure'", "name the column of the input")
     signals = Signals(**required, **found)
     _check_columns(table, signals)
     return signals
+
+
+def _between(table: Table) -> Between | None:
+    """What the first input does between its samples, where the file says so."""
+    word = table.text("between")
+    if word is None:
+        return None
+    if word.upper() not in Between.__members__:
+        known = ", ".join(repr(way.name.lower()) for way in Between)
+        raise table.fail("between", f"is {word!r}", f"give one of {known}, or leave it to the logs")
+    return Between[word.upper()]
 
 
 def _check_columns(table: Table, signals: Signals) -> None:
@@ -105,7 +119,8 @@ def _actuator(table: Table | None) -> Actuator | LinearActuator | None:
         return None
     offset = table.number("offset", 0.0)
     if "num" in table or _delays_only(table):
-        actuator = LinearActuator(UNITY if _delays_only(table) else _proper(table), offset)
+        transfer = UNITY if _delays_only(table) else _proper(table)
+        actuator = LinearActuator(transfer, offset, table.number("bias", 0.0))
     else:
         actuator = Actuator(table.number("T", above=0.0), _alpha(table), table.numbers("gain"), offset)
     table.done()
@@ -179,6 +194,8 @@ def rig_table(rig: Rig) -> dict:
     """The rig as nested dictionaries, in the order of the file."""
     table: dict = {"name": rig.name, "sample_time": rig.sample_time}
     table["signals"] = {role: name for role, name in asdict(rig.signals).items() if name is not None}
+    if rig.between is not None:
+        table["signals"]["between"] = rig.between.name.lower()
     for key in ("regulator", "sensor"):
         stage = getattr(rig, key)
         if stage != UNITY:
@@ -209,6 +226,7 @@ def _actuator_table(actuator: Actuator | LinearActuator) -> dict:
         table = {"T": actuator.T, "alpha": actuator.alpha, "gain": list(actuator.gain)}
     else:
         table = {"num": terms_of(actuator.dynamics.num), "den": terms_of(actuator.dynamics.den)}
-    if actuator.offset:
-        table["offset"] = actuator.offset
+    for key in ("offset", "bias"):
+        if getattr(actuator, key, 0.0):
+            table[key] = getattr(actuator, key)
     return table

@@ -17,6 +17,7 @@ import numpy as np
 from focgen.fractional.delay import split_delay
 from focgen.rig import kernels
 from focgen.rig.delay import delayed, shifted
+from focgen.rig.plant import LINEAR, NO_FRICTION, Friction, Spring
 
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
 
@@ -40,12 +41,23 @@ class Modes:
 
 @dataclass(frozen=True)
 class Dynamics:
-    """What effects change of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls
-    short of the response; beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place)."""
+    """What effects change of an actuator's own equation.
+
+    Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response;
+    beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place). dry friction, the ``drag``, takes away
+    from x, in its unit. Of a :class:`~focgen.rig.plant.Plant`: its ``drag``, its hysteretic ``spring``.
+    """
 
     unloading: float = 1.0
     place: float = 0.0
     stiffness: float = 0.0
+    drag: Friction = NO_FRICTION
+    spring: Spring = LINEAR
+
+    @property
+    def changed(self) -> frozenset[str]:
+        """What of it differs from the nominal equation."""
+        return frozenset(name for name, value in vars(self).items() if value != getattr(UNCHANGED, name))
 
 
 UNCHANGED = Dynamics()
@@ -90,7 +102,8 @@ def respond(
     s; ``rest`` (n,) is true where an experiment begins, none longer than ``duration`` s.
 
     With changed ``dynamics`` the response, too, counts as linear between samples: the delay is exact there in
-    whole samples only.
+    whole samples only. Friction bears the springs and the springpot from sample to sample: y stays where it
+    was as long as that takes no more than ``stick``.
     """
     if delay and dynamics == UNCHANGED:
         whole, part = split_delay(delay, h)
@@ -103,7 +116,9 @@ def respond(
     unloading, longest = dynamics.unloading, 2.0 ** np.ceil(np.log2(duration))
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
-    made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, dynamics.place, dynamics.stiffness)
+    drag = dynamics.drag.slide, max(dynamics.drag.stick, dynamics.drag.slide)
+    obstacle = dynamics.place, dynamics.stiffness
+    made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, *obstacle, *drag)
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
 
 
