@@ -36,7 +36,7 @@ def run(
     """
     whole, part = split_delay(delay, h)
     if between == Between.SMOOTH:
-        if transfer.is_integer and len(transfer.den) > 1 and not part:
+        if transfer.is_integer and transfer.den[0].order and not part:
             return shifted(_smooth(transfer, x, rest, h), rest, whole)
         if transfer != UNITY:
             x = sharpened(np.ascontiguousarray(x, float), rest)

@@ -105,14 +105,14 @@ static void rolled(State *s, const Plant *p, double way)
     if (p->soft != 0.0) s->q = wound(p, s->q, way);
 }
 
-/* From 0 velocity on for `time`, too short for anything to change. */
-static void started(const Plant *p, State *s, double u, double time)
+/* From 0 velocity on for `time`, so short that the push changes in a line, from `first` of the input to `u`. */
+static void started(const Plant *p, State *s, double first, double u, double time)
 {
     decide(p, s, u);
     if (!s->moving) return;
-    double rate = (push(p, s, u) - s->moving * p->slide) / p->m;
+    double rate = (push(p, s, 0.5 * (first + u)) - s->moving * p->slide) / p->m;
     rolled(s, p, p->order == 2 ? 0.5 * rate * time * time : rate * time);
-    if (p->order == 2) s->v = rate * time;
+    if (p->order == 2) s->v = rate * time * (1.0 - 0.5 * p->c / p->m * time);
 }
 
 /* Whether a step that ended well may have turned round twice on its way. */
@@ -152,7 +152,9 @@ static void sample(const Plant *p, State *s, const double *c)
             level++;
             continue;
         }
-        if (again && ahead < 0.0) { /* the event is in this short step: what is left of it, by lines */
+        if (again && ahead < 0.0 && p->order == 2 && p->stick == 0.0) { /* nothing holds it: it turns round */
+            *s = to, s->moving = to.v < 0.0 ? -1 : 1;
+        } else if (again && ahead < 0.0) { /* the event is in this short step: what is left of it, by lines */
             double was = s->moving ? s->moving * s->v : p->stick - fabs(push(p, s, d[0]));
             if (p->order == 1 && s->moving) was = s->moving * push(p, s, d[0]) - p->slide;
             double part = was > 0.0 ? was / (was - ahead) : 0.0;
@@ -161,7 +163,7 @@ static void sample(const Plant *p, State *s, const double *c)
                 rolled(s, p, way);
             }
             s->moving = 0, s->v = 0.0;
-            started(p, s, u, (1.0 - part) * span);
+            started(p, s, d[0] + part * (u - d[0]), u, (1.0 - part) * span);
         } else {
             *s = to;
         }
