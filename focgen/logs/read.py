@@ -57,7 +57,7 @@ def read_logs(
     logs = each_of(paths)
     if logs and all(isinstance(log, Experiment) for log in logs):
         return tuple(log.between(first, last) for log in logs)
-    tables = _tables(logs)
+    tables = tables_of(logs)
     if not tables:
         raise LogError("logs", "none is given", "name at least one log")
     found = [part for table in tables for part in _experiments(table, signals, sample_time, (first, last))]
@@ -70,7 +70,8 @@ def each_of(logs: Log | Sequence[Log]) -> list[Log]:
     return [logs] if isinstance(logs, str | Path | Experiment) or is_frame(logs) else list(logs)
 
 
-def _tables(logs: Sequence[Log]) -> list[LogTable]:
+def tables_of(logs: Sequence[Log]) -> list[LogTable]:
+    """Logs as tables. Raises LogError where one cannot be read."""
     names = ["log"] if len(logs) == 1 else [f"log {k}" for k in range(1, len(logs) + 1)]
     return [table_of(log, name) if is_frame(log) else read_table(log) for log, name in zip(logs, names)]
 
