@@ -11,6 +11,7 @@ __version__ = "0.1.0"
 
 # Where each function lives; imported on first use, so that `import focgen` is quick.
 _FUNCTIONS = {
+    "init": "focgen.rig.proposal",
     "identify": "focgen.identification.identify",
     "design": "focgen.loop.design",
     "simulate": "focgen.loop.simulate",
