@@ -93,7 +93,8 @@ def _lag(x, run, dynamics):
 def test_a_form_is_nested_in_the_nominal_chain(effect, form):
     if form.slot == "dynamics":
         x, run = session()
-        zero = form.act(UNCHANGED, tuple(p.zero for p in form.parameters), None)
+        values = tuple(p.starts[0] if p.zero is None else p.zero for p in form.parameters)
+        zero = form.act(UNCHANGED, values, None)
         np.testing.assert_array_equal(_lag(x, run, zero), _lag(x, run, UNCHANGED))
         return
     assert any(p.zero is not None for p in form.parameters) or effect.name == "resonance"

@@ -176,6 +176,8 @@ def _actuator(actuator, here: Sequence[Placed], held: bool, delay: float) -> lis
 def _linear(actuator: LinearActuator, dynamics: Dynamics, held: bool, delay: float) -> list[Step]:
     if dynamics == UNCHANGED:
         return [_transfer(actuator.dynamics, held, delay)]
+    if not linear.single_lag(actuator.dynamics):
+        return [_bent(actuator.dynamics, dynamics, held, delay)]
     return [_lag(*linear.single_lag(actuator.dynamics), dynamics, delay)]
 
 
@@ -187,9 +189,22 @@ def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) 
     )
 
 
+def _bent(transfer, dynamics: Dynamics, held: bool, delay: float) -> Step:
+    return (
+        (transfer, dynamics, held, delay),
+        lambda x, run: linear.run_bent(transfer, x, run.rest, run.h, held, dynamics, delay),
+        None,
+    )
+
+
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
-    """Whether a form can act in a stage of this rig: only a single lag has dynamics to change."""
+    """Whether a form can act in a stage of this rig: only a single lag has dynamics to change, and only what
+    a spring holds has a spring that may bend."""
     if form.slot != "dynamics":
         return True
-    linear_one = isinstance(rig.actuator, LinearActuator) and linear.single_lag(rig.actuator.dynamics)
-    return stage == "actuator" and (isinstance(rig.actuator, Actuator) or bool(linear_one))
+    if stage != "actuator" or rig.actuator is None:
+        return False
+    if isinstance(rig.actuator, Actuator) or linear.single_lag(rig.actuator.dynamics):
+        return True
+    made = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None)
+    return made.only_bends and linear.is_spring(rig.actuator.dynamics)

@@ -39,13 +39,38 @@ class Modes:
 
 
 @dataclass(frozen=True)
+class Bend:
+    """A spring whose stiffness changes with y: 1 + ``first`` q + ``second`` q² times that at rest,
+    q = |y|/``scale``; what gives beside it, mass or damper, stays as it is."""
+
+    first: float = 0.0
+    second: float = 0.0
+    scale: float = 1.0
+
+
+STRAIGHT = Bend()
+
+
+@dataclass(frozen=True)
 class Dynamics:
     """What effects change of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls
-    short of the response; beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place)."""
+    short of the response; beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place); the
+    spring y follows ``bend``, of any linear plant."""
 
     unloading: float = 1.0
     place: float = 0.0
     stiffness: float = 0.0
+    bend: Bend = STRAIGHT
+
+    @property
+    def only_bends(self) -> bool:
+        """Whether nothing but the spring is changed."""
+        return self == Dynamics(bend=self.bend)
+
+    def spring(self, gain: float = 1.0) -> tuple[float, ...]:
+        """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``."""
+        bend = self.bend
+        return bend.first / gain, bend.second / gain, bend.scale, self.place, self.stiffness / gain
 
 
 UNCHANGED = Dynamics()
@@ -103,7 +128,10 @@ def respond(
     unloading, longest = dynamics.unloading, 2.0 ** np.ceil(np.log2(duration))
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
-    made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, dynamics.place, dynamics.stiffness)
+    if dynamics.bend != STRAIGHT:
+        made = kernels.bent_modes(x, rest, a, b0, b1, pair, through, switching, dynamics.spring())
+    else:
+        made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, dynamics.place, dynamics.stiffness)
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
 
 
