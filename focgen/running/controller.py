@@ -34,7 +34,9 @@ class LoadedController:
     ``plan`` describes what is computed, ``path`` is the folder, ``differences`` what has been edited in it.
     """
 
-    def __init__(self, plan: Plan, machine: Machine, path: Path, raw: bool, differences: tuple[str, ...] = ()):
+    def __init__(
+        self, plan: Plan, machine: Machine, path: Path, raw: bool, differences: tuple[str, ...] = ()
+    ):
         self.plan, self.path, self.raw, self.differences = plan, path, raw, differences
         self._machine, self._state = machine, machine.state()
         self._signals = Counts() if raw else Physical()
