@@ -17,6 +17,7 @@ _FUNCTIONS = {
     "simulate": "focgen.loop.simulate",
     "generate": "focgen.codegen.generate",
     "verify": "focgen.verification.verify",
+    "load": "focgen.running.load",
     "cost": "focgen.verification.costs",
     "diagnose": "focgen.diagnosis.diagnose",
     "trial": "focgen.trials.trial",
