@@ -1,8 +1,8 @@
-"""The cases of another suite, once more, with what every rig on a bench has: gauges a little off, and logs that
-begin when somebody pressed the button.
+"""The cases of the suite "full" once more, with what every bench has: stages that are a little off, and logs
+that begin when somebody pressed the button.
 
 Only what is given of a case changes, the rig file or the logs; the true rig, what it does, and the logs that
-stay sealed are the other suite's, so that both can be compared case by case.
+stay sealed are the same, so that both can be compared case by case.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.rig.model import Rig, Uncertainty
 from focgen.trials.cases import Case
 
-DISTURBED = {"off": "full", "begun": "full"}  # suite → the suite whose cases it disturbs
+DISTURBED = ("off", "begun")
 _CUT = (0.2, 8.0)  # s after the input first moves
 
 
@@ -25,7 +25,7 @@ def disturbed(case: Case, suite: str, rng: np.random.Generator) -> Case:
 
 
 def off(rig: Rig, rng: np.random.Generator) -> Rig:
-    """The nominal rig with regulator and sensor off, in gain and in time, by as much as is uncertain of them."""
+    """The nominal rig with gain and times of regulator and sensor off by as much as is uncertain of them."""
     stages = {}
     for name in ("regulator", "sensor"):
         known = getattr(Uncertainty(), name)
