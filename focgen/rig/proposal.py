@@ -107,11 +107,10 @@ def _time(table: LogTable, run: str | None) -> _Time:
     if given in ("ms", "us", "µs", "min"):
         scale = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}[given]
         return _Time(name, given, _rounded(scale * step, drift))
-    if name.lower().endswith("ms") or (
-        given is None and _MILLI[0] <= step <= _MILLI[1] and step == int(step)
-    ):
+    named = name.lower().endswith("ms")
+    if named or (given is None and _MILLI[0] <= step <= _MILLI[1] and step == int(step)):
         doubt = f"time: {name!r} is taken as milliseconds, {step:g} between samples"
-        return _Time(name, "ms", _rounded(1e-3 * step, drift), () if name.lower().endswith("ms") else (doubt,))
+        return _Time(name, "ms", _rounded(1e-3 * step, drift), () if named else (doubt,))
     return _Time(name, "s", _rounded(step, drift))
 
 
