@@ -49,6 +49,13 @@ MINUTES ?= 100000
 TRIALS  := build/trials
 SETS     = $(foreach suite,$(SUITES),$(foreach s,$(SIGNALS),$(TRIALS)/$(s)_$(suite)))
 
+$(VENV)/ready-engine: $(VENV)/ready
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[engine]'
+	@touch $@
+
+$(TRIALS)/%_engine/trial.json: | $(VENV)/ready-engine
+	$(RUN) -m focgen trial make $(TRIALS)/$*_engine --signals $* --suite engine --cases $(CASES) --seed $(SEED)
+
 $(TRIALS)/%/trial.json: | $(VENV)/ready
 	$(RUN) -m focgen trial make $(TRIALS)/$* --signals $(firstword $(subst _, ,$*)) \
 	  --suite $(lastword $(subst _, ,$*)) --cases $(CASES) --seed $(SEED)

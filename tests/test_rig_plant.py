@@ -14,9 +14,9 @@ from focgen.rig.engine import Chain, Placed, fits_in
 from focgen.rig.files import read_rig, write_rig
 from focgen.rig.kernels import BALANCED
 from focgen.rig.model import Actuator, LinearActuator, Rig, Signals
-from focgen.rig.modes import Dynamics
+from focgen.rig.dynamics import Bend, Dynamics, Friction, Spring
 from focgen.rig.modes import respond as lag
-from focgen.rig.plant import Friction, Plant, Spring, plant_of, respond
+from focgen.rig.plant import Plant, plant_of, respond
 from focgen.rig.replay import replay
 
 H = 0.02
@@ -53,7 +53,7 @@ def test_a_mass_that_comes_to_rest_between_springs():
     form; it stops for good where the spring can no longer pull it."""
     m, k, F, u0 = 0.25, 9.0, 1.0, 7.4
     x = np.r_[np.zeros(2), np.full(60, u0), np.zeros(400)]
-    y = respond(Plant(2, m, 0.0, k), x, rest(len(x)), H, Friction(F, F), between=Between.HELD)
+    y = respond(Plant(2, m, 0.0, k), x, rest(len(x)), H, Dynamics(drag=Friction(F, F)), between=Between.HELD)
     w, d = np.sqrt(k / m), F / k
     t = H * np.arange(60)
     halves, phase = np.divmod(w * t, np.pi)
@@ -75,7 +75,7 @@ def test_first_order_follows_within_its_band_as_a_play_does():
     """Without inertia or viscosity to speak of, friction against a spring is a play of half width F/k."""
     t = H * np.arange(1500)
     x = 2.0 * np.sin(0.4 * t) + 0.8 * np.sin(1.3 * t)
-    y = respond(Plant(1, 1e-5, 0.0, 2.0), x, rest(len(x)), H, Friction(0.5, 0.5))
+    y = respond(Plant(1, 1e-5, 0.0, 2.0), x, rest(len(x)), H, Dynamics(drag=Friction(0.5, 0.5)))
     now, play = 0.0, []
     for value in x / 2.0:
         now = min(max(now, value - 0.25), value + 0.25)
@@ -87,7 +87,7 @@ def test_an_axis_under_a_staircase_of_forces_breaks_away_and_coasts_to_rest():
     """m y'' = u − c y' − F: held by the breakaway force up to 0.9, then exponentials in closed form."""
     m, c, F, more = 0.5, 0.3, 0.6, 0.3
     x = np.repeat([0.0, 0.85, 0.95, 0.2], [10, 50, 100, 300])
-    y = respond(Plant(2, m, c, 0.0), x, rest(len(x)), H, Friction(F, F + more), between=Between.HELD)
+    y = respond(Plant(2, m, c, 0.0), x, rest(len(x)), H, Dynamics(drag=Friction(F, F + more)), between=Between.HELD)
     assert np.all(y[:61] == 0.0)
     t, tau, end = H * np.arange(101), m / c, (0.95 - F) / c
     np.testing.assert_allclose(y[60:161], end * (t - tau * (1 - np.exp(-t / tau))), atol=1e-7)
@@ -119,7 +119,7 @@ def test_a_hysteretic_spring_against_an_integrator(spring):
     t = H * np.arange(120)
     x, plant = 2 * np.sin(3 * t) + 1.2 * np.sin(7.3 * t), Plant(2, 0.5, 0.3, 40.0)
     exact = _integrated(plant, spring, x, t)
-    made = respond(plant, x, rest(len(x)), H, spring=spring)
+    made = respond(plant, x, rest(len(x)), H, Dynamics(spring=spring))
     np.testing.assert_allclose(made, exact, atol=1e-6 * np.max(np.abs(exact)))
     plain = respond(plant, x, rest(len(x)), H)
     assert np.max(np.abs(made - plain)) > 0.05 * np.max(np.abs(exact))
@@ -130,7 +130,7 @@ def test_a_spring_in_equilibrium_stays_there():
     held = rest(400).copy()
     held[0] = BALANCED
     for side in (-1.0, 1.0):
-        y = respond(plant, np.full(400, side * 3.0), held, H, Friction(0.4, 0.4), spring)
+        y = respond(plant, np.full(400, side * 3.0), held, H, Dynamics(drag=Friction(0.4, 0.4), spring=spring))
         np.testing.assert_allclose(y, y[0], rtol=1e-6)
         q = (1 - np.exp(-4.0 * abs(y[0]))) / 4.0  # wound from 0 in one go
         assert 40.0 * abs(y[0]) + 24.0 * (q - abs(y[0])) == pytest.approx(2.6, rel=1e-4)
@@ -156,7 +156,7 @@ def test_a_fractional_lag_with_friction_keeps_to_its_balance_of_forces(alpha):
 def test_first_order_friction_is_the_same_by_both_ways():
     t = 0.002 * np.arange(4000)
     x = 2.0 * np.sin(0.9 * t) + 0.7 * np.sin(4.1 * t)
-    exact = respond(Plant(1, 0.5, 0.0, 1.0), x, rest(len(x)), 0.002, Friction(0.3, 0.5))
+    exact = respond(Plant(1, 0.5, 0.0, 1.0), x, rest(len(x)), 0.002, Dynamics(drag=Friction(0.3, 0.5)))
     made = lag(x, rest(len(x)), 0.002, 0.5, 1.0, 8.0, Dynamics(drag=Friction(0.3, 0.5)))
     np.testing.assert_allclose(made, exact, atol=2e-3)
 
@@ -248,3 +248,35 @@ def test_friction_of_a_fractional_lag_of_any_gain_is_in_the_units_of_its_input()
     a = Chain(given, of(0.3)).run(x, "regulator", "sensor", run)
     b = Chain(other, of(1.2)).run(x, "regulator", "sensor", run)
     np.testing.assert_allclose(a, b, atol=1e-12)
+
+
+def test_friction_in_a_spring_that_bends():
+    """Three ways to the same: the plant's own steps, the bent filter's and the bent lag's samples."""
+    h, t = 0.001, 0.001 * np.arange(6000)
+    x, first = 2.0 * np.sin(3.0 * t), Run.of([6000], [0.0], 0.001).rest
+    both = Dynamics(bend=Bend(0.3, 0.5, 1.0), drag=Friction(0.3, 0.4))
+    of = transfer(1.0, 0.02, 0.3, 1.5)
+    exact = respond(plant_of(of), x, first, h, both)
+    np.testing.assert_allclose(linear.run_bent(of, x, first, h, False, both), exact, atol=3e-3)
+    slow = respond(Plant(1, 0.3, 0.0, 1.0), x, first, h, both)
+    np.testing.assert_allclose(lag(x, first, h, 0.3, 1.0, 6.0, both), slow, atol=3e-3)
+    bent = respond(plant_of(of), x, first, h, Dynamics(bend=both.bend))
+    np.testing.assert_allclose(linear.run_bent(of, x, first, h, False, Dynamics(bend=both.bend)), bent, atol=1e-5)
+    assert np.max(np.abs(bent - exact)) > 0.1
+
+
+def test_a_bent_spring_with_hysteresis_against_an_integrator():
+    t = H * np.arange(120)
+    x, plant = 2 * np.sin(3 * t) + 1.2 * np.sin(7.3 * t), Plant(2, 0.5, 0.3, 40.0)
+    bend, spring = Bend(0.4, 0.6, 0.1), Spring(0.5, 4.0, 25.0)
+
+    def slope(now, state):
+        y, v, q = state
+        steep = 1.0 - (4.0 if q * v > 0 else -25.0) * abs(q)
+        bent = y * (bend.first * abs(y) / 0.1 + bend.second * (y / 0.1) ** 2)
+        return [v, (np.interp(now, t, x) - 40 * (y + bent + 0.5 * (q - y)) - 0.3 * v) / 0.5, v * steep]
+
+    exact = solve_ivp(slope, (0, t[-1]), [0, 0, 0], t_eval=t, method="DOP853", rtol=1e-9, atol=1e-12, max_step=H)
+    made = respond(plant, x, rest(len(x)), H, Dynamics(spring=spring, bend=bend))
+    assert np.max(np.abs(exact.y[0])) < 0.11  # where the spring goes on straight
+    np.testing.assert_allclose(made, exact.y[0], atol=2e-6 * np.max(np.abs(exact.y[0])))

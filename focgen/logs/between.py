@@ -112,9 +112,10 @@ def smooth_bends(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     bends, twists = np.zeros(len(values)), np.zeros(len(values))
     for points in _CENTRED:
         if len(values) >= points:
-            windows = np.lib.stride_tricks.sliding_window_view(values, points)
-            middle = slice(points // 2, points // 2 + len(windows))
-            bends[middle], twists[middle] = _weights(points, points // 2 - 1) @ windows.T
+            middle = slice(points // 2, points // 2 + len(values) - points + 1)
+            bend, twist = _weights(points, points // 2 - 1)
+            bends[middle] = np.correlate(values, bend, "valid")
+            twists[middle] = np.correlate(values, twist, "valid")
     return bends, twists
 
 

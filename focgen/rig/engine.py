@@ -14,7 +14,8 @@ from focgen.rig.begun import past_of, with_past
 from focgen.rig.delay import delayed
 from focgen.rig.effects import SLOTS, Form, Run
 from focgen.rig.model import UNITY, Actuator, LinearActuator, Rig
-from focgen.rig.modes import UNCHANGED, Dynamics, respond
+from focgen.rig.dynamics import UNCHANGED, Dynamics
+from focgen.rig.modes import respond
 
 STAGES = ("regulator", "actuator", "sensor")
 
@@ -195,16 +196,18 @@ def _actuator(actuator, here: Sequence[Placed], between: Between | bool, delay: 
 def _linear(actuator: LinearActuator, dynamics: Dynamics, between, delay: float) -> list[Step]:
     if dynamics == UNCHANGED:
         return [_transfer(actuator.dynamics, between, delay)]
-    plant = plants.plant_of(actuator.dynamics)
-    if plant is not None and dynamics.changed <= _OF_PLANTS:
+    plant, changed = plants.plant_of(actuator.dynamics), dynamics.changed
+    if plant is not None and (changed == {"drag"} or "spring" in changed):
         return [_plant(plant, dynamics, between, delay)]
+    if not linear.single_lag(actuator.dynamics):
+        return [_bent(actuator.dynamics, dynamics, between, delay)]
     gain, T, alpha = linear.single_lag(actuator.dynamics)
     return [_lag(gain, T, alpha, replace(dynamics, drag=dynamics.drag * abs(gain)), delay)]
 
 
 def _plant(plant: plants.Plant, dynamics: Dynamics, between, delay: float) -> Step:
     def act(x: np.ndarray, run: Run) -> np.ndarray:
-        made = plants.respond(plant, x, run.rest, run.h, dynamics.drag, dynamics.spring, between)
+        made = plants.respond(plant, x, run.rest, run.h, dynamics, between)
         return delayed(made, run.rest, run.h, delay) if delay else made
 
     return (plant, dynamics, between, delay), act, None
@@ -218,8 +221,15 @@ def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) 
     )
 
 
-_OF_PLANTS = frozenset({"drag", "spring"})  # what effects may change of plants of whole orders,
-_OF_LAGS = frozenset({"drag", "unloading", "place", "stiffness"})  # and of a lag of any order
+def _bent(transfer, dynamics: Dynamics, between, delay: float) -> Step:
+    return (
+        (transfer, dynamics, between, delay),
+        lambda x, run: linear.run_bent(transfer, x, run.rest, run.h, between, dynamics, delay),
+        None,
+    )
+
+
+_OF_LAGS = frozenset({"unloading", "place", "stiffness", "bend", "drag"})  # what effects may change of a lag
 
 
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
@@ -230,7 +240,16 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     if stage != "actuator" or rig.actuator is None:
         return False
     changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
-    if isinstance(rig.actuator, Actuator) or linear.single_lag(rig.actuator.dynamics):
-        return changed <= _OF_LAGS
-    plant = plants.plant_of(rig.actuator.dynamics)
-    return plant is not None and changed <= _OF_PLANTS - ({"spring"} if plant.integrates else set())
+    return changed <= _changeable(rig.actuator)
+
+
+def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
+    """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
+    spring that bends where there is one; dry friction on what moves, and on a mass the hysteretic one."""
+    if isinstance(actuator, Actuator) or linear.single_lag(actuator.dynamics):
+        return _OF_LAGS
+    plant = plants.plant_of(actuator.dynamics)
+    found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
+    if plant is not None:
+        found |= {"drag"} if plant.integrates or plant.order == 1 else {"drag", "spring"}
+    return frozenset(found)

@@ -1,4 +1,4 @@
-"""The compiled loops of the chain simulator (``kernels.c``, ``plant.c``), as functions of arrays.
+"""The compiled loops of the chain simulator (``kernels.c``, ``bending.c``, ``plant.c``), as functions of arrays.
 
 The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
 behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), 1 where an experiment begins
@@ -18,7 +18,7 @@ from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 
 BALANCED = 2
-_SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "plant.c")]
+_SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c")]
 _DECLARATIONS = """
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
     const double *b0, const double *b1, const double *pair, double through, int switching, double place,
@@ -45,6 +45,11 @@ void focgen_products(int n, int k, const double *r, double *m);
 void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const double
     *bend, const double *twist, int order, int base, int last, const double *numbers, const double
     *tables);
+void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
+    const double *b0, const double *b1, const double *pair, double through, int switching, const double
+    *spring, double *z);
+void focgen_bent_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
+    const double *c, const double *a, const double *spring, double *w);
 """
 _FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
 
@@ -184,6 +189,36 @@ def plant(
     arrays = [np.ascontiguousarray(a, float) for a in (*course, numbers, tables)]
     *parts, numbers, tables = [ffi.from_buffer("double[]", a) for a in arrays]
     return _call("focgen_plant", x, rest, *parts, *levels, numbers, tables)
+
+
+def bent_modes(x, rest, a, b0, b1, pair, through: float, switching: bool, spring) -> np.ndarray:
+    """As :func:`modes`, with the input less what ``spring`` (7,) takes: see ``bending.c``."""
+    ffi, _ = _library()
+    tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
+    scratch = np.empty(tables[0].shape[1])
+    *pointers, own, room = [ffi.from_buffer("double[]", t) for t in (*tables, np.array(spring, float), scratch)]
+    return _call(
+        "focgen_bent_modes",
+        x,
+        rest,
+        len(scratch),
+        *pointers,
+        float(through),
+        int(switching),
+        own,
+        room,
+    )
+
+
+def bent_rational(x, rest, b, c, a, spring) -> np.ndarray:
+    """As :func:`rational`, with ``c`` the numerator for what ``spring`` (7,) takes from the input."""
+    ffi, _ = _library()
+    order = max(len(a), len(b), len(c)) - 1
+    scratch, *tables = np.zeros((4, order + 1))
+    for table, values in zip(tables, (b, c, a)):
+        table[: len(values)] = values
+    pointers = [ffi.from_buffer("double[]", t) for t in (*tables, np.array(spring, float), scratch)]
+    return _call("focgen_bent_filter", x, rest, order, *pointers)
 
 
 def products(rows: np.ndarray) -> np.ndarray:

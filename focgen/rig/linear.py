@@ -14,6 +14,7 @@ from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
 from focgen.rig.model import UNITY
+from focgen.rig.dynamics import Dynamics
 from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
@@ -125,6 +126,31 @@ def _between(transfer, x, rest, h: float, duration: float, held: bool, share: fl
         return gain * settled(between(x, rest, h, modes, share), x, rest, 1.0 - modes.gain)
     modes = _fractional(transfer, h, longest)
     return settled(between(x, rest, h, modes, share), x, rest, _missing(transfer, modes))
+
+
+def is_spring(transfer: TransferFunction) -> bool:
+    """Whether it is a constant over whole orders, one of them 0: a force on what a spring holds."""
+    single = len(transfer.num) == 1 and transfer.num[0].order == 0.0
+    return single and transfer.is_integer and len(transfer.den) > 1 and transfer.den[-1].order == 0.0
+
+
+def run_bent(
+    transfer: TransferFunction,
+    x: np.ndarray,
+    rest: np.ndarray,
+    h: float,
+    between: Between | bool,
+    dynamics: Dynamics,
+    delay: float = 0.0,
+) -> np.ndarray:
+    """As :func:`run` of a plant :func:`is_spring` whose spring follows ``dynamics``; the response counts as
+    linear between samples, and the delay is exact in whole samples only."""
+    if between == Between.SMOOTH:
+        x = sharpened(np.ascontiguousarray(x, float), rest)
+    b, a = _discrete(transfer, h, between == Between.HELD)
+    c, _ = _discrete(transfer, h, False)
+    made = kernels.bent_rational(x, rest, b, c, a, dynamics.bending(transfer.dc_gain))
+    return delayed(made, rest, h, delay) if delay else made
 
 
 def oscillator(

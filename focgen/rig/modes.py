@@ -17,7 +17,7 @@ import numpy as np
 from focgen.fractional.delay import split_delay
 from focgen.rig import kernels
 from focgen.rig.delay import delayed, shifted
-from focgen.rig.plant import LINEAR, NO_FRICTION, Friction, Spring
+from focgen.rig.dynamics import STRAIGHT, UNCHANGED, Dynamics
 
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
 
@@ -37,30 +37,6 @@ class Modes:
     def gain(self) -> float:
         """Of what is held for as long as the slowest mode takes."""
         return self.through + float(np.sum(self.weights / self.rates)) - (self.residue / self.pole).real
-
-
-@dataclass(frozen=True)
-class Dynamics:
-    """What effects change of an actuator's own equation.
-
-    Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response;
-    beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place). dry friction, the ``drag``, takes away
-    from x, in its unit. Of a :class:`~focgen.rig.plant.Plant`: its ``drag``, its hysteretic ``spring``.
-    """
-
-    unloading: float = 1.0
-    place: float = 0.0
-    stiffness: float = 0.0
-    drag: Friction = NO_FRICTION
-    spring: Spring = LINEAR
-
-    @property
-    def changed(self) -> frozenset[str]:
-        """What of it differs from the nominal equation."""
-        return frozenset(name for name, value in vars(self).items() if value != getattr(UNCHANGED, name))
-
-
-UNCHANGED = Dynamics()
 
 
 @lru_cache(maxsize=256)
@@ -116,9 +92,11 @@ def respond(
     unloading, longest = dynamics.unloading, 2.0 ** np.ceil(np.log2(duration))
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
-    drag = dynamics.drag.slide, max(dynamics.drag.stick, dynamics.drag.slide)
-    obstacle = dynamics.place, dynamics.stiffness
-    made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, *obstacle, *drag)
+    if dynamics.bend != STRAIGHT:
+        made = kernels.bent_modes(x, rest, a, b0, b1, pair, through, switching, dynamics.bending())
+    else:
+        obstacle = dynamics.place, dynamics.stiffness
+        made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, *obstacle, *dynamics.drag.held)
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
 
 

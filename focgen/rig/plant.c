@@ -2,7 +2,7 @@
  *     m y'' + c y' + k y = u - F - w   or   m y' + k y = u - F - w.
  * F is Coulomb's: `slide` against the velocity, up to `stick` where nothing moves. w = soft (q - y) is what a hysteretic
  * spring takes away from the linear one: dq/dy = 1 - K |p|^power scale^(1 - power), p = q in the direction of motion, with K = `loading`
- * where p > 0 and -`unloading` where it is not (Bouc and Wen).
+ * where p > 0 and -`unloading` where it is not (Bouc and Wen). Beside it the spring may bend, as in bent.h: w holds that, too.
  *
  * Between events the equation is linear, and a step is exact for an input that is a cubic: `tables` hold, for steps of h/2^level from
  * `level` = base on, what the state and the four coefficients of the input count. w is a cubic through its values and slopes at the
@@ -10,13 +10,15 @@
  * is left there is run along a line.
  */
 #include <math.h>
+#include "bent.h"
 
 enum { BALANCED = 2, DIPS = 3 };
 
 typedef struct {
     int order, base, last;
     double h, m, c, k, slide, stick, soft, loading, unloading, power, scale;
-    const double *tables;
+    const double *bend, *tables;
+    int curved; /* whether there is a w */
 } Plant;
 
 typedef struct {
@@ -24,13 +26,26 @@ typedef struct {
     int moving; /* the sign of the velocity, 0: stuck */
 } State;
 
-static double taken(const Plant *p, const State *s) { return p->soft * (s->q - s->y); }
+static double taken(const Plant *p, const State *s)
+{
+    double slope;
+    return p->curved ? p->soft * (s->q - s->y) + bent(p->bend, s->y, &slope) : 0.0;
+}
 
 /* dq/dy where q in the direction of motion is `q`. */
 static double steepness(const Plant *p, double q)
 {
     double grown = p->power == 1.0 ? fabs(q) : fabs(q) * pow(fabs(q) / p->scale, p->power - 1.0);
     return 1.0 - (q > 0.0 ? p->loading : -p->unloading) * grown;
+}
+
+/* dw/dt times `span` where it moves to the side `sign`. */
+static double yielding(const Plant *p, const State *s, int sign, double span)
+{
+    double slope;
+    if (!p->curved) return 0.0;
+    bent(p->bend, s->y, &slope);
+    return span * s->v * (p->soft * (steepness(p, sign * s->q) - 1.0) + slope);
 }
 
 /* q after `way` >= 0 in its direction, on one side of 0, for a power of 1. */
@@ -65,19 +80,19 @@ static State stepped(const Plant *p, State s, const double *d, int level, int si
     const double *t = p->tables + 12 * (level - p->base);
     double span = p->h / (double)(1 << level), f[4] = {d[0] - sign * p->slide, d[1], d[2], d[3]};
     double at_end = d[0] + d[1] + d[2] + d[3] - sign * p->slide, before = taken(p, &s);
-    double slope = span * p->soft * (steepness(p, sign * s.q) - 1.0) * s.v;
+    double slope = yielding(p, &s, sign, span);
     State to = s;
     double then = before + slope, steep = slope;
-    for (int round = 0; round < (p->soft != 0.0 ? 3 : 1); round++) {
+    for (int round = 0; round < (p->curved ? 3 : 1); round++) {
         double g[4] = {f[0] - before, f[1] - slope, f[2] - 3.0 * (then - before) + 2.0 * slope + steep,
                        f[3] - slope - steep + 2.0 * (then - before)};
-        if (p->soft == 0.0) for (int i = 0; i < 4; i++) g[i] = f[i];
+        if (!p->curved) for (int i = 0; i < 4; i++) g[i] = f[i];
         to.y = t[0] * s.y + t[1] * s.v + t[4] * g[0] + t[5] * g[1] + t[6] * g[2] + t[7] * g[3];
         if (p->order == 2) to.v = t[2] * s.y + t[3] * s.v + t[8] * g[0] + t[9] * g[1] + t[10] * g[2] + t[11] * g[3];
-        if (p->soft == 0.0) break;
-        to.q = wound(p, s.q, to.y - s.y);
+        if (!p->curved) break;
+        if (p->soft != 0.0) to.q = wound(p, s.q, to.y - s.y);
         then = taken(p, &to);
-        steep = span * p->soft * (steepness(p, sign * to.q) - 1.0) * to.v;
+        steep = yielding(p, &to, sign, span);
     }
     if (p->order == 1) to.v = (at_end - p->k * to.y - taken(p, &to)) / p->m;
     return to;
@@ -178,11 +193,11 @@ static State balanced(const Plant *p, double u)
     State s = {0.0, 0.0, 0.0, 0};
     double left = fabs(u) - p->slide, side = u < 0.0 ? -1.0 : 1.0;
     if (left <= 0.0 || p->k <= 0.0) return s;
-    double low = 0.0, high = p->soft != 0.0 ? 4.0 * left / p->k : left / p->k;
-    for (int i = 0; i < 60 && p->soft != 0.0; i++) {
+    double low = 0.0, high = p->curved ? 20.0 * left / p->k : left / p->k, slope;
+    for (int i = 0; i < 60 && p->curved; i++) {
         double y = 0.5 * (low + high), q = 0.0;
         for (int j = 0; j < 32; j++) q = wound(p, q, y / 32.0);
-        if (p->k * y + p->soft * (q - y) < left) low = y;
+        if (p->k * y + p->soft * (q - y) + bent(p->bend, y, &slope) < left) low = y;
         else high = y;
     }
     for (int j = 0; j < 32; j++) s.q = wound(p, s.q, side * high / 32.0);
@@ -196,7 +211,8 @@ void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, 
                   int order, int base, int last, const double *numbers, const double *tables)
 {
     const double *a = numbers;
-    Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], tables};
+    Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a + 11, tables,
+               a[6] != 0.0 || a[11] != 0.0 || a[12] != 0.0};
     State s = {0.0, 0.0, 0.0, 0};
     for (int k = 0; k < n; k++) {
         double c[4] = {0.0, 0.0, 0.0, 0.0};

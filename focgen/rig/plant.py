@@ -23,13 +23,14 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.rig import kernels
 from focgen.rig.courses import course
+from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 _HALVED = 10  # times that a step is halved for an event: what is left is run along a line
 _SHORT = 0.06  # of a radian of the plant's motion: a step of the hysteretic spring
 _SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
 _MOST = 7  # halvings at most of a step before any event
-_TERMS = 18  # of the exponential series, for steps of less than 1
-_TINY = 0.5  # what a step has to be below, in the norm of its matrix, for the series
+_TERMS = 9  # of the exponential series
+_TINY = 0.05  # what a step has to be below, in the norm of its matrix, for the series to end there
 
 
 @dataclass(frozen=True)
@@ -46,35 +47,6 @@ class Plant:
     def integrates(self) -> bool:
         """Whether nothing pulls it back."""
         return self.k == 0.0
-
-
-@dataclass(frozen=True)
-class Friction:
-    """Coulomb's, in units of the input: ``slide`` against the motion, ``stick`` before it."""
-
-    slide: float = 0.0
-    stick: float = 0.0
-
-    def __add__(self, other: Friction) -> Friction:
-        return Friction(self.slide + other.slide, self.stick + other.stick)
-
-    def __mul__(self, factor: float) -> Friction:
-        return Friction(factor * self.slide, factor * self.stick)
-
-
-@dataclass(frozen=True)
-class Spring:
-    """A hysteretic spring: its ``share`` of the stiffness; ``loading`` and ``unloading`` in 1/output, for a
-    ``power`` other than 1 at displacements of ``scale``, in units of the output."""
-
-    share: float = 0.0
-    loading: float = 0.0
-    unloading: float = 0.0
-    power: float = 1.0
-    scale: float = 1.0
-
-
-NO_FRICTION, LINEAR = Friction(), Spring()
 
 
 def plant_of(transfer: TransferFunction) -> Plant | None:
@@ -94,31 +66,32 @@ def respond(
     x: np.ndarray,
     rest: np.ndarray,
     h: float,
-    friction: Friction = NO_FRICTION,
-    spring: Spring = LINEAR,
+    dynamics: Dynamics = UNCHANGED,
     between: Between | bool = Between.STRAIGHT,
 ) -> np.ndarray:
     """The output (n,) for the input ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is not
-    0.
+    0; of ``dynamics`` the drag, the hysteretic spring and the bend count.
 
     ``between``: what the input does from one sample to the next. In straight lines it comes from 0 within the
     sample ahead of an experiment, as in :func:`~focgen.rig.linear.run`; else it jumps at the first sample.
     """
-    base, last = _levels(plant, spring, h)
-    tables = _tables(plant, h, base, last)
-    soft = spring.share * plant.k
-    numbers = [h, plant.m, plant.c, plant.k, friction.slide, max(friction.stick, friction.slide)]
-    numbers += [soft, spring.loading, spring.unloading, spring.power, spring.scale]
+    base, last = _levels(plant, dynamics, h)
+    tables, spring, bend = _tables(plant, h, base, last), dynamics.spring, dynamics.bend
+    numbers = [h, plant.m, plant.c, plant.k, *dynamics.drag.held, spring.share * plant.k]
+    numbers += [spring.loading, spring.unloading, spring.power, spring.scale]
+    numbers += [plant.k * bend.first, plant.k * bend.second, bend.scale]
     x = np.ascontiguousarray(x, float)
     moves, levels = course(x, rest, between), (plant.order, base, last)
     return kernels.plant(x, rest, moves, levels, np.array(numbers), tables)
 
 
-def _levels(plant: Plant, spring: Spring, h: float) -> tuple[int, int]:
+def _levels(plant: Plant, dynamics: Dynamics, h: float) -> tuple[int, int]:
     """How often a sample is halved: for the motion, and at most, for an event."""
+    spring, bend = dynamics.spring, dynamics.bend
     steepest = 1.0 + spring.share * max(abs(spring.loading), abs(spring.unloading)) * spring.scale
+    steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second)
     pace = np.sqrt(plant.k * steepest / plant.m) if plant.order == 2 else plant.k * steepest / plant.m
-    short = _SHORT if spring.share else _SWING
+    short = _SHORT if dynamics.changed & {"spring", "bend"} else _SWING
     base = int(np.clip(np.ceil(np.log2(max(h * pace / short, 1e-9))), 0, _MOST))
     return base, base + _HALVED
 

@@ -151,4 +151,27 @@ def references(rng: np.random.Generator, Ts: float) -> list[Experiment]:
     ]
 
 
-SUITES = {"full": full, "short": short, "closed": references}
+def engine(rng: np.random.Generator, Ts: float) -> list[Experiment]:
+    """About 290 s for rigs that respond within half a second."""
+    first = steps(rng, Ts, 5, 6.0, 5.0)
+    return [
+        Experiment("steps", first),
+        Experiment("sines", sines(rng, Ts, (0.08, 0.3, 0.9), 1.5, 12.0)),
+        Experiment("staircase", staircase(rng, Ts, 5, 4.5)),
+        Experiment("hold", long_hold(rng, Ts, 55.0, 18.0)),
+        Experiment("loops", minor_loops(rng, Ts, 0.08)),
+        Experiment("repeat", first[: round(20.0 / Ts)].copy()),
+    ]
+
+
+SUITES = {
+    "full": full,
+    "short": short,
+    "closed": references,
+    "engine": engine,
+    "off": full,
+    "begun": full,
+}
+STREAMS = {"closed": 0, "full": 1, "short": 2, "engine": 3, "off": 1, "begun": 1}
+"""Of every suite its number in the seeds of its cases. Those of one number have the same cases, disturbed or
+not (``disturbed``)."""

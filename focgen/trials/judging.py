@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 # What a name of the generator may rightly be called by the vocabulary instead of `unknown`.
 ALSO = {"folded_reading": {"sensor_nonlinearity"}}
+# What an effect may rightly be called as well: dry friction against a spring that returns is a play to the logs.
+LIKE = {"friction": "hysteresis"}
 _CAUSED = ("named", "set")
 
 
@@ -139,10 +141,7 @@ def judge(number: str, label: dict, outcome: dict, diagnosis: dict | None, **mea
         form=truth[0]["form"] if truth else "",
         verdict=said["verdict"],
         stage=(said.get("where") or {}).get("stage"),
-        causes=tuple(
-            tuple((c["effect"], float(c["confidence"])) for c in cause["candidates"])
-            for cause in said.get("causes") or ()
-        ),
+        causes=tuple(_candidates(cause, truth) for cause in said.get("causes") or ()),
         proposal=_proposal(said.get("next_experiment")),
         tied=tuple(design.get("tied", ())),
         resolves=tuple(design.get("resolves", ())),
@@ -151,6 +150,15 @@ def judge(number: str, label: dict, outcome: dict, diagnosis: dict | None, **mea
         seconds=outcome.get("seconds"),
         **measured,
     )
+
+
+def _candidates(cause: dict, truth: list[dict]) -> tuple[tuple[str, float], ...]:
+    """Effect and confidence of each, by the name of the truth where it may be called as it was."""
+    named = [(c["effect"], float(c["confidence"])) for c in cause["candidates"]]
+    for effect in (t["effect"] for t in truth):
+        if effect in LIKE and effect not in dict(named):
+            named = [(effect if name == LIKE[effect] else name, sure) for name, sure in named]
+    return tuple(named)
 
 
 def _proposal(proposed: dict | None) -> str:

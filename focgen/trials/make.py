@@ -27,13 +27,17 @@ from focgen.progress import track
 from focgen.rig.files import rig_table
 from focgen.trials.cases import Case, make_case
 from focgen.trials.closed_cases import make_closed_case
-from focgen.trials.excitation import SUITES
+from focgen.trials.disturbed import DISTURBED, disturbed
+from focgen.trials.excitation import STREAMS, SUITES
 from focgen.trials.facts import SIGNALS
-from focgen.trials.plan import CLOSED_KINDS, KINDS, assignments
+from focgen.trials.engine.cases import make_engine_case
+from focgen.trials.engine.machine import engine
+from focgen.trials.plan import CLOSED_KINDS, ENGINE_KINDS, KINDS, Assignment, assignments
 from focgen.trials.recording import as_csv
 from focgen.trials.sealing import commitment, sealed
 
-DEFAULT_KINDS = {"full": KINDS, "short": KINDS, "closed": CLOSED_KINDS}
+DEFAULT_KINDS = {"full": KINDS, "short": KINDS, "closed": CLOSED_KINDS, "engine": ENGINE_KINDS}
+DEFAULT_KINDS |= dict.fromkeys(DISTURBED, KINDS)
 
 
 @dataclass(frozen=True)
@@ -57,23 +61,19 @@ def make(
     suite: str = "full",
     kinds: tuple[str, ...] | None = None,
 ) -> Made:
-    """Make sealed cases; the same arguments give the same bytes. Raises InputError for arguments that make no
-    sense.
+    """Make sealed cases; the same arguments give the same bytes, those of the suite "engine" on one machine.
+    Raises InputError for arguments that make no sense, and where the physics engine is asked for but not
+    installed.
     """
     folder = Path(folder)
     _check(folder, cases, seed, signals, suite)
-    root = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite)])
+    root = np.random.default_rng([seed, ord(signals), STREAMS[suite]])
     plan = assignments(cases, kinds or DEFAULT_KINDS[suite], signals, suite, root)
     commitments = {}
     for index, assignment in enumerate(track(plan, "trial make"), start=1):
-        rng = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite), index])
+        rng = np.random.default_rng([seed, ord(signals), STREAMS[suite], index])
         number = f"{index:04d}"
-        closed = suite == "closed"
-        case = (
-            make_closed_case(assignment, signals, rng)
-            if closed
-            else make_case(assignment, signals, suite, rng)
-        )
+        case = _made(assignment, signals, suite, rng)
         commitments[number] = _write(folder, number, case, _salt(rng))
     made = Made(str(folder), suite, signals, seed, len(plan), commitments)
     facts = {
@@ -87,6 +87,15 @@ def make(
     return made
 
 
+def _made(assignment: Assignment, signals: str, suite: str, rng: np.random.Generator) -> Case:
+    if suite == "closed":
+        return make_closed_case(assignment, signals, rng)
+    if suite == "engine":
+        return make_engine_case(assignment, signals, rng)
+    case = make_case(assignment, signals, suite, rng)
+    return disturbed(case, suite, rng) if suite in DISTURBED else case
+
+
 def _check(folder: Path, cases: int, seed: int, signals: str, suite: str) -> None:
     if (folder / "trial.json").exists():
         raise InputError(str(folder), "already holds a trial", "choose another folder")
@@ -96,6 +105,8 @@ def _check(folder: Path, cases: int, seed: int, signals: str, suite: str) -> Non
         raise InputError("--signals", f"is {signals!r}", "choose C, B or A")
     if suite not in SUITES:
         raise InputError("--suite", f"is {suite!r}", f"choose one of {', '.join(SUITES)}")
+    if suite == "engine":
+        engine()
 
 
 def _salt(rng: np.random.Generator) -> str:

@@ -8,10 +8,12 @@ import numpy as np
 
 from focgen.errors import InputError
 from focgen.trials.closed import CONTROLLER_EFFECTS
+from focgen.trials.engine.forms import BODY, HANDS
 from focgen.trials.vocabulary import OUTSIDE, VOCABULARY
 
 KINDS = ("single", "pair", "none", "parameters", "outside", "unidentifiable", "linear")
 CLOSED_KINDS = ("single", "none", "parameters", "outside")
+ENGINE_KINDS = CLOSED_KINDS
 _SHARES = {
     "single": 0.58,
     "pair": 0.11,
@@ -102,7 +104,7 @@ def assignments(
     count: int, kinds: tuple[str, ...], signals: str, suite: str, rng: np.random.Generator
 ) -> list[Assignment]:
     """``count`` cases of the given kinds, in the usual shares, shuffled; effects equally often."""
-    allowed = CLOSED_KINDS if suite == "closed" else KINDS
+    allowed = {"closed": CLOSED_KINDS, "engine": ENGINE_KINDS}.get(suite, KINDS)
     unknown = sorted(set(kinds) - set(allowed))
     if unknown:
         raise InputError(
@@ -119,12 +121,12 @@ def assignments(
 
 def _of_kind(kind: str, count: int, signals: str, suite: str, rng) -> list[Assignment]:
     if kind == "single":
-        effects = tuple(VOCABULARY) + (3 * CONTROLLER_EFFECTS if suite == "closed" else ())
+        effects = _vocabulary(suite)
         return _dealt(effects, ("low", "mid", "high"), kind, count, rng)
     if kind == "linear":
         return _dealt(_LINEAR, ("mid", "high"), kind, count, rng)
     if kind == "outside":
-        return _dealt(_outside(signals), ("mid", "high"), kind, count, rng)
+        return _dealt(_outside(signals, suite), ("mid", "high"), kind, count, rng)
     if kind == "pair":
         return [Assignment(kind, _pair(signals, rng), str(rng.choice(("mid", "high")))) for _ in range(count)]
     return [Assignment(kind, (), "high") for _ in range(count)]
@@ -141,8 +143,18 @@ def _dealt(effects, severities, kind, count, rng) -> list[Assignment]:
     return cards[:count]
 
 
-def _outside(signals: str) -> tuple[str, ...]:
+def _vocabulary(suite: str) -> tuple[str, ...]:
+    """The effects that singles of a suite have."""
+    if suite == "engine":
+        around = (effect for effect, (stage, _) in VOCABULARY.items() if stage != "actuator")
+        return (*around, *BODY)
+    return tuple(VOCABULARY) + (3 * CONTROLLER_EFFECTS if suite == "closed" else ())
+
+
+def _outside(signals: str, suite: str) -> tuple[str, ...]:
     """A baseline's swing is a sensor drift to logs without curvature, a folded curve an odd calibration."""
+    if suite == "engine":
+        return (*HANDS, "supply_ripple", "loose_plug")
     return tuple(name for name in OUTSIDE if signals == "C" or name != "room_swing")
 
 

@@ -43,12 +43,12 @@ def draw_chain(rng: np.random.Generator, signals: str, sample_time: float) -> tu
     units = draw_units(rng)
     top = rng.uniform(0.15, 0.35) * units.pressure
     full = rng.uniform(0.008, 0.02) * units.curvature
-    regulator, gain = _draw_regulator(rng, units)
+    regulator, gain = draw_regulator(rng, units)
     pole = rng.uniform(6.0, 16.0)
     rig = Rig(
         name=f"rig{rng.integers(1000)}",
         sample_time=sample_time,
-        signals=_columns(units, signals),
+        signals=columns_of(units, signals),
         actuator=Actuator(
             rng.uniform(0.6, 2.2), rng.uniform(0.5, 0.8), _draw_gain(rng, top, full), _draw_offset(rng, full)
         ),
@@ -71,7 +71,8 @@ def _draw_offset(rng: np.random.Generator, full: float) -> float:
     return rng.uniform(-0.03, 0.03) * full if rng.random() < 0.25 else 0.0
 
 
-def _draw_regulator(rng: np.random.Generator, units: Units) -> tuple[TransferFunction, float]:
+def draw_regulator(rng: np.random.Generator, units: Units) -> tuple[TransferFunction, float]:
+    """A regulator at random, and its gain."""
     gain = rng.uniform(0.05, 0.12) * units.pressure / units.command
     if rng.random() < 0.3:
         tau = rng.uniform(0.03, 0.08)
@@ -81,7 +82,8 @@ def _draw_regulator(rng: np.random.Generator, units: Units) -> tuple[TransferFun
     return TransferFunction([(gain * natural**2, 0.0)], den), gain
 
 
-def _columns(units: Units, signals: str) -> Signals:
+def columns_of(units: Units, signals: str) -> Signals:
+    """The columns that logs of ``signals`` C, B or A have, named after their units."""
     unit = units.names
     return Signals(
         time="t_s",

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from focgen.rig.effects._effect import Effect, Form, Parameter
-from focgen.rig.plant import Friction
+from focgen.rig.dynamics import Friction
 
 
 def _coulomb(x, values, run):

@@ -1,9 +1,12 @@
 """A static gain that departs smoothly from the line K(p): stiffening, ballooning."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
+from focgen.rig.dynamics import Bend
 
 
 def _cubic(x, values, run):
@@ -21,10 +24,22 @@ def _exponential(x, values, run):
     return x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
 
 
+def _stiffening(x, values, run):
+    size, scale = values
+    return replace(x, bend=Bend(0.0, size, scale))
+
+
+def _bent_spring(x, values, run):
+    return replace(x, bend=Bend(*values))
+
+
+_FIRST = Parameter("first", lower=-0.45, upper=20.0, starts=(0.2, -0.1, 1.0), zero=0.0)
+_SECOND = Parameter("second", lower=-0.3, upper=50.0, starts=(0.0, 0.0, 1.0), zero=0.0)
+
 EFFECT = Effect(
     name="gain_nonlinearity",
     stage="actuator",
-    meaning="the static gain departs smoothly from the line K(p): stiffening, ballooning",
+    meaning="the static gain departs smoothly from the line K(p): stiffening, ballooning, whether on the way to the spring or in it",
     reveals="six or more levels, up and down, in mixed order: the residual depends on level only",
     confused_with=("dead_zone", "contact", "softening", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
@@ -48,6 +63,14 @@ EFFECT = Effect(
             (Parameter("bend", level=-1, lower=-0.97, upper=3.0, starts=(0.3, -0.3), zero=0.0),),
             _gent,
         ),
+        # of the actuator's own spring, which is the quicker where it is the stiffer
+        Form(
+            "stiffening",
+            "dynamics",
+            (Parameter("size", lower=-0.3, upper=50.0, starts=(0.2, -0.1, 1.0), zero=0.0), LARGEST),
+            _stiffening,
+        ),
+        Form("bent_spring", "dynamics", (_FIRST, _SECOND, LARGEST), _bent_spring),
         _curves.quartic("drive"),
         _curves.spline("drive"),
     ],

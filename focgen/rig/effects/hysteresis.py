@@ -3,9 +3,9 @@ a mass, of the spring that pulls it back."""
 
 from dataclasses import replace
 
+from focgen.rig.dynamics import Spring
 from focgen.rig.effects import _loops
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
-from focgen.rig.plant import Spring
 
 
 def _spring(x, values, run):
