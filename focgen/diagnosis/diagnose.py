@@ -12,6 +12,7 @@ from focgen.control.files import read_controller
 from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.carried import carried
+from focgen.diagnosis.decimate import decimated
 from focgen.diagnosis.explain import Explanation, clues_for, explain
 from focgen.diagnosis.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.model import Diagnosis
@@ -65,9 +66,12 @@ def diagnose(
     if out is not None:
         check_apart((Path(out) / name for name in WRITTEN), given)
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
-    logs = begun_session(rig, _usable(experiments(rig, logs, first, last)))
+    logs = _usable(experiments(rig, logs, first, last))
     ran = running(read_controller(controller), logs) if controller is not None else None
+    rig, logs = decimated(rig, logs)
+    logs = begun_session(rig, logs)
     explanations = explain_all(rig, logs, THRESHOLD, only, bootstrap)
+    rig = explanations[0].told(rig)
     rigs = compose.compose(rig, explanations, logs)
     logs = begun_with(rigs, logs)
     rigs, diagnosis, evidence = verdict.reach(rig, logs, rigs, explanations, ran, only is not None)

@@ -43,7 +43,7 @@ class References:
 
     def scale(self, parameter, slot: str) -> float:
         """The physical size of 1 in units of this parameter."""
-        return self.levels[slot] ** parameter.level * self.clocks[parameter.clock] ** parameter.time
+        return self.levels[parameter.at or slot] ** parameter.level * self.clocks[parameter.clock] ** parameter.time
 
 
 @dataclass(eq=False)
@@ -179,7 +179,7 @@ class Problem:
         ends = np.cumsum([len(self.gauges), segment.unsure.shape[1]])
         gauges, off, begun = np.split(vector[own + 1 : self.head], ends)
         x = self._entered(float(vector[own]), off)
-        made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held)
+        made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.between)
         made = self._read(made, *gauges)
         return made + segment.loose @ begun if np.any(begun) else made
 

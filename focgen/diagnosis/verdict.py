@@ -235,7 +235,7 @@ def estimates(of, which: int) -> dict[str, Estimate]:
             float(scale * (np.exp(np.clip(e, -60, 60)) if parameter.log else e)) for e in (v - s, v, v + s)
         ]
         found[parameter.name] = Estimate(
-            ends[1], (ends[0], ends[2]), _unit(parameter, slot_in(clue.form, clue.stage))
+            ends[1], (ends[0], ends[2]), _unit(parameter, parameter.at or slot_in(clue.form, clue.stage))
         )
     return found
 
