@@ -11,11 +11,13 @@ __version__ = "0.1.0"
 
 # Where each function lives; imported on first use, so that `import focgen` is quick.
 _FUNCTIONS = {
+    "init": "focgen.rig.proposal",
     "identify": "focgen.identification.identify",
     "design": "focgen.loop.design",
     "simulate": "focgen.loop.simulate",
     "generate": "focgen.codegen.generate",
     "verify": "focgen.verification.verify",
+    "load": "focgen.running.load",
     "cost": "focgen.verification.costs",
     "diagnose": "focgen.diagnosis.diagnose",
     "trial": "focgen.trials.trial",

@@ -37,7 +37,7 @@ def crashing(path: Path) -> None:
 
 CHANNEL = """
 class Channel:
-    name = 'u'
+    name, properties = 'u', {{}}
     def __getitem__(self, at):
         return {values}
 class Group:

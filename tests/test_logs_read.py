@@ -238,9 +238,6 @@ MALFORMED = {
     "microseconds": (_table(t_s=1e6 * table()["t_s"]), r"microseconds\?"),
     "words": (_with("p_bar", 8, "low"), "'low' in line 10"),
     "underscore": (_with("p_bar", 8, "0_1"), "'0_1' in line 10"),
-    "semicolons": (_text(lambda text: text.replace(",", ";")), "';'"),
-    "semicolons, comma": (_text(lambda text: text.replace(",", ";").replace(".", ",")), "';'"),
-    "tabs": (_text(lambda text: text.replace(",", "\t")), "tabs"),
     "decimal comma": (_with("p_bar", 8, '"0,15"'), "'0,15' in line 10.*point"),
     "cells missing": (
         _text(lambda text: text[: text.rindex(",")] + "\n"),
@@ -250,11 +247,6 @@ MALFORMED = {
     "blank lines": (_text(lambda text: "\n\n"), "is empty"),
     "no header": (_text(lambda text: text.partition("\n")[2]), "instead of a header"),
     "a column twice": (_text(lambda text: text.replace("p_bar", "u_V", 1)), "'u_V' twice"),
-    "not UTF-8": (
-        lambda path: path.write_bytes(csv_text(table()).replace("u_V", "µ_V").encode("latin-1")),
-        "UTF-8",
-    ),
-    "UTF-16": (lambda path: path.write_bytes(csv_text(table()).encode("utf-16")), "UTF-8"),
     "binary": (lambda path: path.write_bytes(b"t_s,\x00\x00\n" * 9), "log.csv"),
     "in mbar": (_table(p_bar=1e3 * table()["p_bar"]), "pressure reaches 150 .* range is 0 to 0.25"),
     "in m": (_table(kappa_per_mm=1e-3 * table()["kappa_per_mm"]), "output reaches .* range is 0 to 0.02"),

@@ -22,7 +22,7 @@ from focgen.plan.execute import execute
 from focgen.plan.histories import BankRun, Latest
 from focgen.plan.scenario import Reset, Scenario, Track, to_raw
 from focgen.plan.usable import reach, usable
-from focgen.verification.scenarios import mixed
+from focgen.verification.scenarios import mixed, raw_scenarios
 from focgen.verification.unusable import strewn
 from tests.c_code import compiler, run
 from tests.controllers import random_controller, seed_controller, simple
@@ -284,3 +284,9 @@ def test_the_test_survives_fast_math(arithmetic, name, flags, tmp_path: Path):
     sources = [tmp_path / "fast.c", tmp_path / "lead.c"]
     run(*compiler(name, *flags), "-std=c99", *flags, *sources, "-o", tmp_path / "fast.exe", "-lm")
     assert run(tmp_path / "fast.exe").split() == ["16"] * 6 + ["0"] * 2
+
+
+def test_one_sample_is_enough_to_strew():
+    plan = build_plan(seed_controller(8), "f32")
+    found = raw_scenarios(plan, 1, 0)["unusable inputs"]
+    assert found.samples == 1 and math.isnan(found.ref[0, 0])

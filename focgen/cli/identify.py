@@ -27,7 +27,9 @@ EXAMPLE = """example:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("logs", nargs="+", metavar="LOG", help=".csv, .csv.gz, .parquet, .mat or .tdms")
+    parser.add_argument(
+        "logs", nargs="+", metavar="LOG", help=".csv, .txt, .tsv (also .gz), .lvm, .tdms, .mat or .parquet"
+    )
     parser.add_argument("--rig", required=True, metavar="RIG", help="rig.toml: columns, regulator and sensor")
     parser.add_argument("--out", required=True, metavar="NEW_RIG", help="the rig.toml to write")
     parser.add_argument(

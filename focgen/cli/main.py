@@ -16,6 +16,7 @@ from focgen.jsontext import to_json
 
 # The order of the help page; a command exists where focgen/cli has its file.
 _COMMANDS = (
+    "init",
     "identify",
     "design",
     "simulate",
@@ -31,6 +32,7 @@ _COMMANDS = (
 
 _PROLOGUE = """From a CSV of step tests to a verified fractional-order controller on a microcontroller.
 
+  focgen init logs/*.csv --out rig.toml
   focgen identify logs/*.csv --rig rig.toml --out identified.toml
   focgen design identified.toml --out controller.toml --settling 1.5
   focgen generate controller.toml --out firmware --arithmetic q31

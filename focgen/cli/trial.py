@@ -36,9 +36,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="S")
     parser.add_argument(
         "--suite",
-        choices=("full", "short", "closed", "engine"),
+        choices=("full", "off", "begun", "short", "closed", "engine"),
         default="full",
-        help="about 600 s, 270 s, closed-loop logs, or rigs moved by a physics engine (pip install 'focgen[engine]')",
+        help="about 600 s, the same with regulator and sensor off or with logs cut, 270 s, closed-loop logs, "
+        "or rigs moved by a physics engine (pip install 'focgen[engine]')",
     )
     parser.add_argument("--kinds", metavar="KIND,…", help=f"only these kinds of cases, of {', '.join(KINDS)}")
     parser.add_argument(

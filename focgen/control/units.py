@@ -1,9 +1,9 @@
-"""Units read from the names of a log's columns, for comments and labels only."""
+"""Units of a rig's signals, as it states them or as its columns' names tell, for comments and labels only."""
 
 from __future__ import annotations
 
 from focgen.control.controller import Units
-from focgen.rig.model import Rig
+from focgen.rig.model import Rig, Signals
 
 _KNOWN = (
     "V",
@@ -40,8 +40,16 @@ def unit_of(column: str | None) -> str:
     return f"1/{words[-1]}" if words[-2] == "per" else words[-1]
 
 
+def unit_of_role(signals: Signals, role: str) -> str:
+    """The unit of a role's signal: the rig's own, else as its column's name tells it, "" where neither
+    does."""
+    return signals.units.get(role) or ("" if role in signals.scales else unit_of(getattr(signals, role)))
+
+
 def units_of(rig: Rig, scheduled: bool) -> Units:
     """The controller's units as far as the rig's columns tell them."""
     signals = rig.signals
-    command = signals.command or signals.pressure
-    return Units(unit_of(signals.output), unit_of(command), unit_of(signals.pressure) if scheduled else "")
+    command = "command" if signals.command else "pressure"
+    roles = "output", command, "pressure"
+    output, command, pressure = (unit_of_role(signals, role) for role in roles)
+    return Units(output, command, pressure if scheduled else "")

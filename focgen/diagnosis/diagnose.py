@@ -21,6 +21,7 @@ from focgen.diagnosis.smooth import freed
 from focgen.diagnosis.unexplained import is_unknown
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
+from focgen.logs.read import each_of
 from focgen.output import check_apart
 from focgen.progress import say
 from focgen.rig.effects import library
@@ -59,6 +60,7 @@ def diagnose(
     one of them in the place of a result, FocgenError for an unknown effect.
     """
     _check(only)
+    logs = each_of(logs)
     given = (rig, *logs, controller)
     if out is not None:
         check_apart((Path(out) / name for name in WRITTEN), given)

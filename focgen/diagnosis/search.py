@@ -11,6 +11,7 @@ import numpy as np
 from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit, innovations, jacobian
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
+from focgen.diagnosis.repeats import without_hearsay
 
 _COARSE = 5000  # samples of the first, coarse pass
 _DEEP = 5  # how many forms are fitted to the end beside the families' best
@@ -62,6 +63,7 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
     ground = fit(thin, problem.stretched(base, 1.0 / factor), WHITE)
     known = jacobian(thin, ground.vector, ground.innovations, WHITE, *thin.bounds())
     tried = [t for clue in clues if (t := best_start(thin, ground.vector, clue, known)) is not None]
+    tried = without_hearsay(ground, tried)
     errors = _errors(tried, ground)
     tried = _promising(tried, ground)
     rough, ground = _coloured(ground, min([ground, *tried], key=lambda t: t.sse), 6)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,9 +18,9 @@ from focgen.diagnosis.next_experiment import propose
 from focgen.diagnosis.rivals import Cause
 from focgen.diagnosis.running import Departure, Running
 from focgen.diagnosis.search import evidence as nats
-from focgen.diagnosis.shrink import Shrink, predict
+from focgen.diagnosis.promise import paths, promised
+from focgen.diagnosis.shrink import Shrink
 from focgen.diagnosis.unexplained import disturbed, is_rounded, is_unknown
-from focgen.diagnosis.unseen import foreseen
 from focgen.diagnosis.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
@@ -67,10 +67,20 @@ def reach(
         propose(logs, explanations, found),
         _description(unknown),
         (),
-        (*notes_of(logs), *far_moves(rig, told.rigs.fitted if told.causes else told.rigs.refitted)),
+        (*notes_of(logs), *_cautions(rig, told)),
         _plain_fits(explanations),
     )
     return told.rigs, diagnosis, Evidence(made, tuple(explanations))
+
+
+def _cautions(rig: Rig, told: _Told) -> Iterator[str]:
+    """What a refit moved far, and what cannot be foretold."""
+    yield from far_moves(rig, told.rigs.fitted if told.causes else told.rigs.refitted)
+    for clue in (clue for e, _ in told.causes for clue in paths(e)):
+        yield (
+            f"the {clue.effect} wanders: followed through this session, its next turn cannot be foretold, "
+            "and nothing of it is promised"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +103,7 @@ class _Told:
             self.total is not None
             and self.total.value < _VAIN
             and self.floor < _ABOVE**2 * float(np.mean(self.squares["refitted"]))
-            and not any(is_rounded(e) for e, _ in self.causes)
+            and not any(is_rounded(e) or paths(e) for e, _ in self.causes)
         )
 
 
@@ -108,7 +118,8 @@ def _told(rig: Rig, logs, rigs: compose.Rigs, explanations, left_out) -> _Told:
     }
     squares = {name: compose.squares(logs, m) for name, m in made.items()}
     floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
-    total = _promised(rig, logs, explanations, left_out, squares, floor) if causes else None
+    held = [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
+    total = promised(rig, logs, held, squares, floor) if causes else None
     return _Told(rigs, causes, made, squares, floor, total)
 
 
@@ -121,14 +132,6 @@ def _no_closer(rigs: compose.Rigs, logs, last: Explanation) -> list[Explanation]
     both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
     found, bare = (compose.mean_square(logs, made) for made in both)
     return [last] if found > bare else []
-
-
-def _promised(rig: Rig, logs, explanations, left_out, squares, floor: float) -> Shrink | None:
-    """The shrink to expect of new experiments, from what those at hand foretell of each other."""
-    held = [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
-    found = {c.effect for e in held for c in e.best.problem.clues}
-    drifts = any(p.clock == "session" for name in found for f in library()[name].forms for p in f.parameters)
-    return predict(squares["refitted"], squares["explained"], foreseen(rig, logs, held), floor, drifts)
 
 
 def _plain_fits(explanations: Sequence[Explanation]) -> tuple[PlainFit, ...]:
@@ -193,7 +196,8 @@ def _found(
 
 
 def _share_lost(cause: Cause, rigs: compose.Rigs, logs, squares, floor: float, total: Shrink) -> Shrink:
-    """The part of the shrink that is lost without the cause; its interval is as wide as the total's."""
+    """The part of the shrink that is lost without the cause, none for a wander; its interval is as wide as
+    the total's."""
     best = cause.rivals[0]
     others = tuple(p for p in rigs.placed if (p.effect, p.stage) != (best.effect, best.stage))
     if not others:
@@ -201,7 +205,9 @@ def _share_lost(cause: Cause, rigs: compose.Rigs, logs, squares, floor: float, t
     without = compose.squares(logs, compose.simulated(rigs.fitted, others, logs))
     could = max(float(np.mean(squares["refitted"])) - floor, 1e-300)
     lost = np.mean(np.minimum(without, squares["refitted"])) - np.mean(squares["explained"])
-    value, wide = float(np.clip(lost / could, 0, 1)), (total.interval[1] - total.interval[0]) / 2
+    wanders = any(c.form.wanders and c.effect == best.effect for c in best.fit.problem.clues)
+    value = 0.0 if wanders else float(np.clip(lost / could, 0, 1))
+    wide = (total.interval[1] - total.interval[0]) / 2
     return Shrink(value, (max(value - wide, -1.0), min(value + wide, 1.0)))
 
 

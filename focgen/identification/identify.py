@@ -25,7 +25,7 @@ from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, check_determined, with_stages
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
-from focgen.logs.read import read_logs
+from focgen.logs.read import each_of, read_logs
 from focgen.output import check_apart, write_file
 from focgen.rig.engine import STAGES
 from focgen.rig.files import read_rig, rig_text
@@ -58,6 +58,7 @@ def identify(
 
     Raises LogError, RigError or FitError; nothing is written then.
     """
+    logs, unseen = each_of(logs), each_of(unseen)
     if out is not None:
         check_apart([out], (*logs, rig, *unseen))
     check_degree(gain_degree)
@@ -85,8 +86,6 @@ def identify(
 
 
 def _read(logs, rig: Rig, first, last) -> tuple[Experiment, ...]:
-    if logs and all(isinstance(log, Experiment) for log in logs):
-        return tuple(log.between(first, last) for log in logs)
     limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
     return read_logs(logs, rig.signals, rig.sample_time, first, last, limits)
 

@@ -73,7 +73,9 @@ def _table(path: Path, head: dict, body: bytes) -> LogTable:
     for name, texts, count in head["columns"]:
         columns[name] = numbers[at : at + count].copy() if texts is None else texts
         at += count if texts is None else 0
-    return LogTable(str(path), columns)
+    clock = numbers[at:].copy() if head["clock"] else None
+    known = {key: head[key] for key in ("units", "aliases", "runs")}
+    return LogTable(str(path), columns, clock=clock, **known)
 
 
 def _fault(kind: str, *parts) -> FocgenError | OSError:

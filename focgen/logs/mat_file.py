@@ -1,29 +1,37 @@
-"""Logs in .mat (up to version 7): one vector a column, on the top level or as the fields of one structure."""
+"""Logs in .mat (version 5 to 7.3): vectors, the columns of matrices, and the fields of structures.
+
+A structure's fields go by their own names, and by "structure.field"; a matrix x of k columns gives x_1 … x_k.
+A structure that Simulink wrote ("with time") goes by the labels of its signals.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
-from focgen.errors import LogError
+from focgen.errors import LogError, MissingExtra
 from focgen.logs.table import LogTable
 
-_REMEDY = "save one vector a column, with -v7"
+_REMEDY = "save one vector a column"
+_WIDEST = 64  # columns: a wider matrix is no log
 
 
 def read(path: Path) -> LogTable:
-    """Read a file. Raises LogError where it is damaged, of version 7.3, or holds no vectors."""
+    """Read a file. Raises LogError where it is damaged or holds no vectors, MissingExtra for version 7.3
+    without h5py."""
     path.open("rb").close()  # loadmat would try other names
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:
-        raise LogError(str(path), "is a MAT file of version 7.3", _REMEDY) from None
+        content = _version_73(path)
     except (ValueError, TypeError, MatReadError, EOFError, KeyError, IndexError):
         raise LogError(str(path), "is not a whole MAT file", _REMEDY) from None
-    columns = _columns({name: value for name, value in content.items() if not name.startswith("__")})
+    named = {name: value for name, value in content.items() if not name.startswith(("__", "#"))}
+    columns, aliases = _by_name(list(_vectors(named)))
     lengths = {len(column) for column in columns.values()}
     if not columns:
         raise LogError(str(path), "holds no vectors", _REMEDY)
@@ -32,15 +40,68 @@ def read(path: Path) -> LogTable:
         raise LogError(
             str(path), f"holds vectors of different lengths ({sizes})", "save one experiment a file"
         )
-    return LogTable(str(path), columns)
+    return LogTable(str(path), columns, aliases=aliases)
 
 
-def _columns(content: dict) -> dict[str, np.ndarray]:
-    """The vectors, those inside structures too; scalars (settings, counters) are left out."""
-    found = {}
+def _version_73(path: Path) -> dict:
+    """The content of an HDF5 file as nested dictionaries of arrays, as MATLAB has them."""
+    try:
+        import h5py
+    except ImportError:
+        raise MissingExtra.of("h5py", "mat", str(path)) from None
+    try:
+        with h5py.File(path, "r") as file:
+            return {name: _of_hdf5(item) for name, item in file.items()}
+    except OSError:
+        raise LogError(str(path), "is not a whole MAT file", _REMEDY) from None
+
+
+def _of_hdf5(item):
+    """A group as a dictionary; an array, whose axes HDF5 has in reverse, as MATLAB has it; else None."""
+    if hasattr(item, "items"):
+        return {name: _of_hdf5(part) for name, part in item.items()}
+    values = item[()] if item.dtype.kind in "fiub" else None
+    if values is None or item.attrs.get("MATLAB_empty", 0):
+        return None
+    text = item.attrs.get("MATLAB_class", b"") == b"char"
+    return "".join(map(chr, np.ravel(values))) if text else np.squeeze(np.asarray(values).T)
+
+
+def _vectors(content: dict, owner: str = "") -> Iterator[tuple[str, str, np.ndarray]]:
+    """Yield (owner, name, column) of all that is inside; scalars (settings, counters) are left out."""
+    label = content.get("label")
     for name, value in content.items():
         if hasattr(value, "_fieldnames"):
-            found.update(_columns({field: getattr(value, field) for field in value._fieldnames}))
-        elif isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "fiubU":
-            found[name] = value.astype(float) if value.dtype.kind == "b" else value
-    return found
+            value = {field: getattr(value, field) for field in value._fieldnames}
+        if isinstance(value, dict):
+            yield from _vectors(value, name)
+        elif isinstance(value, np.ndarray) and value.dtype == object:
+            for part in value.ravel():
+                if hasattr(part, "_fieldnames"):
+                    yield from _vectors({f: getattr(part, f) for f in part._fieldnames}, name)
+        elif isinstance(value, np.ndarray):
+            own = label if name == "values" and isinstance(label, str) and label else name
+            yield from ((owner, own + mark, column) for mark, column in _columns(value))
+
+
+def _columns(value: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield (mark of its name, column (m,)) of a vector or a matrix."""
+    if value.dtype.kind not in "fiubU" or value.size < 2:
+        return
+    value = value.astype(float) if value.dtype.kind == "b" else value
+    if value.ndim == 1:
+        yield "", value
+    elif value.ndim == 2 and value.dtype.kind != "U" and value.shape[1] <= _WIDEST:
+        yield from ((f"_{k + 1}", value[:, k]) for k in range(value.shape[1]))
+
+
+def _by_name(found: list[tuple[str, str, np.ndarray]]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Columns by their own name where no other has it, else by "owner.name"; and the aliases."""
+    names = [name for _, name, _ in found]
+    columns, aliases = {}, {}
+    for owner, name, column in found:
+        whole = f"{owner}.{name}" if owner else name
+        own = name if names.count(name) == 1 else whole
+        columns[own] = column
+        aliases |= {whole: own} if whole != own else {}
+    return columns, aliases

@@ -5,34 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from focgen.errors import LogError
 from focgen.logs.experiment import Experiment
+from focgen.logs.frames import is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
+from focgen.logs.scales import Scale, known, same
 from focgen.logs.table import LogTable, read_table, stem
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
 
 Limits = Mapping[str, tuple[float, float]]
+Log = str | Path | Mapping[str, Any] | Any  # a file, a dictionary of arrays, or a frame
 
 
 class Roles(Protocol):
-    """Which column plays which role (the rig's ``Signals``)."""
+    """Which column plays which role, and how it becomes its signal (the rig's ``Signals``)."""
 
     time: str
     run: str | None
+    scales: Mapping[str, Scale]
+    units: Mapping[str, str]
 
     def columns(self) -> dict[str, str]:
         """Role → column, without time and run."""
 
 
 def read_logs(
-    paths: Sequence[str | Path],
+    paths: Log | Sequence[Log],
     signals: Roles,
     sample_time: float,
     first: float | None = None,
@@ -42,42 +47,95 @@ def read_logs(
     """Read the experiments of one session, in the order of their time stamps, or as given where those
     overlap.
 
+    ``paths`` are files, or logs in memory: a pandas or polars frame, a dictionary of arrays (m,), or a list
+    of these. Experiments that were read before are only cut.
+
     ``sample_time`` (s) is the rig's: what is not uniformly sampled is resampled to it. ``first`` and ``last``
     cut each experiment (s since its first sample). ``limits`` are each role's (low, high) in its unit, which
     reveal a wrong unit. Raises LogError naming file, column, line and remedy.
     """
-    if not paths:
+    logs = each_of(paths)
+    if logs and all(isinstance(log, Experiment) for log in logs):
+        return tuple(log.between(first, last) for log in logs)
+    tables = tables_of(logs)
+    if not tables:
         raise LogError("logs", "none is given", "name at least one log")
-    found = [part for path in paths for part in _experiments(path, signals, sample_time, (first, last))]
+    found = [part for table in tables for part in _experiments(table, signals, sample_time, (first, last))]
     _check_limits(found, dict(limits or {}), signals.columns())
     return in_session_order(_with_own_names(found))
 
 
-def _experiments(path, signals: Roles, sample_time: float, window) -> Iterator[tuple[str, Experiment]]:
-    """Yield (path, experiment) for each run of a file, or part of one."""
-    table = read_table(path)
+def each_of(logs: Log | Sequence[Log]) -> list[Log]:
+    """One log, or several, as a list."""
+    return [logs] if isinstance(logs, str | Path | Experiment) or is_frame(logs) else list(logs)
+
+
+def tables_of(logs: Sequence[Log]) -> list[LogTable]:
+    """Logs as tables. Raises LogError where one cannot be read."""
+    names = ["log"] if len(logs) == 1 else [f"log {k}" for k in range(1, len(logs) + 1)]
+    return [table_of(log, name) if is_frame(log) else read_table(log) for log, name in zip(logs, names)]
+
+
+def _experiments(
+    table: LogTable, signals: Roles, sample_time: float, window
+) -> Iterator[tuple[str, Experiment]]:
+    """Yield (path, experiment) for each run of a log, or part of one."""
     columns, notes = _present(table, signals)
-    time = table.numbers(signals.time)
+    time, said = _time(table, signals)
+    notes = (*table.notes, *said, *notes)
     for name, rows in _runs(table, signals.run):
         where = f"{table.path}" if len(rows) == len(table) else f"{table.path} run {name}"
         run = Raw(name, where, f"{where} [{signals.time}]", time, columns, table.line, notes).part(rows)
         for experiment in experiments_of(run, sample_time, window):
-            yield str(path), experiment
+            yield table.path, experiment
+
+
+def _time(table: LogTable, signals: Roles) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The time stamps (m,) in s, and a note where no column gives them."""
+    if signals.time in table:
+        return _scaled(table, "time", table.seconds(signals.time), signals), ()
+    if table.clock is None:
+        raise table.missing("time", signals.time, {signals.run, *signals.columns().values()})
+    step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
+    return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
+
+
+def _scaled(table: LogTable, role: str, values: np.ndarray, signals: Roles) -> np.ndarray:
+    """A column's values (m,) as the role's signal. Raises LogError where its unit cannot be converted."""
+    scale = signals.scales.get(role)
+    if scale is None:
+        return values
+    try:
+        return scale.applied(values, "s" if role == "time" else signals.units.get(role))
+    except ValueError as reason:
+        name = signals.time if role == "time" else signals.columns()[role]
+        remedy = f"correct it, or name the unit of {role} in [units]"
+        raise LogError(f"{table.path} [{name}]", f"cannot be converted: {reason}", remedy) from None
 
 
 def _present(table: LogTable, signals: Roles) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """The columns that are there, by role, and notes on those that are not."""
+    """The signals that are there, by role, and notes on those that are not, or in another unit."""
     wanted = signals.columns()
     taken = {signals.time, signals.run, *wanted.values()}
-    if signals.time not in table.columns:
-        raise table.missing("time", signals.time, taken)
-    columns = {role: table.numbers(name) for role, name in wanted.items() if name in table.columns}
     inputs = [role for role in ("command", "pressure") if role in wanted]
-    for role in ["output"] + inputs[: 0 if any(role in columns for role in inputs) else 1]:
-        if role not in columns:
+    there = [role for role, name in wanted.items() if name in table]
+    for role in ["output"] + inputs[: 0 if any(role in there for role in inputs) else 1]:
+        if role not in there:
             raise table.missing(role, wanted[role], taken)
+    columns = {role: _scaled(table, role, table.numbers(wanted[role]), signals) for role in there}
     absent = [(role, name) for role, name in wanted.items() if role not in columns and role != "reference"]
-    return columns, tuple(_absence(table, role, name, taken) for role, name in absent)
+    notes = [_absence(table, role, name, taken) for role, name in absent]
+    return columns, (*notes, *filter(None, (_unit_note(table, role, signals) for role in columns)))
+
+
+def _unit_note(table: LogTable, role: str, signals: Roles) -> str | None:
+    """What the file says of a column's unit, where the rig takes it for another."""
+    column = signals.columns()[role]
+    given, own, scale = table.unit(column), signals.units.get(role), signals.scales.get(role)
+    taken = own if scale is None else scale.unit
+    if given is None or taken is None or not (known(given) and known(taken)) or same(given, taken):
+        return None
+    return f"the log gives {column!r} in {given}, {role} is taken as {taken}: is it {{ unit = {given!r} }}?"
 
 
 def _absence(table: LogTable, role: str, name: str, taken: set) -> str:
@@ -87,10 +145,13 @@ def _absence(table: LogTable, role: str, name: str, taken: set) -> str:
 
 def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, np.ndarray]]:
     """Yield (name, row numbers) in the order of appearance."""
-    if run is None or run not in table.columns:
+    if run is not None and run in table:
+        labels = np.array(table.texts(run))
+    elif table.runs is not None:
+        labels = np.array(table.runs)
+    else:
         yield stem(table.path), np.arange(len(table))
         return
-    labels = np.array(table.texts(run))
     names, firsts, codes = np.unique(labels, return_index=True, return_inverse=True)
     for code in np.argsort(firsts):
         if not names[code]:

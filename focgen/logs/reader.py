@@ -1,7 +1,8 @@
 """The process that reads one log: ``python -m focgen.logs.reader MODULE PATH``.
 
-Answers on stdout: a line of JSON, ``{"columns": [[name, texts or null, count], …]}`` or ``{"fault": [kind,
-…]}``, and behind it the columns of numbers as float64, one after the other.
+Answers on stdout: a line of JSON, ``{"columns": [[name, texts or null, count], …], "units": …, "aliases": …,
+"runs": …, "clock": …}`` or ``{"fault": [kind, …]}``, and behind it the columns of numbers and the clock as
+float64, one after the other.
 """
 
 from __future__ import annotations
@@ -79,7 +80,10 @@ def _columns(table: LogTable) -> tuple[dict, list[np.ndarray]]:
         else:
             cells = column.tolist() if isinstance(column, np.ndarray) else column
             head.append([str(name), [_cell(cell) for cell in cells], len(cells)])
-    return {"columns": head}, numbers
+    if table.clock is not None:
+        numbers.append(np.ascontiguousarray(table.clock, dtype=np.float64))
+    known = {"units": dict(table.units), "aliases": dict(table.aliases), "runs": table.runs}
+    return {"columns": head, **known, "clock": table.clock is not None}, numbers
 
 
 def _cell(cell) -> str:

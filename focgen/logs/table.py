@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -13,15 +13,23 @@ from pathlib import Path
 import numpy as np
 
 from focgen.errors import LogError
+from focgen.logs import stamps
+from focgen.logs.dialect import MISSING, is_stamp
 
 # The reader of each kind of file: a module of this room with ``read(path) -> LogTable``.
 _READERS = {
-    ".csv": "focgen.logs.csv_file",
-    ".csv.gz": "focgen.logs.csv_file",
+    **{
+        f".{kind}{packed}": "focgen.logs.text_file"
+        for kind in ("csv", "txt", "tsv")
+        for packed in ("", ".gz")
+    },
+    ".lvm": "focgen.logs.lvm_file",
+    ".lvm.gz": "focgen.logs.lvm_file",
     ".parquet": "focgen.logs.parquet_file",
     ".mat": "focgen.logs.mat_file",
     ".tdms": "focgen.logs.tdms_file",
 }
+_LOOK = 100  # cells: by then a column of dates shows that it is one
 _BINARY = (".parquet", ".mat", ".tdms")  # foreign readers, each in a process of its own
 
 
@@ -29,21 +37,42 @@ _BINARY = (".parquet", ".mat", ".tdms")  # foreign readers, each in a process of
 class LogTable:
     """Columns of one length by name: texts as a file of text has them, or an array of shape (m,).
 
-    ``line`` turns a row's index into the words that find it in the file ("line 17").
+    ``line`` turns a row's index into the words that find it in the file ("line 17"). ``decimal``: the decimal
+    mark of texts. ``units`` as the file gives them, by column. ``aliases``: further names of columns.
+    ``clock`` (m,): the time in s that a file gives without a column for it. ``runs`` (m,): the name of the
+    run of each row, where the file has them apart. ``notes``: how the file was read.
     """
 
     path: str
     columns: Mapping[str, Sequence[str] | np.ndarray]
     line: Callable[[int], str] = "row {}".format
+    decimal: str = "."
+    units: Mapping[str, str] = field(default_factory=dict)
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    clock: np.ndarray | None = None
+    runs: Sequence[str] | None = None
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns or name in self.aliases
+
+    def column(self, name: str) -> Sequence[str] | np.ndarray:
+        """A column (m,) by its name or another name of it."""
+        return self.columns[name if name in self.columns else self.aliases[name]]
+
+    def unit(self, name: str) -> str | None:
+        """The unit that the file gives for a column."""
+        return self.units.get(name if name in self.columns else self.aliases.get(name, name))
 
     def closest(self, name: str, taken: Collection[str] = ()) -> str | None:
         """The column, not one of those ``taken``, whose name is nearest to ``name``, or None where none is
         near.
         """
-        lowered = {column.lower(): column for column in self.columns if column not in taken}
+        names = [*self.columns, *self.aliases]
+        lowered = {column.lower(): column for column in names if column not in taken}
         near = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
         return lowered[near[0]] if near else None
 
@@ -62,17 +91,27 @@ class LogTable:
 
     def texts(self, name: str) -> list[str]:
         """A column as text, numbers in their shortest form."""
-        return [cell if isinstance(cell, str) else f"{cell:g}" for cell in _plain(self.columns[name])]
+        return [cell if isinstance(cell, str) else f"{cell:g}" for cell in _plain(self.column(name))]
+
+    def seconds(self, name: str) -> np.ndarray:
+        """A column of time (m,): numbers as they are, ISO dates and times of day in s."""
+        column = self.column(name)
+        if not isinstance(column, np.ndarray) and any(is_stamp(cell) for cell in column[:_LOOK]):
+            try:
+                return stamps.seconds(column)
+            except ValueError as reason:
+                what = f"has a time that cannot be read ({reason})"
+                raise LogError(f"{self.path} [{name}]", what, "write it as 2026-01-31T12:00:00.000") from None
+        return self.numbers(name)
 
     def numbers(self, name: str) -> np.ndarray:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no
         number.
         """
-        column = self.columns[name]
+        column = self.column(name)
         try:
-            values = (
-                column if isinstance(column, np.ndarray) and column.dtype.kind in "fiu" else _parsed(column)
-            )
+            plain = isinstance(column, np.ndarray) and column.dtype.kind in "fiu"
+            values = column if plain else _parsed(column, self.decimal)
         except (ValueError, TypeError):
             raise self._not_a_number(name) from None
         values = np.asarray(values, dtype=float)
@@ -84,7 +123,8 @@ class LogTable:
         return values
 
     def _not_a_number(self, name: str) -> LogError:
-        row, cell = next((i, c) for i, c in enumerate(_plain(self.columns[name])) if not _is_number(c))
+        cells = enumerate(_plain(self.column(name)))
+        row, cell = next((i, c) for i, c in cells if not _is_number(c, self.decimal))
         remedy = (
             "write decimals with a point" if "," in str(cell) else "leave the cell empty or give a number"
         )
@@ -122,22 +162,28 @@ def _reader(kind: str) -> Callable[[Path], LogTable]:
 def stem(path: str | Path) -> str:
     """The file's name without folder and ending."""
     name = Path(path).name
-    return name[: -len(".csv.gz")] if name.lower().endswith(".csv.gz") else Path(name).stem
+    return Path(name[: -len(".gz")] if name.lower().endswith(".gz") else name).stem
 
 
 def _plain(column) -> list:
     return column.tolist() if isinstance(column, np.ndarray) else list(column)
 
 
-def _parsed(column) -> list[float]:
+def _parsed(column, decimal: str = ".") -> list[float]:
     cells = _plain(column)
     if any(isinstance(cell, str) and "_" in cell for cell in cells):
         raise ValueError  # Python reads 1_000 as a number, nobody else does
-    return [float(cell) if cell not in ("", None) else math.nan for cell in cells]
+    if decimal == ",":
+        cells = [cell.replace(",", ".") if isinstance(cell, str) else cell for cell in cells]
+    return [math.nan if _is_missing(cell) else float(cell) for cell in cells]
 
 
-def _is_number(cell) -> bool:
+def _is_missing(cell) -> bool:
+    return cell is None or isinstance(cell, str) and cell.lower() in MISSING
+
+
+def _is_number(cell, decimal: str) -> bool:
     try:
-        return bool(_parsed([cell]))
+        return bool(_parsed([cell], decimal))
     except (ValueError, TypeError):
         return False

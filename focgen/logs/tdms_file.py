@@ -1,16 +1,33 @@
-"""Logs in .tdms (LabVIEW): one channel a column, named by the channel, or "group/channel" where names
-repeat.
+"""Logs in .tdms (LabVIEW): one channel a column, by its name alone and by "group/channel".
+
+Groups with the same channels are runs, each with the group's name; the channels of other groups belong
+together. Channels without a column of time are waveforms, whose properties give it.
 """
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from focgen.errors import LogError, MissingExtra
 from focgen.logs.table import LogTable
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """``channels`` (m,) by name, their ``units``, and the time in s that their waveforms have, or None."""
+
+    name: str
+    channels: Mapping[str, np.ndarray]
+    units: Mapping[str, str]
+    clock: np.ndarray | None
+
+    def __len__(self) -> int:
+        return len(next(iter(self.channels.values())))
 
 
 def read(path: Path) -> LogTable:
@@ -25,29 +42,75 @@ def read(path: Path) -> LogTable:
     log_manager.set_level(logging.ERROR)  # what it warns of is refused below, in one line
     path.open("rb").close()
     try:
-        groups = nptdms.TdmsFile.read(path).groups()
-        channels = [
-            (group.name, channel.name, np.asarray(channel[:]))
-            for group in groups
-            for channel in group.channels()
-        ]
+        groups = [_group(group) for group in nptdms.TdmsFile.read(path).groups()]
     except MemoryError:
         raise
     except Exception:  # nptdms has no error of its own for damaged files
         raise LogError(str(path), "is not a whole TDMS file", "write it again") from None
-    names = [channel for _, channel, _ in channels]
-    columns = {
-        channel if names.count(channel) == 1 else f"{group}/{channel}": _seconds(values)
-        for group, channel, values in channels
-        if len(values)
-    }
-    if len({len(values) for values in columns.values()}) > 1:
-        sizes = ", ".join(f"{name} {len(values)}" for name, values in columns.items())
-        raise LogError(str(path), f"holds channels of different lengths ({sizes})", "log them at one rate")
-    return LogTable(str(path), columns)
+    groups = [group for group in groups if group.channels]
+    if not groups:
+        return LogTable(str(path), {})
+    for group in groups:
+        _check_lengths(path, group.channels)
+    runs = len(groups) > 1 and all(set(g.channels) == set(groups[0].channels) for g in groups)
+    return _one_after_the_other(path, groups) if runs else _side_by_side(path, groups)
+
+
+def _group(group) -> _Group:
+    found = {c.name: (c, _seconds(np.asarray(c[:]))) for c in group.channels()}
+    channels = {name: values for name, (_, values) in found.items() if len(values)}
+    units = {name: str(c.properties.get("unit_string", "")) for name, (c, _) in found.items()}
+    clocks = [_clock(c.properties, len(values)) for c, values in found.values() if len(values)]
+    known = [clock for clock in clocks if clock is not None]
+    same = known and all(np.array_equal(clock, known[0]) for clock in known)
+    return _Group(group.name, channels, {n: u for n, u in units.items() if u}, known[0] if same else None)
+
+
+def _clock(properties: Mapping, count: int) -> np.ndarray | None:
+    """The time (m,) in s that a waveform's properties give: from its start, where that is known."""
+    step = float(properties.get("wf_increment", 0.0))
+    if step <= 0.0:
+        return None
+    start = properties.get("wf_start_time")
+    begin = _seconds(np.array([start], "datetime64[us]"))[0] if start is not None else 0.0
+    return begin + float(properties.get("wf_start_offset", 0.0)) + step * np.arange(count)
 
 
 def _seconds(values: np.ndarray) -> np.ndarray:
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]").astype(np.int64) * 1e-9
     return values
+
+
+def _check_lengths(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    if len({len(values) for values in columns.values()}) > 1:
+        sizes = ", ".join(f"{name} {len(values)}" for name, values in columns.items())
+        raise LogError(str(path), f"holds channels of different lengths ({sizes})", "log them at one rate")
+
+
+def _one_after_the_other(path: Path, groups: Sequence[_Group]) -> LogTable:
+    columns = {name: np.concatenate([g.channels[name] for g in groups]) for name in groups[0].channels}
+    clocks = [g.clock for g in groups]
+    return LogTable(
+        str(path),
+        columns,
+        units=groups[0].units,
+        clock=np.concatenate(clocks) if all(c is not None for c in clocks) else None,
+        runs=[g.name for g in groups for _ in range(len(g))],
+    )
+
+
+def _side_by_side(path: Path, groups: Sequence[_Group]) -> LogTable:
+    """Channels by their own name where that is told from all others, and by "group/channel" always."""
+    names = [name for g in groups for name in g.channels]
+    columns, units, aliases = {}, {}, {}
+    for g in groups:
+        for channel, values in g.channels.items():
+            whole = f"{g.name}/{channel}"
+            name = channel if names.count(channel) == 1 else whole
+            columns[name] = values
+            units |= {name: g.units[channel]} if channel in g.units else {}
+            aliases |= {whole: name} if name != whole else {}
+    _check_lengths(path, columns)
+    clock = next((g.clock for g in groups if g.clock is not None), None)
+    return LogTable(str(path), columns, units=units, aliases=aliases, clock=clock)

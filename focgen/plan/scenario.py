@@ -73,8 +73,9 @@ def nearest_raw(values, form: Format) -> np.ndarray:
     """
     if form.floating:
         return np.asarray(values, dtype=np.float32 if form.ctype == "float" else np.float64)
-    scaled = np.asarray(values, dtype=float) / form.lsb
-    whole, top = np.floor(np.abs(scaled)), 1 << (form.bits - 1)
+    top = 1 << (form.bits - 1)
+    scaled = np.clip(np.asarray(values, dtype=float) / form.lsb, -top, top)
+    whole = np.floor(np.abs(scaled))
     nearest = np.copysign(whole + (np.abs(scaled) - whole >= 0.5), scaled)
     return np.clip(nearest, -top, top - 1).astype(np.int64)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from focgen.control.units import unit_of
+from focgen.control.units import unit_of_role
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found
 from focgen.rig.model import Rig
 
@@ -21,7 +21,7 @@ _MEANS = (
 def units_of_rig(rig: Rig) -> dict[str, str]:
     """The unit of each signal as far as its column tells it; the curvature's is the output's where it has
     none."""
-    units = {role: unit_of(getattr(rig.signals, role)) for role in _LOGGED}
+    units = {role: unit_of_role(rig.signals, role) for role in _LOGGED}
     return units | {"curvature": units["curvature"] or units["output"]}
 
 

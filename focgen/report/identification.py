@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.control.units import unit_of
+from focgen.control.units import unit_of_role
 from focgen.identification.model import ExperimentFit, Identification, Joint
 from focgen.identification.stages import StageFit
 from focgen.report.identification_summary import driving_role, gain_unit, model_label
@@ -100,7 +100,7 @@ def _legend_beside(axes, ends) -> None:
 
 def _named(found: Identification, role: str, ahead: str = "") -> str:
     """A signal's name, with ``ahead`` before it, and the unit that its column tells."""
-    return with_unit(ahead + role, unit_of(getattr(found.rig.signals, role)))
+    return with_unit(ahead + role, unit_of_role(found.rig.signals, role))
 
 
 def _models(found: Identification) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from focgen.control.units import unit_of
+from focgen.control.units import unit_of_role
 from focgen.identification.model import ExperimentFit, Identification, Joint
 from focgen.identification.stages import StageFit
 from focgen.report.page import TableOf, text_table
@@ -129,12 +129,12 @@ def driving_role(found: Identification) -> str:
 
 
 def _driving_unit(found: Identification) -> str:
-    return unit_of(getattr(found.rig.signals, driving_role(found)))
+    return unit_of_role(found.rig.signals, driving_role(found))
 
 
 def gain_unit(found: Identification) -> str:
     """The unit of K, as far as the columns tell it."""
-    above, below = unit_of(getattr(found.rig.signals, found.experiments[0].fitted)), _driving_unit(found)
+    above, below = unit_of_role(found.rig.signals, found.experiments[0].fitted), _driving_unit(found)
     if not above or not below:
         return ""
     return f"1/({above[2:]} {below})" if above.startswith("1/") else f"{above}/{below}"

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import tomlkit
 
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
+from focgen.logs.scales import Scale
 from focgen.output import write_file
 from focgen.rig.model import (
     UNITY,
@@ -24,17 +27,20 @@ from focgen.rig.model import (
 from focgen.tomlfile import Table, terms_of
 
 _STAGES = ("regulator", "actuator", "sensor")
+_ROLES = ("time", "output", "command", "pressure", "curvature", "reference")
 _LONGEST = 1e6  # samples that a nominal delay may have
 
 
-def read_rig(path: str | Path) -> Rig:
-    """Read a rig. Raises RigError naming file, table, key and remedy."""
-    top = Table.read(path, RigError)
+def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
+    """Read a rig from its file, or from a dictionary of the same shape. Raises RigError naming file, table,
+    key and remedy."""
+    given = isinstance(path, Mapping)
+    top = Table(path, "rig", RigError) if given else Table.read(path, RigError)
     sample_time = top.number("sample_time", above=0.0)
     stages = {stage: top.table(stage) for stage in _STAGES}
     delays = Delays(**{stage: _delay(table, sample_time) for stage, table in stages.items()})
     rig = Rig(
-        name=top.text("name", Path(path).stem),
+        name=top.text("name", "rig" if given else Path(path).stem),
         sample_time=sample_time,
         signals=_signals(top),
         actuator=_actuator(stages["actuator"]),
@@ -53,24 +59,56 @@ def _signals(top: Table) -> Signals:
     table = top.table("signals")
     if table is None:
         raise top.fail(None, "lacks the table [signals]", "say which log column plays which role")
-    optional = ("command", "pressure", "curvature", "reference", "run")
-    found = {role: table.text(role) for role in optional}
-    required = {}
     for role in ("time", "output"):
         table.required(role)
-        required[role] = table.text(role)
+    named = {role: _column(table, role) for role in _ROLES}
+    found = {role: column for role, (column, _) in named.items()} | {"run": table.text("run")}
     table.done()
     if found["command"] is None and found["pressure"] is None:
         raise table.fail(None, "has neither 'command' nor 'pressure'", "name the column of the input")
-    signals = Signals(**required, **found)
-    _check_columns(table, signals)
+    _check_columns(table, found)
+    scales = {role: scale for role, (_, scale) in named.items() if scale is not None}
+    signals = Signals(**found, scales=scales, units=_units(top.table("units")))
+    for role, scale in scales.items():
+        try:
+            scale.applied(np.zeros(1), "s" if role == "time" else signals.units.get(role))
+        except ValueError as reason:
+            remedy = f"correct it, or name the unit of {role} in [units]"
+            raise table.fail(role, f"cannot be converted: {reason}", remedy) from None
     return signals
 
 
-def _check_columns(table: Table, signals: Signals) -> None:
+def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:
+    """A role's column, by its name or as a table that says how it is scaled too."""
+    if not isinstance(table.raw(role), dict):
+        return table.text(role), None
+    given = table.table(role)
+    name = given.required("column") and given.text("column")
+    scale = Scale(given.number("scale", 1.0), given.number("offset", 0.0), given.text("unit"))
+    given.done()
+    if scale.unit is not None and ("scale" in given or "offset" in given):
+        raise given.fail("unit", "is given beside 'scale' or 'offset'", "give the unit, or the numbers")
+    if scale.scale == 0.0:
+        raise given.fail("scale", "is 0", "give what the column is multiplied by")
+    return name, None if scale == Scale() else scale
+
+
+def _units(table: Table | None) -> dict[str, str]:
+    if table is None:
+        return {}
+    found = {role: table.text(role) for role in _ROLES if role in table}
+    table.done()
+    if found.pop("time", "s") != "s":
+        raise table.fail(
+            "time", "is not s", "the rig's time is in s: give the column's own unit in [signals]"
+        )
+    return found
+
+
+def _check_columns(table: Table, columns: dict[str, str | None]) -> None:
     """Refuse a column with two roles: the stage between them would be taken for 1 without a word."""
     roles: dict[str, str] = {}
-    for role, column in asdict(signals).items():
+    for role, column in columns.items():
         if column is not None and column in roles:
             remedy = "give each role its own column, and leave out what is not logged"
             raise table.fail(role, f"is the column {column!r}, as {roles[column]!r} is", remedy)
@@ -178,7 +216,9 @@ def rig_text(rig: Rig) -> str:
 def rig_table(rig: Rig) -> dict:
     """The rig as nested dictionaries, in the order of the file."""
     table: dict = {"name": rig.name, "sample_time": rig.sample_time}
-    table["signals"] = {role: name for role, name in asdict(rig.signals).items() if name is not None}
+    table["signals"] = _signals_table(rig.signals)
+    if rig.signals.units:
+        table["units"] = dict(rig.signals.units)
     for key in ("regulator", "sensor"):
         stage = getattr(rig, key)
         if stage != UNITY:
@@ -198,6 +238,22 @@ def rig_table(rig: Rig) -> dict:
     if rig.effects:
         table["effects"] = [dict(effect) for effect in rig.effects]
     return table
+
+
+def _signals_table(signals: Signals) -> dict:
+    named = {role: getattr(signals, role) for role in (*_ROLES, "run")}
+    return {
+        role: _column_table(name, signals.scales.get(role))
+        for role, name in named.items()
+        if name is not None
+    }
+
+
+def _column_table(name: str, scale: Scale | None) -> str | dict:
+    if scale is None:
+        return name
+    given = {"unit": scale.unit} if scale.unit is not None else {"scale": scale.scale, "offset": scale.offset}
+    return {"column": name, **given}
 
 
 def _relative_table(part: Relative, usual: Relative) -> dict:

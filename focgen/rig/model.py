@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from focgen.fractional.transfer import TransferFunction
+from focgen.logs.scales import Scale
 
 UNITY = TransferFunction([(1.0, 0.0)])
 
@@ -19,6 +20,8 @@ class Signals:
 
     ``time`` in s; ``command`` into the regulator; ``pressure`` between regulator and actuator; ``curvature``
     between actuator and sensor; ``output`` what the controller reads; ``run`` splits a file into experiments.
+    ``scales``: how a role's column becomes the role's signal, where it is not the signal itself; ``units``:
+    the rig's own unit of each role, where stated.
     """
 
     time: str
@@ -28,6 +31,8 @@ class Signals:
     curvature: str | None = None
     reference: str | None = None
     run: str | None = None
+    scales: Mapping[str, Scale] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def columns(self) -> dict[str, str]:
         """The logged roles and their columns, without ``time`` and ``run``."""

@@ -61,8 +61,7 @@ def links(
 
 def _units(rig: Rig) -> dict[str, str]:
     """What names the unit of each role: the rig's units, else its column."""
-    named = getattr(rig, "units", None) or {}
-    return {**rig.signals.columns(), **(named if isinstance(named, dict) else {})}
+    return {**rig.signals.columns(), **rig.signals.units}
 
 
 def _enough(experiments: Sequence[Experiment]) -> list[Experiment]:

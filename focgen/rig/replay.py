@@ -68,8 +68,6 @@ def experiments(
     rig: Rig, logs: Sequence[Experiment | str | Path], first=None, last=None
 ) -> tuple[Experiment, ...]:
     """The logs read, and cut to ``first`` … ``last`` s."""
-    if logs and all(isinstance(log, Experiment) for log in logs):
-        return tuple(log.between(first, last) for log in logs)
     return read_logs(logs, rig.signals, rig.sample_time, first, last)
 
 

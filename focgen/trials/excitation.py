@@ -164,6 +164,14 @@ def engine(rng: np.random.Generator, Ts: float) -> list[Experiment]:
     ]
 
 
-SUITES = {"full": full, "short": short, "closed": references, "engine": engine}
-STREAMS = {"closed": 0, "full": 1, "short": 2, "engine": 3}
-"""Of every suite its number in the seeds of its cases."""
+SUITES = {
+    "full": full,
+    "short": short,
+    "closed": references,
+    "engine": engine,
+    "off": full,
+    "begun": full,
+}
+STREAMS = {"closed": 0, "full": 1, "short": 2, "engine": 3, "off": 1, "begun": 1}
+"""Of every suite its number in the seeds of its cases. Those of one number have the same cases, disturbed or
+not (``disturbed``)."""

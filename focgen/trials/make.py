@@ -27,6 +27,7 @@ from focgen.progress import track
 from focgen.rig.files import rig_table
 from focgen.trials.cases import Case, make_case
 from focgen.trials.closed_cases import make_closed_case
+from focgen.trials.disturbed import DISTURBED, disturbed
 from focgen.trials.excitation import STREAMS, SUITES
 from focgen.trials.facts import SIGNALS
 from focgen.trials.engine.cases import make_engine_case
@@ -36,6 +37,7 @@ from focgen.trials.recording import as_csv
 from focgen.trials.sealing import commitment, sealed
 
 DEFAULT_KINDS = {"full": KINDS, "short": KINDS, "closed": CLOSED_KINDS, "engine": ENGINE_KINDS}
+DEFAULT_KINDS |= dict.fromkeys(DISTURBED, KINDS)
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ def _made(assignment: Assignment, signals: str, suite: str, rng: np.random.Gener
         return make_closed_case(assignment, signals, rng)
     if suite == "engine":
         return make_engine_case(assignment, signals, rng)
-    return make_case(assignment, signals, suite, rng)
+    case = make_case(assignment, signals, suite, rng)
+    return disturbed(case, suite, rng) if suite in DISTURBED else case
 
 
 def _check(folder: Path, cases: int, seed: int, signals: str, suite: str) -> None:

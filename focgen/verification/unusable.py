@@ -29,7 +29,8 @@ def strewn(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
     for values in signals.values():
         where = _places(rng, values.shape)
         values[where] = rng.choice(bad, np.count_nonzero(where))
-    signals["ref"][0, :2] = bad[:2]
+    first = signals["ref"][0, :2]
+    first[:] = bad[: first.size]
     others = [values[-1] for name, values in signals.items() if name != "meas"]
     _largest(rng, signals["meas"][-1], others, kind(limit(plan)))
     return Scenario(**signals, resets=_resets(rng, scenario, bad), tracks=_tracks(rng, scenario, bad))

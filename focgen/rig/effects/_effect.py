@@ -99,7 +99,8 @@ class Form:
     ``seen(y)`` reads the values off what was measured, (n,), where that can be done at sight; None where it
     is not there. ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is
-    linear, None where not.
+    linear, None where not. ``wanders``: it follows the session's time through free values, so that it
+    foretells nothing of a later one.
     """
 
     name: str
@@ -109,6 +110,7 @@ class Form:
     seen: Callable[[np.ndarray], tuple[float, ...] | None] | None = None
     leaves: Callable[[np.ndarray, tuple[float, ...], Run], dict[str, float]] | None = None
     response: Callable[[tuple[float, ...], np.ndarray], np.ndarray] | None = None
+    wanders: bool = False
 
     @property
     def drawn(self) -> bool:

@@ -1,9 +1,15 @@
-"""Slow functions of the session's time, shared by the families that drift."""
+"""Slow functions of the session's time, shared by the families that drift.
+
+A trend of one sense goes on after the session. A wander is followed through the session, and nobody can
+foretell its next turn: what remains of it later is its mean.
+"""
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from focgen.rig.effects._effect import Form, Parameter
+
+_SESSION = Parameter("session", time=1, clock="session", lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
 
 
 def _linear(x, values, run):
@@ -16,15 +22,18 @@ def _settling(x, values, run):
 
 
 def _bending(x, values, run):
-    first, second = values
-    t = run.clock
-    return t * (first + second * t)
+    """From 0 to ``size`` at the session's end, never back; then straight on."""
+    size, straight, session = values
+    q = run.clock / session
+    inside = np.minimum(q, 1.0)
+    return size * (inside * (straight + (1.0 - straight) * inside) + (2.0 - straight) * (q - inside))
 
 
 def _wandering(x, values, run):
-    *sizes, spacing = values
-    knots = spacing * np.arange(len(sizes) + 1)
-    return CubicSpline(knots, [0.0, *sizes], bc_type="natural")(np.minimum(run.clock, knots[-1]))
+    *sizes, session = values
+    knots = session / len(sizes) * np.arange(len(sizes) + 1)
+    path = CubicSpline(knots, [0.0, *sizes], bc_type="natural")
+    return np.where(run.clock <= knots[-1], path(run.clock), path.integrate(0.0, knots[-1]) / knots[-1])
 
 
 def forms(slot, level, onto):
@@ -52,20 +61,20 @@ def forms(slot, level, onto):
             "bending",
             slot,
             (
-                Parameter("rate", time=-1, starts=(0.1,), **size),
-                Parameter("acceleration", time=-2, starts=(0.05,), **size),
+                Parameter("size", starts=(0.1, 0.1), **size),
+                Parameter("straightness", lower=0.0, upper=2.0, starts=(0.5, 1.5)),
+                _SESSION,
             ),
             act(_bending),
         ),
         Form(
             "wandering",
             slot,
-            (  # a spline through values at equal times; the last, within the session, is kept
+            (  # a natural spline through values at the quarters of the session
                 *(Parameter(name, starts=(0.01,), **size) for name in ("first", "second", "third", "fourth")),
-                Parameter(
-                    "spacing", time=1, clock="session", lower=0.2, upper=0.25, starts=(0.24,), log=True
-                ),
+                _SESSION,
             ),
             act(_wandering),
+            wanders=True,
         ),
     ]

@@ -162,4 +162,6 @@ def _play(scene: Scene, settings: list[Setting], recorder: Recorder, label: dict
     ranges = Ranges((0.0, 1.2 * scene.full), None, (0.0, 1.3 * scene.spans.output))
     nominal = replace(nominal, ranges=ranges if rng.random() < 0.7 else Ranges())
     count = len(scene.seen)
-    return Case(nominal, played[:count], played[count:], recorder, {**label, "floor": floor_of(played[count:])})
+    return Case(
+        nominal, played[:count], played[count:], recorder, {**label, "floor": floor_of(played[count:])}
+    )

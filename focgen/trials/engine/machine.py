@@ -18,9 +18,7 @@ from focgen.trials.machine import Setting, Trace
 from focgen.trials.vocabulary import VOCABULARY
 
 _SETTLING = 8.0  # body times before each experiment: it hangs as it hangs
-_STAGE_OF = {
-    form.name: stage for stage, forms in (*VOCABULARY.values(), *OUTSIDE.values()) for form in forms
-}
+_STAGE_OF = {form.name: stage for stage, forms in (*VOCABULARY.values(), *OUTSIDE.values()) for form in forms}
 
 
 def engine():

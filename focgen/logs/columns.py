@@ -1,0 +1,203 @@
+"""What the columns of a log may be: each role's likeliest column, by name, unit and shape."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from focgen.errors import LogError
+from focgen.logs.plausibility import unit_of
+from focgen.logs.table import LogTable
+
+SIGNALS = ("command", "pressure", "curvature", "output", "reference")
+_TIME = frozenset("t time zeit timestamp stamp clock sec seconds secs ms tiempo temps x".split())
+_RUN = frozenset("run runs experiment exp trial test segment session series".split())
+_WORDS = {
+    "command": "u cmd command valve pwm duty input drive pump motor voltage stell control heater",
+    "pressure": "p pressure press druck gauge chamber presion",
+    "curvature": "cam camera truth true vision mocap optitrack laser",
+    "output": "y output out kappa curvature angle sensor flex bend bending theta position pos q "
+    "displacement disp deflection strain speed velocity temperature imu height level winkel",
+    "reference": "ref reference setpoint set sp target desired des goal w r soll",
+}
+_EITHER = frozenset("force f torque load".split())  # drives some rigs, and is what others answer with
+_ROLE_WORDS = {role: frozenset(words.split()) for role, words in _WORDS.items()}
+_KINDS = {  # points for a unit's kind, by role
+    "voltage": {"command": 2.0, "output": 0.5},
+    "current": {"command": 2.0},
+    "pressure": {"pressure": 2.5, "command": 0.5, "reference": 0.2},
+    "curvature": {"output": 2.0, "curvature": 1.5, "reference": 0.5},
+    "angle": {"output": 2.0, "curvature": 1.5, "reference": 0.5},
+}
+_LENGTHS = ("mm", "cm", "m", "um", "N", "mN", "kN", "Nm", "K", "Hz", "rpm")  # units that end a name
+_NAMED, _LETTER, _MAYBE = 3.0, 2.0, 1.6  # points for a word, for a single letter, for a word of two roles
+_LEAST = 1.5  # points: less is no role's column
+_SURE = 2.0  # points: less is a guess
+_CLOSE = 1.0  # points: a column so little behind might be meant as well
+_HELD, _LEVELS = 0.8, 60  # share of readings that repeat the last, and levels, of a column set by a program
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """A column over all logs: ``values`` (m,), NaN where a reading is missing; ``unit``, "" where unknown."""
+
+    name: str
+    unit: str
+    values: np.ndarray
+
+    @property
+    def held(self) -> bool:
+        """Whether it looks as if a program had set it: levels, held."""
+        known = self.values[~np.isnan(self.values)]
+        return len(np.unique(known)) <= _LEVELS and float(np.mean(np.diff(known) == 0.0)) >= _HELD
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has more than one value."""
+        known = self.values[~np.isnan(self.values)]
+        return len(known) > 1 and bool(np.ptp(known) > 0.0)
+
+    @property
+    def words(self) -> list[str]:
+        """The words of its name, without its unit."""
+        bare = re.sub(r"[\[(].*?[\])]", "", self.name).replace("per_", "per")
+        spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare)
+        words = [w.lower() for w in re.split(r"[^A-Za-zµκθ]+", spaced) if w]
+        return words[:-1] if len(words) > 1 and self.unit else words
+
+
+def columns_of(tables: Sequence[LogTable]) -> tuple[Column, ...]:
+    """The columns of numbers that all logs have. Raises LogError where there are none."""
+    names = [name for name in tables[0].columns if all(name in table for table in tables)]
+    found = []
+    for name in names:
+        try:
+            values = np.concatenate([table.numbers(name) for table in tables])
+        except LogError:
+            continue  # words, or dates
+        if not np.isnan(values).all():
+            found.append(Column(name, _unit(tables[0], name), values))
+    if not found:
+        raise LogError(tables[0].path, "has no column of numbers", "give a log with a header")
+    return tuple(found)
+
+
+def _unit(table: LogTable, name: str) -> str:
+    named, last = unit_of(name), name.split("_")[-1]
+    return table.unit(name) or (named[1] if named else last if last != name and last in _LENGTHS else "")
+
+
+def time_of(table: LogTable) -> str | None:
+    """The column of time: one that increases but for new beginnings, best by its name; None where the log
+    has its own clock or no time at all."""
+    rising = [name for name in table.columns if _rises(table, name)]
+    named = [name for name in rising if set(Column(name, "s", np.empty(0)).words) & _TIME]
+    dated = [name for name in rising if not isinstance(table.column(name), np.ndarray)]
+    return (named or [n for n in dated if _is_dated(table, n)] or rising or [None])[0]
+
+
+def _is_dated(table: LogTable, name: str) -> bool:
+    try:
+        table.numbers(name)
+        return False
+    except LogError:
+        return True
+
+
+def _rises(table: LogTable, name: str) -> bool:
+    try:
+        values = table.seconds(name)
+    except LogError:
+        return False
+    steps = np.diff(values)
+    return len(steps) > 0 and not np.isnan(steps).any() and float(np.mean(steps > 0)) > 0.98
+
+
+def run_of(table: LogTable) -> str | None:
+    """The column that tells the runs apart: named so, and constant over long parts."""
+    for name in table.columns:
+        words = set(Column(name, "", np.empty(0)).words)
+        labels = np.array(table.texts(name)) if words & _RUN else np.empty(0)
+        if len(labels) and np.mean(labels[1:] == labels[:-1]) > 0.9 and "" not in labels:
+            return name
+    return None
+
+
+def points(column: Column) -> dict[str, float]:
+    """How well a column suits each role."""
+    words, kind = column.words, unit_of(column.unit)
+    kinds = _KINDS.get(kind[0], {}) if kind else {}
+    found = {}
+    for role in SIGNALS:
+        hits = [_LETTER if len(word) == 1 else _NAMED for word in words if word in _ROLE_WORDS[role]]
+        found[role] = max(hits, default=0.0) + 0.5 * (len(hits) > 1) + kinds.get(role, 0.0)
+    if set(words) & _EITHER:
+        found = found | {role: found[role] + _MAYBE for role in ("command", "output")}
+    if found["pressure"] and found["reference"] >= _NAMED:
+        found["command"] += 4.0  # a set pressure is what the regulator is told
+    if found["output"] and set(words) & _ROLE_WORDS["reference"]:
+        found["reference"] += 1.5
+    if found["output"] and set(words) & _ROLE_WORDS["curvature"]:
+        found["curvature"] += 1.5
+    if column.held:
+        found["command"] += 1.0
+        found["reference"] += 0.5
+    else:
+        found["command"] -= 1.0
+        found["output"] += 0.5
+    return found
+
+
+@dataclass(frozen=True)
+class Guess:
+    """``column`` for a role; ``sure`` where its name or unit says so and no other column comes near;
+    ``others`` that might be meant."""
+
+    column: str
+    sure: bool
+    others: tuple[str, ...] = ()
+
+
+def guessed(columns: Sequence[Column]) -> dict[str, Guess]:
+    """The likeliest column of each role that has one: the assignment with the most points.
+
+    An output is always found, and an input: without a name or a unit that tells, the held column, or the
+    first, is the input, and the last the output.
+    """
+    moving = [c for c in columns if c.moves]
+    scores = np.array([[points(c)[role] for c in moving] for role in SIGNALS]).reshape(len(SIGNALS), -1)
+    worth = np.maximum(scores - _LEAST, 0.0)
+    taken = dict(zip(*(axis.tolist() for axis in linear_sum_assignment(-worth))))
+    chosen = {SIGNALS[i]: j for i, j in taken.items() if worth[i, j] > 0.0}
+    sure = {SIGNALS[i] for i, j in taken.items() if scores[i, j] >= _SURE}
+    chosen = _completed(chosen, moving, scores)
+    return {role: _guess(role, j, role in sure, chosen, moving, scores) for role, j in chosen.items()}
+
+
+def _completed(chosen: Mapping[str, int], moving: Sequence[Column], scores: np.ndarray) -> dict[str, int]:
+    """With an output and an input, from columns that have no role."""
+    chosen = dict(chosen)
+    if "output" not in chosen and "curvature" in chosen:
+        chosen["output"] = chosen.pop("curvature")
+    free = [j for j in range(len(moving)) if j not in chosen.values()]
+    if free and not {"command", "pressure"} & set(chosen):
+        held = [j for j in free if moving[j].held]
+        chosen["command"] = (held or free)[0]
+        free.remove(chosen["command"])
+    if free and "output" not in chosen:
+        chosen["output"] = max(free, key=lambda j: (scores[SIGNALS.index("output"), j], j))
+    if "output" not in chosen and {"command", "pressure"} <= set(chosen):
+        chosen["output"] = chosen.pop("pressure")  # the log of a regulator alone
+    return {role: chosen[role] for role in SIGNALS if role in chosen}
+
+
+def _guess(role: str, j: int, sure: bool, chosen: Mapping[str, int], moving, scores: np.ndarray) -> Guess:
+    own = scores[SIGNALS.index(role)]
+    near = [
+        k for k in range(len(moving)) if k not in chosen.values() and own[k] > max(_LEAST, own[j] - _CLOSE)
+    ]
+    return Guess(moving[j].name, sure and not near, tuple(moving[k].name for k in near))

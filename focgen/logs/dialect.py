@@ -1,0 +1,192 @@
+"""How a file of text writes its table: what separates columns, decimals, and where header and data are."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+_SAMPLE = 1000  # lines that the dialect is read off
+_TAIL = 60  # of them, the last ones: surely data, behind whatever an instrument writes ahead
+_DELIMITERS = (",", ";", "\t", "|", " ")
+_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
+_COMMENTS = ("#", "%", "//")
+_COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_POINT_DECIMAL = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
+_BRACKETED = re.compile(r"[\[(].*[\])]")
+_UNIT = re.compile(
+    r"[a-zA-Zµμ°Ω%Å]{1,4}([/*·^]?[-+0-9a-zA-Zµμ°²³⁻¹]{0,4}){0,3}|1/[a-zA-Zµμ°]{1,4}|-|\d/[a-z]+"
+)
+MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """``delimiter`` between columns, " " for any run of blanks; ``decimal`` the decimal mark; ``header`` and
+    ``units`` the rows of names and of units, ``data`` the first row of readings, counted from 0. ``units`` is
+    None where there is no such row, ``header`` where the file has no names."""
+
+    delimiter: str
+    decimal: str
+    header: int | None
+    units: int | None
+    data: int
+
+    def in_words(self) -> str:
+        """What is not as in plain CSV; empty where all is."""
+        said = []
+        if self.delimiter != ",":
+            said.append(f"columns separated by {_NAMES[self.delimiter]}")
+        if self.decimal != ".":
+            said.append("decimal commas")
+        return ", ".join(said)
+
+
+def rows_of(text: str, delimiter: str) -> list[list[str]]:
+    """The cells of every line, without blanks around them; none for an empty line or a comment.
+
+    Raises csv.Error where quotes do not close.
+    """
+    if delimiter == " ":
+        return [[] if _is_comment(line) else line.split() for line in text.splitlines()]
+    lines = ("\n" if _is_comment(line) else line for line in io.StringIO(text, newline=""))
+    rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter != "\t")
+    cells = ([cell.strip() for cell in row] for row in rows)
+    return [row if any(row) else [] for row in cells]
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith(_COMMENTS)
+
+
+def sniffed(text: str) -> Dialect:
+    """The dialect of a file. Raises csv.Error where quotes do not close."""
+    sample = "\n".join(text.split("\n", _SAMPLE)[:_SAMPLE])
+    delimiter = _delimiter(sample)
+    rows = rows_of(sample, delimiter)
+    decimal = _decimal(rows, delimiter)
+    return Dialect(delimiter, decimal, *_places(rows, decimal))
+
+
+def _delimiter(sample: str) -> str:
+    """Plain CSV is recognised without ado, for it is what most logs are; the rest is put to a library."""
+    lines = [line for line in sample.splitlines() if line.strip() and not _is_comment(line)]
+    tail = lines[-min(_TAIL, max(1, len(lines) - 1)) :]
+    rows = [row for row in rows_of("\n".join(tail), ",") if row]
+    if len({len(row) for row in rows}) == 1 and len(rows[0]) > 1 and _all_plain(rows):
+        return ","
+    import clevercsv  # G. J. J. van den Burg et al., Data Min. Knowl. Disc. 33, 2019
+
+    dialect = clevercsv.Detector().detect("\n".join(tail), delimiters=list(_DELIMITERS))
+    found = getattr(dialect, "delimiter", None)
+    likely = [found, *_DELIMITERS] if found in _DELIMITERS else list(_DELIMITERS)
+    return max(likely, key=lambda delimiter: _readable("\n".join(tail), delimiter))  # the first of the best
+
+
+def _readable(text: str, delimiter: str) -> int:
+    """How many tenths of the cells are numbers, dates or empty; 0 where rows differ in length or have one.
+
+    The library knows text better than numbers: "0,0 1,5" looks to it like three columns.
+    """
+    rows = [row for row in rows_of(text, delimiter) if row]
+    cells = [cell for row in rows for cell in row]
+    if not cells or len(rows[0]) < 2 or len({len(row) for row in rows}) > 1:
+        return 0
+    decimal = "." if delimiter == "," and '"' not in text else ","
+    good = sum(is_number(cell, decimal) or is_stamp(cell) or cell.lower() in MISSING for cell in cells)
+    return 10 * good // len(cells)
+
+
+def _all_plain(rows: Sequence[Sequence[str]]) -> bool:
+    cells = [cell for row in rows for cell in row]
+    return sum(is_number(cell, ".") for cell in cells) >= 0.5 * len(cells) and not any(
+        mark in cell for cell in cells for mark in ";\t|"
+    )
+
+
+def _decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
+    """A comma where cells have one inside a number, and none has a point there."""
+    tail = [cell for row in rows[-_TAIL:] for cell in row]
+    commas = any(_COMMA_DECIMAL.fullmatch(cell) for cell in tail)
+    return "," if commas and not any(_POINT_DECIMAL.fullmatch(cell) for cell in tail) else "."
+
+
+def _places(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int | None, int | None, int]:
+    """The rows of header, units, and the first of data.
+
+    The header is the last row of words ahead of the first row of readings, or the one before that where the
+    last holds units. What an instrument writes ahead of it (its settings, a title) is passed over.
+    """
+    filled = [i for i, row in enumerate(rows) if row]
+    width = _width([rows[i] for i in filled])
+    numeric = _numeric_columns([rows[i] for i in filled], width, decimal)
+    full = [i for i in filled if len(rows[i]) == width and _is_data(rows[i], numeric, decimal)]
+    if not full:
+        return (filled[0] if filled else None), None, (filled[0] + 1 if filled else 0)
+    words = [
+        i
+        for i in filled
+        if i < full[0] and _same(rows[i], width) and not _any_number(rows[i], numeric, decimal)
+    ]
+    if not words:
+        return None, None, full[0]
+    last = words[-1]
+    before = words[-2] if len(words) > 1 and filled.index(last) == filled.index(words[-2]) + 1 else None
+    if before is not None and _are_units(rows[last]):
+        return before, last, last + 1
+    return last, None, last + 1
+
+
+def _width(rows: Sequence[Sequence[str]]) -> int:
+    """How many cells most of the last rows have."""
+    counts = [len(row) for row in rows[-_TAIL:]]
+    return max(set(counts), key=counts.count, default=0)
+
+
+def _same(row: Sequence[str], width: int) -> bool:
+    """Whether a row of names fits rows of readings: some instruments end one of them with a delimiter."""
+    return len(row) == width or abs(len(row) - width) == 1 and bool(row) and (not row[-1] or len(row) < width)
+
+
+def _numeric_columns(rows: Sequence[Sequence[str]], width: int, decimal: str) -> list[int]:
+    tail = [row for row in rows[-_TAIL:] if len(row) == width]
+    return [
+        j
+        for j in range(width)
+        if 2 * sum(is_number(row[j], decimal) or is_stamp(row[j]) for row in tail) > len(tail)
+    ]
+
+
+def _is_data(row: Sequence[str], numeric: Sequence[int], decimal: str) -> bool:
+    readings = [row[j] for j in numeric]
+    known = [is_number(cell, decimal) or is_stamp(cell) for cell in readings]
+    return any(known) and all(k or cell.lower() in MISSING for k, cell in zip(known, readings))
+
+
+def _any_number(row: Sequence[str], numeric: Sequence[int], decimal: str) -> bool:
+    return any(is_number(row[j], decimal) or is_stamp(row[j]) for j in numeric if j < len(row))
+
+
+def _are_units(row: Sequence[str]) -> bool:
+    cells = [cell for cell in row if cell]
+    return all(_BRACKETED.fullmatch(cell) or _UNIT.fullmatch(cell) for cell in cells)
+
+
+def is_number(cell: str, decimal: str = ".") -> bool:
+    """Whether a cell is a finite number as this dialect writes it; "nan" is a reading that is missing."""
+    try:
+        value = float(cell.replace(",", ".") if decimal == "," else cell)
+    except ValueError:
+        return False
+    return value == value and "_" not in cell
+
+
+_DATE = re.compile(r"\d{4}-?\d{2}-?\d{2}([T ]\d{1,2}:?\d{2}.*)?")
+_CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
+
+
+def is_stamp(cell: str) -> bool:
+    """Whether a cell is an ISO 8601 date and time, or a time of day."""
+    return bool(("-" in cell and _DATE.fullmatch(cell)) or _CLOCK.fullmatch(cell))

@@ -1,0 +1,62 @@
+"""Logs that are in memory: a pandas or polars frame, or a dictionary of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from focgen.errors import LogError
+from focgen.logs.table import LogTable
+
+
+def is_frame(log: object) -> bool:
+    """Whether a log is in memory: a dictionary, or what has columns."""
+    return isinstance(log, Mapping) or hasattr(log, "columns")
+
+
+def table_of(frame, name: str) -> LogTable:
+    """A frame, or a dictionary name → values (m,), as the table of a log that is called ``name``.
+
+    An index that has a name, or holds times, is a column, too. Raises LogError where columns are no vectors
+    of one length.
+    """
+    columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
+    index = getattr(frame, "index", None)
+    if index is not None and not callable(index) and str(index.name) not in columns:
+        values = _column(index, name, "index")
+        if index.name is not None:
+            columns = {str(index.name): values, **columns}
+        clock = values if np.asarray(index).dtype.kind in "mM" else None
+    else:
+        clock = None
+    if len({len(values) for values in columns.values()}) > 1:
+        sizes = ", ".join(f"{key} {len(values)}" for key, values in columns.items())
+        raise LogError(name, f"holds columns of different lengths ({sizes})", "give one value a sample")
+    if not columns or not len(next(iter(columns.values()))):
+        raise LogError(name, "holds no samples", "give one row a sample")
+    return LogTable(name, columns, clock=clock)
+
+
+def _keys(frame) -> list:
+    return list(frame) if isinstance(frame, Mapping) else list(frame.columns)
+
+
+def _column(values, name: str, key: str) -> np.ndarray | list:
+    """Numbers as float64, times in s, everything else as a list."""
+    try:
+        array = np.asarray(values)
+    except (ValueError, TypeError):
+        raise LogError(f"{name} [{key}]", "is no vector", "give one number a sample") from None
+    if array.ndim != 1:
+        raise LogError(f"{name} [{key}]", f"has the shape {array.shape}", "give one number a sample")
+    if array.dtype.kind in "mM":
+        return (
+            array.astype(f"{'datetime' if array.dtype.kind == 'M' else 'timedelta'}64[ns]").astype(np.int64)
+            * 1e-9
+        )
+    return array.astype(float) if array.dtype.kind in "fiub" else [_cell(cell) for cell in array.tolist()]
+
+
+def _cell(cell):
+    return None if cell is None or cell != cell else cell if isinstance(cell, float | int) else str(cell)

@@ -1,0 +1,117 @@
+"""Logs in .lvm (LabVIEW measurement): settings, then segments, each with channels of its own.
+
+Every segment is a run. Where the file has no column of time, its rows are X0 + i Delta_X apart. Format:
+National Instruments, "Specification for the LabVIEW Measurement File (.lvm)".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from focgen.errors import LogError
+from focgen.logs.table import LogTable
+from focgen.logs.text_file import decoded, table_of, unpacked
+
+_END = "***End_of_Header***"
+_SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
+_TIME, _COMMENT = "X_Value", "Comment"
+
+
+@dataclass(frozen=True, eq=False)
+class _Segment:
+    """``lines``: its rows of cells and their number in the file; ``names`` of the cells, in order."""
+
+    settings: Mapping[str, Sequence[str]]
+    names: Sequence[str]
+    lines: Sequence[tuple[int, Sequence[str]]]
+
+
+def read(path: Path) -> LogTable:
+    """Read a file. Raises LogError where it is not whole; text without the format's first line is read as a
+    table."""
+    text, encoding = decoded(unpacked(path), path)
+    lines = text.splitlines()
+    if not lines or not lines[0].startswith("LabVIEW Measurement"):
+        return table_of(path, text, encoding)
+    settings, separator = _settings(lines)
+    segments = [s for s in _segments(lines, separator) if s.lines]
+    if not segments:
+        raise LogError(str(path), "holds no segment with data", "write it again")
+    decimal = settings.get("Decimal_Separator", ["."])[0]
+    return _table(path, segments, decimal, settings.get("X_Columns", ["One"])[0])
+
+
+def _settings(lines: Sequence[str]) -> tuple[dict[str, list[str]], str]:
+    """The keys of the first header, and what separates columns."""
+    named = next(
+        (line[len("Separator") :].strip(" ") for line in lines if line.startswith("Separator")), "\t"
+    )
+    separator = next((mark for name, mark in _SEPARATORS.items() if name in named), named[:1] or "\t")
+    return _keys(lines[: lines.index(_END)] if _END in lines else lines, separator), separator
+
+
+def _keys(lines: Sequence[str], separator: str) -> dict[str, list[str]]:
+    cells = [line.split(separator) for line in lines]
+    return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in cells if len(row) > 1}
+
+
+def _segments(lines: Sequence[str], separator: str) -> Iterator[_Segment]:
+    """Yield each: the lines behind the end of its header begin with the names of its columns."""
+    cells = [[cell.strip() for cell in line.rstrip(separator).split(separator)] for line in lines]
+    begins = [i for i, row in enumerate(cells) if row[0] == _TIME]
+    heads = [_head(cells, begin) for begin in begins]
+    for begin, head, end in zip(begins, heads, [*heads[1:], len(lines)]):
+        names = [name for name in cells[begin] if name != _COMMENT]
+        body = [(i, cells[i]) for i in range(begin + 1, end) if any(cells[i])]
+        yield _Segment(_keys(lines[head:begin], separator), names, body)
+
+
+def _head(cells: Sequence[Sequence[str]], begin: int) -> int:
+    """Where the header of the segment whose names are in row ``begin`` starts."""
+    at = next((i for i in range(begin, -1, -1) if cells[i][0] == "Channels"), begin)
+    return at
+
+
+def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) -> LogTable:
+    """The segments one after the other. Raises LogError where they have different channels."""
+    first = segments[0].names
+    if any(s.names != first for s in segments):
+        raise LogError(str(path), "holds segments with different channels", "save each as a file of its own")
+    if time == "Multi":
+        raise LogError(str(path), "holds a time for each channel", "save it with one column of X values")
+    rows = [row for s in segments for row in s.lines]
+    for number, row in rows:
+        if len(row) > len(first) + 1 or len(row) < len(first):
+            what = f"line {number + 1} has {len(row)} values for {len(first)} columns"
+            raise LogError(str(path), what, "complete the line")
+    columns = {name: [row[j] for _, row in rows] for j, name in enumerate(first)}
+    doubled = len(columns) != len(first)
+    if doubled:
+        raise LogError(str(path), "has a channel's name twice", "give each channel a name of its own")
+    clock = None
+    if time == "No" or not any(columns[_TIME]):
+        clock = np.concatenate([_clock(path, s) for s in segments])
+        columns = {name: column for name, column in columns.items() if name != _TIME}
+    runs = [str(k) for k, s in enumerate(segments, start=1) for _ in s.lines] if len(segments) > 1 else None
+    units = dict(zip(first[1:], segments[0].settings.get("Y_Unit_Label", ())))
+    return LogTable(
+        str(path),
+        columns,
+        lambda row: f"line {rows[row][0] + 1}",
+        decimal=decimal,
+        units={name: unit for name, unit in units.items() if unit},
+        clock=clock,
+        runs=runs,
+    )
+
+
+def _clock(path: Path, segment: _Segment) -> np.ndarray:
+    try:
+        begin, step = (float(segment.settings[key][0].replace(",", ".")) for key in ("X0", "Delta_X"))
+    except (KeyError, IndexError, ValueError):
+        raise LogError(str(path), "has neither a column of time nor Delta_X", "log the time") from None
+    return begin + step * np.arange(len(segment.lines))

@@ -1,0 +1,226 @@
+"""A first ``rig.toml`` for logs that have none: roles, sample time, units, ranges, and what is unsure."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tomlkit
+
+from focgen.errors import LogError
+from focgen.logs import clock
+from focgen.logs.columns import SIGNALS, Column, Guess, columns_of, guessed, run_of, time_of
+from focgen.logs.read import Log, each_of, tables_of
+from focgen.logs.table import LogTable, stem
+from focgen.output import check_apart, write_file
+from focgen.rig.files import read_rig
+from focgen.rig.model import Rig
+
+_MEANING = {
+    "time": "s",
+    "run": "splits a file into experiments",
+    "command": "into the regulator",
+    "pressure": "between regulator and actuator",
+    "curvature": "between actuator and sensor: the camera's truth",
+    "output": "what the controller reads",
+    "reference": "in closed-loop logs",
+}
+_NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+_MILLI = 0.9, 1e4  # s between samples: a clock this slow, with whole numbers, counts milliseconds
+_NOISE = 0.02  # of the span: so far below 0 a signal that starts there strays
+_COLUMN = 40  # where comments begin
+
+Ask = Callable[[str, str, Sequence[str]], str]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """``rig`` without models; ``text``: its file, with comments; ``doubts``: what to check; ``next``: the
+    command that identifies the models."""
+
+    rig: Rig
+    text: str
+    doubts: tuple[str, ...]
+    next: str
+
+
+@dataclass(frozen=True)
+class _Time:
+    """The column of time, or a name for the log's own clock; the time between samples in s."""
+
+    column: str
+    unit: str
+    step: float
+    doubts: tuple[str, ...] = ()
+
+
+def init(
+    logs: Log | Sequence[Log], out: str | Path | None = None, ask: Ask | None = None, name: str | None = None
+) -> Proposal:
+    """Propose a rig for logs of one rig; written to ``out`` where given.
+
+    Roles go by the columns' names and units, and by their shape where those do not tell. ``ask(role, likely,
+    columns)`` returns the column of a role that is unsure, "" for none. Raises LogError where the logs hold
+    no time, input or output, InputError where ``out`` is one of them.
+    """
+    logs = each_of(logs)
+    if out is not None:
+        check_apart([out], logs)
+    tables = tables_of(logs)
+    run = run_of(tables[0])
+    time = _time(tables[0], run)
+    columns = [c for c in columns_of(tables) if c.name not in (time.column, run)]
+    guesses = _asked(guessed(columns), columns, ask)
+    _check(tables[0], guesses)
+    by_name = {c.name: c for c in columns}
+    roles = {role: by_name[guess.column] for role, guess in guesses.items()}
+    doubts = (*time.doubts, *_doubts(guesses, roles, [c.name for c in columns]))
+    label = name or (stem(tables[0].path) if isinstance(logs[0], str | Path) else "rig")
+    files = [str(log) for log in logs if isinstance(log, str | Path)] or ["LOG"]
+    told = _next(files, roles, out)
+    text = _text(label, run, time, roles, guesses, doubts, told)
+    rig = read_rig(tomllib.loads(text))
+    if out is not None:
+        write_file(out, text, logs)
+    return Proposal(rig, text, doubts, told)
+
+
+def _check(table: LogTable, guesses: Mapping[str, Guess]) -> None:
+    if "output" not in guesses or not {"command", "pressure"} & set(guesses):
+        there = ", ".join(table.columns).replace(";", ",")
+        what = f"has no two columns that move, for an input and an output; there are: {there}"
+        raise LogError(table.path, what, "log what drives the rig and what it answers")
+
+
+def _time(table: LogTable, run: str | None) -> _Time:
+    name = time_of(table)
+    if name is None and table.clock is None:
+        raise LogError(table.path, "has no column that increases with time", "log the time of each sample")
+    stamps = table.clock if name is None else table.seconds(name)
+    step, drift = _step(stamps), 0.5 / len(stamps)
+    if name is None:
+        return _Time("time", "s", _rounded(step, drift))
+    given = table.unit(name)
+    if given in ("ms", "us", "µs", "min"):
+        scale = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}[given]
+        return _Time(name, given, _rounded(scale * step, drift))
+    named = name.lower().endswith("ms")
+    if named or (given is None and _MILLI[0] <= step <= _MILLI[1] and step == int(step)):
+        doubt = f"time: {name!r} is taken as milliseconds, {step:g} between samples"
+        return _Time(name, "ms", _rounded(1e-3 * step, drift), () if named else (doubt,))
+    return _Time(name, "s", _rounded(step, drift))
+
+
+def _step(stamps: np.ndarray) -> float:
+    """Between samples, in the stamps' unit: of a uniform clock its mean, so that rounding does not count."""
+    part = stamps[clock.sittings(stamps)[0]]
+    steps = np.diff(part)
+    forward = steps[steps > 0]
+    if not len(forward):
+        return 1.0
+    return clock.uniform_step(part) or float(np.median(forward))
+
+
+def _rounded(step: float, drift: float) -> float:
+    """A round number of seconds, or of samples a second, where the step is one up to ``drift`` (relative)."""
+    for round_one in (float(f"{step:.2g}"), 1.0 / round(1.0 / step) if step < 0.5 else step):
+        if abs(round_one / step - 1.0) < drift:
+            return round_one
+    return float(f"{step:.6g}")
+
+
+def _asked(guesses: dict[str, Guess], columns: Sequence[Column], ask: Ask | None) -> dict[str, Guess]:
+    """The guesses, the unsure ones as the user says."""
+    if ask is None:
+        return guesses
+    names, found = [c.name for c in columns], {}
+    for role in SIGNALS:
+        guess = guesses.get(role)
+        free = [n for n in names if n not in {g.column for g in found.values()}]
+        if guess is not None and not guess.sure:
+            chosen = ask(role, guess.column, free)
+            guess = Guess(chosen, True) if chosen else None
+        if guess is not None:
+            found[role] = guess
+    return found
+
+
+def _doubts(
+    guesses: Mapping[str, Guess], roles: Mapping[str, Column], names: Sequence[str]
+) -> tuple[str, ...]:
+    said = []
+    for role, guess in guesses.items():
+        if not guess.sure:
+            also = f"; it might be {' or '.join(map(repr, guess.others))}" if guess.others else ""
+            said.append(f"{role}: {guess.column!r} is a guess{also}")
+    said += [
+        f"{role}: the unit of {column.name!r} is not known, put it into [units]"
+        for role, column in roles.items()
+        if not column.unit
+    ]
+    if unused := [name for name in names if name not in {c.name for c in roles.values()}]:
+        said.append(f"no role: {', '.join(map(repr, unused))}")
+    if "command" not in roles:
+        said.append(
+            "no command: the regulator cannot be identified, and the controller will set the pressure"
+        )
+    elif "pressure" not in roles:
+        said.append("no pressure: regulator and actuator are told apart only by a [regulator] that you give")
+    said.append("ranges: what the logs show, with some room; give what each signal can reach")
+    return tuple(said)
+
+
+def _next(files: Sequence[str], roles: Mapping[str, Column], out) -> str:
+    stages = ["regulator"] * ({"command", "pressure"} <= set(roles)) + ["actuator"]
+    stages += ["sensor"] * ("curvature" in roles)
+    asked = f" --stages {','.join(stages)}" if len(stages) > 1 else ""
+    return f"focgen identify {' '.join(files)} --rig {out or 'rig.toml'}{asked} --out identified.toml"
+
+
+def _text(label, run, time: _Time, roles, guesses, doubts, told: str) -> str:
+    """The file, with what each line is and how sure."""
+    lines = [f"name = {_quoted(label)}", _line(f"sample_time = {time.step!r}", "s, as logged"), ""]
+    lines += ["[signals]"] + ([_line(f"run = {_quoted(run)}", _MEANING["run"])] if run else [])
+    of_time = _quoted(time.column)
+    converted = f'{{ column = {of_time}, unit = "{time.unit}" }}'
+    lines.append(_line(f"time = {of_time if time.unit == 's' else converted}", "s"))
+    for role, column in roles.items():
+        unsure = "" if guesses[role].sure else " (a guess)"
+        lines.append(_line(f"{role} = {_quoted(column.name)}", _MEANING[role] + unsure))
+    if any(c.unit for c in roles.values()):
+        lines += ["", "[units]"] + [f"{role} = {_quoted(c.unit)}" for role, c in roles.items() if c.unit]
+    lines += ["", "[ranges]" + " " * (_COLUMN - 8) + "# what each signal can reach"]
+    for role in ("command", "pressure", "output"):
+        if role in roles:
+            low, high = np.nanmin(roles[role].values), np.nanmax(roles[role].values)
+            least = _NOISE * (high - low)
+            span = [_outward(low) if low < -least else 0.0, _outward(high) if high > least else 0.0]
+            lines.append(_line(f"{role} = {span}", f"seen {low:.4g} to {high:.4g}"))
+    lines += ["", *(f"# unsure: {doubt}" for doubt in doubts)]
+    lines += ["# The models of the stages come from the logs:", f"#   {_plain(told)}"]
+    return "\n".join(_plain(line) for line in lines) + "\n"
+
+
+def _line(text: str, comment: str) -> str:
+    return f"{text:<{_COLUMN}}# {comment}"
+
+
+def _quoted(text: str) -> str:
+    return tomlkit.string(text).as_string()
+
+
+def _plain(line: str) -> str:
+    """Without control characters, which neither a comment nor a line may hold."""
+    return "".join(c if c.isprintable() else " " for c in line)
+
+
+def _outward(value: float) -> float:
+    """The next round number away from zero."""
+    if value == 0.0:
+        return 0.0
+    power = 10.0 ** np.floor(np.log10(abs(value)))
+    size = next(float(f"{n * power:.3g}") for n in (*_NICE, 12.0) if n * power >= abs(value) * (1 - 1e-9))
+    return size if value > 0 else -size

@@ -1,0 +1,1 @@
+"""Generated controllers as Python objects."""

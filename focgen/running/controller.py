@@ -1,0 +1,170 @@
+"""A generated controller as a Python object: its C, and one state."""
+
+from __future__ import annotations
+
+from enum import IntFlag
+from pathlib import Path
+from typing import Any, Literal, Self, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from focgen.errors import InputError
+from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, FLAG_SCHEDULE, Format, Plan
+from focgen.running.machine import Machine
+from focgen.running.signals import Counts, Physical
+
+
+class Flags(IntFlag):
+    """What a step says of itself, the bits of NAME_flags."""
+
+    HIGH = FLAG_HIGH
+    LOW = FLAG_LOW
+    SCHEDULE = FLAG_SCHEDULE
+    INPUT = FLAG_INPUT
+    INVALID = FLAG_INVALID
+
+
+class LoadedController:
+    """One controller, as :func:`focgen.load` gives it: each has a state of its own and starts after init.
+
+    In the units of controller.toml, or in counts with ``raw``. Bit for bit what the C does on any processor.
+    Errors of a call are InputErrors that name the argument; no call that raises one changes the state.
+
+    ``plan`` describes what is computed, ``path`` is the folder, ``differences`` what has been edited in it.
+    """
+
+    def __init__(
+        self, plan: Plan, machine: Machine, path: Path, raw: bool, differences: tuple[str, ...] = ()
+    ):
+        self.plan, self.path, self.raw, self.differences = plan, path, raw, differences
+        self._machine, self._state = machine, machine.state()
+        self._signals = Counts() if raw else Physical()
+
+    @property
+    def name(self) -> str:
+        """The controller's name in C."""
+        return self.plan.name
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds between two steps."""
+        return self.plan.sample_time
+
+    @property
+    def scheduled(self) -> bool:
+        """Whether ``step`` and ``run`` take a scheduling signal."""
+        return self.plan.schedule is not None
+
+    @property
+    def flags(self) -> Flags:
+        """Of the latest step; none after init and reset."""
+        return Flags(self._machine.flags(self._state))
+
+    def init(self) -> None:
+        """Start at rest: no error so far, the output at 0 or the end nearest to it."""
+        self._machine.init(self._state)
+
+    def reset(self, ref: float, meas: float, u0: float) -> None:
+        """Start without a bump: the error has been ref − meas for ever, and the output is at ``u0``."""
+        plan = self.plan
+        given = self._one("ref", ref, plan.error), self._one("meas", meas, plan.error)
+        self._machine.reset(self._state, *given, self._one("u0", u0, plan.output))
+
+    def track(self, u: float) -> None:
+        """The plant has got ``u`` instead of the output: go on from there."""
+        self._machine.track(self._state, self._one("u", u, self.plan.output))
+
+    def step(self, ref: float, meas: float) -> float:
+        """One sample; the output."""
+        return self._step(ref, meas)
+
+    @overload
+    def run(self, ref: ArrayLike, meas: ArrayLike, *, with_flags: Literal[False] = False) -> np.ndarray: ...
+
+    @overload
+    def run(
+        self, ref: ArrayLike, meas: ArrayLike, *, with_flags: Literal[True]
+    ) -> tuple[np.ndarray, np.ndarray]: ...
+
+    def run(self, ref: ArrayLike, meas: ArrayLike, *, with_flags: bool = False) -> Any:
+        """A step for each sample, from the present state on; the outputs, shape (samples,).
+
+        A single number stands for one that does not change. ``with_flags`` returns (outputs, flags).
+        """
+        return self._run((("ref", ref), ("meas", meas)), with_flags)
+
+    def new(self) -> Self:
+        """Another controller of the same C, after init."""
+        return type(self)(self.plan, self._machine, self.path, self.raw, self.differences)
+
+    def copy(self) -> Self:
+        """Another controller that stands where this one does."""
+        made = self.new()
+        made._state = self._machine.state(self._machine.content(self._state))
+        return made
+
+    def counts(self) -> Self:
+        """Another controller of the same C, after init, in counts."""
+        return type(self)(self.plan, self._machine, self.path, True, self.differences)
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: dict) -> Self:
+        return self.copy()
+
+    def __reduce__(self):
+        raise TypeError("compiled C cannot be pickled: load the folder in each process")
+
+    def __repr__(self) -> str:
+        plan, units = self.plan, self.plan.controller.units
+        memory = f"{plan.states} modes" if plan.exponential else f"{plan.length} past samples"
+        signals = "counts" if self.raw else f"{units.measurement or '1'} -> {units.output or '1'}"
+        edited = ", edited" if self.differences else ""
+        return f"<{type(self).__name__} {plan.name}: {plan.arithmetic}, {memory}, {plan.sample_time:g} s, " \
+               f"{signals}{edited}>"  # fmt: skip
+
+    # ----------------------------------------------------------------------------------------- the calls
+
+    def _one(self, name: str, value: Any, form: Format) -> int | float:
+        return self._signals.one(f"{self.plan.name}: {name}", value, form)
+
+    def _step(self, ref: float, meas: float, *sched: int | float) -> float:
+        error = self.plan.error
+        given = self._one("ref", ref, error), self._one("meas", meas, error)
+        return self._signals.back(self._machine.step(self._state, *given, *sched), self.plan.output)
+
+    def _run(self, inputs: tuple[tuple[str, ArrayLike], ...], with_flags: bool) -> Any:
+        u, flags = self._machine.loop(self._state, self._rows(inputs))
+        outputs = self._signals.back(u, self.plan.output)
+        return (outputs, flags) if with_flags else outputs
+
+    def _rows(self, inputs: tuple[tuple[str, ArrayLike], ...]) -> list[np.ndarray]:
+        """Raw inputs of one length."""
+        forms = dict(ref=self.plan.error, meas=self.plan.error)
+        if self.plan.schedule:
+            forms["sched"] = self.plan.schedule.signal
+        rows = [self._signals.many(f"{self.name}: {name}", values, forms[name]) for name, values in inputs]
+        try:
+            return [np.ascontiguousarray(row) for row in np.broadcast_arrays(*rows, np.empty(1, bool))[:-1]]
+        except ValueError:
+            sizes = ", ".join(f"{name} {row.size}" for (name, _), row in zip(inputs, rows))
+            what = f"the inputs have different lengths: {sizes}"
+            raise InputError(self.name, what, "give one value for each sample") from None
+
+
+class ScheduledController(LoadedController):
+    """One whose gain is scheduled: ``step`` and ``run`` take the scheduling signal, too."""
+
+    def step(self, ref: float, meas: float, sched: float) -> float:  # type: ignore[override]
+        """One sample; the output."""
+        return self._step(ref, meas, self._one("sched", sched, self.plan.schedule.signal))
+
+    def run(  # type: ignore[override]
+        self, ref: ArrayLike, meas: ArrayLike, sched: ArrayLike, *, with_flags: bool = False
+    ) -> Any:
+        """A step for each sample, from the present state on; the outputs, shape (samples,).
+
+        A single number stands for one that does not change. ``with_flags`` returns (outputs, flags).
+        """
+        return self._run((("ref", ref), ("meas", meas), ("sched", sched)), with_flags)
