@@ -44,6 +44,13 @@ def test_a_tone_in_the_noise_is_heard_and_noise_is_none():
     assert not disturbance(noise, H, 1.0).hums and disturbance(tone, H, 1.0).hums
 
 
+def test_a_tone_as_slow_as_the_rig_is_heard_however_fast_the_samples():
+    rng, h = np.random.default_rng(0), H / 10
+    noise = [_noise(rng, 6000) for _ in range(4)]
+    tone = [p + 1.5 * np.sin(2 * np.pi * 0.4 * h * np.arange(len(p)) + i) for i, p in enumerate(noise)]
+    assert not disturbance(noise, h, 1.0).hums and disturbance(tone, h, 1.0).hums
+
+
 def test_ringing_is_foretold_and_noise_is_not():
     logs, rng = session(3), np.random.default_rng(5)
     segment = make(logs, "command", "output")

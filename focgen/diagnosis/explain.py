@@ -11,7 +11,7 @@ from focgen.diagnosis.accept import Asked, begun_anew, chosen
 from focgen.diagnosis.converter import Converter, converter_of
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit
-from focgen.diagnosis.leftover import Leftover, leftover
+from focgen.diagnosis.leftover import LEFT, Leftover, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.realign import realigned
@@ -32,6 +32,7 @@ _MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of o
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
 _RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
+_FREED = 0.7  # of the mean square left: an actuator far from the one given has to leave less
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 
 
@@ -51,6 +52,11 @@ class Explanation:
     left_nominal: Leftover
     errors: dict[str, float]
     converter: Converter | None = None
+
+    @property
+    def strained(self) -> bool:
+        """Whether it takes own parameters of the actuator three times their uncertainty off, or more."""
+        return self.best.problem.own.strained(self.best.vector)
 
     @property
     def stage(self) -> str | None:
@@ -143,6 +149,19 @@ def explain(
     whether the input could be freed of its noise.
     """
     problem = _widened(_gauged(_held(rig, segment, logs)))
+    found = _explained(rig, problem, threshold, only, trusted)
+    if not found.strained or problem.own.far or found.left.share < LEFT:
+        return found
+    freed = replace(problem, own=replace(problem.own, far=True), memory={})
+    other = _explained(rig, freed, threshold, only, trusted)
+    better = np.mean(other.best.weighed**2) < _FREED * np.mean(found.best.weighed**2)
+    return other if better else found
+
+
+def _explained(
+    rig: Rig, problem: Problem, threshold: float, only: Sequence[str] | None, trusted: bool
+) -> Explanation:
+    segment = problem.segment
     clues, guests = clues_for(segment, rig), guests_in(segment, rig)
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
@@ -220,11 +239,11 @@ def _gauged(problem: Problem) -> Problem:
 
 def _widened(problem: Problem) -> Problem:
     """The problem with a stage faster, or of another gain, than three times the uncertainty of what was given
-    allows, where that is all there is: no effect stands for it."""
+    allows, and an actuator of any numbers, where that is all there is: then no effect stands for it."""
     ground = _ground(problem, problem.nominal())
     if not problem.own.beyond(ground.vector) or not _shows_more(ground):
         return problem
-    wide = replace(problem, own=replace(problem.own, wide=True))
+    wide = replace(problem, own=replace(problem.own, wide=True, far=True))
     return problem if _seems_more(wide, wide.nominal()) else wide
 
 

@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.diagnosis.factors import LEAST, WITHIN
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.model import Actuator, LinearActuator, Rig
 
+_SLACK = 1e-6  # what stands as close to an end stands there
 _USUAL = 0.2  # relative deviation of own parameters from those given that surprises nobody
 
 
@@ -41,12 +43,41 @@ class Free:
             return np.r_[self._from_transfer(a.dynamics), bias, a.offset / self.level_out]
         return np.zeros(0)
 
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds of the vector.
+    def bounds(self, far: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the vector; not ``far``: of an actuator, three times its uncertainty.
 
         A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead
         zone.
         """
+        low, high = self._utmost()
+        if far or not self.has_offset:
+            return low, high
+        near = self._usual()
+        return np.maximum(low, near[0]), np.minimum(high, near[1])
+
+    def beyond(self, vector: np.ndarray) -> bool:
+        """Whether a number stands at an end of what is usual, or further off."""
+        if not self.has_offset:
+            return False
+        low, high = self._usual()
+        return bool(np.any((vector < low + _SLACK) | (vector > high - _SLACK)))
+
+    def _usual(self) -> tuple[np.ndarray, np.ndarray]:
+        """Three times the actuator's uncertainty about what was given; any offset."""
+        known, start, a = self.rig.uncertainty.actuator, self.start(), self.rig.actuator
+        gain, time = (np.log([max(1.0 - WITHIN * u, LEAST), 1.0 + WITHIN * u]) for u in (known.gain, known.time))
+        if isinstance(a, Actuator):
+            off = WITHIN * known.gain * np.abs(start[2:-1]).sum()
+            order = WITHIN * known.alpha * start[1]
+            moves = [time, (-order, order), *[(-off, off)] * (len(start) - 3)]
+        else:
+            last, parts = a.dynamics.den[-1].order, (a.dynamics.num, a.dynamics.den[:-1])
+            orders = [t.order for t in parts[0]], [t.order - last for t in parts[1]]
+            moves = [gain + k * time for k in orders[0]] + [k * time for k in orders[1]]
+        ends = np.array([*moves, (-np.inf, np.inf)]).T
+        return start + ends[0], start + ends[1]
+
+    def _utmost(self) -> tuple[np.ndarray, np.ndarray]:
         start = self.start()
         low, high = start - 50.0, start + 50.0
         if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
