@@ -15,8 +15,6 @@ from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
 from focgen.diagnosis.fit import WHITE, fit
 from focgen.diagnosis.leftover import foretold
-from focgen.diagnosis.menu import menu
-from focgen.diagnosis.next_experiment import _showing
 from focgen.diagnosis.rivals import Rival, _indistinct
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.segments import make
@@ -327,21 +325,6 @@ def test_a_reading_that_stops_tells_how_far_the_actuator_went():
     assert [found["response"] for found in levels] == pytest.approx([0.004, 0.002])
     seen = references(RIG, make(logs, "pressure", "curvature"), logs).levels
     assert seen["response"] == max(np.abs(log["curvature"]).max() for log in logs) > 0.008
-
-
-@pytest.mark.parametrize(
-    "rivals, left_out",
-    [
-        (("softening", "gain_drift"), ("staircase", "hold at", "small steps")),
-        (("creep", "sensor_relaxation"), ("mixed", "triangle", "staircase", "sines")),
-        (("slow_regulator", "transport_delay"), ("triangle",)),
-    ],
-)
-def test_only_experiments_that_show_the_rivals_are_proposed(rivals, left_out):
-    asked, choices = [SimpleNamespace(effect=name) for name in rivals], menu(1.0, 2.0, 0.02)
-    shown = [c.what for c in _showing(choices, asked, 2.0)]
-    assert len(shown) == len(choices) - len(left_out)
-    assert not [what for what in shown if any(word in what for word in left_out)]
 
 
 def _effect_fit(left, share, *effects):

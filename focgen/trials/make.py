@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,7 @@ from focgen.trials.cases import Case, make_case
 from focgen.trials.closed_cases import make_closed_case
 from focgen.trials.excitation import SUITES
 from focgen.trials.facts import SIGNALS
-from focgen.trials.plan import CLOSED_KINDS, KINDS, assignments
+from focgen.trials.plan import CLOSED_KINDS, KINDS, Assignment, assignments
 from focgen.trials.recording import as_csv
 from focgen.trials.sealing import commitment, sealed
 
@@ -48,6 +49,36 @@ class Made:
     commitments: dict[str, str]
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """What the cases of a trial are drawn by: the same gives the same cases, again and again."""
+
+    cases: int
+    seed: int
+    signals: str
+    suite: str
+    kinds: tuple[str, ...]
+
+    @cached_property
+    def plan(self) -> list[Assignment]:
+        """What each case is to be."""
+        root = np.random.default_rng(self._roots)
+        return assignments(self.cases, self.kinds, self.signals, self.suite, root)
+
+    @property
+    def _roots(self) -> list[int]:
+        return [self.seed, ord(self.signals), sorted(SUITES).index(self.suite)]
+
+    def case(self, index: int) -> tuple[Case, str]:
+        """Case number ``index``, from 1, and the salt that its commitment has."""
+        rng, assignment = np.random.default_rng([*self._roots, index]), self.plan[index - 1]
+        if self.suite == "closed":
+            case = make_closed_case(assignment, self.signals, rng)
+        else:
+            case = make_case(assignment, self.signals, self.suite, rng)
+        return case, _salt(rng)
+
+
 def make(
     folder: str | Path,
     *,
@@ -62,25 +93,19 @@ def make(
     """
     folder = Path(folder)
     _check(folder, cases, seed, signals, suite)
-    root = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite)])
-    plan = assignments(cases, kinds or DEFAULT_KINDS[suite], signals, suite, root)
+    kinds = tuple(kinds or DEFAULT_KINDS[suite])
+    drawn = Drawing(cases, seed, signals, suite, kinds)
     commitments = {}
-    for index, assignment in enumerate(track(plan, "trial make"), start=1):
-        rng = np.random.default_rng([seed, ord(signals), sorted(SUITES).index(suite), index])
-        number = f"{index:04d}"
-        closed = suite == "closed"
-        case = (
-            make_closed_case(assignment, signals, rng)
-            if closed
-            else make_case(assignment, signals, suite, rng)
-        )
-        commitments[number] = _write(folder, number, case, _salt(rng))
-    made = Made(str(folder), suite, signals, seed, len(plan), commitments)
+    for index in track(range(1, len(drawn.plan) + 1), "trial make"):
+        case, salt = drawn.case(index)
+        commitments[f"{index:04d}"] = _write(folder, f"{index:04d}", case, salt)
+    made = Made(str(folder), suite, signals, seed, cases, commitments)
     facts = {
         "focgen": focgen.__version__,
         "suite": suite,
         "signals": signals,
         "seed": seed,
+        "kinds": kinds,
         "commitments": commitments,
     }
     write_file(folder / "trial.json", json.dumps(facts, indent=1) + "\n")
