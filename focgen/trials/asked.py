@@ -107,7 +107,7 @@ def _experiments(folder: Path, number: str) -> Iterator[_Asked]:
     yield _Asked(PROPOSED, table[:, 1], told["inputs"]["also_log"])
     rig = read_rig(case / "rig.toml")
     logs = experiments(rig, sorted((case / "logs").iterdir()))
-    for i, choice in enumerate(menu(reach_of(rig, logs, cuts(logs)[0]))):
+    for i, choice in enumerate(menu(reach_of(rig, logs, cuts(logs)[0]).faster)):
         yield _Asked(f"menu{i}", np.repeat(choice.input, choice.reach.coarse))
 
 
