@@ -16,6 +16,7 @@ from focgen.diagnosis.decimate import decimated
 from focgen.diagnosis.explain import Explanation, clues_for, explain
 from focgen.diagnosis.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.model import Diagnosis
+from focgen.diagnosis.next_experiment import NEXT
 from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
 from focgen.diagnosis.segments import cuts, make
 from focgen.diagnosis.smooth import freed
@@ -64,7 +65,7 @@ def diagnose(
     logs = each_of(logs)
     given = (rig, *logs, controller)
     if out is not None:
-        check_apart((Path(out) / name for name in WRITTEN), given)
+        check_apart((Path(out) / name for name in (*WRITTEN, NEXT)), given)
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
     logs = _usable(experiments(rig, logs, first, last))
     ran = running(read_controller(controller), logs) if controller is not None else None

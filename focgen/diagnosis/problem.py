@@ -128,7 +128,7 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
         low, high = self.own.bounds()
-        nuisance = [self.slack, *self.gauges, *[_OFF] * self.ways]
+        nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *[_OFF] * self.ways]
         low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
         for clue in self.clues:
             for p in clue.form.parameters:
@@ -136,6 +136,11 @@ class Problem:
                 low.append(np.log(least) if p.log else least)
                 high.append(np.log(max(p.upper, least)) if p.log else p.upper)
         return np.array(low, float), np.array(high, float)
+
+    @property
+    def _shifted(self) -> bool:
+        """Whether a clue says how late the output is: two numbers for one thing would share it at random."""
+        return any(library()[clue.effect].shifts for clue in self.clues)
 
     def _least(self, p) -> float:
         """The lower bound: a time constant of less than two samples is nothing that samples could show."""

@@ -154,7 +154,7 @@ class Effect:
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
     ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone;
-    ``uneven``: the family that it is as well where it is uneven; ``smooth``: its curves have no kinks.
+    ``shifts``: it does what columns out of step do, which then are a part of it. ``uneven``: the family that it is as well where it is uneven; ``smooth``: its curves have no kinks.
     """
 
     name: str
@@ -169,5 +169,6 @@ class Effect:
     single: bool = False
     noiselike: bool = False
     tonal: bool = False
+    shifts: bool = False
     uneven: str = ""
     smooth: bool = False
