@@ -46,7 +46,16 @@ class Bend:
     scale: float = 1.0
 
 
-STRAIGHT, NO_FRICTION, LINEAR = Bend(), Friction(), Spring()
+@dataclass(frozen=True)
+class Rise:
+    """What friction rises by as it moves, ``size`` (1 − exp(−|y'|/``speed``)), in units of the input; below 0
+    it falls, as in lubricated bearings (R. Stribeck, Z. VDI 46, 1902)."""
+
+    size: float = 0.0
+    speed: float = 1.0
+
+
+STRAIGHT, NO_FRICTION, LINEAR, LEVEL = Bend(), Friction(), Spring(), Rise()
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,8 @@ class Dynamics:
     Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response;
     beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place). Of that and of any other
     spring y follows ``bend``, and dry friction, the ``drag``, takes away from x, in its unit. Of a
-    :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``.
+    :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``,
+    and the ``rise`` of its drag.
     """
 
     unloading: float = 1.0
@@ -66,6 +76,7 @@ class Dynamics:
     bend: Bend = STRAIGHT
     drag: Friction = NO_FRICTION
     spring: Spring = LINEAR
+    rise: Rise = LEVEL
 
     @property
     def changed(self) -> frozenset[str]:

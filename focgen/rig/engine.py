@@ -197,7 +197,7 @@ def _linear(actuator: LinearActuator, dynamics: Dynamics, between, delay: float)
     if dynamics == UNCHANGED:
         return [_transfer(actuator.dynamics, between, delay)]
     plant, changed = plants.plant_of(actuator.dynamics), dynamics.changed
-    if plant is not None and (changed == {"drag"} or "spring" in changed):
+    if plant is not None and (changed == {"drag"} or changed & {"spring", "rise"}):
         return [_plant(plant, dynamics, between, delay)]
     if not linear.single_lag(actuator.dynamics):
         return [_bent(actuator.dynamics, dynamics, between, delay)]
@@ -251,5 +251,6 @@ def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
     plant = plants.plant_of(actuator.dynamics)
     found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
     if plant is not None:
-        found |= {"drag"} if plant.integrates or plant.order == 1 else {"drag", "spring"}
+        found |= {"drag"} | ({"rise"} if plant.order == 2 else set())
+        found |= {"spring"} if plant.order == 2 and not plant.integrates else set()
     return frozenset(found)

@@ -1,6 +1,7 @@
 /* A plant of first or second order with dry friction and a hysteretic spring in its own equation:
  *     m y'' + c y' + k y = u - F - w   or   m y' + k y = u - F - w.
- * F is Coulomb's: `slide` against the velocity, up to `stick` where nothing moves. w = soft (q - y) is what a hysteretic
+ * F is Coulomb's: `slide` against the velocity, up to `stick` where nothing moves; of a plant of second order it rises by `rise`
+ * (1 - exp(-|y'|/speed)) as it moves. w = soft (q - y) is what a hysteretic
  * spring takes away from the linear one: dq/dy = 1 - K |p|^power scale^(1 - power), p = q in the direction of motion, with K = `loading`
  * where p > 0 and -`unloading` where it is not (Bouc and Wen). Beside it the spring may bend, as in bent.h: w holds that, too.
  *
@@ -16,9 +17,9 @@ enum { BALANCED = 2, DIPS = 3 };
 
 typedef struct {
     int order, base, last;
-    double h, m, c, k, slide, stick, soft, loading, unloading, power, scale;
+    double h, m, c, k, slide, stick, soft, loading, unloading, power, scale, rise, speed;
     const double *bend, *tables;
-    int curved; /* whether there is a w */
+    int curved; /* whether there is a w, or friction that depends on the speed */
 } Plant;
 
 typedef struct {
@@ -39,13 +40,22 @@ static double steepness(const Plant *p, double q)
     return 1.0 - (q > 0.0 ? p->loading : -p->unloading) * grown;
 }
 
-/* dw/dt times `span` where it moves to the side `sign`. */
-static double yielding(const Plant *p, const State *s, int sign, double span)
+/* What friction has risen by, against the side `sign`, and what it rises by with the speed. */
+static double risen(const Plant *p, const State *s, int sign)
+{
+    return p->rise != 0.0 ? -sign * p->rise * expm1(-fabs(s->v) / p->speed) : 0.0;
+}
+
+static double rising(const Plant *p, const State *s) { return p->rise != 0.0 ? p->rise / p->speed * exp(-fabs(s->v) / p->speed) : 0.0; }
+
+/* The rate of w and of what friction has risen by, times `span`, where it moves to the side `sign` under the input `u`. */
+static double yielding(const Plant *p, const State *s, int sign, double u, double span)
 {
     double slope;
     if (!p->curved) return 0.0;
     bent(p->bend, s->y, &slope);
-    return span * s->v * (p->soft * (steepness(p, sign * s->q) - 1.0) + slope);
+    double gained = (u - p->k * s->y - p->c * s->v - taken(p, s) - risen(p, s, sign) - sign * p->slide) / p->m;
+    return span * (s->v * (p->soft * (steepness(p, sign * s->q) - 1.0) + slope) + gained * rising(p, s));
 }
 
 /* q after `way` >= 0 in its direction, on one side of 0, for a power of 1. */
@@ -79,8 +89,8 @@ static State stepped(const Plant *p, State s, const double *d, int level, int si
 {
     const double *t = p->tables + 12 * (level - p->base);
     double span = p->h / (double)(1 << level), f[4] = {d[0] - sign * p->slide, d[1], d[2], d[3]};
-    double at_end = d[0] + d[1] + d[2] + d[3] - sign * p->slide, before = taken(p, &s);
-    double slope = yielding(p, &s, sign, span);
+    double at_end = d[0] + d[1] + d[2] + d[3] - sign * p->slide, before = taken(p, &s) + risen(p, &s, sign);
+    double slope = yielding(p, &s, sign, d[0], span);
     State to = s;
     double then = before + slope, steep = slope;
     for (int round = 0; round < (p->curved ? 3 : 1); round++) {
@@ -91,8 +101,8 @@ static State stepped(const Plant *p, State s, const double *d, int level, int si
         if (p->order == 2) to.v = t[2] * s.y + t[3] * s.v + t[8] * g[0] + t[9] * g[1] + t[10] * g[2] + t[11] * g[3];
         if (!p->curved) break;
         if (p->soft != 0.0) to.q = wound(p, s.q, to.y - s.y);
-        then = taken(p, &to);
-        steep = yielding(p, &to, sign, span);
+        then = taken(p, &to) + risen(p, &to, sign);
+        steep = yielding(p, &to, sign, at_end + sign * p->slide, span);
     }
     if (p->order == 1) to.v = (at_end - p->k * to.y - taken(p, &to)) / p->m;
     return to;
@@ -135,8 +145,8 @@ static int dips(const Plant *p, const State *s, const State *to, const double *d
 {
     if (p->order == 1) return 0;
     int sign = s->moving;
-    double first = push(p, s, d[0]) - p->c * s->v - sign * p->slide;
-    double last = push(p, to, d[0] + d[1] + d[2] + d[3]) - p->c * to->v - sign * p->slide;
+    double first = push(p, s, d[0]) - p->c * s->v - sign * p->slide - risen(p, s, sign);
+    double last = push(p, to, d[0] + d[1] + d[2] + d[3]) - p->c * to->v - sign * p->slide - risen(p, to, sign);
     return sign * first < 0.0 && sign * last > 0.0;
 }
 
@@ -211,8 +221,8 @@ void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, 
                   int order, int base, int last, const double *numbers, const double *tables)
 {
     const double *a = numbers;
-    Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a + 11, tables,
-               a[6] != 0.0 || a[11] != 0.0 || a[12] != 0.0};
+    Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a + 13, tables,
+               a[6] != 0.0 || a[11] != 0.0 || a[13] != 0.0 || a[14] != 0.0};
     State s = {0.0, 0.0, 0.0, 0};
     for (int k = 0; k < n; k++) {
         double c[4] = {0.0, 0.0, 0.0, 0.0};

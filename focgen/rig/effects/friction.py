@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from focgen.rig.effects._effect import Effect, Form, Parameter
-from focgen.rig.dynamics import Friction
+from focgen.rig.dynamics import Friction, Rise
 
 
 def _coulomb(x, values, run):
@@ -15,8 +15,16 @@ def _breakaway(x, values, run):
     return replace(x, drag=x.drag + Friction(force, force + more))
 
 
+def _rising(x, values, run):
+    force, rise, speed = values
+    return replace(x, drag=x.drag + Friction(force, force), rise=Rise(rise, speed))
+
+
 # what drives the actuator bears it: K(p) p, or the input of a num/den actuator
 _FORCE = Parameter("force", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.2), zero=0.0, at="drive")
+# below 0, friction falls with the speed: what is left stays a friction
+_RISE = Parameter("rise", level=1, lower=-0.4, upper=0.9, starts=(0.05, -0.02), zero=0.0, at="drive")
+_SPEED = Parameter("speed", level=1, time=-1, lower=1e-3, upper=3.0, starts=(0.1, 0.1), log=True)
 _MORE = Parameter("breakaway", level=1, lower=0.0, upper=0.9, starts=(0.03, 0.1), zero=0.0, at="drive")
 
 EFFECT = Effect(
@@ -28,6 +36,7 @@ EFFECT = Effect(
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
     forms=[
         Form("coulomb", "dynamics", (_FORCE,), _coulomb),
+        Form("rising", "dynamics", (_FORCE, _RISE, _SPEED), _rising),
         Form("breakaway", "dynamics", (_FORCE, _MORE), _breakaway),
     ],
 )
