@@ -30,7 +30,8 @@ class Free:
         return self.stage == "actuator" and self.rig.actuator is not None
 
     def start(self) -> np.ndarray:
-        """The vector of the rig as given."""
+        """The vector of the rig as given: logarithms of coefficients or T, α and the gain's numbers, then the
+        bias where the actuator integrates, and the offset last."""
         if self.stage != "actuator":
             return self._from_transfer(getattr(self.rig, self.stage))
         a = self.rig.actuator
@@ -38,7 +39,8 @@ class Free:
             gains = [g * self.level_in ** (i + 1) / self.level_out for i, g in enumerate(a.gain)]
             return np.array([np.log(a.T), a.alpha, *gains, a.offset / self.level_out])
         if isinstance(a, LinearActuator):
-            return np.r_[self._from_transfer(a.dynamics), a.offset / self.level_out]
+            bias = [a.bias / self.level_in] if a.integrates else []
+            return np.r_[self._from_transfer(a.dynamics), bias, a.offset / self.level_out]
         return np.zeros(0)
 
     def bounds(self, far: bool = True) -> tuple[np.ndarray, np.ndarray]:
@@ -91,14 +93,14 @@ class Free:
     def doubt(self, vector: np.ndarray) -> float:
         """Nats against own parameters this far from those given. The owner identified them once: a tenth off
         is usual, a factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a
-        guess; an offset is free."""
+        guess; an offset and a bias are free."""
         start = self.start()
         if not len(start):
             return 0.0
         away, scale = vector - start, np.full(len(start), _USUAL)
         if self.stage == "actuator":
-            away = away[:-1]
-            scale = scale[:-1]
+            free = 2 if getattr(self.rig.actuator, "integrates", False) else 1
+            away, scale = away[:-free], scale[:-free]
         if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
             gains = np.abs(start[2:-1])
             scale[1], scale[2:] = 0.5 * _USUAL * start[1], _USUAL * (gains + 0.1 * gains.sum() + 1e-12)
@@ -115,7 +117,8 @@ class Free:
             gains = tuple(g * self.level_out / self.level_in ** (i + 1) for i, g in enumerate(v[2:-1]))
             moved = Actuator(float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out)
         else:
-            moved = LinearActuator(self._to_transfer(a.dynamics, vector[:-1]), v[-1] * self.level_out)
+            bias = v[-2] * self.level_in if a.integrates else a.bias
+            moved = LinearActuator(self._to_transfer(a.dynamics, vector), v[-1] * self.level_out, bias)
         return replace(rig, actuator=moved)
 
     def _transfer_of(self) -> TransferFunction:
