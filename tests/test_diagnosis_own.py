@@ -208,3 +208,12 @@ def test_an_actuator_is_strained_three_times_its_uncertainty_off_and_may_go_furt
     assert own.strained(np.where(np.arange(len(start)) == 1, high, start))
     freed = replace(own, far=True)
     assert np.all(freed.bounds()[1] >= high) and freed.bounds()[1][1] > high[1]
+
+
+def test_what_is_known_exactly_of_an_actuator_is_held_and_strains_nothing():
+    known = replace(RIG, uncertainty=Uncertainty(actuator=Relative(0.2, 0.0, 0.0)))
+    for far in (False, True):
+        own = Own(known, ("actuator",), "actuator", 1.0, 1.0, far=far)
+        (low, high), start = own.bounds(), own.start()
+        assert np.all(low[:2] == start[:2]) and np.all(high[:2] == start[:2]) and np.all(low[2:] < high[2:])
+        assert not own.strained(start)

@@ -59,6 +59,16 @@ class Explanation:
         return self.best.problem.own.strained(self.best.vector)
 
     @property
+    def square(self) -> float:
+        """The mean square that its effects leave."""
+        return float(np.mean(self.best.weighed**2))
+
+    @property
+    def freed(self) -> bool:
+        """Whether it had to be let go further than that."""
+        return self.best.problem.own.far and self.strained
+
+    @property
     def stage(self) -> str | None:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
@@ -152,10 +162,12 @@ def explain(
     found = _explained(rig, problem, threshold, only, trusted)
     if not found.strained or problem.own.far or found.left.share < LEFT:
         return found
-    freed = replace(problem, own=replace(problem.own, far=True), memory={})
+    freed, asked = replace(problem, own=replace(problem.own, far=True), memory={}), _FREED * found.square
+    beside = freed.with_clues(found.best.problem.clues)
+    if np.mean(fit(beside, found.best.vector, Weighing(found.ar)).weighed ** 2) > asked:
+        return found
     other = _explained(rig, freed, threshold, only, trusted)
-    better = np.mean(other.best.weighed**2) < _FREED * np.mean(found.best.weighed**2)
-    return other if better else found
+    return other if other.square < asked else found
 
 
 def _explained(

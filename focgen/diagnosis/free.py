@@ -50,17 +50,19 @@ class Free:
         zone.
         """
         low, high = self._utmost()
-        if far or not self.has_offset:
+        if not self.has_offset:
             return low, high
         near = self._usual()
-        return np.maximum(low, near[0]), np.minimum(high, near[1])
+        kept = np.logical_not(far) | (near[0] == near[1])  # what is known exactly does not move
+        return np.where(kept, np.maximum(low, near[0]), low), np.where(kept, np.minimum(high, near[1]), high)
 
     def beyond(self, vector: np.ndarray) -> bool:
         """Whether a number stands at an end of what is usual, or further off."""
         if not self.has_offset:
             return False
         low, high = self._usual()
-        return bool(np.any((vector < low + _SLACK) | (vector > high - _SLACK)))
+        ends = (vector < low + _SLACK) | (vector > high - _SLACK)
+        return bool(np.any(ends & (low < high)))
 
     def _usual(self) -> tuple[np.ndarray, np.ndarray]:
         """Three times the actuator's uncertainty about what was given; any offset."""

@@ -190,7 +190,7 @@ def _found(
 ) -> Found:
     kept = tied(cause.rivals)
     read = library()[kept[0].effect].forms[0].seen is not None  # off the signal itself: nothing else does
-    sure = confidences(kept, 1.0 if read else cause.share)
+    sure = confidences(kept, 1.0 if read else 0.0 if e.freed else cause.share)
     lost = _share_lost(cause, rigs, logs, squares, floor, total or Shrink(0.0, (0.0, 0.0)))
     candidates = tuple(_candidate(r, float(p)) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)

@@ -74,7 +74,6 @@ class Dynamics:
     stiffness: float = 0.0
     drag: Friction = NO_FRICTION
     bend: Bend = STRAIGHT
-    drag: Friction = NO_FRICTION
     spring: Spring = LINEAR
     rise: Rise = LEVEL
 
