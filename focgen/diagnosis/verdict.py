@@ -49,7 +49,7 @@ def reach(
     effects are there, however little they explain."""
     unknown = [e for e in explanations if is_unknown(e)]
     told = _told(rig, logs, rigs, explanations, [*unknown, *_no_closer(rigs, logs, explanations[-1])])
-    if told.in_vain and not granted and (vain := _in_vain(told, logs, list(explanations))):
+    if told.in_vain and not granted and (vain := _in_vain(told, logs, explanations)):
         unknown += vain
         told = _told(rig, logs, rigs, explanations, unknown)
     made, squares, floor, total = told.made, told.squares, told.floor, told.total
@@ -139,7 +139,7 @@ def _in_vain(told: _Told, logs, explanations: Sequence[Explanation]) -> list[Exp
     """Of the segments with effects those whose own gap they do not close on new experiments either: what one
     leaves unexplained takes nothing away from what is clear in another."""
     segments = list(dict.fromkeys(e for e, _ in told.causes))
-    return segments if segments == explanations else [e for e in segments if own_share(e, logs) < _VAIN]
+    return segments if len(explanations) == 1 else [e for e in segments if own_share(e, logs) < _VAIN]
 
 
 def _no_closer(rigs: compose.Rigs, logs, last: Explanation) -> list[Explanation]:
