@@ -184,3 +184,12 @@ def delayed(rig):
 
 def _noisy(rng, signal):
     return signal + 0.004 * np.ptp(signal) * rng.normal(size=len(signal))
+
+
+def test_a_gauge_far_off_beside_an_effect_is_said_and_left_to_no_effect():
+    """The sensor's filter is three times as slow, and its gain a tenth low: no effect stands for that."""
+    logs = [log.between(0.0, 40.0) for log in session(7, sensor=(0.9, 0.5))[:3]]
+    found = diagnose(RIG, logs, only=("sensor_lag",))
+    assert [[c.effect for c in f.candidates] for f in found.causes] == [["sensor_lag"]]
+    assert any("sensor's gain by -" in note for note in found.notes)
+    assert found.shrink > 0.9
