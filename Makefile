@@ -5,7 +5,7 @@ RUN    := $(VENV)/bin/python
 JOBS   ?= 2
 FUZZ_SECONDS ?= 600
 
-.PHONY: help demo test test-long bench trials trial-cases trial-report prove fuzz clean
+.PHONY: help demo test test-long bench trials trial-cases trial-report foreign prove fuzz clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -68,6 +68,9 @@ trials: trial-cases            ## sealed cases diagnosed blind, then the table o
 
 trial-report: $(VENV)/ready    ## the table of what `make trials` has diagnosed so far
 	$(RUN) -m focgen trial score $(SETS) --partial --oracle --jobs $(JOBS) --out $(TRIALS)/table
+
+foreign: $(VENV)/ready-test    ## what the diagnosis says of another simulator's rigs, a table (an hour of one core)
+	OMP_NUM_THREADS=1 $(RUN) -m tests.foreign
 
 $(VENV)/ready-prove: $(VENV)/ready-test
 	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[prove]'

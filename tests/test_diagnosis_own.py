@@ -217,3 +217,12 @@ def test_what_is_known_exactly_of_an_actuator_is_held_and_strains_nothing():
         (low, high), start = own.bounds(), own.start()
         assert np.all(low[:2] == start[:2]) and np.all(high[:2] == start[:2]) and np.all(low[2:] < high[2:])
         assert not own.strained(start)
+
+
+def test_a_gauge_far_off_beside_an_effect_is_said_and_left_to_no_effect():
+    """The sensor's filter is three times as slow, and its gain a tenth low: no effect stands for that."""
+    logs = [log.between(0.0, 40.0) for log in session(7, sensor=(0.9, 0.5))[:3]]
+    found = diagnose(RIG, logs, only=("sensor_lag",))
+    assert [[c.effect for c in f.candidates] for f in found.causes] == [["sensor_lag"]]
+    assert any("sensor's gain by -" in note for note in found.notes)
+    assert found.shrink > 0.9

@@ -233,7 +233,17 @@ def _fitted(left, innovations, *clues):
         problem=SimpleNamespace(clues=clues, segment=segment),
         size=1,
         doubt=0.0,
+        foretold=0.0,
     )
+
+
+@pytest.mark.parametrize("foretold, behind, apart", [(0.0, 1.05, True), (0.2, 1.05, False), (0.2, 1.6, True)])
+def test_a_rival_behind_by_what_the_better_form_lacks_itself_stays(foretold, behind, apart):
+    """Where inputs foretell a fifth of what is left, a form without fault would gain 0.1 nats a sample."""
+    noise = np.random.default_rng(0).standard_normal(4000)
+    nominal, best, other = (_fitted(k, np.sqrt(k) * noise) for k in (4.0, 1.0, behind))
+    best.foretold = foretold
+    assert (separation(best, other, nominal) > SET_WITHIN) == apart
 
 
 @pytest.mark.parametrize("left, told", [(0.12, False), (0.2, True)])

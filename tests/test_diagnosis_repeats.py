@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.explain import problem_of
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.repeats import repeats_of
@@ -105,3 +108,13 @@ def test_a_wander_comes_to_its_mean_after_the_session(family):
     path = wandering.act(np.ones(4001), (0.2, -0.1, 0.3, 0.1, 100.0), Run.of([4001], [0.0], 0.05)) - 1.0
     assert path[500] == pytest.approx(0.2) and path[2000] == pytest.approx(0.1)
     assert path[2001:] == pytest.approx(np.mean(path[:2000]), abs=1e-3)
+
+
+@pytest.mark.parametrize("size, pushed", [(0.0, False), (0.3, False), (4.0, True)])
+def test_what_pushes_the_rig_is_no_noise_of_a_sensor(size, pushed):
+    """White noise, and what a filter of the sensor makes of it, against pushes at the pace of the rig."""
+    rng = np.random.default_rng(3)
+    filtered = [lfilter([0.3], [1.0, -0.7], rng.normal(size=4000)) for _ in range(3)]
+    slow = [gaussian_filter1d(rng.normal(size=4000), 15.0) for _ in range(3)]
+    parts = [n + size * s / np.std(s) for n, s in zip(filtered, slow)]
+    assert disturbance(parts, 0.05, 1.5).pushed == pushed

@@ -1,15 +1,18 @@
 """Diagnoses of rigs simulated apart from the library."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
-from focgen.diagnosis import compose, verdict
+from focgen.diagnosis import compose, promise, verdict
 from focgen.diagnosis.bootstrap import threshold
 from focgen.diagnosis.diagnose import THRESHOLD, diagnose, explain_all
 from focgen.diagnosis.explain import clues_for, explain
 from focgen.diagnosis.shrink import Shrink
+from focgen.diagnosis.unseen import own_share
 from focgen.errors import FocgenError
 from focgen.rig.files import read_rig
 from focgen.rig.model import UNITY
@@ -179,12 +182,44 @@ def test_behind_a_stage_that_hums_small_effects_are_not_believed(hum, trusted, m
     assert told[:2] == [True, trusted]
 
 
-def test_effects_that_promise_next_to_nothing_are_not_the_cause(monkeypatch):
-    monkeypatch.setattr(verdict, "predict", lambda *given: Shrink(0.15, (0.0, 0.5)))
-    logs = session(11, slip=0.35)
+def test_of_one_segment_that_promises_next_to_nothing_all_is_in_vain(monkeypatch):
+    """Of several, those that do not close their own gap either."""
+    shares = {"clear": 0.9, "vain": 0.1}
+    monkeypatch.setattr(verdict, "own_share", lambda e, logs: shares[e])
+    told = SimpleNamespace(causes=[("clear", None), ("vain", None), ("vain", None)])
+    assert verdict._in_vain(told, (), ["clear", "vain"]) == ["vain"]
+    assert verdict._in_vain(SimpleNamespace(causes=[("clear", None)]), (), ["clear"]) == ["clear"]
+
+
+@pytest.mark.parametrize("share, causes", [(0.9, [["valve_asymmetry"]]), (0.1, [])])
+def test_what_is_clear_in_one_segment_stands_whatever_is_left_in_another(share, causes, monkeypatch):
+    """The output promises next to nothing; the pressure, logged, closes its own gap, or not even that."""
+    monkeypatch.setattr(promise, "predict", lambda *given: Shrink(0.15, (0.0, 0.5)))
+    monkeypatch.setattr(verdict, "own_share", lambda *given: share)
+    found = diagnose(RIG, session(11, vent=0.8, roles=("pressure",)), last=40.0)
+    assert named(found) == causes
+
+
+def test_effects_close_their_own_gap_on_parts_not_seen():
+    logs = [log.between(0.0, 40.0) for log in session(11, vent=0.8)]
+    first, *_ = explain_all(RIG, logs, THRESHOLD, ["valve_asymmetry"])
+    assert own_share(first, logs) > 0.95
+    parted = [log.between(0.0, 40.0) for log in session(11, vent=0.8)[:2] + session(11)[2:]]
+    second, *_ = explain_all(RIG, parted, THRESHOLD, ["valve_asymmetry"])
+    assert own_share(second, parted) < 0.8
+
+
+def test_a_push_that_no_input_foretells_is_unknown_beside_what_is_clear():
+    """Pushes of random size and sign reach the output at the pace of the rig, far above its noise."""
+    rng, logs = np.random.default_rng(5), []
+    for log in session(3, vent=0.8, roles=("pressure",)):
+        push = gaussian_filter1d(rng.normal(size=len(log)), 12.0)
+        output = log["output"] + 0.0006 * push / np.std(push)
+        logs.append(replace(log, signals={**log.signals, "output": output}).between(0.0, 40.0))
     found = diagnose(RIG, logs)
-    assert found.verdict == "unknown" and not found.causes and found.unexplained
-    assert diagnose(RIG, logs, only=("hysteresis",)).verdict == "named"
+    assert named(found) == [["valve_asymmetry"]]
+    assert found.unexplained["pressure to output"]["pushed"]
+    assert any("pressure to output: no effect explains" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("noise, in_vain", [(0.8, True), (0.84, False)])

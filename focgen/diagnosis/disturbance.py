@@ -19,18 +19,25 @@ BURSTS = (12.0, 5.0)
 RESTLESS = (6.0, 4.0)  # kurtosis and loudest of what may be an effect that is a little wrong, but is no noise
 HUMS = 0.25  # of the power in one line, in the greater part of the long experiments; up to a tenth for noise
 _LONG = 400  # samples of an experiment in which a line stands out
+# root mean square over that of what is white, and power at periods of two to ten responses over that at an
+# eighth to half a one: of sound rigs, their sensors' noise coloured, at most 2.4 and 40
+PUSHED = (3.0, 80.0)
 SWINGS = 20.0  # power at periods beyond eight responses over that between one and four; 1 for noise
 
 
 @dataclass(frozen=True)
 class Disturbance:
     """``kurtosis`` and ``loudest`` of the innovations, ``slow``: the ratio of slow power to that about the
-    response; ``line``: the part of the power in the strongest line, in the median of the long experiments."""
+    response; ``line``: the part of the power in the strongest line, in the median of the long experiments;
+    ``above``: the root mean square over that of what is white; ``paced``: the power at the pace of the rig
+    over that of what is faster."""
 
     kurtosis: float
     loudest: float
     slow: float
     line: float
+    above: float = 1.0
+    paced: float = 1.0
 
     @property
     def hums(self) -> bool:
@@ -46,6 +53,11 @@ class Disturbance:
     def restless(self) -> bool:
         """Whether it is less steady than noise."""
         return self.kurtosis > RESTLESS[0] and self.loudest > RESTLESS[1]
+
+    @property
+    def pushed(self) -> bool:
+        """Whether it is far above the sensor's noise, and as slow as what has passed through the rig."""
+        return self.above > PUSHED[0] and self.paced > PUSHED[1]
 
     @property
     def swings(self) -> bool:
@@ -65,8 +77,33 @@ def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturban
     local = np.array([np.mean(s**2) for p in quiet for s in np.array_split(p, max(1, len(p) // count))])
     loudest = float(np.max(local) / max(np.median(local), 1e-300))
     return Disturbance(
-        float(np.mean(joined**4) / variance**2), loudest, _slow(parts, h, response), _line(parts, h, response)
+        float(np.mean(joined**4) / variance**2),
+        loudest,
+        _slow(parts, h, response),
+        _line(parts, h, response),
+        _above(parts),
+        _paced(parts, h, response),
     )
+
+
+def _above(parts: list[np.ndarray]) -> float:
+    """The root mean square over that of what is white: of second differences, in the median experiment."""
+    white = np.median([1.4826 * np.median(np.abs(np.diff(p, 2))) / np.sqrt(6.0) for p in parts if len(p) > 2])
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)) / max(white, 1e-300))
+
+
+def _paced(parts: list[np.ndarray], h: float, response: float) -> float:
+    """Mean power density at two to ten responses over that at an eighth to half a one; 1 where there is too
+    little."""
+    power, count = np.zeros(2), np.zeros(2)
+    for p in parts:
+        density = np.abs(np.fft.rfft((p - p.mean()) * np.hanning(len(p)))) ** 2 / len(p)
+        pace = np.fft.rfftfreq(len(p), h) * response
+        for i, inside in enumerate(((pace > 0.1) & (pace < 0.5), (pace > 2.0) & (pace < 8.0))):
+            power[i], count[i] = power[i] + density[inside].sum(), count[i] + inside.sum()
+    if min(count) < 6 or power[1] <= 0:
+        return 1.0
+    return float(power[0] / count[0] / (power[1] / count[1]))
 
 
 def _line(parts: list[np.ndarray], h: float, response: float) -> float:

@@ -221,8 +221,20 @@ def _grown(
             continue
         if best is None:
             break
+        best = _widened_beside(best, asked.threshold)
         base, vector = best.problem, best.vector
     return rankings, clues
+
+
+def _widened_beside(best: Fit, threshold: float) -> Fit:
+    """Where a number of a stage stands at its end beside the effects found, it may pass that, if evidence asks
+    for it: what no effect stands for would be mended by one that imitates it."""
+    problem = best.problem
+    if problem.own.wide or not problem.own.beyond(best.vector):
+        return best
+    wide = replace(problem, own=replace(problem.own, wide=True))
+    now, then = (fit(p, best.vector, WHITE, 8) for p in (problem, wide))
+    return then if evidence(then, now) > threshold else best
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.diagnosis.fit import Fit, Weighing, fit
-from focgen.diagnosis.problem import Clue
+from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.separation import separation
 from focgen.rig.effects import confused
@@ -63,7 +63,7 @@ def _cause(name: str, best: Fit, nominal: Fit, rankings, clues, weighing: Weighi
     own = [c for c in best.problem.clues if c.effect == name]
     without = left_out(best, own, weighing)
     gain = evidence(best, without)
-    same = (r for r in rankings if r.base.problem.clues == without.problem.clues)
+    same = (r for r in rankings if _alike(r.base.problem, without.problem))
     ranking = next(same, None)
     if ranking is None:
         untried = [c for c in clues if c.effect != name and not c.form.seen]
@@ -71,6 +71,11 @@ def _cause(name: str, best: Fit, nominal: Fit, rankings, clues, weighing: Weighi
     others = _rivals(best, without, ranking, clues, weighing, len(own) > 1)
     rivals = [Rival(name, own[0].stage, 0.0, gain, best), *(_behind(r, name, best) for r in others)]
     return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), gain, share_of(nominal, without, best))
+
+
+def _alike(a: Problem, b: Problem) -> bool:
+    """Whether two problems of a segment are the same."""
+    return a.clues == b.clues and a.own.wide == b.own.wide
 
 
 def share_of(nominal: Fit, without: Fit, best: Fit) -> float:

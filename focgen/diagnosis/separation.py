@@ -17,6 +17,10 @@ _FORM = (
     0.004,
     0.01,
 )  # of the gain: what a form a little wrong may cost, in one stage, and where stages are merged
+# of the nats that inputs still foretell of what the better one leaves: its form is wrong by as much at least,
+# and so may the other's be
+_SEEN = 0.5
+_NOISE = 0.01  # of a residual's mean square foretold by inputs: up to here it is chance
 _UNTOLD = 0.05
 _DRAWN = (
     0.03  # the same where the better one is a curve drawn through points: it describes, and explains little
@@ -34,7 +38,8 @@ def separation(better: Fit, other: Fit, nominal: Fit, indistinct: bool = False) 
     those given preferred; innovations of the same weighing.
 
     To the spread belongs that no form is quite what the rig does: a part of the gain over ``nominal``, a
-    larger one where the experiments are not made to tell the two apart (``indistinct``).
+    larger one where the experiments are not made to tell the two apart (``indistinct``), and what inputs
+    still foretell of what ``better`` leaves.
     """
     a, b = better.innovations, other.innovations
     n = min(len(a), len(b))
@@ -47,11 +52,18 @@ def separation(better: Fit, other: Fit, nominal: Fit, indistinct: bool = False) 
     drawn = any(c.form.drawn for c in better.problem.clues)
     part = _DRAWN if drawn else _FORM[len(better.problem.segment.stages) > 1]
     part = max(part, _UNTOLD * indistinct)
-    spread = float(np.hypot(max(spread, _COUNTED if indistinct else 1.0), part * gain))
+    wrong = np.hypot(part * gain, _SEEN * _left(better))
+    spread = float(np.hypot(max(spread, _COUNTED if indistinct else 1.0), wrong))
     paid = 0.5 * (better.size - other.size) * np.log(n)
     likely = (other.doubt - better.doubt) / max(spread, _ROUGH)
     apart = float((difference.sum() - paid) / spread + likely) + _KINKED * (_kinked(other) - _kinked(better))
     return min(apart, _AT_MOST) if indistinct and _closes_alike(better, other, nominal) else apart
+
+
+def _left(of: Fit) -> float:
+    """Nats that a form without fault would gain over this one."""
+    share = min(max(of.foretold - _NOISE, 0.0), 1.0 - 1e-9)
+    return -0.5 * len(of.innovations) * float(np.log1p(-share))
 
 
 def _kinked(of: Fit) -> bool:

@@ -48,6 +48,19 @@ def foreseen(rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explan
     return np.array([np.mean(part**2) for part in np.split(error, ends)])
 
 
+def own_share(e: Explanation, logs: Sequence[Experiment]) -> float:
+    """The part of a segment's own gap that its effects close at its own exit, each part of the session
+    simulated by a fit to the others."""
+    fold = parts(logs)
+    error = np.empty(len(fold))
+    for part in np.unique(fold):
+        without = _fitted(e.best, e.ar, fold != part)
+        error[fold == part] = e.best.problem.weighed(without.vector)[fold == part]
+    before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
+    noise = after * (1.0 - e.left.share)
+    return float((before - np.mean(error**2)) / max(before - noise, 1e-300))
+
+
 def _without(e: Explanation, seen: np.ndarray) -> Explanation:
     """The explanation with its fit made to the samples ``seen`` (n,) only."""
     if not e.best.problem.clues:

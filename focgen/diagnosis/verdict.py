@@ -21,6 +21,7 @@ from focgen.diagnosis.search import evidence as nats
 from focgen.diagnosis.promise import paths, promised
 from focgen.diagnosis.shrink import Shrink
 from focgen.diagnosis.unexplained import disturbed, is_rounded, is_unknown
+from focgen.diagnosis.unseen import own_share
 from focgen.diagnosis.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
@@ -31,6 +32,7 @@ from focgen.rig.replay import goodness
 
 _VAIN = 0.2  # promised share of a gap: below it its effects are not what causes it,
 _ABOVE = 0.82  # unless the noise is more than this part of it, in root mean squares
+_NEAR = 0.95  # of the error without any effect: with more a family is not near
 _CONTROLLER = 0.95  # confidence that what comes closest to a controller's commands is what it does
 _PARAMETERS = 12.0  # nats for the verdict that refitting closes a gap
 
@@ -47,8 +49,8 @@ def reach(
     effects are there, however little they explain."""
     unknown = [e for e in explanations if is_unknown(e)]
     told = _told(rig, logs, rigs, explanations, [*unknown, *_no_closer(rigs, logs, explanations[-1])])
-    if told.in_vain and not granted:
-        unknown += [e for e, _ in told.causes if e not in unknown]
+    if told.in_vain and not granted and (vain := _in_vain(told, logs, explanations)):
+        unknown += vain
         told = _told(rig, logs, rigs, explanations, unknown)
     made, squares, floor, total = told.made, told.squares, told.floor, told.total
     found = _ordered([_found(e, c, told.rigs, logs, squares, floor, total) for e, c in told.causes])
@@ -68,20 +70,30 @@ def reach(
         proposed[0] if proposed else None,
         _description(unknown),
         (),
-        (*notes_of(logs), *_cautions(rig, told)),
+        (*notes_of(logs), *_cautions(rig, told, unknown)),
         _plain_fits(explanations),
     )
     return told.rigs, diagnosis, Evidence(made, tuple(explanations), proposed[1] if proposed else None)
 
 
-def _cautions(rig: Rig, told: _Told) -> Iterator[str]:
-    """What a refit moved far, and what cannot be foretold."""
+def _cautions(rig: Rig, told: _Told, unknown: Sequence[Explanation]) -> Iterator[str]:
+    """What a refit moved far, what cannot be foretold, and what is unexplained beside what is named."""
     yield from far_moves(rig, told.rigs.fitted if told.causes else told.rigs.refitted)
     for clue in (clue for e, _ in told.causes for clue in paths(e)):
         yield (
             f"the {clue.effect} wanders: followed through this session, its next turn cannot be foretold, "
             "and nothing of it is promised"
         )
+    for e in unknown if told.causes else ():
+        yield f"{e.segment.entry} to {e.segment.exit}: no effect explains what is left there{_nearest(e)}"
+
+
+def _nearest(e: Explanation) -> str:
+    """The family that would close most of a segment's gap, where one closes any."""
+    if min(e.errors.values(), default=1.0) > _NEAR:
+        return ""
+    name = min(e.errors, key=lambda k: e.errors[k])
+    return f"; nearest is {name}, with which its error is {e.errors[name]:.2g} of what it is without"
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +134,13 @@ def _told(rig: Rig, logs, rigs: compose.Rigs, explanations, left_out) -> _Told:
     held = [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
     total = promised(rig, logs, held, squares, floor) if causes else None
     return _Told(rigs, causes, made, squares, floor, total)
+
+
+def _in_vain(told: _Told, logs, explanations: Sequence[Explanation]) -> list[Explanation]:
+    """Of the segments with effects those whose own gap they do not close on new experiments either: what one
+    leaves unexplained takes nothing away from what is clear in another."""
+    segments = list(dict.fromkeys(e for e, _ in told.causes))
+    return segments if len(explanations) == 1 else [e for e in segments if own_share(e, logs) < _VAIN]
 
 
 def _no_closer(rigs: compose.Rigs, logs, last: Explanation) -> list[Explanation]:
@@ -282,5 +301,6 @@ def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
             "bursts": noise.bursts,
             "slow_swings": noise.swings,
             "hums": noise.hums,
+            "pushed": noise.pushed,
         }
     return found
