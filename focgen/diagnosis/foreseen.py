@@ -35,7 +35,7 @@ class Part:
         problem, left = fit.problem, []
         segment = problem.segment
         chain = Chain(problem.rig(fit.vector), problem.placed(fit.vector))
-        chain.run(segment.x, segment.stages[0], segment.stages[-1], segment.run, segment.held, left=left)
+        chain.run(segment.x, segment.stages[0], segment.stages[-1], segment.run, segment.between, left=left)
         return cls(problem, fit.vector, left)
 
     @property
