@@ -31,7 +31,7 @@ def _beside_response(values, s):
 # a sharp mode is found from close by only
 _STARTS = tuple(0.02 * 1.16**k for k in range(41))
 _PERIOD = Parameter("period", time=1, lower=0.002, upper=30.0, starts=_STARTS, log=True)
-_DAMPING = Parameter("damping", lower=0.005, upper=0.5, starts=(0.1,), log=True)
+_DAMPING = Parameter("damping", lower=0.005, upper=0.3, starts=(0.1,), log=True)
 
 EFFECT = Effect(
     name="resonance",
