@@ -12,10 +12,11 @@ from focgen.diagnosis.converter import Converter, converter_of
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.leftover import Leftover, leftover
+from focgen.diagnosis.integrating import pace, settled
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.realign import realigned
-from focgen.diagnosis.rivals import Cause, doubted, left_out
+from focgen.diagnosis.rivals import Cause, Rival, doubted, left_out
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.segments import Segment, is_single, owner
@@ -125,6 +126,7 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     scales = references(rig, segment, logs)
     freely = owner(rig) if owner(rig) in segment.stages else None
     load, response = (scales.levels["load"], scales.levels["response"])
+    segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
     slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
     return Problem(segment, Own(rig, segment.stages, freely, load, response), scales, slack=slack)
 
@@ -155,6 +157,8 @@ def explain(
     best, causes = doubted(best, nominal, rankings, clues, weighing)
     if converter is not None:
         best, causes = converter.beside(best, nominal, causes, weighing)
+    causes = tuple(replace(c, rivals=tuple(_at_rest(r, best) for r in c.rivals)) for c in causes)
+    best, nominal = settled(best), settled(nominal)
     response = problem.references.clocks["response"]
     return Explanation(
         segment,
@@ -168,6 +172,11 @@ def explain(
         rankings[0].errors,
         converter,
     )
+
+
+def _at_rest(rival: Rival, best: Fit) -> Rival:
+    """A rival that is what was found, with what that is in the end."""
+    return replace(rival, fit=settled(best)) if rival.fit is best else rival
 
 
 def _grown(
