@@ -157,8 +157,9 @@ def explain(
     best, causes = doubted(best, nominal, rankings, clues, weighing)
     if converter is not None:
         best, causes = converter.beside(best, nominal, causes, weighing)
-    causes = tuple(replace(c, rivals=tuple(_at_rest(r, best) for r in c.rivals)) for c in causes)
-    best, nominal = settled(best), settled(nominal)
+    found, (best, nominal) = best, map(settled, _between_anew(rig, best, nominal, weighing))
+    segment = best.problem.segment
+    causes = tuple(replace(c, rivals=tuple(_in_the_end(r, found, best) for r in c.rivals)) for c in causes)
     response = problem.references.clocks["response"]
     return Explanation(
         segment,
@@ -174,9 +175,31 @@ def explain(
     )
 
 
-def _at_rest(rival: Rival, best: Fit) -> Rival:
-    """A rival that is what was found, with what that is in the end."""
-    return replace(rival, fit=settled(best)) if rival.fit is best else rival
+def _between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:
+    """Both fits with the command running between its samples as suits what was found: a nominal rig far from
+    what it models may be suited by another way."""
+    segment = best.problem.segment
+    if rig.between is not None or segment.entry != "command" or not best.problem.clues:
+        return best, nominal
+    others = [replace(segment, between=way) for way in _WAYS if way != segment.between]
+    tried = [_moved_to(best, other, weighing) for other in others]
+    closest = min([best, *tried], key=lambda f: f.sse)
+    if closest is best:
+        return best, nominal
+    return closest, _moved_to(nominal, closest.problem.segment, weighing)
+
+
+def _moved_to(of: Fit, segment: Segment, weighing: Weighing) -> Fit:
+    """A fit made anew to another account of its segment."""
+    problem = replace(of.problem, segment=segment, memory={})
+    start = of.vector.copy()
+    start[len(problem.own_start)] = 0.0  # the alignment made up for the wrong way
+    return fit(problem, start, weighing, 8)
+
+
+def _in_the_end(rival: Rival, found: Fit, best: Fit) -> Rival:
+    """A rival that is what was ``found``, with what that is in the end."""
+    return replace(rival, fit=best) if rival.fit is found else rival
 
 
 def _grown(
