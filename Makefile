@@ -5,7 +5,7 @@ RUN    := $(VENV)/bin/python
 JOBS   ?= 2
 FUZZ_SECONDS ?= 600
 
-.PHONY: help demo test test-long bench trials trial-cases trial-report foreign prove fuzz clean
+.PHONY: help demo test test-long bench trials trial-cases trial-report foreign records prove fuzz clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -71,6 +71,12 @@ trial-report: $(VENV)/ready    ## the table of what `make trials` has diagnosed 
 
 foreign: $(VENV)/ready-test    ## what the diagnosis says of another simulator's rigs, a table (an hour of one core)
 	OMP_NUM_THREADS=1 $(RUN) -m tests.foreign
+
+records: export OMP_NUM_THREADS = 1
+
+# Public benchmarks; their data are no part of the project: FOCGEN_DATA names the folder that holds them.
+records: $(VENV)/ready-test    ## public benchmarks: diagnosed, and replayed on their tests (FOCGEN_DATA=folder)
+	$(RUN) -m tests.records
 
 $(VENV)/ready-prove: $(VENV)/ready-test
 	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[prove]'

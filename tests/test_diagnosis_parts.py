@@ -260,7 +260,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
     monkeypatch.setattr(unexplained, "disturbed", lambda e: left)
     nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
     return SimpleNamespace(
-        segment=SimpleNamespace(closed=closed),
+        segment=SimpleNamespace(pace=0.0, closed=closed),
         converter=None,
         left=SimpleNamespace(share=share),
         nominal=nominal,
@@ -348,6 +348,7 @@ def test_a_reading_that_stops_tells_how_far_the_actuator_went():
 def _effect_fit(left, share, *effects):
     """A fit with ``effects`` that leaves ``left``, of which inputs foretell ``share``."""
     problem = SimpleNamespace(
+        segment=SimpleNamespace(pace=0.0),
         clues=[SimpleNamespace(effect=name, form=SimpleNamespace(seen=None)) for name in effects],
         lacks=lambda name: None,
         untried=list,

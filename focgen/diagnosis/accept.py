@@ -15,6 +15,7 @@ import numpy as np
 from focgen.diagnosis.converter import Converter
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import Fit
+from focgen.diagnosis.integrating import counted
 from focgen.diagnosis.leftover import LEFT
 from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.reconsider import near_families, reconsidered
@@ -67,7 +68,8 @@ def chosen(rankings: Sequence[Ranking], asked: Asked, clues: Sequence[Clue]) -> 
         return missing
     winner, again = ranking.best[_leading(ranking, asked.converter)], _again(ranking)
     gained = evidence(again, ranking.base) if again is not None else 0.0
-    mends = gained > asked.threshold and _mends(ranking.base, again, _VISIBLE[1], 0.0, asked.converter)
+    sure = gained > asked.threshold and counted(again, ranking.base) > asked.threshold
+    mends = sure and _mends(ranking.base, again, _VISIBLE[1], 0.0, asked.converter)
     mended = again if mends else None
     if gained > _MENDING * ranking.gain[ranking.winner]:
         return mended
@@ -83,7 +85,7 @@ def begun_anew(
     """Where one effect leaves much that no second one explains: begun with another of those that came close,
     if it and another effect, unlike either, explain much more; the other's ranking, and both."""
     alone = rankings[-1].base
-    if alone.foretold < LEFT:
+    if alone.foretold < LEFT or alone.problem.segment.pace:  # the errors of a path that is kept are too few
         return None
     found = []
     for first in near_families(rankings[0], alone):
@@ -136,6 +138,8 @@ def _useful(rankings: Sequence[Ranking], winner: Fit, asked: Asked) -> bool:
     measured, further = base.problem.segment.entry != "command", len(base.problem.clues) > 0
     visible = _NOISY[asked.trusted] if measured and not (further and asked.trusted) else _VISIBLE[further]
     if _goes_round(base, winner):
+        return False
+    if counted(winner, base) < asked.threshold:
         return False
     return _mends(base, winner, visible, _WHOLE * further, asked.converter)
 

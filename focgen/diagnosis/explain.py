@@ -11,11 +11,12 @@ from focgen.diagnosis.accept import Asked, begun_anew, chosen
 from focgen.diagnosis.converter import Converter, converter_of
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit
+from focgen.diagnosis.integrating import pace, settled
 from focgen.diagnosis.leftover import LEFT, Leftover, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.realign import realigned
-from focgen.diagnosis.rivals import Cause, doubted, left_out
+from focgen.diagnosis.rivals import Cause, Rival, doubted, left_out
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.segments import Segment, is_single, owner
@@ -141,6 +142,7 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     scales = references(rig, segment, logs)
     freely = owner(rig) if owner(rig) in segment.stages else None
     load, response = (scales.levels["load"], scales.levels["response"])
+    segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
     slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
     return Problem(segment, Own(rig, segment.stages, freely, load, response), scales, slack=slack)
 
@@ -186,6 +188,9 @@ def _explained(
     best, causes = doubted(best, nominal, rankings, clues, weighing)
     if converter is not None:
         best, causes = converter.beside(best, nominal, causes, weighing)
+    found, (best, nominal) = best, map(settled, _between_anew(rig, best, nominal, weighing))
+    segment = best.problem.segment
+    causes = tuple(replace(c, rivals=tuple(_in_the_end(r, found, best) for r in c.rivals)) for c in causes)
     response = problem.references.clocks["response"]
     return Explanation(
         segment,
@@ -199,6 +204,33 @@ def _explained(
         rankings[0].errors,
         converter,
     )
+
+
+def _between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:
+    """Both fits with the command running between its samples as suits what was found: a nominal rig far from
+    what it models may be suited by another way."""
+    segment = best.problem.segment
+    if rig.between is not None or segment.entry != "command" or not best.problem.clues:
+        return best, nominal
+    others = [replace(segment, between=way) for way in _WAYS if way != segment.between]
+    tried = [_moved_to(best, other, weighing) for other in others]
+    closest = min([best, *tried], key=lambda f: f.sse)
+    if closest is best:
+        return best, nominal
+    return closest, _moved_to(nominal, closest.problem.segment, weighing)
+
+
+def _moved_to(of: Fit, segment: Segment, weighing: Weighing) -> Fit:
+    """A fit made anew to another account of its segment."""
+    problem = replace(of.problem, segment=segment, memory={})
+    start = of.vector.copy()
+    start[len(problem.own_start)] = 0.0  # the alignment made up for the wrong way
+    return fit(problem, start, weighing, 8)
+
+
+def _in_the_end(rival: Rival, found: Fit, best: Fit) -> Rival:
+    """A rival that is what was ``found``, with what that is in the end."""
+    return replace(rival, fit=best) if rival.fit is found else rival
 
 
 def _grown(

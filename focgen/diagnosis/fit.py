@@ -82,9 +82,11 @@ def means(part: np.ndarray, coarse: int) -> np.ndarray:
 def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing) -> np.ndarray:
     """The weighed residual, as a share of the output's level."""
     segment = problem.segment
-    return innovated(
-        segment.y, problem.simulate(vector), segment.weight, segment.run.rest, weighing.coarse, weighing.ar
-    )
+    made, weight, rest = problem.simulate(vector), segment.weight, segment.run.rest
+    if not segment.pace:
+        return innovated(segment.y, made, weight, rest, weighing.coarse, weighing.ar)
+    left = segment.recent(segment.y - made)
+    return innovated(left, np.zeros_like(left), weight, rest, weighing.coarse, weighing.ar)
 
 
 def fit(

@@ -208,8 +208,8 @@ class Problem:
         return y
 
     def residual(self, vector: np.ndarray) -> np.ndarray:
-        """Measured less simulated (n,), in the log's units."""
-        return self.segment.y - self.simulate(vector)
+        """Measured less simulated (n,), in the log's units; of a rig that integrates, what is recent of it."""
+        return self.segment.recent(self.segment.y - self.simulate(vector))
 
     def weighed(self, vector: np.ndarray) -> np.ndarray:
         """The residual (n,) as a share of the output's level, each sample by its trust."""

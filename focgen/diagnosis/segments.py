@@ -10,6 +10,7 @@ import numpy as np
 
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
+from focgen.rig import kernels
 from focgen.rig.effects import Run
 from focgen.rig.model import UNITY, Rig
 
@@ -29,7 +30,8 @@ class Segment:
     the reference in a closed loop, else the input; ``led``: whether it is a reference; ``closed``: whether a
     loop was closed around the rig. ``unsure`` (n, k): ways in which an input that was simulated may be off, a
     standard deviation each. ``loose`` (n, k): what the output would be off by, were experiments to begin a
-    little otherwise than ``run`` says, in the output's unit."""
+    little otherwise than ``run`` says, in the output's unit. ``pace``: s after which an error no longer
+    counts, of a rig that integrates; 0: none is forgotten."""
 
     entry: str
     exit: str
@@ -45,6 +47,7 @@ class Segment:
     closed: bool
     unsure: np.ndarray
     loose: np.ndarray
+    pace: float = 0.0
 
     @cached_property
     def level_in(self) -> float:
@@ -93,6 +96,12 @@ class Segment:
         run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
         thin = replace(self, x=x, y=y, trust=trust, asked=asked, run=run, between=False)
         return replace(thin, unsure=unsure, loose=loose)
+
+    def recent(self, signal: np.ndarray) -> np.ndarray:
+        """``signal`` (n,), less what it was a ``pace`` ago."""
+        if not self.pace:
+            return signal
+        return signal - kernels.lag(signal, self.run.rest, self.run.h, self.pace, self.pace)
 
     def parts(self, signal: np.ndarray) -> list[np.ndarray]:
         """``signal`` (n, …) by experiment."""

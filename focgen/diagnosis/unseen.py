@@ -15,6 +15,7 @@ import numpy as np
 from focgen.diagnosis import compose
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import Fit, Weighing, fit
+from focgen.diagnosis.integrating import settled
 from focgen.logs.experiment import Experiment
 from focgen.rig.model import Rig
 
@@ -71,4 +72,4 @@ def _without(e: Explanation, seen: np.ndarray) -> Explanation:
 def _fitted(best: Fit, ar: np.ndarray, seen: np.ndarray) -> Fit:
     problem, segment = best.problem, best.problem.segment
     masked = replace(segment, trust=segment.trust * seen)
-    return fit(replace(problem, segment=masked), best.vector, Weighing(ar), _ITERATIONS)
+    return settled(fit(replace(problem, segment=masked), best.vector, Weighing(ar), _ITERATIONS))

@@ -93,7 +93,7 @@ static State stepped(const Plant *p, State s, const double *d, int level, int si
     double slope = yielding(p, &s, sign, d[0], span);
     State to = s;
     double then = before + slope, steep = slope;
-    for (int round = 0; round < (p->curved ? 3 : 1); round++) {
+    for (int round = 0; round < (p->curved ? 2 : 1); round++) {
         double g[4] = {f[0] - before, f[1] - slope, f[2] - 3.0 * (then - before) + 2.0 * slope + steep,
                        f[3] - slope - steep + 2.0 * (then - before)};
         if (!p->curved) for (int i = 0; i < 4; i++) g[i] = f[i];

@@ -26,7 +26,7 @@ from focgen.rig.courses import course
 from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 _HALVED = 10  # times that a step is halved for an event: what is left is run along a line
-_SHORT = 0.06  # of a radian of the plant's motion: a step of the hysteretic spring
+_SHORT = 0.1  # of a radian of the plant's motion: a step of the hysteretic spring
 _YIELDS = 0.2  # of the time in which friction that rises stops what moves: a step
 _SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
 _MOST = 7  # halvings at most of a step before any event
@@ -94,6 +94,7 @@ def _levels(plant: Plant, dynamics: Dynamics, h: float) -> tuple[int, int]:
     steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second)
     pace = np.sqrt(plant.k * steepest / plant.m) if plant.order == 2 else plant.k * steepest / plant.m
     short = _SHORT if dynamics.changed & {"spring", "bend"} else _SWING
+    short *= 1.0 if spring.power == 1.0 else 0.5
     base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
     base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _MOST))
     return base, base + _HALVED

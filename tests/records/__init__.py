@@ -1,0 +1,1 @@
+"""Public benchmarks: diagnosed on their training record, replayed on their official test."""
