@@ -129,7 +129,8 @@ def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
         if good:
             best = max(good, key=lambda o: o.least(telling) / np.sqrt(o.choice.seconds))
             return best.least(telling), best
-    best = max(options, key=lambda o: o.least(telling))
+    plain = [o for o in options if o.stage is None] or options  # a further signal is asked for where it tells
+    best = max(plain, key=lambda o: o.least(telling))
     return best.least(telling), best
 
 

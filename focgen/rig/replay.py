@@ -20,7 +20,7 @@ from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
-_BESIDES = ("name", "form", "stage", "clock", "carried")
+_BESIDES = ("name", "form", "stage", "clock", "carried", "promise", "learned")
 
 
 @dataclass(frozen=True)
