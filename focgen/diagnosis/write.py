@@ -1,4 +1,4 @@
-"""``diagnosis.json``, the two rigs, the experiment that is proposed, and pictures where matplotlib is there."""
+"""``diagnosis.json``, the two rigs, the proposed experiment, and pictures where matplotlib is there."""
 
 from __future__ import annotations
 
