@@ -166,5 +166,11 @@ def test_the_most_telling_experiment_is_chosen(tiers, chosen):
     assert _best(made)[1] is [o for tier in made for o in tier][chosen]
 
 
+@pytest.mark.parametrize("apart, asked", [(2.9, False), (3.1, True)])
+def test_a_further_signal_is_asked_for_where_it_tells_enough(apart, asked):
+    plain, logged = option([1.0]), replace(option([apart]), stage="regulator")
+    assert (_best([[plain], [logged]])[1] is logged) == asked
+
+
 def test_nothing_is_proposed_where_nothing_is_allowed():
     assert _best([]) is None

@@ -171,13 +171,17 @@ def test_what_a_diagnosis_writes_is_known_beforehand(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "to_json", lambda diagnosis: "{}")
     monkeypatch.setattr(module, "rig_table", lambda rig: {})
     found = object.__new__(Diagnosis)
-    for key, name in (("refitted_rig", "refitted.toml"), ("augmented_rig", "augmented.toml")):
+    for key, name in (
+        ("refitted_rig", "refitted.toml"),
+        ("augmented_rig", "augmented.toml"),
+        ("shrink", 0.9),
+    ):
         object.__setattr__(found, key, name)
 
     class Rigs:
         refitted = None
 
-        def augmented(self, logs):
+        def augmented(self, logs, promise):
             return None
 
     asked = Choice("a step", np.array([0.0, 1.0]), Reach(0.0, 2.0, 0.0, np.inf, 9.0, 1.0, 0.1, 2))

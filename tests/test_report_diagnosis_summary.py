@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit, Where
+from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, NextExperiment, PlainFit, Where
 from focgen.report.diagnosis_summary import diagnosis_text
 
 UNITS = {"command": "V", "pressure": "bar", "curvature": "1/mm", "output": "1/mm"}
@@ -59,3 +59,11 @@ def test_healthy_and_refitted_rigs_name_no_effect():
     assert "Which: no effect." in diagnosis_text(healthy, UNITS, "gap")
     refitted = replace(FOUND, verdict="parameters", causes=())
     assert "the rig's own numbers were off, and refitted.toml" in diagnosis_text(refitted, UNITS, "gap")
+
+
+def test_the_next_experiment_is_said_with_the_file_that_makes_it():
+    what = "steps, on the command from 0 to 2 V"
+    asked = NextExperiment("telling leak from contact", what, 5.0, {"file": "a.csv"})
+    text = diagnosis_text(replace(FOUND, next_experiment=asked), UNITS, "gap")
+    assert f"Next: record {what} (its input: a.csv), for telling leak from contact." in text
+    assert "check the promise" not in text

@@ -27,8 +27,9 @@ class Rigs:
     fitted: Rig
     placed: tuple[Placed, ...]
 
-    def augmented(self, logs: Sequence[Experiment]) -> Rig:
-        """The rig that carries its effects, and what outlives this session."""
+    def augmented(self, logs: Sequence[Experiment], promise: float | None = None) -> Rig:
+        """The rig that carries its effects, what outlives this session, the outputs that they were learned
+        at, and the share that they ``promise`` to explain."""
         left: list[dict[str, float]] = []
         entry = "command" if all("command" in log for log in logs) else "pressure"
         x = np.concatenate([np.asarray(log[entry], float) for log in logs])
@@ -36,7 +37,10 @@ class Rigs:
         run = session(logs, entry)
         Chain(self.fitted, self.placed).run(x, first, "sensor", run, between_of(self.fitted, entry), left=left)
         clock = max(log.start + len(log) * log.sample_time for log in logs)
-        return replace(self.fitted, effects=effect_tables(self.placed, left, clock))
+        told = {"learned": [float(f([f(log["output"]) for log in logs])) for f in (np.min, np.max)]}
+        told |= {"promise": float(promise)} if promise is not None else {}
+        tables = effect_tables(self.placed, left, clock)
+        return replace(self.fitted, effects=tuple(table | told for table in tables))
 
 
 def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> Rigs:

@@ -83,8 +83,8 @@ class _Asked:
 
 @dataclass(frozen=True, eq=False)
 class _Option:
-    """A ``choice``, made as it is or with what leaves ``stage`` logged too: ``apart``, the expected separation
-    of the first rival from each of the others (k,)."""
+    """A ``choice``, made as it is or with what leaves ``stage`` logged too: ``apart``, the expected
+    separation of the first rival from each of the others (k,)."""
 
     choice: Choice
     stage: str | None
@@ -97,7 +97,8 @@ class _Option:
 
 def _between(rig: Rig, logs, explanations, e: Explanation, rivals: Sequence[Rival]):
     """The experiment that tells the first of ``rivals`` from the others. First asked is what the rig has done
-    before and the logs hold; steps where there were none, or a further signal, only where that is not enough."""
+    before and the logs hold; steps where there were none, or a further signal, only where that does not
+    do."""
     entry, bounds = cuts(logs)[0], bounds_of(rig, logs)
     reach, rigs = reach_of(rig, logs, entry), imagined(explanations, e, rivals)
     tiers, choices = [], []
@@ -129,7 +130,8 @@ def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
         if good:
             best = max(good, key=lambda o: o.least(telling) / np.sqrt(o.choice.seconds))
             return best.least(telling), best
-    best = max(options, key=lambda o: o.least(telling))
+    plain = [o for o in options if o.stage is None] or options  # a further signal is asked for where it tells
+    best = max(plain, key=lambda o: o.least(telling))
     return best.least(telling), best
 
 

@@ -1,4 +1,4 @@
-"""``diagnosis.json``, the two rigs, the experiment that is proposed, and pictures where matplotlib is there."""
+"""``diagnosis.json``, the two rigs, the proposed experiment, and pictures where matplotlib is there."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def write(
     files: dict[str, str | bytes] = {
         "diagnosis.json": to_json(diagnosis),
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
-        diagnosis.augmented_rig: tomlkit.dumps(rig_table(rigs.augmented(logs))),
+        diagnosis.augmented_rig: tomlkit.dumps(rig_table(rigs.augmented(logs, diagnosis.shrink))),
     }
     if evidence.next_input is not None:
         files[NEXT] = _next(evidence.next_input)

@@ -19,6 +19,7 @@ from focgen.control.setpoints import default_setpoints
 from focgen.errors import ControllerError, DesignError
 from focgen.loop.chain import chain
 from focgen.loop.frozen import frozen_loop, frozen_margins, frozen_step
+from focgen.loop.learned import learned_notes
 from focgen.loop.plan_stepper import PlanStepper
 from focgen.loop.relaxation import Plant, run_with_effects
 from focgen.loop.run import LoopRun, run_loop
@@ -126,6 +127,7 @@ def simulate(
     plan = build_plan(which, arithmetic, length)
     start = rest(model, which.ranges.output)
     targets = _targets(model, which, setpoints, start, consecutive)
+    notes += learned_notes(model, targets)
     points = [holding(model, target, ranges) for target in targets]
     return _Trial(model, which, plan, start, points, consecutive, delay).result(duration, tuple(notes))
 

@@ -130,7 +130,9 @@ def _how_far(found: Diagnosis, units: Mapping[str, str]) -> str:
 
 def _next(found: Diagnosis) -> list[str]:
     if found.next_experiment:
-        return [f"Next: record {found.next_experiment.what}, for {found.next_experiment.why}."]
+        proposed = found.next_experiment
+        file = f" (its input: {proposed.inputs['file']})" if "file" in proposed.inputs else ""
+        return [f"Next: record {proposed.what}{file}, for {proposed.why}."]
     if found.verdict in ("named", "set"):
         return [f"Next: check the promise on a new log, `focgen replay {found.augmented_rig} LOG`."]
     return []

@@ -22,7 +22,7 @@ from focgen.rig.plausibility import doubts
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 _CLOSER = 0.05  # of the mean square that a held command leaves: less, and another way is what the command does
-_BESIDES = ("name", "form", "stage", "clock", "carried")
+_BESIDES = ("name", "form", "stage", "clock", "carried", "promise", "learned")
 
 
 @dataclass(frozen=True)
