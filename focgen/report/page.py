@@ -1,4 +1,4 @@
-"""A report as one HTML page beside its pictures: readable from disk, no scripts, nothing fetched."""
+"""A report as one HTML page: beside its pictures and without scripts, or by itself with figures that move."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import focgen
+from focgen.report.figures import MOST, Figure
+from focgen.report.interactive import document, legend, library
+from focgen.report.texts import data
 from focgen.resources import shipped
 
 
@@ -29,13 +32,15 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """One step of the chain: what was found, as sentences, tables and pictures, and where the files are."""
+    """One step of the chain: what was found, as sentences and tables, shown in pictures (files beside the page) or in
+    figures (within it), and where the files are."""
 
     title: str
     sentences: tuple[str, ...] = ()
     tables: tuple[TableOf, ...] = ()
     pictures: tuple[Picture, ...] = ()
     files: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -47,16 +52,33 @@ class Page:
     sections: tuple[Section, ...] = field(default=())
 
     def html(self) -> str:
-        """The page as text; equal pages give equal bytes."""
-        environment = Environment(
-            loader=FileSystemLoader(shipped("templates")),
-            autoescape=True,
-            undefined=StrictUndefined,
-            trim_blocks=True,
-            lstrip_blocks=True,
-            keep_trailing_newline=True,
-        )
-        return environment.get_template("report.html").render(page=self, version=focgen.__version__)
+        """The page beside its pictures; equal pages give equal bytes."""
+        return _environment().get_template("report.html").render(page=self, version=focgen.__version__)
+
+    def self_contained(self) -> str:
+        """The page with its figures in it, which fetches nothing; equal pages give equal bytes.
+
+        Raises MissingExtra where Bokeh, which draws them, is not installed.
+        """
+        script = library()
+        figures = [figure for section in self.sections for figure in section.figures]
+        documents = {f"figure{i}": document(figure) for i, figure in enumerate(figures, 1)}
+        template = _environment().get_template("report/page.html")
+        legends = [legend(figure) for figure in figures]
+        values = {"documents": data(documents), "legends": legends, "library": script, "most": MOST}
+        return template.render(page=self, version=focgen.__version__, **values)
+
+
+def _environment() -> Environment:
+    """Whatever a template prints is escaped, unless it says that it is safe."""
+    return Environment(
+        loader=FileSystemLoader(shipped("templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
 
 
 def text_table(table: TableOf) -> str:
