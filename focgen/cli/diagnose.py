@@ -6,9 +6,10 @@ import argparse
 
 from focgen.cli.outcome import Outcome
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.drawn import units_of_rig
 from focgen.errors import FocgenError
 from focgen.progress import led_by
-from focgen.report.diagnosis_summary import diagnosis_text, units_of_rig
+from focgen.report.diagnosis_summary import diagnosis_text
 from focgen.rig.files import read_rig
 
 HELP = "where the gap to the real rig lies, which effect causes it, and how far it shrinks"

@@ -1,4 +1,4 @@
-"""``diagnosis.json``, the two rigs, and the pictures where matplotlib is there."""
+"""``diagnosis.json``, the two rigs, what figures draw, and the pictures where matplotlib is there."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import tomlkit
 
 from focgen.diagnosis.compose import Rigs
+from focgen.diagnosis.drawn import FILE, drawn_of, drawn_text, units_of_rig
 from focgen.diagnosis.model import Diagnosis, Evidence
 from focgen.jsontext import to_json
 from focgen.logs.experiment import Experiment
@@ -30,11 +31,12 @@ def write(
     """
     files: dict[str, str | bytes] = {
         "diagnosis.json": to_json(diagnosis),
+        FILE: drawn_text(drawn_of(rigs.refitted, evidence, logs)),
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
         diagnosis.augmented_rig: tomlkit.dumps(rig_table(rigs.augmented(logs))),
     }
     if drawn and find_spec("matplotlib"):
         from focgen.report.diagnosis import pictures
 
-        files |= pictures(diagnosis, evidence, logs)
+        files |= pictures(diagnosis, evidence, logs, units_of_rig(rigs.refitted))
     write_files(out, files, inputs)

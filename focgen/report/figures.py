@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from focgen.logs.thinning import thinned
+
 if TYPE_CHECKING:
     from focgen.report.page import TableOf
 
@@ -115,24 +117,8 @@ class Figure:
     linked: bool = True
 
 
-def thinned(x: np.ndarray, *signals: np.ndarray, most: int = MOST) -> np.ndarray:
-    """Indices (m,) of at most ``most`` samples of signals over ``x``, all (n,): in every stretch of equally many
-    samples the smallest and the largest of each signal, so that no peak is lost."""
-    count = len(x)
-    if count <= most:
-        return np.arange(count)
-    stretches = max(1, (most - 2) // (2 * len(signals)))
-    edges = np.linspace(0, count, stretches + 1).astype(int)
-    kept = {0, count - 1}
-    for signal in signals:
-        plain = np.where(np.isfinite(signal), signal, 0.0)
-        for a, b in zip(edges[:-1], edges[1:]):
-            kept |= {a + int(plain[a:b].argmin()), a + int(plain[a:b].argmax())}
-    return np.array(sorted(kept))
-
-
 def curve(label: str, x: Sequence[float], y: Sequence[float], colour: str, **how) -> Line:
     """A :class:`Line` of at most :data:`MOST` points."""
     x, y = np.asarray(x, float), np.asarray(y, float)
-    kept = thinned(x, y)
+    kept = thinned(y, most=MOST)
     return Line(label, x[kept], y[kept], colour, **how)

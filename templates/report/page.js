@@ -9,7 +9,7 @@
     "#dddddd": "#4a535b", "#cc79a7": "#e79cc6", "#56b4e9": "#9bd3f5", "#e69f00": "#ffbf3f",
   };
   const drawn = {};  // by figure: its document in BokehJS
-  const inks = new Map();  // by model and property: the colour on white paper
+  const inks = new WeakMap();  // by model: its colours on white paper
 
   const ink = (colour, night) => (night && onDark[String(colour).toLowerCase()]) || colour;
 
@@ -47,11 +47,11 @@
 
   function remember(model, name, night) {
     if (!(name in model.properties)) return;
-    const key = model.id + name;
-    const now = model[name];
-    const given = inks.has(key) ? inks.get(key) : (now && typeof now === "object" ? now.value : now);
+    if (!inks.has(model)) inks.set(model, {});
+    const kept = inks.get(model), now = model[name];
+    const given = kept[name] ?? (now && typeof now === "object" ? now.value : now);
     if (typeof given !== "string") return;
-    inks.set(key, given);
+    kept[name] = given;
     model[name] = now && typeof now === "object" ? { value: ink(given, night) } : ink(given, night);
   }
 
