@@ -7,13 +7,15 @@ never asked for.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from focgen.errors import MissingExtra
-from focgen.report.figures import Area, Axis, Bars, Figure, Line, Mark, Panel, Rule
+from focgen.logs.thinning import thinned
+from focgen.report.figures import MOST, Area, Axis, Bars, Figure, Line, Mark, Panel, Rule
 from focgen.report.style import COLOURS
 from focgen.report.texts import drawn
 
@@ -35,13 +37,15 @@ def library() -> str:
     return path.read_text(encoding="utf-8").replace("</script", "<\\/script")
 
 
-def document(figure: Figure) -> dict[str, Any]:
-    """The figure as a document of BokehJS; equal figures give equal documents. Raises MissingExtra."""
+def document(figure: Figure, most: int = MOST) -> dict[str, Any]:
+    """The figure as a document of BokehJS, with about ``most`` points a curve; equal figures give equal documents.
+    Raises MissingExtra where Bokeh is not installed.
+    """
     _bokeh()
     from bokeh.document import Document
     from bokeh.layouts import column
 
-    plots = _plots(figure)
+    plots = _plots(figure, most)
     made = Document()
     made.add_root(column(*plots, sizing_mode="stretch_width", spacing=4))
     return _numbered(made.to_json(deferred=False))
@@ -71,13 +75,13 @@ def _group(mark: Line | Bars | Area) -> str:
 # ------------------------------------------------------------------------------------------------ plots
 
 
-def _plots(figure: Figure) -> list:
+def _plots(figure: Figure, most: int) -> list:
     from bokeh.models import CrosshairTool, Span
 
     groups = [entry["name"] for entry in legend(figure)]
     cross, shared, plots = Span(dimension="height", line_width=1, line_dash="dotted"), None, []
     for panel in figure.panels:
-        plot = _plot(panel, shared, groups)
+        plot = _plot(panel, shared, groups, most)
         if figure.linked:
             shared = plot.x_range
             plot.add_tools(CrosshairTool(overlay=cross))
@@ -89,7 +93,7 @@ def _plots(figure: Figure) -> list:
     return plots
 
 
-def _plot(panel: Panel, shared, groups: Sequence[str]):
+def _plot(panel: Panel, shared, groups: Sequence[str], most: int):
     from bokeh.models import HoverTool, PlainText
     from bokeh.plotting import figure as plain
 
@@ -105,6 +109,8 @@ def _plot(panel: Panel, shared, groups: Sequence[str]):
         toolbar_location="above",
         min_border_right=12,
         min_border_left=58,
+        background_fill_color=None,  # the page's own paper shows, light or dark
+        border_fill_color=None,
     )
     plot.toolbar.logo = None
     if panel.title:
@@ -113,7 +119,7 @@ def _plot(panel: Panel, shared, groups: Sequence[str]):
         axis.axis_label = PlainText(text=drawn(said.label))
         _places(axis, said.places)
     for mark in panel.marks:
-        _draw(plot, mark, groups)
+        _draw(plot, _thin(mark, most), groups)
     plot.add_tools(HoverTool(tooltips=_tips(panel), renderers=_hovered(plot), line_policy="nearest"))
     return plot
 
@@ -210,6 +216,14 @@ def _draw(plot, mark: Mark, groups: Sequence[str]) -> None:
         renderer.tags = [f"g{groups.index(name)}"] if name else []
         renderer.nonselection_glyph = None
         renderer.muted_glyph = None
+
+
+def _thin(mark: Mark, most: int) -> Mark:
+    """The mark with fewer points, its peaks kept."""
+    if not isinstance(mark, Line) or len(mark.x) <= most:
+        return mark
+    kept = thinned(mark.x, mark.y, most=most)
+    return replace(mark, x=mark.x[kept], y=mark.y[kept])
 
 
 def _line(plot, mark: Line):

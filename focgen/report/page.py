@@ -7,10 +7,15 @@ from dataclasses import dataclass, field
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import focgen
+from focgen.errors import MissingExtra
 from focgen.report.figures import MOST, Figure
 from focgen.report.interactive import document, legend, library
 from focgen.report.texts import data
 from focgen.resources import shipped
+
+LARGEST = 3_000_000
+"""Bytes of a page with its figures."""
+_POINTS = (MOST, MOST // 2, MOST // 4, 500)  # of a curve
 
 
 @dataclass(frozen=True)
@@ -58,15 +63,29 @@ class Page:
     def self_contained(self) -> str:
         """The page with its figures in it, which fetches nothing; equal pages give equal bytes.
 
+        Curves are thinned until the page has at most :data:`LARGEST` bytes, if need be, but not below 500 points.
         Raises MissingExtra where Bokeh, which draws them, is not installed.
         """
-        script = library()
+        for most in _POINTS:
+            text = self._with_figures(most)
+            if len(text.encode("utf-8")) <= LARGEST:
+                break
+        return text
+
+    def best(self) -> str:
+        """The page with its figures where Bokeh is installed, else beside its pictures."""
+        try:
+            return self.self_contained()
+        except MissingExtra:
+            return self.html()
+
+    def _with_figures(self, most: int) -> str:
         figures = [figure for section in self.sections for figure in section.figures]
-        documents = {f"figure{i}": document(figure) for i, figure in enumerate(figures, 1)}
+        documents = {f"figure{i}": document(figure, most) for i, figure in enumerate(figures, 1)}
         template = _environment().get_template("report/page.html")
+        values = {"documents": data(documents), "library": library(), "most": most}
         legends = [legend(figure) for figure in figures]
-        values = {"documents": data(documents), "legends": legends, "library": script, "most": MOST}
-        return template.render(page=self, version=focgen.__version__, **values)
+        return template.render(page=self, version=focgen.__version__, legends=legends, **values)
 
 
 def _environment() -> Environment:

@@ -16,11 +16,11 @@
   function paint(night) {
     const style = getComputedStyle(document.documentElement);
     const named = (name) => style.getPropertyValue(name).trim();
-    const [text, soft, line, grid, paper] = night === dark.matches
-      ? ["--ink", "--soft", "--line", "--grid", "--paper"].map(named)
-      : ["#000000", "#444444", "#cccccc", "#e6eaed", "#ffffff"];
+    const [text, soft, grid] = night === dark.matches
+      ? ["--ink", "--soft", "--grid"].map(named)
+      : ["#000000", "#444444", "#e6eaed"];
     for (const doc of Object.values(drawn)) {
-      for (const model of doc.all_models) recolour(model, { text, soft, line, grid, paper }, night);
+      for (const model of doc.all_models) recolour(model, { text, soft, grid }, night);
     }
     for (const mark of document.querySelectorAll("[data-ink]")) {
       const colour = ink(mark.dataset.ink, night);
@@ -31,7 +31,7 @@
   function recolour(model, page, night) {
     const kind = model.type;
     if (kind === "Figure") {
-      model.setv({ background_fill_color: page.paper, border_fill_color: page.paper, outline_line_color: null });
+      model.setv({ background_fill_color: null, border_fill_color: null, outline_line_color: null });
     } else if (/Axis$/.test(kind)) {
       model.setv({ axis_line_color: page.soft, major_tick_line_color: page.soft, minor_tick_line_color: null,
         major_label_text_color: page.soft, axis_label_text_color: page.text, axis_label_text_font_style: "normal",

@@ -186,7 +186,7 @@ def _means(drawn: Drawn, units: Mapping[str, str]) -> Figure:
         "rate": f"rate of {entry} ({unit or 1}/s)",
         "time": "the session's time (s)",
     }
-    y = Axis(with_unit(f"mean error of {exit}", units.get(exit, "")))
+    y = Axis(with_unit("mean error", units.get(exit, "")))
     panels = tuple(
         Panel(Axis(labels[over]), y, (*(_mean(m) for m in drawn.means if m.over == over), Rule(0.0)), f"Over {_OVER[over]}", 240)
         for over in _OVER
@@ -242,7 +242,7 @@ def _session(drawn: Drawn, units: Mapping[str, str]) -> Figure:
     shown = with_unit("output", units.get("output", ""))
     panels = (
         Panel(time, Axis(shown), tuple(outputs), height=300),
-        Panel(time, Axis(f"error of {shown}"), (*errors, Rule(0.0)), height=190),
+        Panel(time, Axis(with_unit("error", units.get("output", ""))), (*errors, Rule(0.0)), height=190),
         Panel(time, Axis(with_unit(entry, units.get(entry, ""))), (Line(entry, clock, whole(lambda t: t.input), "command"),), height=170),
     )
     thin = f" Of {drawn.samples} samples {drawn.kept} are kept, every peak among them." if drawn.kept < drawn.samples else ""
