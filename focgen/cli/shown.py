@@ -39,7 +39,7 @@ def drawn(path: str | None, page: Callable[[], Page], pictures: Callable[[], Map
 
 def write_report(path: str | None, what, inputs: Iterable) -> str:
     """Write what :func:`drawn` gave, and say where it is."""
-    if what is None:
+    if not what:
         return ""
     if isinstance(what, str):
         write_file(path, what, inputs)

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from focgen.report.page import TableOf
+from focgen.report.figures import Figure
+from focgen.report.page import Section, TableOf
 
 
 def sentence(line: str) -> str:
@@ -41,3 +42,8 @@ def curves_table(caption: str, curves: Sequence[tuple[str, Sequence[float]]]) ->
         ends = (finite[0], finite.min(), finite.max(), finite[-1]) if len(finite) else (None,) * 4
         rows.append((name, *map(number, ends)))
     return TableOf(("curve", "first", "smallest", "largest", "last"), tuple(rows), caption)
+
+
+def figures_of(sections: Iterable[Section]) -> tuple[Figure, ...]:
+    """All figures of some sections, for a page that tells their story in its own words."""
+    return tuple(figure for section in sections for figure in section.figures)
