@@ -14,7 +14,7 @@ from focgen.diagnosis.moves import far_moves
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.segments import make
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Delays, Relative, Uncertainty
+from focgen.rig.model import Delays, LinearActuator, Relative, Uncertainty
 from focgen.rig.replay import simulate_session
 from tests.diagnosis_rig import RIG, session
 
@@ -184,3 +184,36 @@ def delayed(rig):
 
 def _noisy(rng, signal):
     return signal + 0.004 * np.ptp(signal) * rng.normal(size=len(signal))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_linear_actuator_moves_by_three_times_its_uncertainty(order):
+    den = [(0.02, 2.0), (0.4, 1.0), (1.0, 0.0)][2 - order :]
+    rig = replace(RIG, actuator=LinearActuator(TransferFunction([(3.0, 0.0)], den)))
+    own = Own(rig, ("actuator",), "actuator", 1.0, 1.0)
+    low, high = (own.put(rig, v).actuator.dynamics for v in own.bounds())
+    assert high.num[0].coefficient == pytest.approx(1.6 * 3.0) and low.num[0].coefficient == pytest.approx(1.2)
+    for k, given in enumerate(den[:-1]):
+        power = order - k
+        assert high.den[k].coefficient == pytest.approx(1.6**power * given[0])
+        assert low.den[k].coefficient == pytest.approx(0.4**power * given[0])
+
+
+def test_an_actuator_is_strained_three_times_its_uncertainty_off_and_may_go_further_only_if_freed():
+    own = Own(RIG, ("actuator",), "actuator", 1.0, 1.0)
+    (low, high), start = own.bounds(), own.start()
+    given, most = RIG.actuator, own.put(RIG, np.where(np.isfinite(high), high, start)).actuator
+    assert most.T == pytest.approx(1.6 * given.T) and most.alpha == pytest.approx(min(1.3 * given.alpha, 1.9))
+    assert not own.strained(start) and not own.strained(0.5 * (start + np.clip(low, start - 0.3, None)))
+    assert own.strained(np.where(np.arange(len(start)) == 1, high, start))
+    freed = replace(own, far=True)
+    assert np.all(freed.bounds()[1] >= high) and freed.bounds()[1][1] > high[1]
+
+
+def test_what_is_known_exactly_of_an_actuator_is_held_and_strains_nothing():
+    known = replace(RIG, uncertainty=Uncertainty(actuator=Relative(0.2, 0.0, 0.0)))
+    for far in (False, True):
+        own = Own(known, ("actuator",), "actuator", 1.0, 1.0, far=far)
+        (low, high), start = own.bounds(), own.start()
+        assert np.all(low[:2] == start[:2]) and np.all(high[:2] == start[:2]) and np.all(low[2:] < high[2:])
+        assert not own.strained(start)

@@ -15,8 +15,7 @@ from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import problem_of
 from focgen.diagnosis.fit import WHITE, fit
 from focgen.diagnosis.leftover import foretold
-from focgen.diagnosis.menu import menu
-from focgen.diagnosis.next_experiment import _showing
+from focgen.diagnosis.problem import Clue
 from focgen.diagnosis.rivals import Rival, _indistinct
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.segments import make
@@ -42,6 +41,13 @@ def test_a_tone_in_the_noise_is_heard_and_noise_is_none():
     noise = [_noise(rng, 1500) for _ in range(4)]
     tone = [p + 1.2 * np.sin(2 * np.pi * 3.1 * H * np.arange(len(p)) + i) for i, p in enumerate(noise)]
     assert not disturbance(noise, H, 1.0).hums and disturbance(tone, H, 1.0).hums
+
+
+def test_a_tone_as_slow_as_the_rig_is_heard_however_fast_the_samples():
+    rng, h = np.random.default_rng(0), H / 10
+    noise = [_noise(rng, 6000) for _ in range(4)]
+    tone = [p + 1.5 * np.sin(2 * np.pi * 0.4 * h * np.arange(len(p)) + i) for i, p in enumerate(noise)]
+    assert not disturbance(noise, h, 1.0).hums and disturbance(tone, h, 1.0).hums
 
 
 def test_ringing_is_foretold_and_noise_is_not():
@@ -329,21 +335,6 @@ def test_a_reading_that_stops_tells_how_far_the_actuator_went():
     assert seen["response"] == max(np.abs(log["curvature"]).max() for log in logs) > 0.008
 
 
-@pytest.mark.parametrize(
-    "rivals, left_out",
-    [
-        (("softening", "gain_drift"), ("staircase", "hold at", "small steps")),
-        (("creep", "sensor_relaxation"), ("mixed", "triangle", "staircase", "sines")),
-        (("slow_regulator", "transport_delay"), ("triangle",)),
-    ],
-)
-def test_only_experiments_that_show_the_rivals_are_proposed(rivals, left_out):
-    asked, choices = [SimpleNamespace(effect=name) for name in rivals], menu(1.0, 2.0, 0.02)
-    shown = [c.what for c in _showing(choices, asked, 2.0)]
-    assert len(shown) == len(choices) - len(left_out)
-    assert not [what for what in shown if any(word in what for word in left_out)]
-
-
 def _effect_fit(left, share, *effects):
     """A fit with ``effects`` that leaves ``left``, of which inputs foretell ``share``."""
     problem = SimpleNamespace(
@@ -420,3 +411,27 @@ def test_behind_a_hidden_curve_the_likeliest_that_is_not_hidden_leads():
         _leading(ranking, Converter(SimpleNamespace(effect="sensor_quantization"), (), 9.0))
         == "sensor_nonlinearity"
     )
+
+
+@pytest.mark.parametrize(
+    "stage, late, entry, exit, off",
+    [
+        ("regulator", ("pressure", "curvature", "output"), "command", "pressure", 0.005),
+        ("sensor", ("output",), "curvature", "output", 0.005),
+        ("regulator", ("output",), "command", "output", 0.5 * H),  # the sums of that rig's actuator are early
+    ],
+)
+def test_a_delay_is_not_shared_with_columns_out_of_step(stage, late, entry, exit, off):
+    logs = [replace(log, signals=_later(log.signals, late, 3)) for log in session(3, noise=1e-4)]
+    bare = problem_of(RIG, replace(make(logs, entry, exit), held=False), logs)
+    delay = bare.with_clues([Clue("transport_delay", library()["transport_delay"].forms[0], stage)])
+    found = fit(delay, np.r_[bare.nominal(), delay.starts(delay.clues[0])[1]], WHITE)
+    assert found.vector[len(delay.own_start)] == 0.0 < bare.bounds()[1][len(bare.own_start)]
+    assert delay.values(found.vector)[0][0] == pytest.approx(3 * H, abs=off)
+
+
+def _later(signals, roles, samples):
+    """The signals, those of ``roles`` later by so many samples."""
+    return {
+        role: np.r_[np.zeros(samples), y][: len(y)] if role in roles else y for role, y in signals.items()
+    }

@@ -9,13 +9,16 @@ import pytest
 import focgen
 from focgen.rig.effects import SLOTS, STAGES, Excitation, Run, form_of, library
 from focgen.rig.engine import slot_in
-from focgen.rig.modes import UNCHANGED, respond
+from focgen.rig import plant
+from focgen.rig.dynamics import UNCHANGED
+from focgen.rig.modes import respond
+from focgen.rig.plant import Plant
 
 NAMES = sorted(library())
 RICH = Excitation(10, 0.1, 20, 20, 100.0, 0.01, 8, 5, 5, 500.0, 100.0)
 POOR = Excitation(1, 1.0, 0, 0, 0.5, 10.0, 1, 0, 0, 2.0, 100.0)
 CONTRACT = """transport_delay slow_regulator valve_asymmetry valve_stiction flow_limit supply_saturation
-leak hysteresis creep unloading_asymmetry softening gain_nonlinearity dead_zone contact resonance gain_drift
+leak hysteresis friction creep unloading_asymmetry softening gain_nonlinearity dead_zone contact resonance gain_drift
 sensor_nonlinearity sensor_hysteresis sensor_relaxation sensor_lag sensor_drift sensor_quantization
 sensor_saturation""".split()
 
@@ -85,17 +88,27 @@ def test_a_form_stands_where_it_may(effect, form):
         assert not p.log or p.lower > 0
 
 
-def _lag(x, run, dynamics):
-    return respond(x, run.rest, run.h, 0.3, 0.7, run.duration, dynamics)
+def _answers(form, x, run):
+    """What a lag, or a mass on a spring where the form is of a plant's, answers: nominal, as the form's zero
+    leaves it, and changed."""
+
+    def made(dynamics):
+        if "spring" in changed.changed:
+            return plant.respond(Plant(2, 0.2, 0.3, 1.0), x, run.rest, run.h, dynamics)
+        return respond(x, run.rest, run.h, 0.3, 0.7, run.duration, dynamics)
+
+    starts = tuple(p.starts[0] for p in form.parameters)
+    changed = form.act(UNCHANGED, starts, None)
+    zero = tuple(s if p.zero is None else p.zero for s, p in zip(starts, form.parameters))
+    return made(UNCHANGED), made(form.act(UNCHANGED, zero, None)), made(changed)
 
 
 @pytest.mark.parametrize("effect, form", forms())
 def test_a_form_is_nested_in_the_nominal_chain(effect, form):
     if form.slot == "dynamics":
         x, run = session()
-        values = tuple(p.starts[0] if p.zero is None else p.zero for p in form.parameters)
-        zero = form.act(UNCHANGED, values, None)
-        np.testing.assert_array_equal(_lag(x, run, zero), _lag(x, run, UNCHANGED))
+        nominal, zero, _ = _answers(form, x, run)
+        np.testing.assert_allclose(zero, nominal, rtol=0.0, atol=1e-9)
         return
     assert any(p.zero is not None for p in form.parameters) or effect.name == "resonance"
     x, run = session()
@@ -109,8 +122,8 @@ def test_a_form_is_nested_in_the_nominal_chain(effect, form):
 def test_a_form_changes_something_and_stays_finite(effect, form):
     if form.slot == "dynamics":
         x, run = session(1)
-        moved = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None)
-        assert np.max(np.abs(_lag(x, run, moved) - _lag(x, run, UNCHANGED))) > 1e-3
+        nominal, _, changed = _answers(form, x, run)
+        assert np.max(np.abs(changed - nominal)) > 1e-3
         return
     x, run = session(1)
     x = np.where(np.arange(len(x)) > 550, -x, x)

@@ -14,7 +14,8 @@ from focgen.rig import kernels, linear
 from focgen.rig.effects import Run, form_of
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.model import Actuator, Rig, Signals
-from focgen.rig.modes import Dynamics, respond
+from focgen.rig.dynamics import Dynamics
+from focgen.rig.modes import respond
 from focgen.rig.replay import effect_tables, placed_in
 
 

@@ -12,13 +12,13 @@ from focgen.errors import FitError, LogError
 from focgen.fractional.responses import mittag_leffler, step_response
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification import identify as module
-from focgen.identification.between import course_of, jumps_of
 from focgen.identification.excitation import prepare
 from focgen.identification.fractional import fit_fractional
 from focgen.identification.integer import SHAPES, fit_integer_models
 from focgen.identification.kernel import kernels
 from focgen.identification.gain import secants_of
 from focgen.identification.quality import gof
+from focgen.logs.between import course_of, jumps_of
 from focgen.logs.experiment import Experiment
 from tests.conftest import paper_rig
 

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import focgen
@@ -162,8 +163,10 @@ def test_a_diagnosis_of_an_earlier_result_is_refused(files, name, capsys):
 def test_what_a_diagnosis_writes_is_known_beforehand(tmp_path, monkeypatch):
     """The names that are looked at before the work, and those that are written after it."""
     from focgen.diagnosis import write as module
-    from focgen.diagnosis.diagnose import WRITTEN
-    from focgen.diagnosis.model import Diagnosis
+    from focgen.diagnosis.diagnose import NEXT, WRITTEN
+    from focgen.diagnosis.menu import Choice
+    from focgen.diagnosis.reach import Reach
+    from focgen.diagnosis.model import Diagnosis, Evidence
 
     monkeypatch.setattr(module, "to_json", lambda diagnosis: "{}")
     monkeypatch.setattr(module, "rig_table", lambda rig: {})
@@ -177,12 +180,15 @@ def test_what_a_diagnosis_writes_is_known_beforehand(tmp_path, monkeypatch):
         def augmented(self, logs):
             return None
 
-    module.write(tmp_path, found, None, Rigs(), (), drawn=False)
-    assert {path.name for path in tmp_path.iterdir()} == set(WRITTEN)
+    asked = Choice("a step", np.array([0.0, 1.0]), Reach(0.0, 2.0, 0.0, np.inf, 9.0, 1.0, 0.1, 2))
+    evidence = Evidence({}, (), asked)
+    module.write(tmp_path, found, evidence, Rigs(), (), drawn=False)
+    assert {path.name for path in tmp_path.iterdir()} == {*WRITTEN, NEXT}
+    assert (tmp_path / NEXT).read_text().splitlines() == ["time_s,input", "0,0", "0.05,0", "0.1,2", "0.15,2"]
     mine = [tmp_path / "refitted.toml"]
     mine[0].write_text("mine")
     with pytest.raises(InputError, match="is the input"):
-        module.write(tmp_path, found, None, Rigs(), (), drawn=False, inputs=mine)
+        module.write(tmp_path, found, evidence, Rigs(), (), drawn=False, inputs=mine)
     assert mine[0].read_text() == "mine"
 
 

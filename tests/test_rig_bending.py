@@ -94,3 +94,9 @@ def test_only_what_a_spring_holds_has_one_that_bends():
     wall = form_of("contact", "spring")
     assert fits_in(FORM, "actuator", rig_of(SECOND)) and not fits_in(wall, "actuator", rig_of(SECOND))
     assert not fits_in(FORM, "actuator", rig_of(zero)) and not fits_in(FORM, "actuator", rig_of(free))
+
+
+@pytest.mark.parametrize("actuator", [FIRST, SECOND, Actuator(0.5, 0.7, (2.0,))])
+def test_a_spring_that_gives_way_does_not_run_away(actuator):
+    made = made_by(actuator, 3.0 * X, values=(-0.45, -0.3, 0.8))
+    assert np.all(np.isfinite(made)) and np.max(np.abs(made)) < 30.0

@@ -19,7 +19,8 @@ from focgen.rig.delay import delayed
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
 from focgen.rig.model import UNITY, Actuator, Delays, LinearActuator, Rig, Signals
-from focgen.rig.modes import Dynamics, respond
+from focgen.rig.dynamics import Dynamics
+from focgen.rig.modes import respond
 from tests.diagnosis_rig import RIG, session
 
 H = 0.02

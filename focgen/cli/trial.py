@@ -54,6 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--oracle", action="store_true", help="score: also diagnose knowing the effect")
     parser.add_argument(
+        "--proposals",
+        action="store_true",
+        help="score: also make the proposed experiments, and those of the menu, and diagnose again",
+    )
+    parser.add_argument(
         "--no-baseline", action="store_true", help="score: leave the residual correlation out"
     )
     parser.add_argument(
@@ -96,6 +101,7 @@ def _score(args: argparse.Namespace) -> Outcome:
         "score",
         *args.folder,
         oracle=args.oracle,
+        proposals=args.proposals,
         baseline=not args.no_baseline,
         partial=args.partial,
         jobs=args.jobs,

@@ -13,7 +13,7 @@ from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import Fit
 from focgen.diagnosis.segments import session
 from focgen.logs.experiment import Experiment
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.model import Rig
 from focgen.rig.replay import effect_tables, simulate_session
 
@@ -34,7 +34,7 @@ class Rigs:
         x = np.concatenate([np.asarray(log[entry], float) for log in logs])
         first = "regulator" if entry == "command" else "actuator"
         run = session(logs, entry)
-        Chain(self.fitted, self.placed).run(x, first, "sensor", run, entry == "command", left=left)
+        Chain(self.fitted, self.placed).run(x, first, "sensor", run, between_of(self.fitted, entry), left=left)
         clock = max(log.start + len(log) * log.sample_time for log in logs)
         return replace(self.fitted, effects=effect_tables(self.placed, left, clock))
 

@@ -27,7 +27,8 @@ def tied(rivals: Sequence[Rival]) -> tuple[Rival, ...]:
 
 def confidences(kept: Sequence[Rival], share: float = 1.0) -> np.ndarray:
     """The probability of every rival of the set ``kept``, the best first; they sum to less than 1.
-    ``share``: what the cause explains of its segment's gap.
+    ``share``: what the cause explains of its segment's gap; 0 where own parameters far from those given do
+    as much of it.
 
     That one is the best, by however little, tells more than by how much, as long as it stays below
     ``SET_WITHIN``.

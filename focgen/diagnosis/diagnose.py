@@ -12,9 +12,11 @@ from focgen.control.files import read_controller
 from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.carried import carried
+from focgen.diagnosis.decimate import decimated
 from focgen.diagnosis.explain import Explanation, clues_for, explain
 from focgen.diagnosis.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.model import Diagnosis
+from focgen.diagnosis.next_experiment import NEXT
 from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
 from focgen.diagnosis.segments import cuts, make
 from focgen.diagnosis.smooth import freed
@@ -63,11 +65,14 @@ def diagnose(
     logs = each_of(logs)
     given = (rig, *logs, controller)
     if out is not None:
-        check_apart((Path(out) / name for name in WRITTEN), given)
+        check_apart((Path(out) / name for name in (*WRITTEN, NEXT)), given)
     rig = rig if isinstance(rig, Rig) else read_rig(rig)
-    logs = begun_session(rig, _usable(experiments(rig, logs, first, last)))
+    logs = _usable(experiments(rig, logs, first, last))
     ran = running(read_controller(controller), logs) if controller is not None else None
+    rig, logs = decimated(rig, logs)
+    logs = begun_session(rig, logs)
     explanations = explain_all(rig, logs, THRESHOLD, only, bootstrap)
+    rig = explanations[0].told(rig)
     rigs = compose.compose(rig, explanations, logs)
     logs = begun_with(rigs, logs)
     rigs, diagnosis, evidence = verdict.reach(rig, logs, rigs, explanations, ran, only is not None)

@@ -6,6 +6,7 @@ temperature in slow swings: neither depends on the input, and both are there.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,19 +65,20 @@ def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturban
     local = np.array([np.mean(s**2) for p in quiet for s in np.array_split(p, max(1, len(p) // count))])
     loudest = float(np.max(local) / max(np.median(local), 1e-300))
     return Disturbance(
-        float(np.mean(joined**4) / variance**2), loudest, _slow(parts, h, response), _line(parts)
+        float(np.mean(joined**4) / variance**2), loudest, _slow(parts, h, response), _line(parts, h, response)
     )
 
 
-def _line(parts: list[np.ndarray]) -> float:
+def _line(parts: list[np.ndarray], h: float, response: float) -> float:
     """The part of the power within two bins of the strongest line, slow ones left out; the median over
-    experiments."""
-    shares = []
+    experiments. Slow is a period beyond four responses, whatever the samples, or beyond a hundred samples where
+    these are more."""
+    shares, slow = [], max(100.0, 4.0 * response / h)
     for p in parts:
         if len(p) >= _LONG:
             power = np.abs(np.fft.rfft((p - p.mean()) * np.hanning(len(p)))) ** 2
             near = np.convolve(power, np.ones(5), "same")
-            shares.append(float(near[len(power) // 50 :].max() / max(power.sum(), 1e-300)))
+            shares.append(float(near[math.ceil(len(p) / slow) :].max() / max(power.sum(), 1e-300)))
     return float(np.median(shares)) if shares else 0.0
 
 

@@ -11,7 +11,7 @@ from focgen.diagnosis.accept import Asked, begun_anew, chosen
 from focgen.diagnosis.converter import Converter, converter_of
 from focgen.diagnosis.disturbance import disturbance
 from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit
-from focgen.diagnosis.leftover import Leftover, leftover
+from focgen.diagnosis.leftover import LEFT, Leftover, leftover
 from focgen.diagnosis.own import Own
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.realign import realigned
@@ -19,9 +19,10 @@ from focgen.diagnosis.rivals import Cause, doubted, left_out
 from focgen.diagnosis.scales import references
 from focgen.diagnosis.search import Ranking, evidence, rank
 from focgen.diagnosis.segments import Segment, is_single, owner
+from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Effect, library
-from focgen.rig.engine import fits_in
+from focgen.rig.engine import between_of, fits_in
 from focgen.rig.model import Rig
 
 _DEPTH = 4
@@ -29,6 +30,9 @@ _DEPTH = 4
 _OUT_OF_STEP = 0.05
 _MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of other stages are tried too
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
+_WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
+_RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
+_FREED = 0.7  # of the mean square left: an actuator far from the one given has to leave less
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 
 
@@ -50,9 +54,30 @@ class Explanation:
     converter: Converter | None = None
 
     @property
+    def strained(self) -> bool:
+        """Whether it takes own parameters of the actuator three times their uncertainty off, or more."""
+        return self.best.problem.own.strained(self.best.vector)
+
+    @property
+    def square(self) -> float:
+        """The mean square that its effects leave."""
+        return float(np.mean(self.best.weighed**2))
+
+    @property
+    def freed(self) -> bool:
+        """Whether it had to be let go further than that."""
+        return self.best.problem.own.far and self.strained
+
+    @property
     def stage(self) -> str | None:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
+
+    def told(self, rig: Rig) -> Rig:
+        """``rig`` with what its command does between samples, where that is not as usual."""
+        between = self.segment.between
+        entry = self.segment.entry
+        return rig if entry != "command" or between == between_of(rig, entry) else replace(rig, between=between)
 
     def kept_by(self, given: Rig, refitted: Rig) -> bool:
         """Whether the refit of its own parameters is part of the rig ``refitted``."""
@@ -134,6 +159,21 @@ def explain(
     whether the input could be freed of its noise.
     """
     problem = _widened(_gauged(_held(rig, segment, logs)))
+    found = _explained(rig, problem, threshold, only, trusted)
+    if not found.strained or problem.own.far or found.left.share < LEFT:
+        return found
+    freed, asked = replace(problem, own=replace(problem.own, far=True), memory={}), _FREED * found.square
+    beside = freed.with_clues(found.best.problem.clues)
+    if np.mean(fit(beside, found.best.vector, Weighing(found.ar)).weighed ** 2) > asked:
+        return found
+    other = _explained(rig, freed, threshold, only, trusted)
+    return other if other.square < asked else found
+
+
+def _explained(
+    rig: Rig, problem: Problem, threshold: float, only: Sequence[str] | None, trusted: bool
+) -> Explanation:
+    segment = problem.segment
     clues, guests = clues_for(segment, rig), guests_in(segment, rig)
     if only is not None:
         clues, guests, threshold = [c for c in clues if c.effect in only], [], 0.0
@@ -186,8 +226,16 @@ def _grown(
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
-    """The problem with the command as a staircase or as a polygon, whichever the log was: loggers differ."""
-    problems = [problem_of(rig, replace(segment, held=held), logs) for held in {segment.held, False}]
+    """The problem with the command as a staircase, as a polygon or as a smooth curve, whichever the log was,
+    where the rig does not say it: loggers differ."""
+    ways = [segment.between] if segment.entry != "command" else list(_WAYS)
+    if rig.between is not None:
+        ways = [rig.between]
+    elif len(ways) > 1 and np.mean(np.diff(segment.x) == 0.0) > _RESTS:
+        ways.remove(Between.SMOOTH)
+    problems = [problem_of(rig, replace(segment, between=way), logs) for way in ways]
+    if len(problems) == 1:
+        return problems[0]
     fits = [fit(p, p.nominal(), WHITE, 6) for p in problems]
     return min(fits, key=lambda f: f.sse).problem
 
@@ -203,11 +251,11 @@ def _gauged(problem: Problem) -> Problem:
 
 def _widened(problem: Problem) -> Problem:
     """The problem with a stage faster, or of another gain, than three times the uncertainty of what was given
-    allows, where that is all there is: no effect stands for it."""
+    allows, and an actuator of any numbers, where that is all there is: then no effect stands for it."""
     ground = _ground(problem, problem.nominal())
     if not problem.own.beyond(ground.vector) or not _shows_more(ground):
         return problem
-    wide = replace(problem, own=replace(problem.own, wide=True))
+    wide = replace(problem, own=replace(problem.own, wide=True, far=True))
     return problem if _seems_more(wide, wide.nominal()) else wide
 
 

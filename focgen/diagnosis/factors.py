@@ -11,7 +11,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.rig.model import UNITY, Rig
 
 WITHIN = 3.0  # times its uncertainty a number may be off without being a fault
-_LEAST = 0.05  # of a number as given: no refit moves it below, nor above the inverse
+LEAST = 0.05  # of a number as given: no refit moves it below, nor above the inverse
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Factor:
     def bounds(self, wide: bool) -> tuple[float, float]:
         """What the logarithm may be; ``wide``: anything where no effect stands for it."""
         usual = WITHIN * self.uncertainty
-        low, high = np.log(max(1.0 - usual, _LEAST)), np.log1p(usual)
+        low, high = np.log(max(1.0 - usual, LEAST)), np.log1p(usual)
         if wide and self.faults >= 0:
-            low = np.log(_LEAST)
+            low = np.log(LEAST)
         if wide and self.faults <= 0:
-            high = -np.log(_LEAST)
+            high = -np.log(LEAST)
         return float(low), float(high)
 
     def put(self, rig: Rig, logarithm: float) -> Rig:

@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.diagnosis.factors import LEAST, WITHIN
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.model import Actuator, LinearActuator, Rig
 
+_SLACK = 1e-6  # what stands as close to an end stands there
 _USUAL = 0.2  # relative deviation of own parameters from those given that surprises nobody
 
 
@@ -28,7 +30,8 @@ class Free:
         return self.stage == "actuator" and self.rig.actuator is not None
 
     def start(self) -> np.ndarray:
-        """The vector of the rig as given."""
+        """The vector of the rig as given: logarithms of coefficients or T, α and the gain's numbers, then the
+        bias where the actuator integrates, and the offset last."""
         if self.stage != "actuator":
             return self._from_transfer(getattr(self.rig, self.stage))
         a = self.rig.actuator
@@ -36,15 +39,47 @@ class Free:
             gains = [g * self.level_in ** (i + 1) / self.level_out for i, g in enumerate(a.gain)]
             return np.array([np.log(a.T), a.alpha, *gains, a.offset / self.level_out])
         if isinstance(a, LinearActuator):
-            return np.r_[self._from_transfer(a.dynamics), a.offset / self.level_out]
+            bias = [a.bias / self.level_in] if a.integrates else []
+            return np.r_[self._from_transfer(a.dynamics), bias, a.offset / self.level_out]
         return np.zeros(0)
 
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds of the vector.
+    def bounds(self, far: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the vector; not ``far``: of an actuator, three times its uncertainty.
 
         A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead
         zone.
         """
+        low, high = self._utmost()
+        if not self.has_offset:
+            return low, high
+        near = self._usual()
+        kept = np.logical_not(far) | (near[0] == near[1])  # what is known exactly does not move
+        return np.where(kept, np.maximum(low, near[0]), low), np.where(kept, np.minimum(high, near[1]), high)
+
+    def beyond(self, vector: np.ndarray) -> bool:
+        """Whether a number stands at an end of what is usual, or further off."""
+        if not self.has_offset:
+            return False
+        low, high = self._usual()
+        ends = (vector < low + _SLACK) | (vector > high - _SLACK)
+        return bool(np.any(ends & (low < high)))
+
+    def _usual(self) -> tuple[np.ndarray, np.ndarray]:
+        """Three times the actuator's uncertainty about what was given; any offset."""
+        known, start, a = self.rig.uncertainty.actuator, self.start(), self.rig.actuator
+        gain, time = (np.log([max(1.0 - WITHIN * u, LEAST), 1.0 + WITHIN * u]) for u in (known.gain, known.time))
+        if isinstance(a, Actuator):
+            off = WITHIN * known.gain * np.abs(start[2:-1]).sum()
+            order = WITHIN * known.alpha * start[1]
+            moves = [time, (-order, order), *[(-off, off)] * (len(start) - 3)]
+        else:
+            last, parts = a.dynamics.den[-1].order, (a.dynamics.num, a.dynamics.den[:-1])
+            orders = [t.order for t in parts[0]], [t.order - last for t in parts[1]]
+            moves = [gain + k * time for k in orders[0]] + [k * time for k in orders[1]]
+        ends = np.array([*moves, (-np.inf, np.inf)]).T
+        return start + ends[0], start + ends[1]
+
+    def _utmost(self) -> tuple[np.ndarray, np.ndarray]:
         start = self.start()
         low, high = start - 50.0, start + 50.0
         if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
@@ -60,14 +95,14 @@ class Free:
     def doubt(self, vector: np.ndarray) -> float:
         """Nats against own parameters this far from those given. The owner identified them once: a tenth off
         is usual, a factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a
-        guess; an offset is free."""
+        guess; an offset and a bias are free."""
         start = self.start()
         if not len(start):
             return 0.0
         away, scale = vector - start, np.full(len(start), _USUAL)
         if self.stage == "actuator":
-            away = away[:-1]
-            scale = scale[:-1]
+            free = 2 if getattr(self.rig.actuator, "integrates", False) else 1
+            away, scale = away[:-free], scale[:-free]
         if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
             gains = np.abs(start[2:-1])
             scale[1], scale[2:] = 0.5 * _USUAL * start[1], _USUAL * (gains + 0.1 * gains.sum() + 1e-12)
@@ -84,7 +119,8 @@ class Free:
             gains = tuple(g * self.level_out / self.level_in ** (i + 1) for i, g in enumerate(v[2:-1]))
             moved = Actuator(float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out)
         else:
-            moved = LinearActuator(self._to_transfer(a.dynamics, vector[:-1]), v[-1] * self.level_out)
+            bias = v[-2] * self.level_in if a.integrates else a.bias
+            moved = LinearActuator(self._to_transfer(a.dynamics, vector), v[-1] * self.level_out, bias)
         return replace(rig, actuator=moved)
 
     def _transfer_of(self) -> TransferFunction:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from focgen.diagnosis.menu import Choice
+
 Interval = tuple[float, float]
 
 
@@ -108,7 +110,8 @@ class Diagnosis:
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """What the pictures are drawn from: signals by experiment (as given, refitted, explained), explanations
-    by segment."""
+    by segment; ``next_input``: the experiment that is proposed."""
 
     simulated: dict[str, list[dict[str, np.ndarray]]]
     explanations: tuple
+    next_input: Choice | None = None

@@ -32,6 +32,8 @@ def _moves(given: Rig, refitted: Rig) -> Iterator[tuple[str, str, float, float]]
     if isinstance(before, Actuator) and isinstance(after, Actuator):
         yield "actuator", "T", after.T / before.T - 1.0, given.uncertainty.actuator.time
         yield "actuator", "alpha", after.alpha / before.alpha - 1.0, given.uncertainty.actuator.alpha
+        if len(before.gain) == 1 and before.gain[0]:
+            yield "actuator", "gain", after.gain[0] / before.gain[0] - 1.0, given.uncertainty.actuator.gain
     for stage in ("regulator", "actuator", "sensor"):
         if delay := getattr(given.delays, stage):
             later = getattr(refitted.delays, stage) / delay - 1.0

@@ -1,8 +1,10 @@
 """The rig's own parameters, which a refit may move, as one vector of numbers of order one.
 
-The actuator's, or those of the one stage there is, move freely. What was given of a regulator or a sensor was
-measured, or stands in a data sheet: its gain and its times move as a whole, and have a normal prior as wide
-as the rig's ``[uncertainty]``, so that what the data do not show stays where it was.
+The actuator's, or those of the one stage there is, move freely, the actuator's within three times their
+uncertainty: a refit that goes further makes up for an effect as easily as for a number given wrong. What was
+given of a regulator or a sensor was measured, or stands in a data sheet: its gain and its times move as a
+whole, and have a normal prior as wide as the rig's ``[uncertainty]``, so that what the data do not show stays
+where it was.
 """
 
 from __future__ import annotations
@@ -21,8 +23,8 @@ from focgen.rig.model import Rig
 class Own:
     """Turns the own parameters of a segment's ``stages`` into a vector and back: those of ``freely``, the
     stage that is refitted freely, then a logarithm for each of the others' factors; levels are the segment's
-    largest magnitudes. ``wide``: what no effect stands for may go beyond three times its uncertainty;
-    ``held``: nothing moves."""
+    largest magnitudes. ``wide``: what no effect stands for may go beyond three times its uncertainty, ``far``:
+    so may the actuator's own; ``held``: nothing moves."""
 
     rig: Rig
     stages: tuple[str, ...]
@@ -30,6 +32,7 @@ class Own:
     level_in: float
     level_out: float
     wide: bool = False
+    far: bool = False
     held: bool = False
 
     @cached_property
@@ -63,7 +66,7 @@ class Own:
         """Lower and upper bounds of the vector."""
         if self.held:
             return self.start(), self.start()
-        free = self._free.bounds() if self._free else (np.zeros(0), np.zeros(0))
+        free = self._free.bounds(self.far) if self._free else (np.zeros(0), np.zeros(0))
         ends = np.array([f.bounds(self.wide) for f in self.factors]).reshape(-1, 2).T
         return np.r_[free[0], ends[0]], np.r_[free[1], ends[1]]
 
@@ -80,8 +83,16 @@ class Own:
         logs = vector[count : len(self.precision)]
         return free + 0.5 * float(self.precision[count:] @ logs**2)
 
+    def strained(self, vector: np.ndarray) -> bool:
+        """Whether the actuator's own are three times their uncertainty off, or more."""
+        count = len(self._first)
+        return bool(count) and self._free.beyond(vector[:count])
+
     def beyond(self, vector: np.ndarray) -> bool:
-        """Whether a factor stands at an end that it could pass if it were ``wide``."""
+        """Whether a factor stands at an end that it could pass if it were ``wide``, or the actuator's own at
+        one that they could pass if they were ``far``."""
+        if self.strained(vector):
+            return True
         usual, wide = (np.array([f.bounds(w) for f in self.factors]).reshape(-1, 2) for w in (False, True))
         logs = vector[len(self._first) : len(self.precision), None]
         return bool(np.any((usual != wide) & (np.abs(logs - usual) < 1e-6)))

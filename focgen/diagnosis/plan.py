@@ -15,6 +15,7 @@ import numpy as np
 from focgen.diagnosis.excitation import excitation
 from focgen.diagnosis.explain import clues_for, problem_of
 from focgen.diagnosis.menu import menu
+from focgen.diagnosis.reach import Reach
 from focgen.diagnosis.segments import cuts, make
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run, library
@@ -22,10 +23,11 @@ from focgen.rig.engine import Chain
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.rig.replay import experiments
-from focgen.rig.response import response_time
+from focgen.rig.response import integrations, response_time
 
 ALIKE = 0.9  # cosine beyond which two effects cannot be told apart
 HIDDEN = 0.1  # surviving share below which an effect hides in the nominal parameters
+_FINE, _LONGEST = 200, 600.0  # samples of a response time, and response times of an experiment of the menu
 _ROLES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 
 
@@ -76,18 +78,26 @@ def plan(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path] = ()) ->
 
 def _menu(rig: Rig) -> tuple[Experiment, ...]:
     """The menu's experiments on the nominal rig."""
-    span = rig.ranges.command or (0.0, 10.0)
     response = response_time(rig, rig.sample_time, 2e4 * rig.sample_time)
     start, found = 0.0, []
-    for choice in menu(span[1], response, rig.sample_time):
-        run = Run.of([len(choice.command)], [start], choice.h)
+    for choice in menu(_reach(rig, response)):
+        run = Run.of([len(choice.levels)], [start], choice.reach.h)
         tap: dict[str, np.ndarray] = {}
-        Chain(rig).run(choice.command, "regulator", "sensor", run, tap=tap)
+        Chain(rig).run(choice.input, "regulator", "sensor", run, tap=tap)
         logged = {role for role in ("pressure", "curvature") if getattr(rig.signals, role)} | {"output"}
-        signals = {"command": choice.command} | {_ROLES[s]: y for s, y in tap.items() if _ROLES[s] in logged}
-        found.append(Experiment(choice.what, choice.h, signals, start))
+        signals = {"command": choice.input} | {_ROLES[s]: y for s, y in tap.items() if _ROLES[s] in logged}
+        found.append(Experiment(choice.what, choice.reach.h, signals, start))
         start += choice.seconds
     return tuple(found)
+
+
+def _reach(rig: Rig, response: float) -> Reach:
+    """What the rig file says of the command: from 0 to 10 where it is silent."""
+    low, high = rig.ranges.command or (0.0, 10.0)
+    h = max(rig.sample_time, response / _FINE)
+    return Reach(
+        low, high, min(max(0.0, low), high), np.inf, _LONGEST * response, response, h, 1, integrations(rig)
+    )
 
 
 def _segment(rig: Rig, session, entry: str, exit: str, seen) -> list[Survival]:

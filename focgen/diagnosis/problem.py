@@ -43,7 +43,7 @@ class References:
 
     def scale(self, parameter, slot: str) -> float:
         """The physical size of 1 in units of this parameter."""
-        return self.levels[slot] ** parameter.level * self.clocks[parameter.clock] ** parameter.time
+        return self.levels[parameter.at or slot] ** parameter.level * self.clocks[parameter.clock] ** parameter.time
 
 
 @dataclass(eq=False)
@@ -128,7 +128,7 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
         low, high = self.own.bounds()
-        nuisance = [self.slack, *self.gauges, *[_OFF] * self.ways]
+        nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *[_OFF] * self.ways]
         low, high = [*low, *(-b for b in nuisance)], [*high, *nuisance]
         for clue in self.clues:
             for p in clue.form.parameters:
@@ -136,6 +136,11 @@ class Problem:
                 low.append(np.log(least) if p.log else least)
                 high.append(np.log(max(p.upper, least)) if p.log else p.upper)
         return np.array(low, float), np.array(high, float)
+
+    @property
+    def _shifted(self) -> bool:
+        """Whether a clue says how late the output is: two numbers for one thing would share it at random."""
+        return any(library()[clue.effect].shifts for clue in self.clues)
 
     def _least(self, p) -> float:
         """The lower bound: a time constant of less than two samples is nothing that samples could show."""
@@ -179,7 +184,7 @@ class Problem:
         ends = np.cumsum([len(self.gauges), segment.unsure.shape[1]])
         gauges, off, begun = np.split(vector[own + 1 : self.head], ends)
         x = self._entered(float(vector[own]), off)
-        made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.held)
+        made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.between)
         made = self._read(made, *gauges)
         return made + segment.loose @ begun if np.any(begun) else made
 

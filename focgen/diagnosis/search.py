@@ -14,6 +14,7 @@ from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.repeats import without_hearsay
 
 _COARSE = 5000  # samples of the first, coarse pass
+_QUICKEST = 4.0  # of them at least in a response
 _DEEP = 5  # how many forms are fitted to the end beside the families' best
 _QUICK = 0.3  # of the best quick fit's fall in the sum of squares: forms below are left at that
 _MISFIT = 0.15  # of a residual's mean square foretold by inputs: beyond it the colour is not the noise's
@@ -82,8 +83,10 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
 
 def coarseness(problem: Problem) -> int:
     """How many neighbouring samples a coarse pass takes the mean of."""
-    shortest = min(last - first for first, last in problem.segment.run.spans)
-    return max(1, min(len(problem.segment.y) // _COARSE, shortest // 20))
+    segment = problem.segment
+    shortest = min(last - first for first, last in segment.run.spans)
+    seen = int(problem.references.clocks["response"] / segment.run.h / _QUICKEST)
+    return max(1, min(len(segment.y) // _COARSE, shortest // 20, seen))
 
 
 def on_all(of: Fit, problem: Problem, factor: int) -> Fit:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 from focgen.rig.model import UNITY, Rig
@@ -22,7 +23,7 @@ _ORDER = ("command", "pressure", "curvature", "output")
 @dataclass(frozen=True, eq=False)
 class Segment:
     """The stages between two logged signals: input ``x`` and output ``y`` (n,), experiments one after the
-    other as in ``run``. ``held``: the input is a staircase (a command). ``names`` of the experiments.
+    other as in ``run``. ``between``: what the input does from one sample to the next. ``names`` of the experiments.
     ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a difference
     beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has no part in:
     the reference in a closed loop, else the input; ``led``: whether it is a reference; ``closed``: whether a
@@ -36,7 +37,7 @@ class Segment:
     x: np.ndarray
     y: np.ndarray
     run: Run
-    held: bool
+    between: Between | bool
     names: tuple[str, ...]
     trust: np.ndarray
     asked: np.ndarray
@@ -69,7 +70,7 @@ class Segment:
     def bent(self) -> np.ndarray:
         """The input (n,), where it was measured with its bends sharpened: straight lines between samples of
         a smooth signal pass below its crests, by (2πfh)²/12 of them, which the second difference mends."""
-        if self.entry == "command":
+        if self.entry == "command" or self.between == Between.SMOOTH:
             return self.x
         before, after = _neighbours(self.x, self.run.rest)
         return self.x - (before - 2 * self.x + after) / 12.0
@@ -90,7 +91,7 @@ class Segment:
         rest = np.zeros(len(x), np.uint8)
         rest[np.cumsum([0, *counts[:-1]])] = 1
         run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
-        thin = replace(self, x=x, y=y, trust=trust, asked=asked, run=run, held=False)
+        thin = replace(self, x=x, y=y, trust=trust, asked=asked, run=run, between=False)
         return replace(thin, unsure=unsure, loose=loose)
 
     def parts(self, signal: np.ndarray) -> list[np.ndarray]:
@@ -158,7 +159,7 @@ def make(
         x,
         y,
         session(logs, entry),
-        entry == "command",
+        Between.HELD if entry == "command" else Between.STRAIGHT,
         names,
         trust,
         _asked(logs, x, led),

@@ -55,6 +55,7 @@ def reach(
     found += _departures(controller)
     word = _word(found, unknown, [e for e in explanations if e.kept_by(rig, told.rigs.refitted)])
     shares = stage_shares(found, unknown, explanations)
+    proposed = propose(rig, logs, explanations, found)
     diagnosis = Diagnosis(
         word,
         locate(explanations, shares, found),
@@ -64,13 +65,13 @@ def reach(
         total.interval if total else None,
         "refitted.toml",
         "augmented.toml",
-        propose(logs, explanations, found),
+        proposed[0] if proposed else None,
         _description(unknown),
         (),
         (*notes_of(logs), *_cautions(rig, told)),
         _plain_fits(explanations),
     )
-    return told.rigs, diagnosis, Evidence(made, tuple(explanations))
+    return told.rigs, diagnosis, Evidence(made, tuple(explanations), proposed[1] if proposed else None)
 
 
 def _cautions(rig: Rig, told: _Told) -> Iterator[str]:
@@ -189,7 +190,7 @@ def _found(
 ) -> Found:
     kept = tied(cause.rivals)
     read = library()[kept[0].effect].forms[0].seen is not None  # off the signal itself: nothing else does
-    sure = confidences(kept, 1.0 if read else cause.share)
+    sure = confidences(kept, 1.0 if read else 0.0 if e.freed else cause.share)
     lost = _share_lost(cause, rigs, logs, squares, floor, total or Shrink(0.0, (0.0, 0.0)))
     candidates = tuple(_candidate(r, float(p)) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
@@ -235,7 +236,7 @@ def estimates(of, which: int) -> dict[str, Estimate]:
             float(scale * (np.exp(np.clip(e, -60, 60)) if parameter.log else e)) for e in (v - s, v, v + s)
         ]
         found[parameter.name] = Estimate(
-            ends[1], (ends[0], ends[2]), _unit(parameter, slot_in(clue.form, clue.stage))
+            ends[1], (ends[0], ends[2]), _unit(parameter, parameter.at or slot_in(clue.form, clue.stage))
         )
     return found
 

@@ -1,4 +1,5 @@
-"""``diagnosis.json``, the two rigs, what figures draw, and the pictures where matplotlib is there."""
+"""``diagnosis.json``, the two rigs, the experiment that is proposed, what figures draw, and pictures where matplotlib
+is there."""
 
 from __future__ import annotations
 
@@ -6,11 +7,14 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import tomlkit
 
 from focgen.diagnosis.compose import Rigs
 from focgen.diagnosis.drawn import FILE, drawn_of, drawn_text, units_of_rig
+from focgen.diagnosis.menu import Choice
 from focgen.diagnosis.model import Diagnosis, Evidence
+from focgen.diagnosis.next_experiment import NEXT
 from focgen.jsontext import to_json
 from focgen.logs.experiment import Experiment
 from focgen.output import write_files
@@ -35,8 +39,18 @@ def write(
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
         diagnosis.augmented_rig: tomlkit.dumps(rig_table(rigs.augmented(logs))),
     }
+    if evidence.next_input is not None:
+        files[NEXT] = _next(evidence.next_input)
     if drawn and find_spec("matplotlib"):
         from focgen.report.diagnosis import pictures
 
         files |= pictures(diagnosis, evidence, logs, units_of_rig(rigs.refitted))
     write_files(out, files, inputs)
+
+
+def _next(choice: Choice) -> str:
+    """The input of the experiment that is proposed, as a table: seconds, and the input in the log's unit."""
+    per = choice.reach.coarse
+    values = np.repeat(choice.input, per)
+    times = np.arange(len(values)) * (choice.reach.h / per)
+    return "time_s,input\n" + "".join(f"{t:.9g},{u:.7g}\n" for t, u in zip(times, values))

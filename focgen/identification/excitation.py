@@ -12,8 +12,8 @@ from scipy import fft
 from focgen.errors import FitError, LogError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
-from focgen.identification.between import Course, course_of, jumps_of, noise_level
 from focgen.identification.kernel import Kernels
+from focgen.logs.between import Course, course_of, jumps_of, noise_level
 from focgen.logs.experiment import Experiment
 from focgen.rig.model import UNITY, Rig
 

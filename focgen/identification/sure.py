@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.errors import FitError
-from focgen.identification.between import noise_level
 from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.stages import StageFit
+from focgen.logs.between import noise_level
 from focgen.rig.model import Relative, Uncertainty
 
 _NOTHING = 1.0  # of a parameter: half an interval that says nothing

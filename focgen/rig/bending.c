@@ -1,19 +1,18 @@
 /* Plants whose spring bends: what they take from the input depends on the response itself, which is solved for at every sample.
  * `spring` = {first, second, scale, place, stiffness}: the spring takes y (first q + second q^2), q = |y|/scale, from the input, and
  * beyond q = FAR no more than its slope there; an obstacle beyond y = `place` takes stiffness (y - place).
+ * Two more numbers, `slide` and `stick`, are of dry friction, as in kernels.c.
  * `rest` is as in kernels.c.
  */
 #include <math.h>
+#include "bent.h"
 
 enum { BALANCED = 2, TURNS = 40 };
-static const double FAR = 1.1, FLAT = 0.05, CLOSE = 1e-13;
+static const double FLAT = 0.05, CLOSE = 1e-13;
 
 static double pull(const double *spring, double y, double *slope)
 {
-    double q = fabs(y) / spring[2], near = q < FAR ? q : FAR;
-    *slope = 2.0 * spring[0] * near + 3.0 * spring[1] * near * near;
-    double size = spring[2] * ((spring[0] + spring[1] * near) * near * near + *slope * (q - near));
-    double taken = y < 0.0 ? -size : size;
+    double taken = bent(spring, y, slope);
     if (y > spring[3]) taken += spring[4] * (y - spring[3]), *slope += spring[4];
     return taken;
 }
@@ -29,22 +28,43 @@ static double solved(const double *spring, double still, double gain, double x, 
     return y;
 }
 
+/* The same with dry friction, from the place `last` of the sample before; `taken` is what spring and friction take from x. */
+static double moved(const double *spring, double still, double gain, double x, double last, int *moving, double *taken)
+{
+    double slope, drag = 0.0, slide = spring[5], stick = spring[6];
+    if (stick > 0.0) {
+        double pulled = pull(spring, last, &slope), borne = x - pulled - (last - still) / gain;
+        if (fabs(borne) <= (*moving ? slide : stick)) {
+            *moving = 0, *taken = pulled + borne;
+            return last;
+        }
+        *moving = 1, drag = borne < 0.0 ? -slide : slide;
+    }
+    double y = solved(spring, still, gain, x - drag, last);
+    *taken = pull(spring, y, &slope) + drag;
+    return y;
+}
+
+/* What is left of x for what has come to rest from 0. */
+static double came(const double *spring, double x) { return fabs(x) > spring[5] ? x - (x < 0.0 ? -spring[5] : spring[5]) : 0.0; }
+
 /* As focgen_modes of kernels.c. */
 void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
                        const double *b1, const double *pair, double through, int switching, const double *spring, double *z)
 {
-    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, slope;
+    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, slope, taken;
+    int moving = 0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) {
             for (int i = 0; i < m; i++) z[i] = 0.0;
-            zr = zi = past = last = 0.0;
+            zr = zi = past = last = 0.0, moving = 0;
         }
         if (rest[k] == BALANCED) {
             double dr = 1.0 - pair[0], di = -pair[1], br = pair[2] + pair[4], bi = pair[3] + pair[5], size = dr * dr + di * di;
             double gr = (br * dr + bi * di) / size, gi = (bi * dr - br * di) / size, gain = through + gr;
             for (int i = 0; i < m; i++) gain += (b0[i] + b1[i]) / (1.0 - a[i]);
-            last = solved(spring, 0.0, gain, x[k], 0.0);
-            past = x[k] - pull(spring, last, &slope);
+            last = solved(spring, 0.0, gain, came(spring, x[k]), 0.0);
+            past = came(spring, x[k]) - pull(spring, last, &slope);
             for (int i = 0; i < m; i++) z[i] = (b0[i] + b1[i]) / (1.0 - a[i]) * past;
             zr = gr * past, zi = gi * past;
         }
@@ -56,8 +76,8 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
             still += z[i];
             gain += B1[i];
         }
-        last = y[k] = solved(spring, still, gain, x[k], last);
-        double now = x[k] - pull(spring, last, &slope);
+        last = y[k] = moved(spring, still, gain, x[k], last, &moving, &taken);
+        double now = x[k] - taken;
         for (int i = 0; i < m; i++) z[i] += B1[i] * now;
         double re = P[0] * zr - P[1] * zi + P[2] * past + P[4] * now;
         zi = P[0] * zi + P[1] * zr + P[3] * past + P[5] * now;
@@ -70,21 +90,21 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
 void focgen_bent_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *c,
                         const double *a, const double *spring, double *w)
 {
-    double last = 0.0, slope;
+    double last = 0.0, slope, taken;
+    int moving = 0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) {
             for (int i = 0; i <= m; i++) w[i] = 0.0;
-            last = 0.0;
+            last = 0.0, moving = 0;
         }
         if (rest[k] == BALANCED) {
             double up = 0.0, down = 0.0;
             for (int i = 0; i <= m; i++) up += b[i], down += a[i];
-            last = solved(spring, 0.0, up / down, x[k], 0.0);
-            double taken = pull(spring, last, &slope);
+            last = solved(spring, 0.0, up / down, came(spring, x[k]), 0.0);
+            taken = pull(spring, last, &slope) + x[k] - came(spring, x[k]);
             for (int i = m; i >= 1; i--) w[i - 1] = b[i] * x[k] - c[i] * taken - a[i] * last + (i < m ? w[i] : 0.0);
         }
-        last = y[k] = solved(spring, w[0] + b[0] * x[k], c[0], 0.0, last);
-        double taken = pull(spring, last, &slope);
+        last = y[k] = moved(spring, w[0] + b[0] * x[k], c[0], 0.0, last, &moving, &taken);
         for (int i = 1; i <= m; i++) w[i - 1] = b[i] * x[k] - c[i] * taken - a[i] * last + (i < m ? w[i] : 0.0);
     }
 }

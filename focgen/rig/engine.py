@@ -7,11 +7,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from focgen.logs.between import Between
 from focgen.rig import linear
+from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
+from focgen.rig.delay import delayed
 from focgen.rig.effects import SLOTS, Form, Run
 from focgen.rig.model import UNITY, Actuator, LinearActuator, Rig
-from focgen.rig.modes import UNCHANGED, Dynamics, respond
+from focgen.rig.dynamics import UNCHANGED, Dynamics
+from focgen.rig.modes import respond
 
 STAGES = ("regulator", "actuator", "sensor")
 
@@ -78,34 +82,41 @@ class Chain:
         first: str,
         last: str,
         run: Run,
-        held: bool = False,
+        between: Between | bool = Between.STRAIGHT,
         tap: dict[str, np.ndarray] | None = None,
         left: list[dict[str, float]] | None = None,
     ) -> np.ndarray:
         """What leaves stage ``last`` when ``x`` (n,) enters stage ``first``.
 
-        ``held``: the input is a staircase. ``tap`` receives what leaves each stage, ``left`` what outlives
+        ``between``: what the input does from one sample to the next. ``tap`` receives what leaves each stage, ``left`` what outlives
         the session, one for each of ``placed``.
         """
         if left is not None:
             left[:] = [{} for _ in self.placed]
         if run.begins:
-            return self._begun(x, first, last, run, held, tap, left)
+            return self._begun(x, first, last, run, between, tap, left)
         begin, end = STAGES.index(first), STAGES.index(last)
         for stage in STAGES[begin : end + 1]:
-            for number, (key, act, placed) in enumerate(self.steps(stage, held and stage == first)):
+            for number, (key, act, placed) in enumerate(self.steps(stage, between)):
                 if left is not None and placed is not None:
                     left[_index(self.placed, placed)] = placed.leaves(x, run)
                 x = self._once((stage, number), key, x, act, run)
             if tap is not None:
                 tap[stage] = x
+            between = between if self._passes(stage) else Between.STRAIGHT
         return x
 
-    def _begun(self, x, first, last, run: Run, held, tap, left) -> np.ndarray:
+    def _passes(self, stage: str) -> bool:
+        """Whether a stage leaves what its input does between samples as it is."""
+        if stage == "actuator":
+            return getattr(self.rig.actuator, "dynamics", UNITY) == UNITY
+        return getattr(self.rig, stage) == UNITY
+
+    def _begun(self, x, first, last, run: Run, between, tap, left) -> np.ndarray:
         """The same with what was before each experiment put ahead of it, and cut off again."""
         x = self._once("past", run.begins, x, with_past, run)
         long, kept = past_of(run)
-        y = self.run(x, first, last, long, held, tap, left)
+        y = self.run(x, first, last, long, between, tap, left)
         if tap is not None:
             tap.update({stage: made[kept] for stage, made in tap.items()})
         return y[kept]
@@ -122,24 +133,32 @@ class Chain:
         del kept[2:]
         return y
 
-    def steps(self, stage: str, held: bool) -> list[Step]:
-        """What a signal passes in a stage, in order."""
+    def steps(self, stage: str, between: Between | bool) -> list[Step]:
+        """What a signal passes in a stage, in order; ``between``: what it does from one sample to the
+        next."""
         early, late = ("command", "load", "strain"), ("supply", "response", "reading")
         here = [p for p in self.placed if p.stage == stage]
         steps = [_effect(p) for p in here if p.slot in early]
-        steps += self._core(stage, here, held)
+        steps += self._core(stage, here, between)
         steps += [_effect(p) for p in here if p.slot in late]
         if stage == "actuator" and self.rig.actuator is not None and self.rig.actuator.offset:
             offset = self.rig.actuator.offset
             steps.append((("offset", offset), lambda x, run: x + offset, None))
         return steps
 
-    def _core(self, stage: str, here: Sequence[Placed], held: bool) -> list[Step]:
+    def _core(self, stage: str, here: Sequence[Placed], between: Between | bool) -> list[Step]:
         delay = getattr(self.rig.delays, stage)
         if stage == "actuator":
-            return _actuator(self.rig.actuator, here, held, delay)
+            return _actuator(self.rig.actuator, here, between, delay)
         transfer = getattr(self.rig, stage)
-        return [] if transfer == UNITY and not delay else [_transfer(transfer, held, delay)]
+        return [] if transfer == UNITY and not delay else [_transfer(transfer, between, delay)]
+
+
+def between_of(rig: Rig, entry: str) -> Between:
+    """What the input ``entry`` does from one sample to the next: as the rig says, else the command of a
+    regulator is held, as converters do, and what else there is runs in straight lines."""
+    held = entry == "command" and rig.regulator != UNITY
+    return (Between.HELD if held else Between.STRAIGHT) if rig.between is None else rig.between
 
 
 def _effect(placed: Placed) -> Step:
@@ -151,34 +170,47 @@ def _index(placed: Sequence[Placed], one: Placed) -> int:
     return next(i for i, p in enumerate(placed) if p is one)
 
 
-def _transfer(transfer, held: bool, delay: float) -> Step:
+def _transfer(transfer, between: Between | bool, delay: float) -> Step:
     return (
-        (transfer, held, delay),
-        lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, held, delay),
+        (transfer, between, delay),
+        lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, between, delay),
         None,
     )
 
 
-def _actuator(actuator, here: Sequence[Placed], held: bool, delay: float) -> list[Step]:
+def _actuator(actuator, here: Sequence[Placed], between: Between | bool, delay: float) -> list[Step]:
     drive = [_effect(p) for p in here if p.slot == "drive"]
     if actuator is None:
-        return [*drive, _transfer(UNITY, held, delay)] if delay else drive
+        return [*drive, _transfer(UNITY, between, delay)] if delay else drive
     dynamics = UNCHANGED
     for p in here:
         if p.slot == "dynamics":
             dynamics = p.form.act(dynamics, p.values, None)
     if isinstance(actuator, LinearActuator):
-        return [*drive, *_linear(actuator, dynamics, held, delay)]
+        zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
+        return [*zero, *drive, *_linear(actuator, dynamics, between, delay)]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
     return [line, *drive, _lag(1.0, actuator.T, actuator.alpha, dynamics, delay)]
 
 
-def _linear(actuator: LinearActuator, dynamics: Dynamics, held: bool, delay: float) -> list[Step]:
+def _linear(actuator: LinearActuator, dynamics: Dynamics, between, delay: float) -> list[Step]:
     if dynamics == UNCHANGED:
-        return [_transfer(actuator.dynamics, held, delay)]
+        return [_transfer(actuator.dynamics, between, delay)]
+    plant, changed = plants.plant_of(actuator.dynamics), dynamics.changed
+    if plant is not None and (changed == {"drag"} or changed & {"spring", "rise"}):
+        return [_plant(plant, dynamics, between, delay)]
     if not linear.single_lag(actuator.dynamics):
-        return [_bent(actuator.dynamics, dynamics, held, delay)]
-    return [_lag(*linear.single_lag(actuator.dynamics), dynamics, delay)]
+        return [_bent(actuator.dynamics, dynamics, between, delay)]
+    gain, T, alpha = linear.single_lag(actuator.dynamics)
+    return [_lag(gain, T, alpha, replace(dynamics, drag=dynamics.drag * abs(gain)), delay)]
+
+
+def _plant(plant: plants.Plant, dynamics: Dynamics, between, delay: float) -> Step:
+    def act(x: np.ndarray, run: Run) -> np.ndarray:
+        made = plants.respond(plant, x, run.rest, run.h, dynamics, between)
+        return delayed(made, run.rest, run.h, delay) if delay else made
+
+    return (plant, dynamics, between, delay), act, None
 
 
 def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) -> Step:
@@ -189,22 +221,36 @@ def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) 
     )
 
 
-def _bent(transfer, dynamics: Dynamics, held: bool, delay: float) -> Step:
+def _bent(transfer, dynamics: Dynamics, between, delay: float) -> Step:
     return (
-        (transfer, dynamics, held, delay),
-        lambda x, run: linear.run_bent(transfer, x, run.rest, run.h, held, dynamics, delay),
+        (transfer, dynamics, between, delay),
+        lambda x, run: linear.run_bent(transfer, x, run.rest, run.h, between, dynamics, delay),
         None,
     )
 
 
+_OF_LAGS = frozenset({"unloading", "place", "stiffness", "bend", "drag"})  # what effects may change of a lag
+
+
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
-    """Whether a form can act in a stage of this rig: only a single lag has dynamics to change, and only what
-    a spring holds has a spring that may bend."""
+    """Whether a form can act in a stage of this rig: what it changes of the actuator's own equation has to be
+    in that equation."""
     if form.slot != "dynamics":
         return True
     if stage != "actuator" or rig.actuator is None:
         return False
-    if isinstance(rig.actuator, Actuator) or linear.single_lag(rig.actuator.dynamics):
-        return True
-    made = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None)
-    return made.only_bends and linear.is_spring(rig.actuator.dynamics)
+    changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
+    return changed <= _changeable(rig.actuator)
+
+
+def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
+    """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
+    spring that bends where there is one; dry friction on what moves, and on a mass the hysteretic one."""
+    if isinstance(actuator, Actuator) or linear.single_lag(actuator.dynamics):
+        return _OF_LAGS
+    plant = plants.plant_of(actuator.dynamics)
+    found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
+    if plant is not None:
+        found |= {"drag"} | ({"rise"} if plant.order == 2 else set())
+        found |= {"spring"} if plant.order == 2 and not plant.integrates else set()
+    return frozenset(found)

@@ -11,6 +11,7 @@ import tomlkit
 
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
 from focgen.logs.scales import Scale
 from focgen.output import write_file
 from focgen.rig.model import (
@@ -50,6 +51,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         effects=_effects(top),
         delays=delays,
         uncertainty=_uncertainty(top.table("uncertainty")),
+        between=_between(top.table("signals")),
     )
     top.done()
     return rig
@@ -63,6 +65,7 @@ def _signals(top: Table) -> Signals:
         table.required(role)
     named = {role: _column(table, role) for role in _ROLES}
     found = {role: column for role, (column, _) in named.items()} | {"run": table.text("run")}
+    table.text("between")
     table.done()
     if found["command"] is None and found["pressure"] is None:
         raise table.fail(None, "has neither 'command' nor 'pressure'", "name the column of the input")
@@ -76,6 +79,17 @@ def _signals(top: Table) -> Signals:
             remedy = f"correct it, or name the unit of {role} in [units]"
             raise table.fail(role, f"cannot be converted: {reason}", remedy) from None
     return signals
+
+
+def _between(table: Table) -> Between | None:
+    """What the first input does between its samples, where the file says so."""
+    word = table.text("between")
+    if word is None:
+        return None
+    if word.upper() not in Between.__members__:
+        known = ", ".join(repr(way.name.lower()) for way in Between)
+        raise table.fail("between", f"is {word!r}", f"give one of {known}, or leave it to the logs")
+    return Between[word.upper()]
 
 
 def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:
@@ -143,7 +157,8 @@ def _actuator(table: Table | None) -> Actuator | LinearActuator | None:
         return None
     offset = table.number("offset", 0.0)
     if "num" in table or _delays_only(table):
-        actuator = LinearActuator(UNITY if _delays_only(table) else _proper(table), offset)
+        transfer = UNITY if _delays_only(table) else _proper(table)
+        actuator = LinearActuator(transfer, offset, table.number("bias", 0.0))
     else:
         actuator = Actuator(table.number("T", above=0.0), _alpha(table), table.numbers("gain"), offset)
     table.done()
@@ -217,6 +232,8 @@ def rig_table(rig: Rig) -> dict:
     """The rig as nested dictionaries, in the order of the file."""
     table: dict = {"name": rig.name, "sample_time": rig.sample_time}
     table["signals"] = _signals_table(rig.signals)
+    if rig.between is not None:
+        table["signals"]["between"] = rig.between.name.lower()
     if rig.signals.units:
         table["units"] = dict(rig.signals.units)
     for key in ("regulator", "sensor"):
@@ -265,6 +282,7 @@ def _actuator_table(actuator: Actuator | LinearActuator) -> dict:
         table = {"T": actuator.T, "alpha": actuator.alpha, "gain": list(actuator.gain)}
     else:
         table = {"num": terms_of(actuator.dynamics.num), "den": terms_of(actuator.dynamics.den)}
-    if actuator.offset:
-        table["offset"] = actuator.offset
+    for key in ("offset", "bias"):
+        if getattr(actuator, key, 0.0):
+            table[key] = getattr(actuator, key)
     return table

@@ -17,7 +17,7 @@ import numpy as np
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
-from focgen.rig.engine import STAGES, Chain, Placed
+from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.model import LinearActuator, Rig
 from focgen.rig.response import response_time
 
@@ -168,7 +168,7 @@ class _Setting:
         """What a begin leaves, ``free`` numbers of which are fitted."""
         run = Run.of([self.n], [self.start], self.h, [begin])
         tap: dict[str, np.ndarray] = {}
-        self.chain.run(self.x, *self.stages, run, self.entry == "command", tap)
+        self.chain.run(self.x, *self.stages, run, between_of(self.chain.rig, self.entry), tap)
         made = [tap[stage] / unit for stage, unit in zip(self.roles, self.units)]
         raw = self.y - np.stack(made, axis=1)
         return _Try(begin, free, raw, self._counted(raw, self.asked.offset))

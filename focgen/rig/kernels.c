@@ -10,21 +10,25 @@ enum { BALANCED = 2 };
  * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
  * Coefficients come twice, for loading (first m) and unloading (next m): unloading is x[k] < y[k-1] where x > 0.
  * pair[s] = {a_re, a_im, b0_re, b0_im, b1_re, b1_im} for s = 0, 1.
- * Beyond y = `place` an obstacle takes `stiffness` (y - place) from x: y, linear in the present x, is solved for. */
+ * Beyond y = `place` an obstacle takes `stiffness` (y - place) from x: y, linear in the present x, is solved for.
+ * Friction takes `slide` from x against the motion since the last sample; what it takes to stay there it bears while that is no
+ * more than `slide`, and than `stick` where nothing moved before. */
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0, const double *b1,
-                  const double *pair, double through, int switching, double place, double stiffness, double *z)
+                  const double *pair, double through, int switching, double place, double stiffness, double slide, double stick, double *z)
 {
     double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0;
+    int moving = 0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) {
             for (int i = 0; i < m; i++) z[i] = 0.0;
-            zr = zi = past = last = 0.0;
+            zr = zi = past = last = 0.0, moving = 0;
             if (rest[k] == BALANCED) {
                 double dr = 1.0 - pair[0], di = -pair[1], br = pair[2] + pair[4], bi = pair[3] + pair[5], size = dr * dr + di * di;
                 double gr = (br * dr + bi * di) / size, gi = (bi * dr - br * di) / size, gain = through + gr;
                 for (int i = 0; i < m; i++) gain += (b0[i] + b1[i]) / (1.0 - a[i]);
-                double beyond = (gain * x[k] - place) / (1.0 + gain * stiffness);
-                past = stiffness > 0.0 && beyond > 0.0 ? x[k] - stiffness * beyond : x[k];
+                double left = fabs(x[k]) > slide ? x[k] - (x[k] < 0.0 ? -slide : slide) : 0.0;
+                double beyond = (gain * left - place) / (1.0 + gain * stiffness);
+                past = stiffness > 0.0 && beyond > 0.0 ? left - stiffness * beyond : left;
                 for (int i = 0; i < m; i++) z[i] = (b0[i] + b1[i]) / (1.0 - a[i]) * past;
                 zr = gr * past, zi = gi * past, last = gain * past;
             }
@@ -32,14 +36,21 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
         double now = x[k], sum = 0.0;
         int down = switching && fabs(now) < fabs(last);
         const double *A = a + down * m, *B0 = b0 + down * m, *B1 = b1 + down * m, *P = pair + 6 * down;
-        if (stiffness > 0.0) {
+        if (stiffness > 0.0 || stick > 0.0) {
             double still = P[0] * zr - P[1] * zi + P[2] * past, gain = through + P[4];
             for (int i = 0; i < m; i++) {
                 still += A[i] * z[i] + B0[i] * past;
                 gain += B1[i];
             }
-            double beyond = (still + gain * now - place) / (1.0 + gain * stiffness);
-            if (beyond > 0.0) now -= stiffness * beyond;
+            double pushed = stiffness > 0.0 && last > place ? stiffness * (last - place) : 0.0;
+            double borne = now - pushed - (last - still) / gain; /* what stands still takes from x */
+            if (stick > 0.0 && fabs(borne) <= (moving ? slide : stick)) {
+                now -= borne + pushed, moving = 0;
+            } else {
+                if (stick > 0.0) now -= borne < 0.0 ? -slide : slide, moving = 1;
+                double beyond = (still + gain * now - place) / (1.0 + gain * stiffness);
+                if (stiffness > 0.0 && beyond > 0.0) now -= stiffness * beyond;
+            }
         }
         for (int i = 0; i < m; i++) {
             z[i] = A[i] * z[i] + B0[i] * past + B1[i] * now;

@@ -1,4 +1,4 @@
-"""The compiled loops of the chain simulator (``kernels.c``, ``bending.c``), as functions of arrays.
+"""The compiled loops of the chain simulator (``kernels.c``, ``bending.c``, ``plant.c``), as functions of arrays.
 
 The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
 behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), 1 where an experiment begins
@@ -18,11 +18,11 @@ from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 
 BALANCED = 2
-_SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "bending.c")]
+_SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c")]
 _DECLARATIONS = """
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
     const double *b0, const double *b1, const double *pair, double through, int switching, double place,
-    double stiffness, double *z);
+    double stiffness, double slide, double stick, double *z);
 void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const
     double *down);
 void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
@@ -42,6 +42,9 @@ void focgen_filter(int n, const double *x, double *y, const unsigned char *rest,
 int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double
     *made, const double *weight, int coarse, int order, const double *ar, double *mean);
 void focgen_products(int n, int k, const double *r, double *m);
+void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const double
+    *bend, const double *twist, int order, int base, int last, const double *numbers, const double
+    *tables);
 void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
     const double *b0, const double *b1, const double *pair, double through, int switching, const double
     *spring, double *z);
@@ -81,7 +84,18 @@ def _call(name: str, x: np.ndarray, rest: np.ndarray, *others) -> np.ndarray:
 
 
 def modes(
-    x, rest, a, b0, b1, pair, through: float, switching: bool, place: float = 0.0, stiffness: float = 0.0
+    x,
+    rest,
+    a,
+    b0,
+    b1,
+    pair,
+    through: float,
+    switching: bool,
+    place: float = 0.0,
+    stiffness: float = 0.0,
+    slide: float = 0.0,
+    stick: float = 0.0,
 ) -> np.ndarray:
     """Sum of first-order modes; ``a``, ``b0``, ``b1`` (2, m) and ``pair`` (2, 6), rows loading and
     unloading; beyond ``place`` an obstacle takes ``stiffness`` times how far from ``x``."""
@@ -99,6 +113,8 @@ def modes(
         int(switching),
         float(place),
         float(stiffness),
+        float(slide),
+        float(stick),
         ffi.from_buffer("double[]", scratch),
     )
 
@@ -161,8 +177,22 @@ def rational(x, rest, b, a) -> np.ndarray:
     )
 
 
+def plant(
+    x, rest, course: tuple[np.ndarray, ...], levels: tuple[int, int, int], numbers, tables
+) -> np.ndarray:
+    """A plant with dry friction and a hysteretic spring; what the arguments are is said in ``plant.c``.
+
+    ``course``: ``line``, ``bend`` and ``twist`` (n,); ``levels``: the order, and the levels ``base`` and
+    ``last``.
+    """
+    ffi, _ = _library()
+    arrays = [np.ascontiguousarray(a, float) for a in (*course, numbers, tables)]
+    *parts, numbers, tables = [ffi.from_buffer("double[]", a) for a in arrays]
+    return _call("focgen_plant", x, rest, *parts, *levels, numbers, tables)
+
+
 def bent_modes(x, rest, a, b0, b1, pair, through: float, switching: bool, spring) -> np.ndarray:
-    """As :func:`modes`, with the input less what ``spring`` (5,) takes: see ``bending.c``."""
+    """As :func:`modes`, with the input less what ``spring`` (7,) takes: see ``bending.c``."""
     ffi, _ = _library()
     tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
     scratch = np.empty(tables[0].shape[1])
@@ -181,7 +211,7 @@ def bent_modes(x, rest, a, b0, b1, pair, through: float, switching: bool, spring
 
 
 def bent_rational(x, rest, b, c, a, spring) -> np.ndarray:
-    """As :func:`rational`, with ``c`` the numerator for what ``spring`` (5,) takes from the input."""
+    """As :func:`rational`, with ``c`` the numerator for what ``spring`` (7,) takes from the input."""
     ffi, _ = _library()
     order = max(len(a), len(b), len(c)) - 1
     scratch, *tables = np.zeros((4, order + 1))

@@ -9,9 +9,13 @@ import numpy as np
 from focgen.fractional.delay import split_delay
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
 from focgen.rig import kernels
+from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
-from focgen.rig.modes import Dynamics, Modes, between, fractional_lag, hold, respond, settled
+from focgen.rig.model import UNITY
+from focgen.rig.dynamics import Dynamics
+from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
 
@@ -22,16 +26,23 @@ def run(
     rest: np.ndarray,
     h: float,
     duration: float,
-    held: bool = False,
+    between: Between | bool = Between.STRAIGHT,
     delay: float = 0.0,
 ) -> np.ndarray:
     """The response to ``x`` (n,) sampled every ``h`` s, later by ``delay`` s, at rest wherever ``rest`` (n,)
     is true, every ``duration`` s or sooner.
 
-    ``held``: the input is a staircase, not linear between samples.
+    ``between``: what the input does from one sample to the next. A smooth one's bends are taken as they are
+    by whole orders, and by their area otherwise.
     """
     whole, part = split_delay(delay, h)
-    if transfer.den == ((1.0, 0.0),) and transfer.num == ((1.0, 0.0),):
+    if between == Between.SMOOTH:
+        if transfer.is_integer and transfer.den[0].order and not part:
+            return shifted(_smooth(transfer, x, rest, h), rest, whole)
+        if transfer != UNITY:
+            x = sharpened(np.ascontiguousarray(x, float), rest)
+    held = between == Between.HELD
+    if transfer == UNITY:
         return x if delay == 0.0 else _passed(x, rest, h, delay, held)
     if part:
         found = _between(transfer, x, rest, h, duration, held, 1.0 - part)
@@ -44,6 +55,46 @@ def _passed(x: np.ndarray, rest: np.ndarray, h: float, delay: float, held: bool)
     """A pure delay: between its samples a staircase is what it was at the one before."""
     whole, part = split_delay(delay, h)
     return shifted(x, rest, whole + (part > 0.0)) if held else delayed(x, rest, h, delay)
+
+
+def _smooth(transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: float) -> np.ndarray:
+    """The response of whole orders to an input that runs in lines and bends."""
+    x = np.ascontiguousarray(x, float)
+    line, bend, twist = course(x, rest, Between.SMOOTH)
+    (b, a), pulses = _discrete(transfer, h, True), _bent(transfer, h)
+    made = kernels.rational(x, rest, b, a)
+    for part, weights in zip((line, bend, twist), pulses):
+        if np.any(part):
+            made = made + kernels.rational(part, rest, weights, a)
+    return made
+
+
+@lru_cache(maxsize=512)
+def _bent(transfer: TransferFunction, h: float) -> tuple[np.ndarray, ...]:
+    """Numerators in powers of z^-1 of what a sample's inputs t, t (t − 1) and t (t − 1)(2 t − 1), t = 0 … 1,
+    leave, over the denominator of :func:`_discrete`: from the first samples of the exact responses."""
+    _, a = _discrete(transfer, h, True)
+    count = len(a)
+    power = [_powers(transfer, h, k, count) for k in range(4)]  # of t^k within one sample, and of nothing after
+    shapes = (power[1], power[2] - power[1], 2.0 * power[3] - 3.0 * power[2] + power[1])
+    return tuple(np.convolve(a, shape)[:count] for shape in shapes)
+
+
+def _powers(transfer: TransferFunction, h: float, k: int, count: int) -> np.ndarray:
+    """The output (count,) at the end of a sample in which the input is t^k, and at the ends of those after."""
+    from scipy.linalg import expm
+    from scipy.signal import tf2ss
+
+    A, B, C, _ = tf2ss(_coefficients(transfer.num), _coefficients(transfer.den))
+    n = len(A)
+    whole = np.zeros((n + k + 1, n + k + 1))
+    whole[:n, :n], whole[:n, n : n + 1] = A * h, B * h
+    whole[range(n, n + k), range(n + 1, n + k + 1)] = np.arange(1, k + 1)
+    state, kept, made = expm(whole)[:n, n + k], expm(A * h), []
+    for _ in range(count):
+        made.append(float((C @ state)[0]))
+        state = kept @ state
+    return np.array(made)
 
 
 def _at_samples(transfer, x, rest, h: float, duration: float, held: bool) -> np.ndarray:
@@ -88,15 +139,17 @@ def run_bent(
     x: np.ndarray,
     rest: np.ndarray,
     h: float,
-    held: bool,
+    between: Between | bool,
     dynamics: Dynamics,
     delay: float = 0.0,
 ) -> np.ndarray:
     """As :func:`run` of a plant :func:`is_spring` whose spring follows ``dynamics``; the response counts as
     linear between samples, and the delay is exact in whole samples only."""
-    b, a = _discrete(transfer, h, held)
+    if between == Between.SMOOTH:
+        x = sharpened(np.ascontiguousarray(x, float), rest)
+    b, a = _discrete(transfer, h, between == Between.HELD)
     c, _ = _discrete(transfer, h, False)
-    made = kernels.bent_rational(x, rest, b, c, a, dynamics.spring(transfer.dc_gain))
+    made = kernels.bent_rational(x, rest, b, c, a, dynamics.bending(transfer.dc_gain))
     return delayed(made, rest, h, delay) if delay else made
 
 

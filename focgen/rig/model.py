@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
 from focgen.logs.scales import Scale
 
 UNITY = TransferFunction([(1.0, 0.0)])
@@ -31,8 +33,8 @@ class Signals:
     curvature: str | None = None
     reference: str | None = None
     run: str | None = None
-    scales: Mapping[str, Scale] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
+    scales: Mapping[str, Scale] = field(default_factory=dict, hash=False)
+    units: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     def columns(self) -> dict[str, str]:
         """The logged roles and their columns, without ``time`` and ``run``."""
@@ -69,14 +71,24 @@ class Actuator:
 
 @dataclass(frozen=True)
 class LinearActuator:
-    """An actuator given as a transfer function, with an ``offset`` added to its output."""
+    """An actuator given as a transfer function, with an ``offset`` added to its output.
+
+    ``bias`` is what drives it at an input of 0, in the input's unit: a constant force. On a plant that
+    integrates no offset stands for it.
+    """
 
     dynamics: TransferFunction
     offset: float = 0.0
+    bias: float = 0.0
+
+    @property
+    def integrates(self) -> bool:
+        """Whether it keeps moving under a constant drive."""
+        return not math.isfinite(self.dynamics.dc_gain)
 
     def drive(self, pressure):
-        """The input of the dynamics: the pressure itself."""
-        return pressure
+        """The input of the dynamics: the pressure with the bias on it."""
+        return pressure + self.bias if self.bias else pressure
 
 
 @dataclass(frozen=True)
@@ -124,7 +136,8 @@ class Ranges:
 
 @dataclass(frozen=True)
 class Rig:
-    """The nominal rig. ``sample_time`` in s; ``effects`` are the ``[[effects]]`` tables as read."""
+    """The nominal rig. ``sample_time`` in s; ``effects`` are the ``[[effects]]`` tables as read; ``between``:
+    what its first input does from one sample to the next, None where logs are to tell."""
 
     name: str
     sample_time: float
@@ -136,3 +149,4 @@ class Rig:
     effects: tuple[Mapping[str, Any], ...] = field(default=())
     delays: Delays = Delays()
     uncertainty: Uncertainty = Uncertainty()
+    between: Between | None = None

@@ -17,6 +17,7 @@ import numpy as np
 from focgen.fractional.delay import split_delay
 from focgen.rig import kernels
 from focgen.rig.delay import delayed, shifted
+from focgen.rig.dynamics import STRAIGHT, UNCHANGED, Dynamics
 
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
 
@@ -36,44 +37,6 @@ class Modes:
     def gain(self) -> float:
         """Of what is held for as long as the slowest mode takes."""
         return self.through + float(np.sum(self.weights / self.rates)) - (self.residue / self.pole).real
-
-
-@dataclass(frozen=True)
-class Bend:
-    """A spring whose stiffness changes with y: 1 + ``first`` q + ``second`` q² times that at rest,
-    q = |y|/``scale``; what gives beside it, mass or damper, stays as it is."""
-
-    first: float = 0.0
-    second: float = 0.0
-    scale: float = 1.0
-
-
-STRAIGHT = Bend()
-
-
-@dataclass(frozen=True)
-class Dynamics:
-    """What effects change of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls
-    short of the response; beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place); the
-    spring y follows ``bend``, of any linear plant."""
-
-    unloading: float = 1.0
-    place: float = 0.0
-    stiffness: float = 0.0
-    bend: Bend = STRAIGHT
-
-    @property
-    def only_bends(self) -> bool:
-        """Whether nothing but the spring is changed."""
-        return self == Dynamics(bend=self.bend)
-
-    def spring(self, gain: float = 1.0) -> tuple[float, ...]:
-        """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``."""
-        bend = self.bend
-        return bend.first / gain, bend.second / gain, bend.scale, self.place, self.stiffness / gain
-
-
-UNCHANGED = Dynamics()
 
 
 @lru_cache(maxsize=256)
@@ -115,7 +78,8 @@ def respond(
     s; ``rest`` (n,) is true where an experiment begins, none longer than ``duration`` s.
 
     With changed ``dynamics`` the response, too, counts as linear between samples: the delay is exact there in
-    whole samples only.
+    whole samples only. Friction bears the springs and the springpot from sample to sample: y stays where it
+    was as long as that takes no more than ``stick``.
     """
     if delay and dynamics == UNCHANGED:
         whole, part = split_delay(delay, h)
@@ -129,9 +93,10 @@ def respond(
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
     if dynamics.bend != STRAIGHT:
-        made = kernels.bent_modes(x, rest, a, b0, b1, pair, through, switching, dynamics.spring())
+        made = kernels.bent_modes(x, rest, a, b0, b1, pair, through, switching, dynamics.bending())
     else:
-        made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, dynamics.place, dynamics.stiffness)
+        obstacle = dynamics.place, dynamics.stiffness
+        made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, *obstacle, *dynamics.drag.held)
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
 
 

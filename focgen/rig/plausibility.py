@@ -11,7 +11,7 @@ from focgen.logs import plausibility
 from focgen.logs.experiment import Experiment
 from focgen.logs.plausibility import Link, Signals
 from focgen.rig.effects import Run
-from focgen.rig.engine import STAGES, Chain
+from focgen.rig.engine import STAGES, Chain, between_of
 from focgen.rig.model import UNITY, Rig
 
 _ROLES = ("command", "pressure", "curvature", "output")  # before each stage, and after the last
@@ -54,7 +54,7 @@ def links(
         stages = STAGES[_ROLES.index(entry) : _ROLES.index(exit)]
         if not _modelled(rig, stages):
             continue
-        expected = _simulated(rig, experiments, signals[entry], stages, entry == "command", faster)
+        expected = _simulated(rig, experiments, signals[entry], stages, between_of(rig, entry), faster)
         found.append(_link(entry, exit, expected, signals[exit]))
     return tuple(found)
 
@@ -78,12 +78,12 @@ def _modelled(rig: Rig, stages: Sequence[str]) -> bool:
     )
 
 
-def _simulated(rig: Rig, experiments, parts, stages, held: bool, faster: float = 1.0) -> list[np.ndarray]:
+def _simulated(rig: Rig, experiments, parts, stages, between, faster: float = 1.0) -> list[np.ndarray]:
     if "actuator" not in stages:  # linear: an offset of the input from the first sample on is no step
         parts = [y - y[0] for y in parts]
     step = experiments[0].sample_time * faster
     run = Run.of([len(y) for y in parts], [e.start * faster for e in experiments], step)
-    made = Chain(rig).run(np.concatenate(parts), stages[0], stages[-1], run, held)
+    made = Chain(rig).run(np.concatenate(parts), stages[0], stages[-1], run, between)
     return [made[a:b] for a, b in run.spans]
 
 

@@ -12,7 +12,7 @@ from focgen.rig.model import Ranges, Rig
 from focgen.trials import excitation
 from focgen.trials.designs import Design, Truth, draw_design
 from focgen.trials.forms import Drawn, Spans
-from focgen.trials.machine import Machine, Session, Setting
+from focgen.trials.machine import Machine, Session, Setting, Trace
 from focgen.trials.plan import Assignment
 from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of, sample
 from focgen.trials.rigs import draw_chain, draw_linear, in_time_unit, nominal_of
@@ -25,7 +25,7 @@ _COARSE, _FINE = 0.01, 0.0025  # s: steps of the calibration and of the logs
 @dataclass(frozen=True, eq=False)
 class Case:
     """A finished case: the nominal ``rig``, logs as (name, columns by role), the label of
-    what is true, and in closed loop the ideal controller."""
+    what is true, in closed loop the ideal controller, and in open loop the ``bench``, for further logs."""
 
     rig: Rig
     logs: list[tuple[str, dict]]
@@ -33,6 +33,7 @@ class Case:
     recorder: Recorder
     label: dict
     controller: Controller | None = None
+    bench: Bench | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,14 +192,42 @@ def believed(assignment: Assignment, rig: Rig, rng: np.random.Generator) -> Rig:
     return nominal_of(rig, rng, scatter)
 
 
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """The true rig of a case, and how its logs are taken: makes experiments, those of the session first."""
+
+    stage: Stage
+    settings: tuple[Setting, ...]
+    recorder: Recorder
+
+    def play(self, rng: np.random.Generator) -> list[tuple[str, dict]]:
+        """The session and what stays sealed, as (name, columns by role)."""
+        stage = self.stage
+        session = Session(Machine(stage.rig, self.settings), _FINE)
+        played, experiments = [], [*stage.seen, *stage.unseen]
+        for experiment, command, clock in zip(
+            experiments, stage.commands(experiments, _FINE), stage.clocks
+        ):
+            trace = session.run(command, clock)
+            played.append((experiment.name, self._sampled(trace, session, rng)))
+        return played
+
+    def further(self, command: np.ndarray, rng: np.random.Generator) -> dict:
+        """One more experiment after the session: the log by role of a ``command`` (n,) in its unit."""
+        stage = self.stage
+        session = Session(Machine(stage.rig, self.settings), _FINE)
+        for before, clock in zip(stage.commands(stage.seen, _FINE), stage.clocks):
+            session.run(before, clock)
+        fine = np.repeat(np.asarray(command, float), round(stage.rig.sample_time / _FINE))
+        return self._sampled(session.run(fine, stage.clocks[len(stage.seen)]), session, rng)
+
+    def _sampled(self, trace: Trace, session: Session, rng: np.random.Generator) -> dict:
+        return sample(trace, self.stage.rig.sample_time, self.recorder, session, rng)
+
+
 def _play(stage: Stage, settings, recorder: Recorder, nominal: Rig, label: dict, rng) -> Case:
-    Ts = stage.rig.sample_time
-    session = Session(Machine(stage.rig, tuple(settings)), _FINE)
-    played = []
-    experiments = [*stage.seen, *stage.unseen]
-    for experiment, command, clock in zip(experiments, stage.commands(experiments, _FINE), stage.clocks):
-        trace = session.run(command, clock)
-        played.append((experiment.name, sample(trace, Ts, recorder, session, rng)))
+    bench = Bench(stage, tuple(settings), recorder)
+    played = bench.play(rng)
     unit = float(rng.choice((0.001, 0.1, 1.0, 60.0))) if label["kind"] == "linear" else 1.0
     rig = in_time_unit(nominal, unit)
     if recorder.one_file:
@@ -206,7 +235,8 @@ def _play(stage: Stage, settings, recorder: Recorder, nominal: Rig, label: dict,
     rig = replace(rig, ranges=_ranges(stage) if rng.random() < 0.7 else Ranges())
     count = len(stage.seen)
     label = {**label, "floor": floor_of(played[count:])}
-    return Case(rig, played[:count], played[count:], replace(recorder, time_unit=unit), label)
+    recorder = replace(recorder, time_unit=unit)
+    return Case(rig, played[:count], played[count:], recorder, label, bench=bench)
 
 
 def _ranges(stage: Stage) -> Ranges:

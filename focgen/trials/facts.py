@@ -19,6 +19,7 @@ _WORD = re.compile(r"\w+")
 _ANEW = "make the cases anew"
 
 _FACTS = {"suite": str, "signals": str, "seed": int, "commitments": dict}
+_KINDS = {"kinds?": [str]}
 _TRUTH = {"effect": _WORD, "stage": str, "visible": bool, "severity": str, "form": str}
 _LABEL = {"kind": str, "suite": str, "truth": [_TRUTH], "floor": float, "unseen": dict}
 _DESIGN = {"tied?": [str], "resolves?": [str]}
@@ -38,13 +39,14 @@ _DIAGNOSIS = {
 @dataclass(frozen=True)
 class Facts:
     """A trial: ``suite``, ``signals`` and ``seed`` as it was made with, and each case's commitment by its
-    number ("0001").
+    number ("0001"); ``kinds``: of its cases, none where an earlier version made it.
     """
 
     suite: str
     signals: str
     seed: int
     commitments: dict[str, str]
+    kinds: tuple[str, ...] = ()
 
 
 def facts_of(folder: Path) -> Facts:
@@ -55,9 +57,9 @@ def facts_of(folder: Path) -> Facts:
     if not path.is_file():
         raise InputError(str(folder), "holds no trial", "make one by `focgen trial make`")
     found = read_json(path, _ANEW)
-    if not fits(found, _FACTS):
+    if not fits(found, _FACTS | _KINDS):
         raise InputError(str(path), f"is no trial: it needs {', '.join(_FACTS)}", _ANEW)
-    facts = Facts(*(found[key] for key in _FACTS))
+    facts = Facts(*(found[key] for key in _FACTS), tuple(found.get("kinds", ())))
     if facts.suite not in SUITES or facts.signals not in SIGNALS or facts.seed < 0:
         what = f"suite {facts.suite!r}, signals {facts.signals!r}, seed {facts.seed} are none of a trial's"
         raise InputError(str(path), what, _ANEW)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 # What a name of the generator may rightly be called by the vocabulary instead of `unknown`.
 ALSO = {"folded_reading": {"sensor_nonlinearity"}}
-# What an effect may rightly be called as well: dry friction against a spring that returns is a play to the logs.
+# What an effect may rightly be called as well: friction against a spring that returns is a play to the logs.
 LIKE = {"friction": "hysteresis"}
+PROPOSED = "proposed"  # the name of the experiment that a diagnosis proposes, beside those of the menu
 _CAUSED = ("named", "set")
 
 
@@ -18,7 +20,9 @@ class Judged:
     ``causes``: for each entry its candidates (effect, confidence), most likely first. ``verdict`` is "failed"
     where there is no diagnosis. ``promise`` and ``promise_interval``: the shrink that was predicted;
     ``achieved`` and ``oracle``: what replay on the unseen logs gives, None where it cannot be measured.
-    ``forgone``: the part of the gap in the given logs that the oracle closes beyond what was closed.
+    ``resolved``: of the proposed experiment and those of the menu, by name, whether the true rig's log of it
+    made the diagnosis name the truth and nothing else. ``forgone``: the part of the gap in the given logs
+    that the oracle closes beyond what was closed.
     """
 
     number: str
@@ -42,6 +46,7 @@ class Judged:
     seconds: float | None = None
     baseline: str | None = None
     best_fit: str | None = None
+    resolved: Mapping[str, bool] = field(default_factory=dict)
 
     @property
     def caused(self) -> bool:

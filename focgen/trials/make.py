@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,32 @@ class Made:
     commitments: dict[str, str]
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """What the cases of a trial are drawn by: the same gives the same cases, again and again."""
+
+    cases: int
+    seed: int
+    signals: str
+    suite: str
+    kinds: tuple[str, ...]
+
+    @cached_property
+    def plan(self) -> list[Assignment]:
+        """What each case is to be."""
+        root = np.random.default_rng(self._roots)
+        return assignments(self.cases, self.kinds, self.signals, self.suite, root)
+
+    @property
+    def _roots(self) -> list[int]:
+        return [self.seed, ord(self.signals), STREAMS[self.suite]]
+
+    def case(self, index: int) -> tuple[Case, str]:
+        """Case number ``index``, from 1, and the salt that its commitment has."""
+        rng, assignment = np.random.default_rng([*self._roots, index]), self.plan[index - 1]
+        return _made(assignment, self.signals, self.suite, rng), _salt(rng)
+
+
 def make(
     folder: str | Path,
     *,
@@ -67,20 +94,19 @@ def make(
     """
     folder = Path(folder)
     _check(folder, cases, seed, signals, suite)
-    root = np.random.default_rng([seed, ord(signals), STREAMS[suite]])
-    plan = assignments(cases, kinds or DEFAULT_KINDS[suite], signals, suite, root)
+    kinds = tuple(kinds or DEFAULT_KINDS[suite])
+    drawn = Drawing(cases, seed, signals, suite, kinds)
     commitments = {}
-    for index, assignment in enumerate(track(plan, "trial make"), start=1):
-        rng = np.random.default_rng([seed, ord(signals), STREAMS[suite], index])
-        number = f"{index:04d}"
-        case = _made(assignment, signals, suite, rng)
-        commitments[number] = _write(folder, number, case, _salt(rng))
-    made = Made(str(folder), suite, signals, seed, len(plan), commitments)
+    for index in track(range(1, len(drawn.plan) + 1), "trial make"):
+        case, salt = drawn.case(index)
+        commitments[f"{index:04d}"] = _write(folder, f"{index:04d}", case, salt)
+    made = Made(str(folder), suite, signals, seed, cases, commitments)
     facts = {
         "focgen": focgen.__version__,
         "suite": suite,
         "signals": signals,
         "seed": seed,
+        "kinds": kinds,
         "commitments": commitments,
     }
     write_file(folder / "trial.json", json.dumps(facts, indent=1) + "\n")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from focgen.trials.judging import Judged
+from focgen.trials.judging import PROPOSED, Judged
 from focgen.trials.statistics import interval, reliability
 from focgen.trials.vocabulary import stage_of
 
@@ -140,6 +140,14 @@ ROWS = (
         lambda j: j.says_tied,
         limits=(0.9,),
     ),
+    _Measure(
+        "sets: the proposal resolves what the menu can",
+        lambda j: any(name != PROPOSED and so for name, so in j.resolved.items()),
+        lambda j: j.resolved.get(PROPOSED, False),
+        limits=(0.9,),
+    ),
+    _Measure("  … resolved, of all sets", lambda j: bool(j.resolved), lambda j: j.resolved[PROPOSED]),
+    _Measure("  … by the best of the menu", lambda j: bool(j.resolved), lambda j: any(j.resolved.values())),
     _Measure(
         "one linear stage: top-1 effect", lambda j: j.kind == "linear" and j.visible, lambda j: j.top_right
     ),

@@ -114,12 +114,18 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
         except OSError as reason:
             what = f"cannot be copied ({_first(reason)})"
             raise InputError(str(case), what, "make the cases anew") from None
-        fault = _process(blind, out, limit, effects)
-        out.mkdir(exist_ok=True)
-        if not (out / "outcome.json").exists():
-            word = {"status": "failed", "seconds": None, "fault": fault}
-            (out / "outcome.json").write_text(json.dumps(word) + "\n", encoding="utf-8")
+        blind_diagnosis(blind, out, limit, effects)
         replace_folder(out, target, trial)
+
+
+def blind_diagnosis(blind: Path, out: Path, limit: float, effects: tuple[str, ...] = ()) -> None:
+    """Diagnose the case in the folder ``blind`` in a process of its own; ``out`` holds what came of it, even
+    where the process died or took longer than ``limit`` s."""
+    fault = _process(blind, out, limit, effects)
+    out.mkdir(parents=True, exist_ok=True)
+    if not (out / "outcome.json").exists():
+        word = {"status": "failed", "seconds": None, "fault": fault}
+        (out / "outcome.json").write_text(json.dumps(word) + "\n", encoding="utf-8")
 
 
 def _first(reason: OSError) -> str:

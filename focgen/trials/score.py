@@ -16,6 +16,7 @@ from focgen.errors import FocgenError, InputError
 from focgen.output import write_file
 from focgen.progress import say, track
 from focgen.trials import achieved, baselines
+from focgen.trials.asked import ask, resolved
 from focgen.trials.facts import achieved_in, diagnosis_in, facts_of
 from focgen.trials.judging import Judged, forgone, judge
 from focgen.trials.rows import Row, rows, stated_in
@@ -65,6 +66,7 @@ class Summary:
 def score(
     *folders: str | Path,
     oracle: bool = False,
+    proposals: bool = False,
     baseline: bool = True,
     partial: bool = False,
     jobs: int | None = None,
@@ -72,25 +74,30 @@ def score(
     """Score trials that have been run.
 
     ``oracle``: also diagnose the singles and pairs knowing the effects; ``baseline``: also ask the residual
-    correlation; ``partial``: leave cases out that have not been diagnosed yet, instead of counting them as
-    misses; ``jobs``: processes at a time (default: the cores).
+    correlation; ``proposals``: have the true rig of every case that ended in a set make the proposed
+    experiment and those of the menu, and diagnose it again; ``partial``: leave cases out that have not been
+    diagnosed yet, instead of counting them as misses; ``jobs``: processes at a time (default: the cores).
 
     Writes scores.json into each folder. Raises InputError where a label, a case or an unseen log is not what
     was committed to.
     """
     at_once = processes(jobs)
-    return Summary(tuple(_scored(Path(folder), oracle, baseline, partial, at_once) for folder in folders))
+    asked = (oracle, proposals)
+    return Summary(tuple(_scored(Path(folder), asked, baseline, partial, at_once) for folder in folders))
 
 
-def _scored(folder: Path, oracle: bool, baseline: bool, partial: bool, jobs: int) -> Scores:
+def _scored(folder: Path, asked: tuple[bool, bool], baseline: bool, partial: bool, jobs: int) -> Scores:
     facts = facts_of(folder)
     labels = {
         number: _unsealed(folder, number, committed)
         for number, committed in facts.commitments.items()
         if not partial or ran(folder / "runs" / number)
     }
+    oracle, proposals = asked
     if oracle:
         _ask_oracle(folder, labels, jobs)
+    if proposals:
+        ask(folder, facts, labels, jobs)
     with ProcessPoolExecutor(jobs) as pool:
         waiting = [pool.submit(_judged, folder, number, label, baseline) for number, label in labels.items()]
         judged = [one.result() for one in track(waiting, "trial score")]
@@ -168,6 +175,7 @@ def _judged(folder: Path, number: str, label: dict, baseline: bool) -> Judged:
         if diagnosis and diagnosis.get("shrink") is not None
         else None,
         oracle=_kept(folder, told, number, label),
+        resolved=resolved(folder, number, label),
         forgone=forgone(diagnosis, _diagnosis_of(told)),
         baseline=baselines.guess(folder / "cases" / number) if baseline and single else None,
         best_fit=_best_fit(diagnosis),

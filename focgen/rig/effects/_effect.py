@@ -34,7 +34,7 @@ class Parameter:
     references taken from the data: the largest magnitude at the slot, and the time ``clock``: the rig's
     "response" time, the "sample" time or the "record" (one experiment; "session": all). ``zero`` is the
     value that gives the nominal chain, None where another parameter's zero does. ``log``: searched on a
-    logarithmic scale.
+    logarithmic scale. ``at``: the slot whose level is meant, where it is not the form's own.
     """
 
     name: str
@@ -46,6 +46,7 @@ class Parameter:
     clock: str = "response"
     zero: float | None = None
     log: bool = False
+    at: str = ""
 
 
 LARGEST = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
@@ -153,7 +154,7 @@ class Effect:
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
     ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone;
-    ``uneven``: the family that it is as well where it is uneven; ``smooth``: its curves have no kinks.
+    ``shifts``: it does what columns out of step do, which then are a part of it. ``uneven``: the family that it is as well where it is uneven; ``smooth``: its curves have no kinks.
     """
 
     name: str
@@ -168,5 +169,6 @@ class Effect:
     single: bool = False
     noiselike: bool = False
     tonal: bool = False
+    shifts: bool = False
     uneven: str = ""
     smooth: bool = False

@@ -6,7 +6,7 @@ import numpy as np
 
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
-from focgen.rig.modes import Bend
+from focgen.rig.dynamics import Bend
 
 
 def _cubic(x, values, run):

@@ -1,7 +1,29 @@
-"""Rate-independent memory of the actuator: Prandtl–Ishlinskii, Bouc–Wen, even or growing with the load."""
+"""Rate-independent memory of the actuator: loops of the drive, even or growing with the load; in a plant with
+a mass, of the spring that pulls it back."""
 
+from dataclasses import replace
+
+from focgen.rig.dynamics import Spring
 from focgen.rig.effects import _loops
-from focgen.rig.effects._effect import Effect
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
+
+
+def _spring(x, values, run):
+    share, loading, unloading, scale = values
+    return replace(x, spring=Spring(share, loading / scale, unloading / scale, 1.0, scale))
+
+
+def _sharp_spring(x, values, run):
+    share, loading, unloading, power, scale = values
+    return replace(x, spring=Spring(share, loading / scale, unloading / scale, power, scale))
+
+
+# of the stiffness: Bouc and Wen's spring takes it over, and is as stiff where a motion begins
+_SHARE = Parameter("share", lower=0.0, upper=1.0, starts=(0.2, 0.5), zero=0.0)
+# of its stiffness: what a spring wound to the largest displacement has lost; below 0 it stiffens
+_LOADING = Parameter("loading", lower=-3.0, upper=30.0, starts=(0.5, 0.0))
+_UNLOADING = Parameter("unloading", lower=-3.0, upper=30.0, starts=(0.5, 1.0))
+_POWER = Parameter("power", lower=0.5, upper=4.0, starts=(1.0, 1.0))
 
 EFFECT = Effect(
     name="hysteresis",
@@ -16,5 +38,9 @@ EFFECT = Effect(
         "gain_nonlinearity",
     ),
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
-    forms=_loops.forms("drive"),
+    forms=[
+        *_loops.forms("drive"),
+        Form("spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, LARGEST), _spring),
+        Form("sharp_spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, _POWER, LARGEST), _sharp_spring),
+    ],
 )

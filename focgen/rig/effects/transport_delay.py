@@ -19,6 +19,7 @@ EFFECT = Effect(
     needs=lambda e: None if e.fastest < 0.25 else "no change of the input is fast beside the rig's response",
     anywhere=True,
     single=True,
+    shifts=True,
     forms=[
         Form(
             "delay",

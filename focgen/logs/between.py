@@ -9,6 +9,7 @@ pressure begins to rise spoils no neighbour. Where bends drown in noise the line
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import cache
 
 import numpy as np
@@ -20,10 +21,20 @@ _SMALL = 0.02  # of the reach: a smaller change is no jump
 _SEEN = 5.0  # standard deviations: a bend below is noise
 _ROUNDING = 1e-14  # of the largest value: a bend below is rounding
 _POINTS = (6, 4)  # of a polynomial; the second where a jump or the log's end leaves no room for the first
+_CENTRED = (4, 6, 8)  # the same of a smooth signal, from the ends inwards
 _OFF_MIDDLE = 3.0  # a polynomial off the middle has to have a highest difference so much smaller
 _ORDER = 6  # of the difference that noise is told from a signal by
 _OF_SIXTH = 924.0**0.5  # standard deviation of white noise's sixth difference
 _NORMAL = 0.6745  # median of |x| of the normal distribution
+
+
+class Between(IntEnum):
+    """What an input does between its samples: it runs in straight lines, is held until it jumps, or is
+    smooth."""
+
+    STRAIGHT = 0
+    HELD = 1
+    SMOOTH = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +101,22 @@ def course_of(powers: np.ndarray, jumps: np.ndarray, held: bool = False) -> Cour
     if not np.any(bends):
         return course
     return replace(course, bends=np.array(bends), twists=np.array(twists))
+
+
+def smooth_bends(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The coefficients of both bends in the sample that ends at each index, (n,) each, of a signal without
+    noise or jumps: of the polynomial through the eight samples around it, near the ends through fewer.
+
+    What is left is 1e-3 of the bend at 5 samples a period, and falls with the seventh power of the frequency.
+    """
+    bends, twists = np.zeros(len(values)), np.zeros(len(values))
+    for points in _CENTRED:
+        if len(values) >= points:
+            middle = slice(points // 2, points // 2 + len(values) - points + 1)
+            bend, twist = _weights(points, points // 2 - 1)
+            bends[middle] = np.correlate(values, bend, "valid")
+            twists[middle] = np.correlate(values, twist, "valid")
+    return bends, twists
 
 
 def _bent(values: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,92 @@
+"""What effects change of an actuator's own equation, as plain numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb's, in units of the input: ``slide`` against the motion, ``stick`` before it."""
+
+    slide: float = 0.0
+    stick: float = 0.0
+
+    @property
+    def held(self) -> tuple[float, float]:
+        """Both, as the compiled loops take them."""
+        return self.slide, max(self.stick, self.slide)
+
+    def __add__(self, other: Friction) -> Friction:
+        return Friction(self.slide + other.slide, self.stick + other.stick)
+
+    def __mul__(self, factor: float) -> Friction:
+        return Friction(factor * self.slide, factor * self.stick)
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A hysteretic spring: its ``share`` of the stiffness; ``loading`` and ``unloading`` in 1/output, for a
+    ``power`` other than 1 at displacements of ``scale``, in units of the output."""
+
+    share: float = 0.0
+    loading: float = 0.0
+    unloading: float = 0.0
+    power: float = 1.0
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Bend:
+    """A spring whose stiffness changes with y: 1 + ``first`` q + ``second`` q² times that at rest,
+    q = |y|/``scale``; what gives beside it, mass or damper, stays as it is."""
+
+    first: float = 0.0
+    second: float = 0.0
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Rise:
+    """What friction rises by as it moves, ``size`` (1 − exp(−|y'|/``speed``)), in units of the input; below 0
+    it falls, as in lubricated bearings (R. Stribeck, Z. VDI 46, 1902)."""
+
+    size: float = 0.0
+    speed: float = 1.0
+
+
+STRAIGHT, NO_FRICTION, LINEAR, LEVEL = Bend(), Friction(), Spring(), Rise()
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """What effects change of an actuator's own equation.
+
+    Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response;
+    beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place). Of that and of any other
+    spring y follows ``bend``, and dry friction, the ``drag``, takes away from x, in its unit. Of a
+    :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``,
+    and the ``rise`` of its drag.
+    """
+
+    unloading: float = 1.0
+    place: float = 0.0
+    stiffness: float = 0.0
+    drag: Friction = NO_FRICTION
+    bend: Bend = STRAIGHT
+    spring: Spring = LINEAR
+    rise: Rise = LEVEL
+
+    @property
+    def changed(self) -> frozenset[str]:
+        """What of it differs from the nominal equation."""
+        return frozenset(name for name, value in vars(self).items() if value != getattr(UNCHANGED, name))
+
+    def bending(self, gain: float = 1.0) -> tuple[float, ...]:
+        """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, and of
+        the drag."""
+        bend = self.bend
+        return bend.first / gain, bend.second / gain, bend.scale, self.place, self.stiffness / gain, *self.drag.held
+
+
+UNCHANGED = Dynamics()

@@ -1,0 +1,239 @@
+/* A plant of first or second order with dry friction and a hysteretic spring in its own equation:
+ *     m y'' + c y' + k y = u - F - w   or   m y' + k y = u - F - w.
+ * F is Coulomb's: `slide` against the velocity, up to `stick` where nothing moves; of a plant of second order it rises by `rise`
+ * (1 - exp(-|y'|/speed)) as it moves. w = soft (q - y) is what a hysteretic
+ * spring takes away from the linear one: dq/dy = 1 - K |p|^power scale^(1 - power), p = q in the direction of motion, with K = `loading`
+ * where p > 0 and -`unloading` where it is not (Bouc and Wen). Beside it the spring may bend, as in bent.h: w holds that, too.
+ *
+ * Between events the equation is linear, and a step is exact for an input that is a cubic: `tables` hold, for steps of h/2^level from
+ * `level` = base on, what the state and the four coefficients of the input count. w is a cubic through its values and slopes at the
+ * ends of a step of level base. Where the velocity changes sign or the friction gives way, steps are halved down to `last`, and what
+ * is left there is run along a line.
+ */
+#include <math.h>
+#include "bent.h"
+
+enum { BALANCED = 2, DIPS = 3 };
+
+typedef struct {
+    int order, base, last;
+    double h, m, c, k, slide, stick, soft, loading, unloading, power, scale, rise, speed;
+    const double *bend, *tables;
+    int curved; /* whether there is a w, or friction that depends on the speed */
+} Plant;
+
+typedef struct {
+    double y, v, q;
+    int moving; /* the sign of the velocity, 0: stuck */
+} State;
+
+static double taken(const Plant *p, const State *s)
+{
+    double slope;
+    return p->curved ? p->soft * (s->q - s->y) + bent(p->bend, s->y, &slope) : 0.0;
+}
+
+/* dq/dy where q in the direction of motion is `q`. */
+static double steepness(const Plant *p, double q)
+{
+    double grown = p->power == 1.0 ? fabs(q) : fabs(q) * pow(fabs(q) / p->scale, p->power - 1.0);
+    return 1.0 - (q > 0.0 ? p->loading : -p->unloading) * grown;
+}
+
+/* What friction has risen by, against the side `sign`, and what it rises by with the speed. */
+static double risen(const Plant *p, const State *s, int sign)
+{
+    return p->rise != 0.0 ? -sign * p->rise * expm1(-fabs(s->v) / p->speed) : 0.0;
+}
+
+static double rising(const Plant *p, const State *s) { return p->rise != 0.0 ? p->rise / p->speed * exp(-fabs(s->v) / p->speed) : 0.0; }
+
+/* The rate of w and of what friction has risen by, times `span`, where it moves to the side `sign` under the input `u`. */
+static double yielding(const Plant *p, const State *s, int sign, double u, double span)
+{
+    double slope;
+    if (!p->curved) return 0.0;
+    bent(p->bend, s->y, &slope);
+    double gained = (u - p->k * s->y - p->c * s->v - taken(p, s) - risen(p, s, sign) - sign * p->slide) / p->m;
+    return span * (s->v * (p->soft * (steepness(p, sign * s->q) - 1.0) + slope) + gained * rising(p, s));
+}
+
+/* q after `way` >= 0 in its direction, on one side of 0, for a power of 1. */
+static double along(double q, double way, double bend)
+{
+    double x = bend * way;
+    double mean = fabs(x) < 1e-3 ? 1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0)) : -expm1(-x) / x;
+    return q + (1.0 - bend * q) * mean * way;
+}
+
+/* q after the displacement `move`. */
+static double wound(const Plant *p, double q, double move)
+{
+    double side = move < 0.0 ? -1.0 : 1.0, way = fabs(move);
+    q *= side;
+    if (p->power != 1.0) {
+        double one = steepness(p, q), two = steepness(p, q + 0.5 * way * one), three = steepness(p, q + 0.5 * way * two);
+        return side * (q + way / 6.0 * (one + 2.0 * two + 2.0 * three + steepness(p, q + way * three)));
+    }
+    if (q < 0.0) {
+        double bend = p->unloading, inside = -bend * q, to_zero = INFINITY;
+        if (inside > -1.0) to_zero = fabs(inside) < 1e-9 ? -q : log1p(inside) / bend;
+        if (way <= to_zero) return side * along(q, way, bend);
+        way -= to_zero, q = 0.0;
+    }
+    return side * along(q, way, p->loading);
+}
+
+/* The state after a step of `level` with the input `d` (4 coefficients over the step), friction at `sign` times `slide`. */
+static State stepped(const Plant *p, State s, const double *d, int level, int sign)
+{
+    const double *t = p->tables + 12 * (level - p->base);
+    double span = p->h / (double)(1 << level), f[4] = {d[0] - sign * p->slide, d[1], d[2], d[3]};
+    double at_end = d[0] + d[1] + d[2] + d[3] - sign * p->slide, before = taken(p, &s) + risen(p, &s, sign);
+    double slope = yielding(p, &s, sign, d[0], span);
+    State to = s;
+    double then = before + slope, steep = slope;
+    for (int round = 0; round < (p->curved ? 3 : 1); round++) {
+        double g[4] = {f[0] - before, f[1] - slope, f[2] - 3.0 * (then - before) + 2.0 * slope + steep,
+                       f[3] - slope - steep + 2.0 * (then - before)};
+        if (!p->curved) for (int i = 0; i < 4; i++) g[i] = f[i];
+        to.y = t[0] * s.y + t[1] * s.v + t[4] * g[0] + t[5] * g[1] + t[6] * g[2] + t[7] * g[3];
+        if (p->order == 2) to.v = t[2] * s.y + t[3] * s.v + t[8] * g[0] + t[9] * g[1] + t[10] * g[2] + t[11] * g[3];
+        if (!p->curved) break;
+        if (p->soft != 0.0) to.q = wound(p, s.q, to.y - s.y);
+        then = taken(p, &to) + risen(p, &to, sign);
+        steep = yielding(p, &to, sign, at_end + sign * p->slide, span);
+    }
+    if (p->order == 1) to.v = (at_end - p->k * to.y - taken(p, &to)) / p->m;
+    return to;
+}
+
+/* What pushes a plant at rest when the input is `u`. */
+static double push(const Plant *p, const State *s, double u) { return u - p->k * s->y - taken(p, s); }
+
+/* Stuck, moving on, or turned round, by what pushes it. */
+static void decide(const Plant *p, State *s, double u)
+{
+    double pushed = push(p, s, u);
+    int stopped = p->order == 1 && s->moving && s->moving * pushed <= p->slide;
+    if (s->moving && !stopped) {
+        if (p->order == 1) s->v = (pushed - s->moving * p->slide) / p->m;
+        return;
+    }
+    s->moving = fabs(pushed) > p->stick ? (pushed > 0.0 ? 1 : -1) : 0;
+    s->v = s->moving && p->order == 1 ? (pushed - s->moving * p->slide) / p->m : 0.0;
+}
+
+static void rolled(State *s, const Plant *p, double way)
+{
+    s->y += way;
+    if (p->soft != 0.0) s->q = wound(p, s->q, way);
+}
+
+/* From 0 velocity on for `time`, so short that the push changes in a line, from `first` of the input to `u`. */
+static void started(const Plant *p, State *s, double first, double u, double time)
+{
+    decide(p, s, u);
+    if (!s->moving) return;
+    double rate = (push(p, s, 0.5 * (first + u)) - s->moving * p->slide) / p->m;
+    rolled(s, p, p->order == 2 ? 0.5 * rate * time * time : rate * time);
+    if (p->order == 2) s->v = rate * time * (1.0 - 0.5 * p->c / p->m * time);
+}
+
+/* Whether a step that ended well may have turned round twice on its way. */
+static int dips(const Plant *p, const State *s, const State *to, const double *d)
+{
+    if (p->order == 1) return 0;
+    int sign = s->moving;
+    double first = push(p, s, d[0]) - p->c * s->v - sign * p->slide - risen(p, s, sign);
+    double last = push(p, to, d[0] + d[1] + d[2] + d[3]) - p->c * to->v - sign * p->slide - risen(p, to, sign);
+    return sign * first < 0.0 && sign * last > 0.0;
+}
+
+/* The input's coefficients over the step that begins at `at` and is `part` of the sample. */
+static void cut(const double *c, double at, double part, double *d)
+{
+    d[0] = c[0] + at * (c[1] + at * (c[2] + at * c[3]));
+    d[1] = part * (c[1] + at * (2.0 * c[2] + 3.0 * at * c[3]));
+    d[2] = part * part * (c[2] + 3.0 * at * c[3]);
+    d[3] = part * part * part * c[3];
+}
+
+/* One sample under the input c[0] + c[1] t + c[2] t^2 + c[3] t^3, t = 0 ... 1. */
+static void sample(const Plant *p, State *s, const double *c)
+{
+    long whole = 1L << p->last, at = 0;
+    int level = p->base;
+    while (at < whole) {
+        double d[4];
+        cut(c, (double)at / whole, 1.0 / (double)(1 << level), d);
+        decide(p, s, d[0]);
+        double u = d[0] + d[1] + d[2] + d[3], span = p->h / (double)(1 << level);
+        State to = s->moving ? stepped(p, *s, d, level, s->moving) : *s;
+        double ahead = s->moving ? s->moving * to.v : p->stick - fabs(push(p, s, u));
+        if (p->order == 1 && s->moving) ahead = s->moving * push(p, &to, u) - p->slide;
+        int again = ahead < 0.0 || (s->moving && level < p->base + DIPS && dips(p, s, &to, d));
+        if (again && level < p->last) {
+            level++;
+            continue;
+        }
+        if (again && ahead < 0.0 && p->order == 2 && p->stick == 0.0) { /* nothing holds it: it turns round */
+            *s = to, s->moving = to.v < 0.0 ? -1 : 1;
+        } else if (again && ahead < 0.0) { /* the event is in this short step: what is left of it, by lines */
+            double was = s->moving ? s->moving * s->v : p->stick - fabs(push(p, s, d[0]));
+            if (p->order == 1 && s->moving) was = s->moving * push(p, s, d[0]) - p->slide;
+            double part = was > 0.0 ? was / (was - ahead) : 0.0;
+            if (s->moving) {
+                double way = p->order == 2 ? 0.5 * s->v * part * span : part * (to.y - s->y);
+                rolled(s, p, way);
+            }
+            s->moving = 0, s->v = 0.0;
+            started(p, s, d[0] + part * (u - d[0]), u, (1.0 - part) * span);
+        } else {
+            *s = to;
+        }
+        at += whole >> level;
+        while (level > p->base && at % (whole >> (level - 1)) == 0) level--;
+    }
+}
+
+/* Where the plant rests under `u` when it has come there from 0. */
+static State balanced(const Plant *p, double u)
+{
+    State s = {0.0, 0.0, 0.0, 0};
+    double left = fabs(u) - p->slide, side = u < 0.0 ? -1.0 : 1.0;
+    if (left <= 0.0 || p->k <= 0.0) return s;
+    double low = 0.0, high = p->curved ? 20.0 * left / p->k : left / p->k, slope;
+    for (int i = 0; i < 60 && p->curved; i++) {
+        double y = 0.5 * (low + high), q = 0.0;
+        for (int j = 0; j < 32; j++) q = wound(p, q, y / 32.0);
+        if (p->k * y + p->soft * (q - y) + bent(p->bend, y, &slope) < left) low = y;
+        else high = y;
+    }
+    for (int j = 0; j < 32; j++) s.q = wound(p, s.q, side * high / 32.0);
+    s.y = side * high;
+    return s;
+}
+
+/* n samples of the input: `line`, `bend` and `twist` are what it changes by in a line in the sample that ends at each, and the
+ * coefficients of t (t - 1) and t (t - 1)(2 t - 1) beside it; at the first of an experiment, of the sample ahead of it. */
+void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const double *bend, const double *twist,
+                  int order, int base, int last, const double *numbers, const double *tables)
+{
+    const double *a = numbers;
+    Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a + 13, tables,
+               a[6] != 0.0 || a[11] != 0.0 || a[13] != 0.0 || a[14] != 0.0};
+    State s = {0.0, 0.0, 0.0, 0};
+    for (int k = 0; k < n; k++) {
+        double c[4] = {0.0, 0.0, 0.0, 0.0};
+        if (rest[k]) {
+            s = rest[k] == BALANCED ? balanced(&p, x[k]) : (State){0.0, 0.0, 0.0, 0};
+            c[1] = line[k];
+            if (line[k] != 0.0) sample(&p, &s, c);
+        } else {
+            c[0] = x[k - 1], c[1] = line[k] - bend[k] + twist[k], c[2] = bend[k] - 3.0 * twist[k], c[3] = 2.0 * twist[k];
+            sample(&p, &s, c);
+        }
+        y[k] = s.y;
+    }
+}

@@ -1,0 +1,144 @@
+"""Plants of first and second order with dry friction and hysteresis in their own equation.
+
+m y'' + c y' + k y = u − F − w, or m y' + k y = u − F − w, in units of the input u. Coulomb's friction F is
+``slide`` against the velocity; where nothing moves it bears up to ``stick``. w is what a hysteretic spring
+takes away from the linear one (R. Bouc, 1967; Y.-K. Wen, J. Eng. Mech. Div. 102, 1976): a ``share`` of the
+stiffness k holds by q instead of y, with dq/dy = 1 − K |p|^power, p = q in the direction of motion, K =
+``loading`` where the motion winds the spring further, −``unloading`` where it lets it go. With α = share·k,
+z = α q, power 1: z' = α y' − β (γ |y'| z + δ y' |z|), loading = β (γ + δ) and unloading = β (γ − δ).
+
+Between two events (a velocity of 0, a friction that gives way) a plant with friction alone is linear, and a
+step over a whole sample is exact; events are found by halving it. The hysteretic spring is integrated by
+steps so small that its own error is about 1e-7 of its force.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
+from focgen.rig import kernels
+from focgen.rig.courses import course
+from focgen.rig.dynamics import UNCHANGED, Dynamics
+
+_HALVED = 10  # times that a step is halved for an event: what is left is run along a line
+_SHORT = 0.06  # of a radian of the plant's motion: a step of the hysteretic spring
+_YIELDS = 0.2  # of the time in which friction that rises stops what moves: a step
+_SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
+_MOST = 7  # halvings at most of a step before any event
+_TERMS = 9  # of the exponential series
+_TINY = 0.05  # what a step has to be below, in the norm of its matrix, for the series to end there
+
+
+@dataclass(frozen=True)
+class Plant:
+    """m y'' + c y' + k y = u where the ``order`` is 2, m y' + k y = u where it is 1; in units of the input,
+    s and the output."""
+
+    order: int
+    m: float
+    c: float
+    k: float
+
+    @property
+    def integrates(self) -> bool:
+        """Whether nothing pulls it back."""
+        return self.k == 0.0
+
+
+def plant_of(transfer: TransferFunction) -> Plant | None:
+    """The plant that a transfer function is: whole orders, of first or second order, without zeros; None
+    where it is another, or grows of itself."""
+    orders = [t.order for t in transfer.den]
+    if not transfer.is_integer or max(orders) not in (1, 2) or [t.order for t in transfer.num] != [0]:
+        return None
+    gain, den = transfer.num[0].coefficient, {t.order: t.coefficient for t in transfer.den}
+    order = int(max(orders))
+    m, c, k = den[order] / gain, den.get(1, 0.0) / gain if order == 2 else 0.0, den.get(0, 0.0) / gain
+    return Plant(order, m, c, k) if m > 0.0 and c >= 0.0 and k >= 0.0 else None
+
+
+def respond(
+    plant: Plant,
+    x: np.ndarray,
+    rest: np.ndarray,
+    h: float,
+    dynamics: Dynamics = UNCHANGED,
+    between: Between | bool = Between.STRAIGHT,
+) -> np.ndarray:
+    """The output (n,) for the input ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is not
+    0; of ``dynamics`` the drag, the hysteretic spring and the bend count.
+
+    ``between``: what the input does from one sample to the next. In straight lines it comes from 0 within the
+    sample ahead of an experiment, as in :func:`~focgen.rig.linear.run`; else it jumps at the first sample.
+    """
+    base, last = _levels(plant, dynamics, h)
+    tables, spring, bend = _tables(plant, h, base, last), dynamics.spring, dynamics.bend
+    numbers = [h, plant.m, plant.c, plant.k, *dynamics.drag.held, spring.share * plant.k]
+    numbers += [spring.loading, spring.unloading, spring.power, spring.scale]
+    numbers += [dynamics.rise.size, dynamics.rise.speed]
+    numbers += [plant.k * bend.first, plant.k * bend.second, bend.scale]
+    x = np.ascontiguousarray(x, float)
+    moves, levels = course(x, rest, between), (plant.order, base, last)
+    return kernels.plant(x, rest, moves, levels, np.array(numbers), tables)
+
+
+def _levels(plant: Plant, dynamics: Dynamics, h: float) -> tuple[int, int]:
+    """How often a sample is halved: for the motion, and at most, for an event."""
+    spring, bend = dynamics.spring, dynamics.bend
+    steepest = 1.0 + spring.share * max(abs(spring.loading), abs(spring.unloading)) * spring.scale
+    steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second)
+    pace = np.sqrt(plant.k * steepest / plant.m) if plant.order == 2 else plant.k * steepest / plant.m
+    short = _SHORT if dynamics.changed & {"spring", "bend"} else _SWING
+    base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
+    base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _MOST))
+    return base, base + _HALVED
+
+
+@lru_cache(maxsize=256)
+def _tables(plant: Plant, h: float, base: int, last: int) -> np.ndarray:
+    """For steps of h/2^base … h/2^last: what the state (2, 2) and the input's four coefficients (2, 4) count,
+    12 numbers a step."""
+    if plant.order == 2:
+        state = np.array([[0.0, 1.0], [-plant.k / plant.m, -plant.c / plant.m]])
+        force = np.array([0.0, 1.0 / plant.m])
+    else:
+        state, force = np.diag([-plant.k / plant.m, 0.0]), np.array([1.0 / plant.m, 0.0])
+    finer = max(0, int(np.ceil(np.log2(max(np.abs(state).sum() * h / 2.0**last / _TINY, 1e-300)))))
+    kept, driven = _series(state, force, h / 2.0 ** (last + finer))
+    rows = []
+    for level in range(last + finer, base - 1, -1):
+        if level <= last:
+            rows.append(np.r_[kept.ravel(), driven.ravel()])
+        kept, driven = _doubled(kept, driven)
+    return np.concatenate(rows[::-1])
+
+
+def _series(state: np.ndarray, force: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """The state after a short step, by the series of the exponential: powers of the state's matrix for what
+    was, and for an input t^i over the step the sum of A^j b i!/(i + j + 1)! step^(j + 1)."""
+    power, kept, driven = np.eye(2), np.eye(2), np.zeros((2, 4))
+    counts = 1.0 / np.arange(1.0, 5.0)  # i!/(i + 1)!
+    for j in range(_TERMS):
+        driven += np.outer(power @ force * step, counts)
+        counts = counts / (np.arange(4) + j + 2.0)
+        power = power @ state * step
+        kept = kept + power / _factorial(j + 1)
+    return kept, driven
+
+
+def _factorial(n: int) -> float:
+    return float(np.prod(np.arange(1.0, n + 1.0)))
+
+
+_FIRST = np.diag(0.5 ** np.arange(4))  # a cubic's coefficients over the first half of a step,
+_SECOND = np.array([[1, 0.5, 0.25, 0.125], [0, 0.5, 0.5, 0.375], [0, 0, 0.25, 0.375], [0, 0, 0, 0.125]])  # and
+
+
+def _doubled(kept: np.ndarray, driven: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same for a step twice as long."""
+    return kept @ kept, kept @ driven @ _FIRST + driven @ _SECOND
