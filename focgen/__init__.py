@@ -24,6 +24,7 @@ _FUNCTIONS = {
     "replay": "focgen.rig.replay",
     "study": "focgen.studies.study",
     "demo": "focgen.demonstration",
+    "report": "focgen.report.paths",
     "read_logs": "focgen.logs.read",
     "read_rig": "focgen.rig.files",
     "read_controller": "focgen.control.files",

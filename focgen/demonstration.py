@@ -11,6 +11,8 @@ from pathlib import Path
 from focgen.codegen.generate import Generated, generate
 from focgen.control.controller import ARITHMETICS
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.drawn import FILE as SIGNALS
+from focgen.diagnosis.drawn import read_drawn
 from focgen.diagnosis.model import Diagnosis
 from focgen.identification.identify import identify
 from focgen.identification.model import Identification
@@ -82,8 +84,9 @@ def demo(out: str | Path) -> Demo:
             made.verified,
             made.diagnosis,
             made.sealed,
+            read_drawn(scratch / "diagnosis/found" / SIGNALS),
         )
-        (scratch / "report.html").write_text(page.html(), encoding="utf-8")
+        (scratch / "report.html").write_text(page.best(), encoding="utf-8")
     return replace(made, folder=Path(out), report=Path(out) / "report.html")
 
 

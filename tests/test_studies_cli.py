@@ -3,6 +3,7 @@
 import hashlib
 import json
 from dataclasses import replace
+from importlib.util import find_spec
 
 import pytest
 
@@ -69,9 +70,10 @@ def found(folder):
 def test_the_folder_holds_numbers_pictures_and_a_page(folder):
     names = {p.name for p in (folder / "out").iterdir()}
     pictures = {"accuracy.png", "pareto.png", "frequency.png", "loops.png", "plant.png"}
-    assert names == {"rows", "study.json", "report.html"} | pictures
+    assert names == {"rows", "study.json", "curves.json", "report.html"} | pictures
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
-    assert all(name in page for name in pictures)
+    shown = pictures if find_spec("bokeh") is None else {f'id="figure{i}-plot"' for i in range(1, 7)}
+    assert all(name in page for name in shown)
 
 
 def test_every_variant_has_its_row(found):

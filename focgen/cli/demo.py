@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from focgen.cli.outcome import Outcome
+from focgen.cli.shown import add_report, check_report, is_page, write_report
 from focgen.demonstration import Demo, demo
 from focgen.report.demo_page import demo_lead, diagnosis_sentence, firmware_table
 from focgen.report.page import text_table
@@ -20,11 +21,19 @@ EXAMPLE = """example:
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="the folder to write")
+    add_report(parser)
 
 
 def run(args: Namespace) -> Outcome:
+    check_report(args.report, ())
     made = demo(args.out)
-    return Outcome(_payload(made), _text(made), made.holds)
+    folder = made.folder / "pictures"
+    if is_page(args.report):
+        shown = made.report.read_text(encoding="utf-8")
+    else:
+        shown = args.report and {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+    told = write_report(args.report, shown, ())
+    return Outcome(_payload(made), f"{_text(made)}\n{told}", made.holds)
 
 
 def _payload(made: Demo) -> dict:

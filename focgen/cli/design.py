@@ -6,12 +6,14 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from focgen.cli.outcome import Outcome
+from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.control.controller import ARITHMETICS
 from focgen.control.files import controller_text
 from focgen.loop.design import design
-from focgen.output import check_apart, write_file, write_files
+from focgen.output import check_apart, write_file
 from focgen.report.control import design_pictures
 from focgen.report.control_summary import design_payload, design_text
+from focgen.report.pages.control import design_page
 from focgen.rig.files import read_rig
 
 HELP = "invert the rig's model, find the gain schedule K_o(p)/K(p), check the margins"
@@ -57,20 +59,21 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--delay", type=int, default=1, choices=(0, 1), help="computation delay, samples (default: 1)"
     )
-    parser.add_argument("--report", metavar="DIR", help="write pictures of schedule and margins there")
+    add_report(parser)
 
 
 def run(args: Namespace) -> Outcome:
     check_apart([args.out], [args.rig])
+    check_report(args.report, [args.rig])
     wishes = (args.settling, args.overshoot, args.arithmetic, args.length)
     result = design(args.rig, None, *wishes, delay=args.delay, setpoints=args.setpoints)
-    pictures = design_pictures(result, read_rig(args.rig)) if args.report else {}
-    check_apart((Path(args.report) / name for name in pictures), [args.rig])
+    rig = read_rig(args.rig)
+    shown = drawn(args.report, lambda: design_page(result, rig), lambda: design_pictures(result, rig))
+    if isinstance(shown, dict):
+        check_apart((Path(args.report) / name for name in shown), [args.rig])
     write_file(args.out, controller_text(result.controller), [args.rig])
     text = f"{design_text(result)}\n\nwrote {args.out}\n"
-    if pictures:
-        write_files(args.report, pictures, [args.rig])
-        text += f"pictures in {args.report}\n"
+    text += write_report(args.report, shown, [args.rig])
     text += f"next: focgen simulate {args.rig} {args.out}\n"
     text += f"      focgen generate {args.out} --out DIR --arithmetic {args.arithmetic}"
     return Outcome(design_payload(result) | {"controller": args.out}, text, result.holds)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from focgen.cli.outcome import Outcome
+from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.drawn import units_of_rig
 from focgen.errors import FocgenError
 from focgen.progress import led_by
-from focgen.report.diagnosis_summary import diagnosis_text, units_of_rig
+from focgen.report.diagnosis_summary import diagnosis_text
+from focgen.report.paths import page_of
 from focgen.rig.files import read_rig
 
 HELP = "where the gap to the real rig lies, which effect causes it, and how far it shrinks"
@@ -30,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--controller", metavar="FILE", help="the controller of closed-loop logs (controller.toml)"
     )
+    add_report(parser)
     parser.add_argument(
         "--plan", action="store_true", help="only say which effects the experiments could tell apart"
     )
@@ -59,8 +64,18 @@ def run(args: argparse.Namespace) -> Outcome:
         raise FocgenError("diagnose", "no log is given", "name at least one log")
     if args.out is None:
         raise FocgenError("diagnose", "--out is missing", "name the folder for the diagnosis")
+    given = [path for path in (args.rig, *args.logs, args.controller) if path]
+    check_report(args.report, given)
     with led_by("diagnose: the signals from "):
         found = diagnose(
             args.rig, args.logs, args.out, args.controller, args.first, args.last, args.bootstrap
         )
-    return Outcome(found, diagnosis_text(found, units_of_rig(read_rig(args.rig)), args.out))
+    text = diagnosis_text(found, units_of_rig(read_rig(args.rig)), args.out)
+    folder = Path(args.out)
+    shown = drawn(args.report, lambda: page_of([folder]), lambda: _pictures(folder))
+    return Outcome(found, f"{text}\n{write_report(args.report, shown, given)}")
+
+
+def _pictures(folder: Path) -> dict[str, bytes]:
+    """Those that the diagnosis has written."""
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.png"))}

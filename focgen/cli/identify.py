@@ -6,10 +6,12 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from focgen.cli.outcome import Outcome
+from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.identification.identify import identify
 from focgen.output import check_apart, new_folder, write_file
 from focgen.report.identification import identification_pictures
 from focgen.report.identification_summary import identification_payload, identification_text
+from focgen.report.pages.identification import identification_page
 from focgen.rig.files import rig_text
 
 HELP = "fit K(p)/(T s^alpha + 1) to logs of a rig, and integer-order models beside it"
@@ -44,9 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--unseen", nargs="+", default=(), metavar="LOG", help="logs to show the rig against, not fitted"
     )
-    parser.add_argument(
-        "--report", metavar="DIR", help="write pictures there: Table I, fits, parameters, loops"
-    )
+    add_report(parser)
     parser.add_argument(
         "--stages",
         type=_stages,
@@ -74,6 +74,7 @@ def _next(complete: bool, args: Namespace) -> str:
 def run(args: Namespace) -> Outcome:
     given = (*args.logs, args.rig, *args.unseen)
     check_apart([args.out], given)
+    check_report(args.report, given)
     found = identify(
         args.logs,
         args.rig,
@@ -87,15 +88,16 @@ def run(args: Namespace) -> Outcome:
         not args.no_integer,
     )
     text = f"{identification_text(found)}\n\nwrote {args.out}\n"
-    if args.report:
-        pictures = identification_pictures(found)
-        check_apart((Path(args.report) / name for name in pictures), given)
+    shown = drawn(args.report, lambda: identification_page(found), lambda: identification_pictures(found))
+    if isinstance(shown, dict):
+        check_apart((Path(args.report) / name for name in shown), given)
         with new_folder(args.report, given) as folder:  # pictures and rig, or neither
-            for name, picture in pictures.items():
+            for name, picture in shown.items():
                 (folder / name).write_bytes(picture)
             write_file(args.out, rig_text(found.rig), given)
         text += f"pictures in {args.report}\n"
     else:
+        text += write_report(args.report, shown, given)  # ahead of the rig: a page may be without it
         write_file(args.out, rig_text(found.rig), given)
     text += _next(found.rig.actuator is not None, args)
     return Outcome(identification_payload(found) | {"new_rig": args.out}, text)

@@ -26,6 +26,7 @@ _COMMANDS = (
     "study",
     "diagnose",
     "replay",
+    "report",
     "trial",
     "demo",
 )

@@ -5,11 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from focgen.cli.outcome import Outcome
+from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.control.controller import ARITHMETICS
 from focgen.loop.simulate import simulate
-from focgen.output import write_files
 from focgen.report.control import simulation_pictures
 from focgen.report.control_summary import simulation_payload, simulation_text
+from focgen.report.pages.control import simulation_page
 
 HELP = "the closed loop of rig and controller at a row of set points"
 EXAMPLE = """example:
@@ -36,10 +37,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--arithmetic", choices=ARITHMETICS, help="instead of the controller's")
     parser.add_argument("--length", type=int, metavar="L", help="memory length instead of the controller's")
-    parser.add_argument("--report", metavar="DIR", help="write pictures of output and command there")
+    add_report(parser)
 
 
 def run(args: Namespace) -> Outcome:
+    given = [args.rig, args.controller]
+    check_report(args.report, given)
     result = simulate(
         args.rig,
         args.controller,
@@ -51,7 +54,6 @@ def run(args: Namespace) -> Outcome:
         length=args.length,
     )
     text = simulation_text(result)
-    if args.report:
-        write_files(args.report, simulation_pictures(result), [args.rig, args.controller])
-        text += f"\npictures in {args.report}"
+    shown = drawn(args.report, lambda: simulation_page(result), lambda: simulation_pictures(result))
+    text += "\n" + write_report(args.report, shown, given)
     return Outcome(simulation_payload(result), text, result.holds)

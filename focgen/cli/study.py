@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 
 from focgen.cli.outcome import Outcome
+from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.control.controller import ARITHMETICS, MEMORIES
+from focgen.report.pages.study import study_page
+from focgen.report.study import study_pictures
 from focgen.report.study_summary import study_text
 from focgen.studies.study import SUBJECTS, study
 from focgen.studies.write import payload
@@ -36,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_variants(parser)
     parser.add_argument("--target", metavar="CORE", help="count cycles and flash for this core")
     parser.add_argument("--jobs", type=int, metavar="N", help="processes at a time (default: the cores)")
+    add_report(parser)
     parser.add_argument("--scheduler", metavar="ADDRESS", help="do the work on this Dask cluster")
 
 
@@ -81,6 +85,8 @@ def _add_variants(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Outcome:
     """Study, and say what came out."""
+    given = [path for path in (args.controller, args.rig) if path]
+    check_report(args.report, given)
     found = study(
         args.subject,
         args.controller,
@@ -97,4 +103,6 @@ def run(args: argparse.Namespace) -> Outcome:
         jobs=args.jobs,
         scheduler=args.scheduler,
     )
-    return Outcome(payload(found), f"{study_text(found)}\n\nwritten to {args.out}")
+    shown = drawn(args.report, lambda: study_page(found), lambda: study_pictures(found))
+    told = write_report(args.report, shown, given)
+    return Outcome(payload(found), f"{study_text(found)}\n\nwritten to {args.out}\n{told}")

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from focgen.cli.outcome import Outcome
+from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.output import write_files
+from focgen.report.pages.trials import trials_page
+from focgen.report.trials import pictures
 from focgen.trials.plan import KINDS
 from focgen.trials.tables import full_text, markdown
 from focgen.trials.trial import ACTIONS, trial
@@ -63,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="score: leave out what has not been run instead of counting it missed",
     )
     parser.add_argument("--out", metavar="OUT", help="score: also write the table and pictures there")
+    add_report(parser)
 
 
 def run(args: argparse.Namespace) -> Outcome:
@@ -91,6 +96,7 @@ def _run(args: argparse.Namespace) -> Outcome:
 
 
 def _score(args: argparse.Namespace) -> Outcome:
+    check_report(args.report, ())
     summary = trial(
         "score",
         *args.folder,
@@ -102,10 +108,15 @@ def _score(args: argparse.Namespace) -> Outcome:
     )
     text = full_text(summary.sets)
     if args.out:
-        from focgen.report.trials import pictures
-
-        parts = ("trial.json", "cases/**/*", "sealed/**/*")
-        inputs = (path for folder in args.folder for part in parts for path in Path(folder).glob(part))
-        write_files(args.out, {"scores.md": markdown(summary.sets), **pictures(summary.sets)}, inputs)
+        files = {"scores.md": markdown(summary.sets), **pictures(summary.sets)}
+        write_files(args.out, files, _inputs(args.folder))
         text += f"\ntable and pictures in {args.out}"
+    shown = drawn(args.report, lambda: trials_page(summary.sets), lambda: pictures(summary.sets))
+    text += "\n" + write_report(args.report, shown, _inputs(args.folder))
     return Outcome(summary, text, holds=summary.reached)
+
+
+def _inputs(folders: Sequence[str]) -> list[Path]:
+    """The cases and their seals, which nothing may replace."""
+    parts = ("trial.json", "cases/**/*", "sealed/**/*")
+    return [path for folder in folders for part in parts for path in Path(folder).glob(part)]

@@ -57,10 +57,14 @@ from focgen.tomlfile import Table, terms_of
 
 def read_controller(path: str | Path) -> Controller:
     """Read a controller. Raises ControllerError naming file, table, key and remedy."""
-    top = Table.read(path, ControllerError)
+    return controller_of(Table.read(path, ControllerError), Path(path).stem)
+
+
+def controller_of(top: Table, name: str) -> Controller:
+    """The controller that a table describes, ``name`` where it has none. Raises ControllerError."""
     gain = _gain(top)
     controller = Controller(
-        name=top.text("name", Path(path).stem),
+        name=top.text("name", name),
         sample_time=top.number("sample_time", above=0.0),
         transfer=_transfer(top),
         gain=gain,
@@ -157,10 +161,11 @@ def write_controller(controller: Controller, path: str | Path) -> None:
 
 def controller_text(controller: Controller) -> str:
     """The controller as the text of its file; equal controllers give equal bytes."""
-    return tomlkit.dumps(_table(controller))
+    return tomlkit.dumps(controller_table(controller))
 
 
-def _table(controller: Controller) -> dict:
+def controller_table(controller: Controller) -> dict:
+    """The controller as plain numbers, texts and tables of them."""
     plain = ("name", "sample_time", "integrator", "length", "memory", "arithmetic")
     table: dict = {key: getattr(controller, key) for key in plain}
     if controller.memory == "exponential":

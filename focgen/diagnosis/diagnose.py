@@ -35,7 +35,7 @@ from focgen.rig.replay import experiments
 UNTRUSTED = 0.2  # of a segment's residual foretold by inputs: its output still carries noise into the next,
 # as it carries what the form of an effect found lacks, or a hum
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
-WRITTEN = ("diagnosis.json", "refitted.toml", "augmented.toml")  # beside the pictures
+WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml")  # beside the pictures
 THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
 

@@ -1,4 +1,4 @@
-"""``diagnosis.json``, the two rigs, the proposed experiment, and pictures where matplotlib is there."""
+"""``diagnosis.json``, the two rigs, the proposed experiment, what figures draw, and pictures where matplotlib is."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import tomlkit
 
 from focgen.diagnosis.compose import Rigs
+from focgen.diagnosis.drawn import FILE, drawn_of, drawn_text, units_of_rig
 from focgen.diagnosis.menu import Choice
 from focgen.diagnosis.model import Diagnosis, Evidence
 from focgen.diagnosis.next_experiment import NEXT
@@ -17,6 +18,7 @@ from focgen.jsontext import to_json
 from focgen.logs.experiment import Experiment
 from focgen.output import write_files
 from focgen.rig.files import rig_table
+
 
 def write(
     out: str | Path,
@@ -32,6 +34,7 @@ def write(
     """
     files: dict[str, str | bytes] = {
         "diagnosis.json": to_json(diagnosis),
+        FILE: drawn_text(drawn_of(rigs.refitted, evidence, logs)),
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
         diagnosis.augmented_rig: tomlkit.dumps(rig_table(rigs.augmented(logs, diagnosis.shrink))),
     }
@@ -40,7 +43,7 @@ def write(
     if drawn and find_spec("matplotlib"):
         from focgen.report.diagnosis import pictures
 
-        files |= pictures(diagnosis, evidence, logs)
+        files |= pictures(diagnosis, evidence, logs, units_of_rig(rigs.refitted))
     write_files(out, files, inputs)
 
 

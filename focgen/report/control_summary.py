@@ -72,7 +72,7 @@ def design_text(design: Design) -> str:
     """The design for people."""
     tables = text_table(points_table(design)), text_table(margins_table(design)), worst_text(design.worst)
     notes = "\n".join([memory_line(design), *(f"note: {note}" for note in design.notes)])
-    return "\n\n".join(["\n".join(schedule_lines(design)), *tables, notes, _wish_line(design)])
+    return "\n\n".join(["\n".join(schedule_lines(design)), *tables, notes, wish_line(design)])
 
 
 def schedule_lines(design: Design) -> list[str]:
@@ -119,7 +119,8 @@ def memory_line(design: Design) -> str:
     return text
 
 
-def _wish_line(design: Design) -> str:
+def wish_line(design: Design) -> str:
+    """What was wished, and whether it is kept."""
     wish = "" if design.wish.settling is None else f" of at most {design.wish.settling:.3g} s"
     where = " with the rig's effects" if design.points[0].effects else ""
     verdict = f"kept{where}" if design.holds else f"NOT kept by the controller as it will run{where}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from focgen.codegen.generate import Generated
+from focgen.diagnosis.drawn import Drawn
 from focgen.diagnosis.model import Diagnosis
 from focgen.identification.model import Identification
 from focgen.loop.design import Design
@@ -18,7 +19,13 @@ from focgen.report.control_summary import (
 )
 from focgen.report.identification_summary import gain_text, parameter_table, quality_table
 from focgen.report.page import Page, Picture, Section, TableOf
+from focgen.report.pages.control import design_sections, simulation_sections
+from focgen.report.pages.diagnosis import diagnosis_sections
+from focgen.report.pages.identification import identification_sections
+from focgen.report.pages.parts import figures_of
+from focgen.report.pages.study import study_sections
 from focgen.report.study_summary import rows_table
+from focgen.rig.model import Rig
 from focgen.studies.model import Study
 from focgen.verification.verify import Verification
 
@@ -32,17 +39,18 @@ def demo_page(
     verified: dict[str, Verification],
     diagnosis: Diagnosis,
     sealed: tuple[str, ...],
+    drawn: Drawn,
 ) -> Page:
     """The page; its pictures are in ``pictures/``, the C in ``firmware/``, the sealed case in
-    ``diagnosis/``.
+    ``diagnosis/``. ``drawn`` is what the figures of that case draw.
     """
     sections = (
         _model(identification),
-        _controller(design),
+        _controller(design, identification.rig),
         _loop(simulation),
         _memory(memory),
         _firmware(generated, verified),
-        _diagnosis(diagnosis, sealed),
+        _diagnosis(diagnosis, sealed, drawn),
     )
     return Page(
         "From step tests to a verified fractional-order controller",
@@ -89,10 +97,11 @@ def _model(found: Identification) -> Section:
         (quality_table(found), parameter_table(found)),
         tuple(pictures),
         ("identified.toml", "rig.toml", "logs/steps.csv", "logs/sines.csv"),
+        figures_of(identification_sections(found)),
     )
 
 
-def _controller(design: Design) -> Section:
+def _controller(design: Design, rig: Rig) -> Section:
     pictures = (
         Picture("pictures/schedule.png", "The gain schedule, and the formula it stands for"),
         Picture("pictures/margins.png", "The open loop, ideal and as it will run"),
@@ -104,6 +113,7 @@ def _controller(design: Design) -> Section:
         (points_table(design), margins_table(design)),
         pictures,
         ("controller.toml",),
+        figures_of(design_sections(design, rig)),
     )
 
 
@@ -114,6 +124,8 @@ def _loop(simulation: Simulation) -> Section:
         _notes(simulation.notes),
         (setpoints_table(simulation),),
         (Picture("pictures/setpoints.png", caption),),
+        (),
+        figures_of(simulation_sections(simulation)),
     )
 
 
@@ -133,6 +145,7 @@ def _memory(study: Study) -> Section:
         (rows_table(study, study.controller.sample_time),),
         pictures,
         ("memory/report.html", "memory/study.json"),
+        figures_of(study_sections(study)),
     )
 
 
@@ -151,7 +164,7 @@ def _firmware(generated: dict[str, Generated], verified: dict[str, Verification]
     )
 
 
-def _diagnosis(found: Diagnosis, sealed: tuple[str, ...]) -> Section:
+def _diagnosis(found: Diagnosis, sealed: tuple[str, ...], drawn: Drawn) -> Section:
     shown = {
         "ladder.png": "Where the gap is: measured signals put in place of simulated ones, stage by stage",
         "residual.png": "What the refitted model leaves, against level, rate, direction and time, "
@@ -167,6 +180,7 @@ def _diagnosis(found: Diagnosis, sealed: tuple[str, ...]) -> Section:
         (),
         pictures,
         ("diagnosis/found/diagnosis.json", "diagnosis/found/augmented.toml"),
+        figures_of(diagnosis_sections(found, drawn)),
     )
 
 

@@ -2,37 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.ndimage import median_filter, uniform_filter1d
 
+from focgen.diagnosis.drawn import entry_of, means, rate_of, segment_errors, steady, way_of, worst_of
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import problem_residual
 from focgen.diagnosis.model import Diagnosis, Evidence
 from focgen.logs.experiment import Experiment
-from focgen.report.style import COLOURS, figure, png
+from focgen.report.style import COLOURS, figure, png, with_unit
 
 _POINTS = 4000
 
 
-def pictures(diagnosis: Diagnosis, evidence: Evidence, logs: Sequence[Experiment]) -> dict[str, bytes]:
-    """Every picture, PNG bytes by file name."""
-    worst = max(evidence.explanations, key=_gap_ratio)
+def pictures(
+    diagnosis: Diagnosis, evidence: Evidence, logs: Sequence[Experiment], units: Mapping[str, str]
+) -> dict[str, bytes]:
+    """Every picture, PNG bytes by file name; ``units`` by role."""
+    worst = worst_of(evidence)
     found = {
         "ladder.png": ladder(evidence),
-        "residual.png": residual(worst),
-        "loops.png": loops(evidence, logs),
+        "residual.png": residual(worst, units),
+        "loops.png": loops(evidence, logs, units),
         "waterfall.png": waterfall(diagnosis),
     }
     return found | (
         {"candidates.png": candidates(evidence)} if any(e.causes for e in evidence.explanations) else {}
-    )
-
-
-def _gap_ratio(e: Explanation) -> float:
-    return float(
-        np.mean(problem_residual(e.nominal) ** 2) / max(np.mean(problem_residual(e.best) ** 2), 1e-300)
     )
 
 
@@ -42,10 +38,7 @@ def ladder(evidence: Evidence) -> bytes:
     """
     with figure(1, 1) as (fig, axis):
         for i, e in enumerate(evidence.explanations):
-            given = e.nominal.problem.residual(e.given)
-            parts = [given, problem_residual(e.nominal), problem_residual(e.best)]
-            heights = [float(np.sqrt(np.mean(p**2))) / e.segment.level_out * 100 for p in parts]
-            for j, (height, colour) in enumerate(zip(heights, ("measured", "bad", "good"))):
+            for j, (height, colour) in enumerate(zip(segment_errors(e), ("measured", "bad", "good"))):
                 label = ("as given", "refitted", "with effects")[j] if i == 0 else None
                 axis.bar(i + (j - 1) * 0.27, height, 0.25, color=COLOURS[colour], label=label)
         axis.set_xticks(
@@ -63,17 +56,16 @@ def _thin(*signals: np.ndarray) -> list[np.ndarray]:
     return [s[::step] for s in signals]
 
 
-def residual(e: Explanation) -> bytes:
+def residual(e: Explanation, units: Mapping[str, str]) -> bytes:
     """The worst segment's residual against level, rate, direction and time, before and after the effects.
 
     Lines are means: over bins of level and of rate, and of time; those over the level are drawn apart for
     rising and falling input, so that a gap between them is a loop.
     """
     run, before, after = e.segment.run, problem_residual(e.nominal), problem_residual(e.best)
-    level = _steady(e.segment.x, run)
-    rate = _rate(level, run)
-    still = 0.02 * np.quantile(np.abs(rate), 0.99)
-    way = np.where(np.abs(rate) <= still, 0, np.sign(rate))
+    level = steady(e.segment.x, run)
+    rate = rate_of(level, run)
+    way = way_of(rate)
     with figure(2, 2) as (fig, axes):
         (by_level, by_rate), (by_way, by_time) = axes
         for values, colour, label in ((before, "bad", "refitted"), (after, "good", "with effects")):
@@ -83,18 +75,18 @@ def residual(e: Explanation) -> bytes:
                 )
             for sign, style in ((1, "-"), (-1, "--")):
                 by_level.plot(
-                    *_means(level[way == sign], values[way == sign]), style, color=_DARK[colour], lw=1.3
+                    *means(level[way == sign], values[way == sign]), style, color=_DARK[colour], lw=1.3
                 )
-            by_rate.plot(*_means(rate, values), color=_DARK[colour], lw=1.3)
-            by_time.plot(*_means(run.clock, values, 60), color=_DARK[colour], lw=1.3, label=label)
+            by_rate.plot(*means(rate, values), color=_DARK[colour], lw=1.3)
+            by_time.plot(*means(run.clock, values, 60), color=_DARK[colour], lw=1.3, label=label)
         _by_direction(by_way, before, after, way)
         by_level.plot([], [], "-", color="black", label="mean, rising")
         by_level.plot([], [], "--", color="black", label="mean, falling")
         by_level.legend(fontsize=7)
         by_time.legend(fontsize=7)
         for axis, label in (
-            (by_level, e.segment.entry),
-            (by_rate, f"rate of {e.segment.entry} (1/s)"),
+            (by_level, with_unit(e.segment.entry, units[e.segment.entry])),
+            (by_rate, f"rate of {e.segment.entry} ({units[e.segment.entry] or 1}/s)"),
             (by_time, "session's time (s)"),
         ):
             axis.set_xlabel(label)
@@ -104,35 +96,12 @@ def residual(e: Explanation) -> bytes:
         for axis in axes.ravel():
             if axis is not by_way:
                 axis.set_ylim(-widest, widest)
-            axis.set_ylabel(f"error of {e.segment.exit}")
+            axis.set_ylabel(with_unit(f"error of {e.segment.exit}", units[e.segment.exit]))
         fig.suptitle(f"What {e.segment.entry} → {e.segment.exit} leaves")
         return png(fig)
 
 
 _DARK = {"bad": "#7A3500", "good": "#00513B"}  # of the means, on the points of their colour
-
-
-def _steady(x: np.ndarray, run) -> np.ndarray:
-    """The input without its noise: medians of 0.25 s, experiment by experiment."""
-    width = 2 * max(1, round(0.125 / run.h)) + 1
-    parts = [median_filter(x[a:b], width, mode="nearest") for a, b in run.spans]
-    return np.concatenate([uniform_filter1d(p, width, mode="nearest") for p in parts])
-
-
-def _rate(level: np.ndarray, run) -> np.ndarray:
-    return np.concatenate([np.gradient(level[a:b], run.h) for a, b in run.spans])
-
-
-def _means(place: np.ndarray, values: np.ndarray, bins: int = 24) -> tuple[np.ndarray, np.ndarray]:
-    """Mean of ``values`` (n,) over equal bins of ``place`` (n,) that hold enough samples."""
-    if len(place) == 0:
-        return np.array([]), np.array([])
-    edges = np.linspace(place.min(), place.max() + 1e-300, bins + 1)
-    index = np.clip(np.digitize(place, edges) - 1, 0, bins - 1)
-    count = np.bincount(index, minlength=bins)
-    sums = np.bincount(index, weights=values, minlength=bins)
-    kept = count >= max(5, 0.002 * len(place))
-    return 0.5 * (edges[1:] + edges[:-1])[kept], sums[kept] / count[kept]
 
 
 def _by_direction(axis, before: np.ndarray, after: np.ndarray, way: np.ndarray) -> None:
@@ -151,34 +120,31 @@ def _by_direction(axis, before: np.ndarray, after: np.ndarray, way: np.ndarray) 
     axis.set_xlim(-0.6, 2.6)
 
 
-def loops(evidence: Evidence, logs: Sequence[Experiment]) -> bytes:
+def loops(evidence: Evidence, logs: Sequence[Experiment], units: Mapping[str, str]) -> bytes:
     """Output against input, measured and simulated, before and after, for the two experiments that tell most;
     against time where the input only steps.
     """
     chosen = _telling(evidence, logs)
     with figure(len(chosen), 2, squeeze=False, sharex="row", sharey="row") as (fig, axes):
         for row, i in zip(axes, chosen):
-            x = logs[i][_entry(logs)]
-            place, label = (x, _entry(logs)) if _places(x) >= _SWEEPING else (logs[i].time, "time (s)")
+            x = logs[i][entry_of(logs)]
+            swept = with_unit(entry_of(logs), units[entry_of(logs)])
+            place, label = (x, swept) if places(x) >= SWEEPING else (logs[i].time, "time (s)")
             for axis, name in zip(row, ("refitted", "explained")):
                 where, y, made = _thin(place, logs[i]["output"], evidence.simulated[name][i]["output"])
                 axis.plot(where, y, color=COLOURS["measured"], lw=0.7, label="measured")
                 axis.plot(where, made, color=COLOURS["bad" if name == "refitted" else "good"], lw=1.0)
                 axis.set_title(f"{logs[i].name}, {'refitted' if name == 'refitted' else 'with the effects'}")
                 axis.set_xlabel(label)
-            row[0].set_ylabel("output")
+            row[0].set_ylabel(with_unit("output", units["output"]))
         axes[0, 0].legend(loc="best")
         return png(fig)
 
 
-_SWEEPING = 20  # of 50 places in its range: an input that visits fewer only steps
+SWEEPING = 20  # of 50 places in its range: an input that visits fewer only steps
 
 
-def _entry(logs: Sequence[Experiment]) -> str:
-    return "command" if all("command" in log for log in logs) else "pressure"
-
-
-def _places(x: np.ndarray) -> int:
+def places(x: np.ndarray) -> int:
     """How many fiftieths of its range a signal visits."""
     return len(np.unique(np.round((x - x.min()) / max(float(np.ptp(x)), 1e-300) * 50)))
 
@@ -189,7 +155,7 @@ def _telling(evidence: Evidence, logs: Sequence[Experiment]) -> list[int]:
 
     def telling(i: int) -> float:
         changed = np.sqrt(np.mean((before[i]["output"] - after[i]["output"]) ** 2))
-        sweeps = _places(logs[i][_entry(logs)]) >= _SWEEPING
+        sweeps = places(logs[i][entry_of(logs)]) >= SWEEPING
         return float(changed) * (3.0 if sweeps else 1.0) + 1e-12 * len(logs[i])
 
     return sorted(sorted(range(len(logs)), key=telling)[-2:])

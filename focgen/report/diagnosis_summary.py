@@ -4,25 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from focgen.control.units import unit_of_role
+from focgen.diagnosis.drawn import LOGGED
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found
-from focgen.rig.model import Rig
 
 _SHOWN = 3  # parameters of an effect
 _SURE = 1.0  # of a value: an interval that is wider says nothing of its size
-_LOGGED = ("command", "pressure", "curvature", "output")
 _MEANS = (
     "A confidence is a probability, measured on the simulated rigs of docs/diagnosis.md: of names "
     "given at 90 % "
     "there, nine in ten are right."
 )
-
-
-def units_of_rig(rig: Rig) -> dict[str, str]:
-    """The unit of each signal as far as its column tells it; the curvature's is the output's where it has
-    none."""
-    units = {role: unit_of_role(rig.signals, role) for role in _LOGGED}
-    return units | {"curvature": units["curvature"] or units["output"]}
 
 
 def diagnosis_text(found: Diagnosis, units: Mapping[str, str], out: str) -> str:
@@ -91,7 +82,7 @@ def _is_known(estimate: Estimate) -> bool:
 
 def _value(name: str, estimate: Estimate, units: Mapping[str, str]) -> str:
     unit = estimate.unit
-    for role in _LOGGED:
+    for role in LOGGED:
         unit = unit.replace(f"{role} unit", units.get(role) or f"{role} unit")
     half = 0.5 * (estimate.ci95[1] - estimate.ci95[0])
     return f"{name} {estimate.value:.3g} ± {half:.1g} {unit}".rstrip()
@@ -136,3 +127,13 @@ def _next(found: Diagnosis) -> list[str]:
     if found.verdict in ("named", "set"):
         return [f"Next: check the promise on a new log, `focgen replay {found.augmented_rig} LOG`."]
     return []
+
+
+def diagnosis_story(found: Diagnosis, units: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """The same sentences apart: "where", "which", "far" and "next"."""
+    return {
+        "where": (_where(found),),
+        "which": tuple(_which(found, units)),
+        "far": (_how_far(found, units),),
+        "next": tuple(_next(found)),
+    }

@@ -17,7 +17,7 @@ _COMPARED = ("iom_1p", "iom_2p1z", "iom_3p2z")
 _LISTED = 16  # experiments in one column of a legend
 _JUMP = 0.5  # of an input's reach: it jumps where a single sample changes it by so much
 _LETTERS = 60  # in a row below an axis
-_LAST = 0.5  # of a swinging log: the part drawn as loops, when the start has died away
+LAST = 0.5  # of a swinging log: the part drawn as loops, when the start has died away
 
 
 def identification_pictures(found: Identification) -> dict[str, bytes]:
@@ -29,8 +29,8 @@ def identification_pictures(found: Identification) -> dict[str, bytes]:
     pictures |= {"gof.png": _gof(found), "fits.png": _fits(found), "models.png": _models(found)}
     if sum(fit.step for fit in found.experiments) > 1:
         pictures["parameters.png"] = _parameters(found)
-    if swings := _swings(found):
-        pictures["loops.png"] = _loops(found, swings)
+    if swinging := swings(found):
+        pictures["loops.png"] = _loops(found, swinging)
     return pictures
 
 
@@ -41,7 +41,7 @@ def _stage(found: Identification, fit: StageFit) -> bytes:
             axes.plot(time, measured, color=_RUNS[i % len(_RUNS)], lw=0.8, label=fit.names[i])
             axes.plot(time, simulated, color=COLOURS["ideal"], lw=1.0)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel(_named(found, {"regulator": "pressure", "sensor": "output"}[fit.stage]))
+        axes.set_ylabel(named(found, {"regulator": "pressure", "sensor": "output"}[fit.stage]))
         axes.set_title(f"The {fit.stage}: measured (colour) and identified, {fit.shape} (black)")
         _legend_beside(axes, [measured[-1] for _, measured, _ in fit.traces])
         return png(fig)
@@ -64,8 +64,7 @@ def _gof(found: Identification) -> bytes:
         crowded = sum(map(len, names)) > _LETTERS
         axes.set_xticks(range(len(names)), names, rotation=90 if crowded else 0)
         axes.set_ylabel("goodness of fit")
-        lowest = min(found.gof[model][n] for model in models for n in names)
-        axes.set_ylim(max(0.0, np.floor(10.0 * lowest - 0.5) / 10.0), 1.0)
+        axes.set_ylim(0.0, 1.0)
         axes.set_title("Fractional and integer-order models (Table I)")
         axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.34 if crowded else -0.1))
         return png(fig)
@@ -78,7 +77,7 @@ def _fits(found: Identification) -> bytes:
             axes.plot(fit.time, fit.simulated, color=COLOURS["ideal"], lw=0.9, ls=":")
             axes.plot(fit.time, found.joint.simulated[fit.name], color=COLOURS["ideal"], lw=1.0)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel(_named(found, found.experiments[0].fitted))
+        axes.set_ylabel(named(found, found.experiments[0].fitted))
         axes.set_title("Measured (colour), the rig (black), each experiment's own model (dotted)")
         _legend_beside(axes, [fit.measured[-1] for fit in found.experiments])
         return png(fig)
@@ -98,7 +97,7 @@ def _legend_beside(axes, ends) -> None:
     )
 
 
-def _named(found: Identification, role: str, ahead: str = "") -> str:
+def named(found: Identification, role: str, ahead: str = "") -> str:
     """A signal's name, with ``ahead`` before it, and the unit that its column tells."""
     return with_unit(ahead + role, unit_of_role(found.rig.signals, role))
 
@@ -108,10 +107,10 @@ def _models(found: Identification) -> bytes:
     fit = sorted(found.experiments, key=lambda f: f.level)[len(found.experiments) // 2]
     with figure(2, 1, size=(7.0, 5.0), sharex=True, height_ratios=(2, 1)) as (fig, (top, bottom)):
         top.plot(fit.time, fit.measured, color=GREY, lw=0.8, label="measured")
-        for label, simulated, colour in _candidates(fit):
+        for label, simulated, colour in candidates(fit):
             top.plot(fit.time, simulated, color=colour, label=label)
             bottom.plot(fit.time, fit.measured - simulated, color=colour, lw=0.8)
-        top.set_ylabel(_named(found, fit.fitted))
+        top.set_ylabel(named(found, fit.fitted))
         top.set_title(f"Experiment {fit.name}: models of different kind")
         bottom.set_ylabel("residual")
         bottom.set_xlabel("time (s)")
@@ -119,7 +118,7 @@ def _models(found: Identification) -> bytes:
         return png(fig)
 
 
-def _candidates(fit: ExperimentFit):
+def candidates(fit: ExperimentFit):
     yield "FOM", fit.simulated, COLOURS["ideal"]
     for i, model in enumerate(f for f in fit.integer if f"iom_{f.name}" in _COMPARED):
         yield model_label(f"iom_{model.name}"), model.simulated, CYCLE[i]
@@ -138,7 +137,7 @@ def _parameters(found: Identification) -> bytes:
             ax.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
             ax.set_ylabel(label)
             ax.legend(loc="upper left", ncols=2)
-        axes[-1].set_xlabel(_named(found, driving_role(found), "level of the "))
+        axes[-1].set_xlabel(named(found, driving_role(found), "level of the "))
         axes[0].set_title("Parameters of the fractional model over the level")
         return png(fig)
 
@@ -164,7 +163,7 @@ def _draw_joint(axes, joint: Joint, levels: Sequence[float]) -> None:
         ax.axhline(value, color=COLOURS["ideal"], label=f"all together: {value:.4g}, 95 % interval", zorder=1)
 
 
-def _swings(found: Identification) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+def swings(found: Identification) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
     """Name, input, measured and simulated output of what swings; an input that jumps draws no loops."""
     swings = [(u.name, u.pressure, u.measured, u.simulated) for u in found.unseen if u.swings]
     swings += [
@@ -183,12 +182,12 @@ def _loops(found: Identification, swings: list[tuple[str, np.ndarray, np.ndarray
         rows, columns, size=(2.4 * columns + 1.0, 2.6 * rows + 0.5), sharex=True, sharey=True, squeeze=False
     ) as (fig, axes):
         for ax, (name, pressure, measured, simulated) in zip(axes.flat, swings):
-            late = slice(int(len(pressure) * (1.0 - _LAST)), None)
+            late = slice(int(len(pressure) * (1.0 - LAST)), None)
             ax.plot(pressure[late], measured[late], color=GREY, lw=0.7, label="log")
             ax.plot(pressure[late], simulated[late], color=COLOURS["model"], lw=0.9, label="identified rig")
             ax.set_title(name)
         for ax in axes[-1]:
-            ax.set_xlabel(_named(found, driving_role(found)))
-        axes[0, 0].set_ylabel(_named(found, found.experiments[0].fitted))
+            ax.set_xlabel(named(found, driving_role(found)))
+        axes[0, 0].set_ylabel(named(found, found.experiments[0].fitted))
         axes[0, 0].legend(loc="upper left")
         return png(fig)

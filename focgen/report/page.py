@@ -1,4 +1,4 @@
-"""A report as one HTML page beside its pictures: readable from disk, no scripts, nothing fetched."""
+"""A report as one HTML page: beside its pictures and without scripts, or by itself with figures that move."""
 
 from __future__ import annotations
 
@@ -7,7 +7,15 @@ from dataclasses import dataclass, field
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import focgen
+from focgen.errors import MissingExtra
+from focgen.report.figures import MOST, Figure
+from focgen.report.interactive import document, legend, library
+from focgen.report.texts import data
 from focgen.resources import shipped
+
+LARGEST = 3_000_000
+"""Bytes of a page with its figures."""
+_POINTS = (MOST, MOST // 2, MOST // 4, 500)  # of a curve
 
 
 @dataclass(frozen=True)
@@ -29,13 +37,15 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """One step of the chain: what was found, as sentences, tables and pictures, and where the files are."""
+    """One step of the chain: what was found, as sentences and tables, shown in pictures (files beside the page) or in
+    figures (within it), and where the files are."""
 
     title: str
     sentences: tuple[str, ...] = ()
     tables: tuple[TableOf, ...] = ()
     pictures: tuple[Picture, ...] = ()
     files: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -47,16 +57,47 @@ class Page:
     sections: tuple[Section, ...] = field(default=())
 
     def html(self) -> str:
-        """The page as text; equal pages give equal bytes."""
-        environment = Environment(
-            loader=FileSystemLoader(shipped("templates")),
-            autoescape=True,
-            undefined=StrictUndefined,
-            trim_blocks=True,
-            lstrip_blocks=True,
-            keep_trailing_newline=True,
-        )
-        return environment.get_template("report.html").render(page=self, version=focgen.__version__)
+        """The page beside its pictures; equal pages give equal bytes."""
+        return _environment().get_template("report.html").render(page=self, version=focgen.__version__)
+
+    def self_contained(self) -> str:
+        """The page with its figures in it, which fetches nothing; equal pages give equal bytes.
+
+        Curves are thinned until the page has at most :data:`LARGEST` bytes, if need be, but not below 500 points.
+        Raises MissingExtra where Bokeh, which draws them, is not installed.
+        """
+        for most in _POINTS:
+            text = self._with_figures(most)
+            if len(text.encode("utf-8")) <= LARGEST:
+                break
+        return text
+
+    def best(self) -> str:
+        """The page with its figures where Bokeh is installed, else beside its pictures."""
+        try:
+            return self.self_contained()
+        except MissingExtra:
+            return self.html()
+
+    def _with_figures(self, most: int) -> str:
+        figures = [figure for section in self.sections for figure in section.figures]
+        documents = {f"figure{i}": document(figure, most) for i, figure in enumerate(figures, 1)}
+        template = _environment().get_template("report/page.html")
+        values = {"documents": data(documents), "library": library(), "most": most}
+        legends = [legend(figure) for figure in figures]
+        return template.render(page=self, version=focgen.__version__, legends=legends, **values)
+
+
+def _environment() -> Environment:
+    """Whatever a template prints is escaped, unless it says that it is safe."""
+    return Environment(
+        loader=FileSystemLoader(shipped("templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
 
 
 def text_table(table: TableOf) -> str:

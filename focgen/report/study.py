@@ -21,12 +21,12 @@ from focgen.report.style import (
 )
 from focgen.studies.model import Curves, Row, Study
 
-_COLOURS = {"f64": BLUE, "f32": GREEN, "q31": ORANGE, "q15": RED}
+ARITHMETIC_COLOURS = {"f64": BLUE, "f32": GREEN, "q31": ORANGE, "q15": RED}
 _MOST_LINES = 5
-_LEAST = 1e-5  # % of the step: where the distance from the ideal is cut off
-_PLACES = {"short": "length", "exponential": "states"}  # what a form's size is
+LEAST = 1e-5  # % of the step: where the distance from the ideal is cut off
+PLACES = {"short": "length", "exponential": "states"}  # what a form's size is
 _MARKERS = {"short": "o", "exponential": "D"}
-_SHARES = {
+SHARES = {
     "multiplies": "multiplications a step",
     "cycles": "cycles a step",
     "instructions": "instructions a step",
@@ -48,7 +48,8 @@ def study_pictures(study: Study) -> dict[str, bytes]:
     return found
 
 
-def _own(study: Study) -> list[Row]:
+def own_rows(study: Study) -> list[Row]:
+    """The rows at the controller's own sample time, where there are any."""
     h = study.controller.sample_time
     own = [row for row in study.rows if row.sample_time == h and row.error is not None]
     return own or [row for row in study.rows if row.error is not None]
@@ -56,8 +57,8 @@ def _own(study: Study) -> list[Row]:
 
 def accuracy(study: Study) -> bytes:
     """Error and bound against length, and against the number of exponentials, on one scale."""
-    rows = _own(study)
-    memories = [m for m in _PLACES if any(r.memory == m for r in rows)] or ["short"]
+    rows = own_rows(study)
+    memories = [m for m in PLACES if any(r.memory == m for r in rows)] or ["short"]
     size = (7.6, 3.9) if len(memories) > 1 else (6.0, 3.9)
     with figure(1, len(memories), size=size, sharey=True, squeeze=False) as (fig, axes):
         for axis, memory in zip(axes[0], memories):
@@ -73,8 +74,8 @@ def accuracy(study: Study) -> bytes:
 
 def _by_size(axis, rows: Sequence[Row], memory: str) -> None:
     """Error and bound of one form of memory, a colour for each arithmetic."""
-    for arithmetic, colour in _COLOURS.items():
-        _against(axis, [r for r in rows if r.arithmetic == arithmetic], _PLACES[memory], colour, arithmetic)
+    for arithmetic, colour in ARITHMETIC_COLOURS.items():
+        _against(axis, [r for r in rows if r.arithmetic == arithmetic], PLACES[memory], colour, arithmetic)
     axis.set_yscale("log")
     axis.set_title(f"{memory.capitalize()} memory")
     if memory == "short":
@@ -102,14 +103,14 @@ def fronts(study: Study) -> bytes:
         for axis, cost in zip(axes, (first, "ram_bytes")):
             _front(axis, study, cost)
             axis.set_xlabel(
-                _SHARES[cost] + (f" on {_target(study)}" if cost in ("cycles", "instructions") else "")
+                SHARES[cost] + (f" on {_target(study)}" if cost in ("cycles", "instructions") else "")
             )
         axes[0].set_ylabel("error / largest output")
         axes[0].set_title("What accuracy costs")
-        for memory in dict.fromkeys(row.memory for row in _own(study)):
+        for memory in dict.fromkeys(row.memory for row in own_rows(study)):
             axes[1].plot([], [], _MARKERS[memory], color=GREY, ms=4, label=f"{memory} memory")
-        for arithmetic in dict.fromkeys(row.arithmetic for row in _own(study)):
-            axes[1].plot([], [], "s", color=_COLOURS[arithmetic], ms=4, label=arithmetic)
+        for arithmetic in dict.fromkeys(row.arithmetic for row in own_rows(study)):
+            axes[1].plot([], [], "s", color=ARITHMETIC_COLOURS[arithmetic], ms=4, label=arithmetic)
         axes[1].plot([], [], color=GREY, lw=0.9, label="best at its cost")
         axes[1].legend(loc="best")
         for axis in (axes[0].xaxis, axes[1].xaxis, axes[0].yaxis):
@@ -123,9 +124,9 @@ def _target(study: Study) -> str:
 
 
 def _front(axis, study: Study, cost: str) -> None:
-    for row in _own(study):
+    for row in own_rows(study):
         if getattr(row, cost) is not None:
-            marker, colour = _MARKERS[row.memory], _COLOURS[row.arithmetic]
+            marker, colour = _MARKERS[row.memory], ARITHMETIC_COLOURS[row.arithmetic]
             axis.plot(getattr(row, cost), row.error, marker, color=colour, ms=4, alpha=0.85)
     best = [study.rows[i] for i in study.pareto[cost]]
     axis.step(
@@ -135,9 +136,9 @@ def _front(axis, study: Study, cost: str) -> None:
     axis.set_yscale("log")
 
 
-def _chosen(study: Study, part: str) -> list[tuple[Row, Curves, str]]:
+def chosen(study: Study, part: str) -> list[tuple[Row, Curves, str]]:
     """Rows in the controller's arithmetic to draw, with a colour each: some lengths, and one exponential."""
-    rows = _own(study)
+    rows = own_rows(study)
     wanted = study.controller.arithmetic
     if not any(r.arithmetic == wanted for r in rows):
         wanted = rows[0].arithmetic
@@ -161,7 +162,8 @@ def _spread(lengths: Sequence[int]) -> list[int]:
     return list(dict.fromkeys(int(np.argmin(np.abs(np.log(lengths) - place))) for place in wanted))
 
 
-def _label(row: Row) -> str:
+def row_label(row: Row) -> str:
+    """A row's memory by its size."""
     return f"L = {row.length}" if row.memory == "short" else f"{row.states} exponentials"
 
 
@@ -172,8 +174,8 @@ def _style(row: Row) -> dict:
 def frequency(study: Study) -> bytes:
     """What the memory adds to the controller's phase and magnitude, over the band that matters."""
     with figure(2, 1, size=(7.0, 5.2), sharex=True) as (fig, (top, bottom)):
-        for row, curves, colour in _chosen(study, "omega"):
-            top.semilogx(curves.omega, curves.phase_deg, color=colour, label=_label(row), **_style(row))
+        for row, curves, colour in chosen(study, "omega"):
+            top.semilogx(curves.omega, curves.phase_deg, color=colour, label=row_label(row), **_style(row))
             bottom.semilogx(curves.omega, curves.magnitude_db, color=colour, **_style(row))
         top.axhspan(-2.0, 2.0, color=COLOURS["band"], zorder=0, lw=0, label="±2°")
         for place in (study.band.crossover_low, study.band.crossover_high):
@@ -201,19 +203,19 @@ def frequency(study: Study) -> bytes:
 
 def loops(study: Study) -> bytes:
     """The step to the middle set point by length, and what it is off the ideal."""
-    at = [ideal.sample_time for ideal in study.ideal].index(_own(study)[0].sample_time)
+    at = [ideal.sample_time for ideal in study.ideal].index(own_rows(study)[0].sample_time)
     ideal = study.ideal_curves[at]
     time, perfect = np.array(ideal.time), np.array(ideal.output)
-    unit, lines = study.controller.units.measurement, _chosen(study, "time")
+    unit, lines = study.controller.units.measurement, chosen(study, "time")
     with figure(2, 1, size=(7.0, 5.6), sharex=True, height_ratios=(1.4, 1.0)) as (fig, (top, bottom)):
         for row, curves, colour in lines:
             off = 100.0 * np.abs(np.array(curves.output) - perfect) / abs(ideal.reference - perfect[0])
-            top.plot(curves.time, curves.output, color=colour, label=_label(row), **_style(row))
-            bottom.semilogy(curves.time, np.maximum(off, _LEAST), color=colour, **_style(row))
+            top.plot(curves.time, curves.output, color=colour, label=row_label(row), **_style(row))
+            bottom.semilogy(curves.time, np.maximum(off, LEAST), color=colour, **_style(row))
         top.plot(time, perfect, color=COLOURS["ideal"], lw=0.9, label="infinite memory")
         top.axhline(ideal.reference, color=GREY, lw=0.8, ls="--")
         top.set_ylabel(with_unit("output", unit))
-        bottom.set_ylim(_LEAST, None)
+        bottom.set_ylim(LEAST, None)
         bottom.set_ylabel("off the ideal (% of step)")
         bottom.set_xlabel("time (s)")
         top.set_title(f"Closed loop, {lines[0][0].arithmetic}, {lines[0][0].sample_time:g} s")

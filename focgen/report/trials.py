@@ -11,13 +11,13 @@ from focgen.trials.score import Scores
 from focgen.trials.statistics import reliability, reliability_bins
 from focgen.trials.vocabulary import VOCABULARY
 
-_LEAST = 20  # stated confidences below which a reliability picture says nothing
+LEAST = 20  # stated confidences below which a reliability picture says nothing
 
 
 def pictures(sets: Sequence[Scores]) -> dict[str, bytes]:
     """PNG by file name: the reliability of every set with confidences enough, the confusions of each."""
     found = {}
-    telling = [s for s in sets if len(s.stated) >= _LEAST]
+    telling = [s for s in sets if len(s.stated) >= LEAST]
     if telling:
         found["reliability.png"] = reliability_picture(telling)
     for scores in sets:

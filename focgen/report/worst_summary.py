@@ -46,23 +46,33 @@ def _nested(off: Uncertainty) -> dict:
 
 def worst_text(worst: Worst) -> str:
     """The worst for people: a table, and the corners that it names."""
-    named = list(dict.fromkeys(getattr(worst, name).off for name in _MEANING))
-    letters = {off: _letter(i) for i, off in enumerate(off for off in named if _nested(off))}
-    lines = [text_table(_table(worst, letters))]
-    lines += [f"{letter}: {corner_text(off)}" for off, letter in letters.items()]
+    return "\n".join([text_table(worst_table(worst)), *worst_sentences(worst)])
+
+
+def worst_sentences(worst: Worst) -> list[str]:
+    """The corners that the table names, whether all are stable, and what was left out."""
+    lines = [f"{letter}: {corner_text(off)}" for off, letter in _letters(worst).items()]
     if not worst.stable:
         lines.append("the loop is not stable in every corner")
     if worst.beyond:
         points = ", ".join(f"{point:.4g}" for point in worst.beyond)
         lines.append(f"out of the command's reach in a corner, and left out there: {points}")
-    return "\n".join(lines)
+    return lines
+
+
+def _letters(worst: Worst) -> dict[Uncertainty, str]:
+    """A letter for every corner in which something is worst."""
+    named = dict.fromkeys(getattr(worst, name).off for name in _MEANING)
+    return {off: _letter(i) for i, off in enumerate(off for off in named if _nested(off))}
 
 
 def _letter(index: int) -> str:
     return "ABCDE"[index]
 
 
-def _table(worst: Worst, letters: dict[Uncertainty, str]) -> TableOf:
+def worst_table(worst: Worst) -> TableOf:
+    """Margins and steps as given, at their worst, and where that is."""
+    letters = _letters(worst)
     rows = tuple(_cells(name, getattr(worst, name), letters) for name in _MEANING)
     heads = ("within the uncertainty", "as given", "worst", "at", "corner")
     return TableOf(

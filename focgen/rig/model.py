@@ -33,8 +33,8 @@ class Signals:
     curvature: str | None = None
     reference: str | None = None
     run: str | None = None
-    scales: Mapping[str, Scale] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
+    scales: Mapping[str, Scale] = field(default_factory=dict, hash=False)
+    units: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     def columns(self) -> dict[str, str]:
         """The logged roles and their columns, without ``time`` and ``run``."""

@@ -1,4 +1,4 @@
-"""The study's folder: study.json, the pictures, and the page."""
+"""The study's folder: study.json, curves.json, the pictures, and the page."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 from focgen.errors import MissingExtra
 from focgen.output import write_files
+from focgen.studies.kept import FILE, curves_text
 from focgen.studies.model import Study
 
 
@@ -18,21 +19,22 @@ def write(study: Study, folder: Path, inputs: Iterable = ()) -> None:
     of ``inputs`` would be written over.
     """
     files: dict[str, str | bytes] = {
-        "study.json": json.dumps(payload(study), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        "study.json": json.dumps(payload(study), indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        FILE: curves_text(study),
     }
     write_files(folder, files | _shown(study), inputs)
 
 
 def _shown(study: Study) -> dict[str, str | bytes]:
-    # matplotlib is an extra: asked for only where it draws
+    """Pictures, and a page with figures of its own, or beside the pictures: as far as the libraries are there."""
+    from focgen.report.pages.study import study_page
     from focgen.report.study import study_pictures
-    from focgen.report.study_page import study_page
 
     try:
         pictures = study_pictures(study)
     except MissingExtra:
         pictures = {}
-    return {**pictures, "report.html": study_page(study, pictures).html()}
+    return {**pictures, "report.html": study_page(study, pictures).best()}
 
 
 def payload(study: Study) -> dict[str, Any]:

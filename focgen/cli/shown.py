@@ -1,0 +1,48 @@
+"""``--report``: one page where a file of HTML is named, else a folder of pictures."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+from focgen.output import check_apart, write_file, write_files
+from focgen.report.interactive import library
+from focgen.report.page import Page
+
+
+def add_report(parser: ArgumentParser) -> None:
+    """Declare the option."""
+    help_text = "write one self-contained page to this file, or pictures to a folder of another name"
+    parser.add_argument("--report", metavar="FILE.html", help=help_text)
+
+
+def is_page(path: str | None) -> bool:
+    """Whether a page is asked for, not a folder of pictures."""
+    return path is not None and Path(path).suffix.lower() in (".html", ".htm")
+
+
+def check_report(path: str | None, inputs: Iterable) -> None:
+    """Raise before work begins that cannot be shown: MissingExtra without the library that draws on pages,
+    InputError where the page would replace an input."""
+    if is_page(path):
+        library()
+        check_apart([path], inputs)
+
+
+def drawn(path: str | None, page: Callable[[], Page], pictures: Callable[[], Mapping[str, bytes]]):
+    """What is to be written: the page's text, or pictures by name; None where nothing is asked for."""
+    if path is None:
+        return None
+    return page().self_contained() if is_page(path) else pictures()
+
+
+def write_report(path: str | None, what, inputs: Iterable) -> str:
+    """Write what :func:`drawn` gave, and say where it is."""
+    if not what:
+        return ""
+    if isinstance(what, str):
+        write_file(path, what, inputs)
+        return f"page in {path}\n"
+    write_files(path, what, inputs)
+    return f"pictures in {path}\n"

@@ -1,0 +1,1 @@
+"""What each result looks like on a page: sentences first, then figures with their numbers."""

@@ -1,0 +1,205 @@
+"""``report``: one page of whatever the commands have written: a chain, a study, a diagnosis."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from focgen.control.controller import Controller
+from focgen.control.files import read_controller
+from focgen.diagnosis.drawn import FILE as SIGNALS
+from focgen.diagnosis.drawn import read_drawn
+from focgen.errors import InputError
+from focgen.jsontext import fits, read_json
+from focgen.logs.experiment import Experiment
+from focgen.loop.simulate import simulate
+from focgen.output import check_apart, write_file
+from focgen.report.interactive import library
+from focgen.report.page import Page, Section
+from focgen.report.pages.chain import (
+    controller_section,
+    firmware_section,
+    replay_section,
+    rig_section,
+    verification_section,
+)
+from focgen.report.pages.control import simulation_sections
+from focgen.report.pages.diagnosis import diagnosis_page
+from focgen.report.pages.files import read_diagnosis
+from focgen.report.pages.study import study_page
+from focgen.rig.files import read_rig
+from focgen.rig.model import Actuator, Rig
+from focgen.rig.replay import experiments, replay
+from focgen.studies.kept import FILE as CURVES
+from focgen.studies.kept import read_study
+
+_TAKEN = (
+    "name a rig or a controller (.toml), a folder of generate, study or diagnose, what `verify --json` printed (.json), "
+    "or logs beside their rig"
+)
+_PROOF = {"node": str, "worst": (float, None), "type": str, "margin_bits": (float, None), "how": str}
+_MANIFEST = {
+    "name": str,
+    "arithmetic": str,
+    "memory": str,
+    "sample_time": float,
+    "proofs": [_PROOF],
+    "error_bound": {"quantisation": {"operator": float}},
+    "sizes": {"state_bytes": int, "table_bytes": int},
+}
+_ERROR = ({"operator": float}, None)
+_RAN = {"samples": int, "mismatches": int, "max_error": _ERROR, "error_bound": _ERROR}
+_VERIFIED = {"name": str, "arithmetic": str, "targets": dict, "differences": [str], "notes": [str], "holds": bool}
+
+
+@dataclass
+class _Chain:
+    """What lies on the way from a model to C, as it is found among the paths."""
+
+    rig: Rig | None = None
+    controller: Controller | None = None
+    logs: list[Path] = field(default_factory=list)
+    folders: list[Section] = field(default_factory=list)
+    verified: list[Section] = field(default_factory=list)
+    found: list[Page] = field(default_factory=list)  # studies and diagnoses: pages by themselves
+
+
+def report(paths: Sequence[str | Path], out: str | Path) -> Path:
+    """Write one self-contained HTML page of ``paths`` to the file ``out``, and return it.
+
+    A path is a rig or a controller, a log to be replayed with the rig, a folder that generate, study or diagnose has
+    written, or a file with what ``focgen verify --json`` printed. Rig and controller together are simulated; nothing
+    is compiled or run. Raises InputError for a path that is none of these, MissingExtra where Bokeh is not installed.
+    """
+    paths = [Path(path) for path in ((paths,) if isinstance(paths, (str, Path)) else paths)]
+    library()  # before anything takes time
+    check_apart([out], [path for given in paths for path in _files(given)])
+    write_file(out, page_of(paths).self_contained(), [path for path in paths if path.is_file()])
+    return Path(out)
+
+
+def _files(path: Path) -> list[Path]:
+    return sorted(p for p in path.iterdir() if p.is_file() and p.suffix != ".html") if path.is_dir() else [path]
+
+
+def page_of(paths: Sequence[Path]) -> Page:
+    """The page of what the paths hold. Raises InputError for a path that is nothing a page is made of."""
+    chain = _Chain()
+    for path in paths:
+        _take(path, chain)
+    if chain.logs and chain.rig is None:
+        raise InputError(str(chain.logs[0]), "is a log without a rig", "name its rig.toml as well")
+    sections = _sections(chain)
+    if len(chain.found) == 1 and not sections:
+        return chain.found[0]
+    for page in chain.found:
+        sections.append(Section(page.title, (page.lead,)))
+        sections += page.sections
+    return Page(_title(chain), _lead(chain), tuple(sections))
+
+
+def _take(path: Path, chain: _Chain) -> None:
+    """Put what a path holds in its place."""
+    if path.is_dir():
+        _take_folder(path, chain)
+    elif path.name in ("diagnosis.json", "study.json", "manifest.json", SIGNALS, CURVES):
+        _take_folder(path.parent, chain)
+    elif path.suffix == ".json":
+        chain.verified.append(verification_section(_verified(path)))
+    elif path.suffix == ".toml":
+        _take_toml(path, chain)
+    elif path.suffix in (".html", ".htm", ".png", ".c", ".h", ".md"):
+        raise InputError(str(path), "is nothing that a report is made of", _TAKEN)
+    else:
+        chain.logs.append(path)
+
+
+def _take_folder(folder: Path, chain: _Chain) -> None:
+    if (folder / "diagnosis.json").is_file():
+        chain.found.append(_diagnosis(folder))
+    elif (folder / "study.json").is_file():
+        chain.found.append(study_page(read_study(folder)))
+    elif (folder / "manifest.json").is_file():
+        chain.folders.append(firmware_section(_manifest(folder / "manifest.json")))
+    else:
+        raise InputError(str(folder), "holds no diagnosis.json, study.json or manifest.json", _TAKEN)
+
+
+def _take_toml(path: Path, chain: _Chain) -> None:
+    """A rig has signals, a controller a transfer function."""
+    try:
+        controller = "transfer" in tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        controller = False  # the reader of rigs says what is wrong
+    if controller:
+        _only_one(path, chain.controller, "controller")
+        chain.controller = read_controller(path)
+    else:
+        _only_one(path, chain.rig, "rig")
+        chain.rig = read_rig(path)
+
+
+def _only_one(path: Path, there: Any, what: str) -> None:
+    if there is not None:
+        raise InputError(str(path), f"is a second {what}", f"make a page of one {what} at a time")
+
+
+def _diagnosis(folder: Path) -> Page:
+    found = read_diagnosis(folder / "diagnosis.json")
+    drawn = read_drawn(folder / SIGNALS) if (folder / SIGNALS).exists() else None
+    refitted = folder / Path(found.refitted_rig).name
+    name = read_rig(refitted).name if refitted.is_file() else folder.resolve().name
+    return diagnosis_page(found, drawn, name)
+
+
+def _manifest(path: Path) -> dict[str, Any]:
+    remedy = "name a folder that `focgen generate` has written"
+    value = read_json(path, remedy)
+    if not fits(value, _MANIFEST):
+        raise InputError(str(path), "is no manifest", remedy)
+    return value
+
+
+def _verified(path: Path) -> dict[str, Any]:
+    remedy = "name what `focgen verify DIR --json` printed"
+    value = read_json(path, remedy)
+    if not fits(value, _VERIFIED) or not all(fits(one, ({"skipped": str}, _RAN)) for one in value["targets"].values()):
+        raise InputError(str(path), "is no verification", remedy)
+    return value
+
+
+def _sections(chain: _Chain) -> list[Section]:
+    """The chain in the order in which it is gone."""
+    rig, sections = chain.rig, []
+    if rig is not None:
+        sections.append(rig_section(rig))
+    if chain.logs:
+        logs: tuple[Experiment, ...] = experiments(rig, chain.logs)
+        sections.append(replay_section(rig, logs, replay(rig, logs)))
+    if chain.controller is not None:
+        sections.append(controller_section(chain.controller))
+        if rig is not None and isinstance(rig.actuator, Actuator):
+            sections += simulation_sections(simulate(rig, chain.controller))
+    return [*sections, *chain.folders, *chain.verified]
+
+
+def _title(chain: _Chain) -> str:
+    names = [one.name for one in (chain.rig, chain.controller) if one is not None]
+    return f"From the model to the C: {names[0]}" if names else "What focgen found"
+
+
+def _lead(chain: _Chain) -> str:
+    """What the page holds, in the order of the chain."""
+    parts = [
+        "the model" * (chain.rig is not None),
+        "logs beside it" * bool(chain.logs),
+        "the controller" * (chain.controller is not None),
+        "the closed loop of both" * (chain.rig is not None and chain.controller is not None),
+        "the generated C" * bool(chain.folders),
+        "its verification" * bool(chain.verified),
+        *(page.title[:1].lower() + page.title[1:] for page in chain.found),
+    ]
+    return f"This page shows {', '.join(part for part in parts if part)}."

@@ -1,0 +1,95 @@
+"""``curves.json``: what the figures of a study draw, so that they can be drawn from its folder alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from focgen.control.files import controller_of, controller_table
+from focgen.errors import ControllerError, InputError
+from focgen.jsontext import plain, read_json
+from focgen.logs.thinning import thinned
+from focgen.studies.jobs import read_ideal, read_plant, read_row
+from focgen.studies.model import Band, Curves, Plant, Study
+from focgen.tomlfile import Table
+
+FILE = "curves.json"
+MOST = 400
+"""Points of a curve that are kept."""
+_DIGITS = 6
+_REMEDY = "name a folder that `focgen study` has written; study again where it is of an earlier version"
+
+
+def curves_text(study: Study) -> str:
+    """The file's content: compact JSON, curves thinned to :data:`MOST` points, numbers to six digits."""
+    plant = study.plant
+    value = {
+        "controller": controller_table(study.controller),
+        "rows": [_thin(c) for c in study.curves],
+        "ideal": [_thin(c) for c in study.ideal_curves],
+        "plant": plant and {"time": plant.time, "exact": plant.exact, "outputs": [r.output for r in plant.rows]},
+    }
+    return json.dumps(plain(value), ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+
+
+def _thin(curves: Curves) -> dict[str, Any]:
+    """The same with fewer points, peaks kept."""
+    found = asdict(curves)
+    for parts in (("omega", "phase_deg", "magnitude_db"), ("time", "output")):
+        signals = [np.asarray(found[name], float) for name in parts]
+        kept = thinned(*signals[1:], most=MOST) if len(signals[0]) else []
+        found |= {name: [_rounded(v) for v in signal[kept]] for name, signal in zip(parts, signals) if len(signal)}
+    return found
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def read_study(folder: Path) -> Study:
+    """The study that a folder holds, its curves thinned. Raises InputError where it holds none."""
+    told, kept = (read_json(folder / name, _REMEDY) for name in ("study.json", FILE))
+    try:
+        return _study(told, kept, str(folder / FILE))
+    except (TypeError, KeyError, ValueError, IndexError, AttributeError, ControllerError):
+        raise InputError(str(folder), "holds no study that can be read", _REMEDY) from None
+
+
+def _study(told: dict[str, Any], kept: dict[str, Any], where: str) -> Study:
+    rows = _paired("row", told["rows"], kept["rows"], read_row)
+    ideal = _paired("ideal", told["ideal"], kept["ideal"], read_ideal)
+    table = Table(kept["controller"], where, ControllerError)
+    return Study(
+        controller=controller_of(table, told["controller"]),
+        rig=told["rig"],
+        band=Band(**told["band"]),
+        setpoints=tuple(told["setpoints"]),
+        samples=told["samples"],
+        rows=tuple(row for row, _ in rows),
+        ideal=tuple(one for one, _ in ideal),
+        plant=_plant(told["plant"], kept["plant"]),
+        pareto={cost: tuple(front) for cost, front in told["pareto"].items()},
+        recommendation=told["recommendation"],
+        notes=tuple(told["notes"]),
+        curves=tuple(curves for _, curves in rows),
+        ideal_curves=tuple(curves for _, curves in ideal),
+    )
+
+
+def _paired(key: str, values: Sequence, curves: Sequence, read) -> list:
+    if len(values) != len(curves) or any(set(c) != {f.name for f in fields(Curves)} for c in curves):
+        raise ValueError(key)
+    return [read({key: value, "curves": one}) for value, one in zip(values, curves)]
+
+
+def _plant(told: dict[str, Any] | None, kept: dict[str, Any] | None) -> Plant | None:
+    if told is None:
+        return None
+    parts = zip(told["rows"], kept["outputs"], strict=True)
+    rows = tuple(read_plant({"plant": row | {"output": output}}) for row, output in parts)
+    return Plant(told["transfer"], told["sample_time"], tuple(kept["time"]), tuple(kept["exact"]), rows)
