@@ -76,7 +76,7 @@ def test_a_name_in_capitals_has_one_spelling(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "time, micros", ((0.01, 10_000), (0.0003, 300), (1e-6, 1), (1.5e-6, None), (1 / 3, None), (60.0, 60_000_000))
+    "time, micros", ((0.01, 10_000), (0.0003, 300), (1e-6, 1), (1.5e-6, None), (1 / 3, None), (60.0, 60 * 10**6))
 )
 def test_the_period_is_there_where_it_is_whole(time, micros):
     assert period_us(build_plan(paper_controller(5, sample_time=time), "f32")) == micros
@@ -143,9 +143,9 @@ def state_of(c, seed: int):
     ffi, library, plan = c
     state, rng = ffi.new("double[]", library.state_bytes() // 8 + 1), np.random.default_rng(seed)
     library.spba_init(state)
-    for ref, meas, sched in rng.uniform(0.0, 0.02, (50, 3)):
-        library.spba_step(state, *(call(x) for call, x in zip((library.of_ref, library.of_meas, library.of_sched),
-                                                              (ref, meas, 10 * sched))))  # fmt: skip
+    calls = library.of_ref, library.of_meas, library.of_sched
+    for inputs in rng.uniform(0.0, (0.02, 0.02, 0.2), (50, 3)):
+        library.spba_step(state, *(call(x) for call, x in zip(calls, inputs)))
     return state
 
 
@@ -233,7 +233,8 @@ def test_resets_and_tracks_out_of_range_say_so(c):
         pytest.skip("floating inputs have no ends")
     state, ref, high = ffi.new("double[]", library.state_bytes() // 8 + 1), plan.reference, plan.output.high
     library.spba_init(state)
-    for given, flag in (((ref.high, 0, high), 0), ((ref.high + 1, 0, high), 8), ((0, -1, 0), 8), ((0, 0, -1), 8)):
+    resets = ((ref.high, 0, high), 0), ((ref.high + 1, 0, high), 8), ((0, -1, 0), 8), ((0, 0, -1), 8)
+    for given, flag in resets:
         library.spba_reset(state, *given)
         assert library.spba_flags(state) == flag
     for u, flag in ((high, 8), (high + 1, 8), (0, 8)):

@@ -42,7 +42,8 @@ def test_nothing_is_left_to_link(arithmetic, level, tmp_path):
     assert wanted(folder / "x.o") <= MEMORY
     defined = [line.split()[1:] for line in run(tool("nm"), "--defined-only", folder / "x.o").splitlines()]
     public = {name for kind, name in defined if kind.isupper() and kind not in "R"}
-    assert public == {f"finger_{verb}" for verb in ("init", "reset", "step", "track", "flags", "save", "restore")}
+    verbs = ("init", "reset", "step", "track", "flags", "save", "restore")
+    assert public == {f"finger_{verb}" for verb in verbs}
     assert all(kind in "TtRr" for kind, _ in defined), "nothing that can be written to"
     assert all(name.startswith(("finger_", "foc_", ".L", ".rodata", ".text")) for _, name in defined)
 

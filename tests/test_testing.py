@@ -218,7 +218,7 @@ def test_objects_classes_and_plain_functions(folders):
     once = assert_equivalent(folder, loaded.counts().step, samples=400)
     assert once.runs == 1 and once.samples > 800 and not once.flags
     assert assert_equivalent(folder, loaded.counts().step, "bound", 400).runs == 1
-    with pytest.raises(AssertionError, match='1 of .*\nfirst in sample 776 of run 0, "all inputs in one run"'):
+    with pytest.raises(AssertionError, match='1 of .*\nfirst in sample 776 of run 0, "all inputs in one'):
         assert_equivalent(folder, Loop(folder, wrong=777).step, samples=400)
 
 

@@ -1,4 +1,4 @@
-"""Floating states that no step has left: finite outputs within their limits, a flag, and a good state again."""
+"""Floating states that no step has left: finite outputs within their limits, a flag, a good state again."""
 
 import numpy as np
 import pytest
@@ -89,7 +89,9 @@ def test_it_recovers_by_itself(sound, name, arithmetic):
 
 
 def test_by_hand():
-    """The reference: the output stands at the damage, and what follows is a run after a reset to that sample."""
+    """The reference: the output stands at the damage, and what follows is a run after a reset to that
+    sample.
+    """
     plan = build_plan(seed_controller(20), "f64")
     whole = to_raw(plan, mixed(plan.controller, 400, 3))
     signals = [x[:1] for x in (whole.ref, whole.meas, whole.sched)]

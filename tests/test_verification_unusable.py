@@ -282,7 +282,8 @@ def test_the_test_survives_fast_math(arithmetic, name, flags, tmp_path: Path):
     plan = build_plan(lead(), arithmetic)
     write_files(tmp_path, {**folder_files(plan, controller_text(plan.controller).encode()), "fast.c": _FAST})
     sources = [tmp_path / "fast.c", tmp_path / "lead.c"]
-    run(*compiler(name, *flags), "-std=c99", "-DFOC_FLAGS_CHECKED", *flags, *sources, "-o", tmp_path / "fast.exe", "-lm")
+    options = ["-std=c99", "-DFOC_FLAGS_CHECKED", *flags]
+    run(*compiler(name, *flags), *options, *sources, "-o", tmp_path / "fast.exe", "-lm")
     assert run(tmp_path / "fast.exe").split() == ["16"] * 6 + ["0"] * 2
 
 

@@ -38,9 +38,8 @@ def counted(form: Format) -> Counted:
     """The ends of an integer type."""
     top = 1 << (form.bits - 1)
     beyond = top if form.bits == 32 else top - 1  # as far as floats are dense enough
-    return Counted(
-        f"INT{form.bits}_MIN", f"INT{form.bits}_MAX", literal(-float(top), "float"), literal(float(beyond), "float")
-    )
+    ends = (f"INT{form.bits}_{end}" for end in ("MIN", "MAX"))
+    return Counted(*ends, literal(-float(top), "float"), literal(float(beyond), "float"))
 
 
 def inputs_of(plan: Plan) -> dict[str, Format]:
@@ -88,7 +87,7 @@ def tried_conversions(plan: Plan) -> dict[str, tuple[str, float]]:
     for name, form in inputs_of(plan).items():
         for value in _tried(form):
             call = f"{name}_from_f32({constant(value, 'float')})"
-            raw = float(nearest_raw(np.float32(value), form)) if not form.floating else float(np.float32(value))
+            raw = float(np.float32(value) if form.floating else nearest_raw(np.float32(value), form))
             found[call] = f"{plan.name}_{call}", raw
         if not form.floating:
             found[f"{name}_from_f32(NaN)"] = f"{plan.name}_{name}_from_f32(nan)", -float(1 << (form.bits - 1))

@@ -12,7 +12,7 @@ from focgen.plan.usable import EXPONENT
 @dataclass(frozen=True)
 class GuardText:
     """Conditions on the arguments of reset, step and track; ``held``: the output that stands; ``start``: the
-    one before any step; ``damaged``: the condition on what a step has found that only a state which no step has left fulfils.
+    one before any step; ``damaged``: what tells a step that the state is none that a step has left.
     """
 
     error_usable: str

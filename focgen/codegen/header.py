@@ -87,7 +87,7 @@ def header_context(
 def _times(plan: Plan) -> list[Define]:
     found = [Define("SAMPLE_TIME", _sample_time(plan), "s: call step this often")]
     period = period_us(plan)
-    return found if period is None else [*found, Define("PERIOD_US", f"{period}u", "the same in microseconds")]
+    return found + [Define("PERIOD_US", f"{period}u", "the same in microseconds")] * (period is not None)
 
 
 def _aliases(plan: Plan, kernels: Kernels) -> list[str]:

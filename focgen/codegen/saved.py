@@ -16,8 +16,8 @@ _NAMED, _CHECKED = 8, 4  # bytes of the configuration and of the check sum
 
 @dataclass(frozen=True)
 class SavedMember:
-    """A member in C: ``array`` its length where it is one; ``put`` the bits of ``value``, ``get`` the value of
-    ``bits``, each of so many ``bytes``.
+    """A member in C: ``array`` its length where it is one; ``put`` its bits, ``get`` the value that is read,
+    each of so many ``bytes``.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """States that no run has left, in the floating arithmetics, as the reference sees them.
 
-A step that finds such a state is left out, as one with an unusable input is: the output stands, or is the one
-before any step where that is damaged, too. The memory then begins anew, as after a reset to this sample's error
-and the output that stands. So a damage is a reset ahead of a sample that is left out.
+A step that finds such a state is left out, as one with an unusable input is: the output stands, or is the
+one before any step where that is damaged, too. The memory then begins anew, as after a reset to this sample's
+error and the output that stands. So a damage is a reset ahead of a sample that is left out.
 """
 
 from __future__ import annotations

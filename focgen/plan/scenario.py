@@ -51,8 +51,8 @@ class Scenario:
     """Inputs of several independent runs ("lanes"), shape (lanes, samples), each starting from init.
 
     Raw: counts (integers) or the type's floating values, as the C takes them. Physical: the same in physical
-    units. ``sched`` is None where nothing is scheduled. At most one reset and one track a lane and sample, and
-    of damages one without a reset.
+    units. ``sched`` is None where nothing is scheduled. At most one reset and one track a lane and sample;
+    at most one damage, without a reset.
     """
 
     ref: np.ndarray

@@ -213,7 +213,7 @@ def _bits(values: np.ndarray) -> np.ndarray:
 
 
 def _said(plan: Plan, case: Case) -> Trace:
-    """What is expected, and beside the flags whether a reset or a track ahead of the step has raised its own."""
+    """What is expected; beside the flags, whether a reset or a track ahead of the step has raised its own."""
     flags = case.expected.flags
     refused = refused_events(plan, case.scenario, flags)
     return replace(case.expected, flags=np.where(refused, flags | REFUSED, flags).astype(np.uint8))

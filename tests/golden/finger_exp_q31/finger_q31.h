@@ -101,7 +101,7 @@ uint8_t finger_q31_restore(finger_q31_state *s, const uint8_t *from);
    type becomes its end, NaN the lower one: a step takes these for the ends of its ranges, and says so. */
 static inline finger_q31_sig finger_q31_count(float scaled)
 {
-    finger_q31_sig whole = INT32_MIN;
+    finger_q31_sig whole;
 
     if (scaled >= 2.14748365e+09f) {
         whole = INT32_MAX;
@@ -110,6 +110,8 @@ static inline finger_q31_sig finger_q31_count(float scaled)
         const float rest = scaled - (float)part; /* exact */
 
         whole = (finger_q31_sig)(part + (rest >= 0.5f ? 1 : 0) - (rest <= -0.5f ? 1 : 0));
+    } else {
+        whole = INT32_MIN;
     }
     return whole;
 }

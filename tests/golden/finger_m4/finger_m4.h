@@ -101,7 +101,7 @@ uint8_t finger_m4_restore(finger_m4_state *s, const uint8_t *from);
    type becomes its end, NaN the lower one: a step takes these for the ends of its ranges, and says so. */
 static inline finger_m4_sig finger_m4_count(float scaled)
 {
-    finger_m4_sig whole = INT16_MIN;
+    finger_m4_sig whole;
 
     if (scaled >= 32767.0f) {
         whole = INT16_MAX;
@@ -110,6 +110,8 @@ static inline finger_m4_sig finger_m4_count(float scaled)
         const float rest = scaled - (float)part; /* exact */
 
         whole = (finger_m4_sig)(part + (rest >= 0.5f ? 1 : 0) - (rest <= -0.5f ? 1 : 0));
+    } else {
+        whole = INT16_MIN;
     }
     return whole;
 }

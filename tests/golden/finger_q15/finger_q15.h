@@ -98,7 +98,7 @@ uint8_t finger_q15_restore(finger_q15_state *s, const uint8_t *from);
    type becomes its end, NaN the lower one: a step takes these for the ends of its ranges, and says so. */
 static inline finger_q15_sig finger_q15_count(float scaled)
 {
-    finger_q15_sig whole = INT16_MIN;
+    finger_q15_sig whole;
 
     if (scaled >= 32767.0f) {
         whole = INT16_MAX;
@@ -107,6 +107,8 @@ static inline finger_q15_sig finger_q15_count(float scaled)
         const float rest = scaled - (float)part; /* exact */
 
         whole = (finger_q15_sig)(part + (rest >= 0.5f ? 1 : 0) - (rest <= -0.5f ? 1 : 0));
+    } else {
+        whole = INT16_MIN;
     }
     return whole;
 }
