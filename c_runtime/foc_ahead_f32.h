@@ -7,6 +7,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_AHEAD_F32_VERSION 2
+
 #ifndef FOC_HAS_TILES_F32
 static inline void foc_tiles_f32(float *sum, const FOC_ROM float *weights, const float *x, unsigned tiles)
 {

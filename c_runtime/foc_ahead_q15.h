@@ -7,6 +7,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_AHEAD_Q15_VERSION 2
+
 #ifndef FOC_HAS_TILES_Q15
 static inline void foc_tiles_q15(int32_t *sum, const FOC_ROM int16_t *weights, const int16_t *x,
                                  unsigned tiles)

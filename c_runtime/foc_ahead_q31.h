@@ -7,6 +7,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_AHEAD_Q31_VERSION 2
+
 #ifndef FOC_HAS_TILES_Q31
 static inline void foc_tiles_q31(int64_t *sum, const FOC_ROM int32_t *weights, const int32_t *x,
                                  unsigned tiles)

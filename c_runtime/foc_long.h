@@ -11,6 +11,9 @@
 #include "foc_rt.h"
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_LONG_VERSION 2
+
 /* sum += weights[i] * x[i] for i = 0 ... taps-1; taps >= 1. */
 #ifndef FOC_HAS_LINE_Q31
 static inline void foc_line_q31(int64_t *sum, const FOC_ROM int32_t *weights, const int32_t *x,

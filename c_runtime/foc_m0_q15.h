@@ -10,6 +10,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_M0_Q15_VERSION 2
+
 #if defined(FOC_THUMB_M) && !defined(__thumb2__)
 #define FOC_HAS_TILES_Q15
 /* A product overwrites a factor, so the last use of each is its own and the others are copied. Two samples

@@ -11,6 +11,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_M0_Q31_VERSION 2
+
 #if defined(FOC_THUMB_M) && !defined(__thumb2__)
 #define FOC_HAS_LINE_Q31
 

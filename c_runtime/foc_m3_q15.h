@@ -11,6 +11,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_M3_Q15_VERSION 2
+
 #if defined(FOC_THUMB_M) && defined(__thumb2__)
 #define FOC_HAS_WORK_Q15
 /* Loads stand side by side, where all but the first take one cycle. 42 cycles a tile. */

@@ -11,6 +11,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_M3_Q31_VERSION 2
+
 #if defined(FOC_THUMB_M) && defined(__thumb2__)
 #define FOC_HAS_WORK_Q31
 /* Eight registers of sums leave three for weights and one for a sample; the weights change places with

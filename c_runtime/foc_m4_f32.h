@@ -10,6 +10,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_M4_F32_VERSION 2
+
 #if defined(FOC_THUMB_M) && defined(__thumb2__) && defined(FOC_SINGLE)
 #define FOC_HAS_TILES_F32
 /* 42 cycles a tile. Each sum takes its products in turn, from the oldest sample to the newest. */

@@ -11,6 +11,9 @@
 
 #include "foc_tiles.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_M4_Q15_VERSION 2
+
 #if defined(FOC_THUMB_M) && defined(__ARM_FEATURE_DSP) && defined(__thumb2__)
 #define FOC_HAS_WORK_Q15
 /* Weights 2n and 2n+1 stand in one word, which sums 0 and 2 take as it is; sums 1 and 3 take 2n+1 and

@@ -17,6 +17,9 @@
 
 #include "foc_rt.h"
 
+/* Generated files ask for the version they were written for. */
+#define FOC_MEMORY_VERSION 2
+
 /* --- Fixed point ----------------------------------------------------------------------------------- */
 
 /* A mean has `up` bits more than u. Where rate_shift is 0 the drive is all that is rounded, by half a count,

@@ -16,7 +16,7 @@
 #include <stdint.h>
 
 /* Generated files ask for the version they were written for. */
-#define FOC_RT_VERSION 1
+#define FOC_RT_VERSION 2
 
 /* The rounding shifts need the right shift of a negative number to keep its sign. C leaves that to the
    compiler; all that we know of do. */
@@ -108,6 +108,34 @@ static inline uint8_t foc_usable_f64(double x)
 
     view.value = x;
     return (uint8_t)((view.bits & 0x7fffffffffffffffu) < 0x5ff0000000000000u);
+#endif
+}
+
+/* 1 where x is a number: neither NaN nor infinity. What a good state gives always is (proved); so whatever is
+   not comes from a state that no step has left. */
+static inline uint8_t foc_finite_f32(float x)
+{
+    union {
+        float value;
+        uint32_t bits;
+    } view;
+
+    view.value = x;
+    return (uint8_t)((view.bits & 0x7fffffffu) < 0x7f800000u);
+}
+
+static inline uint8_t foc_finite_f64(double x)
+{
+#if defined(__SIZEOF_DOUBLE__) && __SIZEOF_DOUBLE__ == 4
+    return foc_finite_f32((float)x);
+#else
+    union {
+        double value;
+        uint64_t bits;
+    } view;
+
+    view.value = x;
+    return (uint8_t)((view.bits & 0x7fffffffffffffffu) < 0x7ff0000000000000u);
 #endif
 }
 

@@ -30,7 +30,7 @@
 #include "foc_rt.h"
 
 /* Generated files ask for the version they were written for. */
-#define FOC_TILES_VERSION 1
+#define FOC_TILES_VERSION 2
 
 /* A table that is read by words: its first entry stands at one. */
 #ifdef __GNUC__

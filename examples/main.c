@@ -4,7 +4,7 @@
  *   cc -std=c99 -O2 -ffp-contract=off -I firmware examples/main.c firmware/spba.c -o loop && ./loop
  *
  * The actuator here is a crude stand-in: two lags. On hardware read_pressure and read_curvature read the
- * ADC, write_voltage the DAC, and a timer calls the loop every spba_SAMPLE_TIME seconds. The first second
+ * ADC, write_voltage the DAC, and a timer calls the loop every SPBA_SAMPLE_TIME seconds. The first second
  * is manual: somebody holds the valve at 1 V, and the controller follows, so that it takes over without a
  * bump.
  *
@@ -23,7 +23,7 @@ typedef struct {
 
 static void write_voltage(plant *p, double voltage)
 {
-    const double h = (double)spba_SAMPLE_TIME;
+    const double h = (double)SPBA_SAMPLE_TIME;
     const double at_rest = (0.0015 + 0.345 * p->pressure) * p->pressure;
 
     p->voltage = voltage;
@@ -40,20 +40,20 @@ static spba_sig counts(double value, double lsb)
 
 static spba_sig read_curvature(const plant *p)
 {
-    return counts(p->curvature, (double)spba_REF_LSB);
+    return counts(p->curvature, (double)SPBA_REF_LSB);
 }
 
 static spba_sig read_pressure(const plant *p)
 {
-    return counts(p->pressure, (double)spba_SCHED_LSB);
+    return counts(p->pressure, (double)SPBA_SCHED_LSB);
 }
 
 int main(void)
 {
     static spba_state controller;
     plant p = {0.0, 0.0, 0.0};
-    const spba_sig ref = counts(0.008, (double)spba_REF_LSB);
-    const spba_sig by_hand = counts(1.0, (double)spba_U_LSB);
+    const spba_sig ref = counts(0.008, (double)SPBA_REF_LSB);
+    const spba_sig by_hand = counts(1.0, (double)SPBA_U_LSB);
     int k;
 
     spba_reset(&controller, read_curvature(&p), read_curvature(&p), by_hand);
@@ -67,11 +67,11 @@ int main(void)
             spba_track(&controller, by_hand);
         }
         if (k % 50 == 0) {
-            printf("%5.2f %6.3f  %.5f%s%s\n", k * (double)spba_SAMPLE_TIME, p.voltage, p.curvature,
+            printf("%5.2f %6.3f  %.5f%s%s\n", k * (double)SPBA_SAMPLE_TIME, p.voltage, p.curvature,
                    manual ? "  by hand" : "",
-                   (spba_flags(&controller) & spba_FLAG_HIGH) != 0u ? "  at 10 V" : "");
+                   (spba_flags(&controller) & SPBA_FLAG_HIGH) != 0u ? "  at 10 V" : "");
         }
-        write_voltage(&p, (double)(manual ? by_hand : u) * (double)spba_U_LSB);
+        write_voltage(&p, (double)(manual ? by_hand : u) * (double)SPBA_U_LSB);
     }
     return p.curvature > 0.0078 && p.curvature < 0.0082 ? 0 : 1;
 }

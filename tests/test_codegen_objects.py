@@ -42,7 +42,8 @@ def test_nothing_is_left_to_link(arithmetic, level, tmp_path):
     assert wanted(folder / "x.o") <= MEMORY
     defined = [line.split()[1:] for line in run(tool("nm"), "--defined-only", folder / "x.o").splitlines()]
     public = {name for kind, name in defined if kind.isupper() and kind not in "R"}
-    assert public == {f"finger_{verb}" for verb in ("init", "reset", "step", "track", "flags")}
+    verbs = ("init", "reset", "step", "track", "flags", "save", "restore")
+    assert public == {f"finger_{verb}" for verb in verbs}
     assert all(kind in "TtRr" for kind, _ in defined), "nothing that can be written to"
     assert all(name.startswith(("finger_", "foc_", ".L", ".rodata", ".text")) for _, name in defined)
 
@@ -229,7 +230,7 @@ def test_the_example_closes_its_loop(tmp_path):
 def test_the_handshake_refuses_another_runtime(tmp_path):
     folder = folder_of("q15", tmp_path)
     runtime = folder / "foc_rt.h"
-    runtime.write_text(runtime.read_text().replace("#define FOC_RT_VERSION 1", "#define FOC_RT_VERSION 99"))
+    runtime.write_text(runtime.read_text().replace("#define FOC_RT_VERSION 2", "#define FOC_RT_VERSION 99"))
     with pytest.raises(AssertionError, match="run focgen generate again"):
         run(*compiler("gcc"), "-std=c99", "-c", folder / "finger.c", "-o", folder / "x.o")
 

@@ -229,7 +229,7 @@ def test_the_error_of_an_exponential_memory_is_that_of_its_operator(arithmetic):
 def test_the_signal_ahead_of_the_integrator_is_hurt_less_than_its_power():
     """T s^α + 1: the constant part does not forget."""
     controller = variant_of(paper_controller(), Variant("short", "f64", 0.01, length=100))
-    found = measure(controller, build_plan(controller), 0.01, SAMPLES)
+    found = measure(controller, build_plan(controller), 0.01, SAMPLES, np.array([1.0]))
     x = inputs(controller, 0.01, SAMPLES).error
     w = weights(0.6, SAMPLES - 1)
     cut = np.where(np.arange(SAMPLES) <= 100, w, 0.0)
@@ -238,3 +238,23 @@ def test_the_signal_ahead_of_the_integrator_is_hurt_less_than_its_power():
     )
     expected = (np.abs(short - exact).max(axis=1) / np.abs(exact).max(axis=1)).max()
     assert found.error_ahead == pytest.approx(expected, rel=1e-9) and found.error_ahead < found.error
+
+
+@pytest.mark.parametrize("memory", ["short", "exponential"])
+@pytest.mark.parametrize("order", [0.6, 1.4, -0.4])
+def test_the_error_against_s_is_that_of_the_weights_and_of_sampling(memory, order):
+    """By the sums themselves; a fine memory is left with the delay of order · h / 2 of Grünwald–Letnikov."""
+    h, omega = 0.01, np.geomspace(3.0, 0.1 * np.pi / 0.01, 9)
+    options = {"tolerance": 1e-6, "horizon": 100_000} if memory == "exponential" else {"length": 200}
+    transfer = TransferFunction([(2.0, order)])
+    controller = replace(paper_controller(), transfer=transfer, memory=memory, arithmetic="f64", **options)
+    found = measure(controller, build_plan(controller), h, 400, omega).error_s
+    delay = np.exp(-1j * omega * h)
+    own = order if order > 0.0 else order + 1.0  # the power that is summed; 1/s is apart
+    sums = (1.0 - delay) ** own * h**-own
+    if memory == "short":
+        sums = h**-own * np.exp(-1j * np.outer(omega * h, np.arange(201))) @ weights(own, 200)
+    expected = np.abs(sums / (1j * omega) ** own - 1.0).max()
+    assert found == pytest.approx(expected, rel=1e-4)
+    if memory == "exponential":
+        assert found == pytest.approx(0.05 * np.pi * own, rel=0.1)

@@ -115,7 +115,7 @@ PAPER = (
     Fault(
         "track ignored",
         "@.c",
-        r"s->integral = .*foc_clamp\w+\(u_applied, .*;",
+        r"s->integral = (.*u_applied.*|\(int\d\d_t\)u\b.*);",
         r"(void)u_applied;",
     ),
     Fault("track not limited", "@.c", r"foc_clamp\w+\(u_applied, @_U_MIN, @_U_MAX\)", "u_applied"),
@@ -168,11 +168,16 @@ def copied(sound: Path, tmp_path: Path, name: str, arithmetic: str) -> Path:
     return Path(shutil.copytree(sound / f"{name}_{arithmetic}", tmp_path / "broken"))
 
 
+def named(text: str, name: str) -> str:
+    """The controller's name for "@", in capitals ahead of a macro."""
+    return re.sub(r"@(?=_[A-Z])", name.upper(), text).replace("@", name)
+
+
 def sow(folder: Path, name: str, fault: Fault) -> None:
     """Change the text, and make sure that it has changed."""
     path = folder / fault.file.replace("@", name)
     before = path.read_text()
-    after, places = re.subn(fault.pattern.replace("@", name), fault.by.replace("@", name), before)
+    after, places = re.subn(named(fault.pattern, name), named(fault.by, name), before)
     assert places and after != before, f"{fault}: nothing to change"
     path.write_text(after)
 

@@ -46,7 +46,7 @@ def c(request, tmp_path_factory):
     ctype = plan.output.ctype
     compile_shared([folder / "spba.c"], folder / "spba.so", ["-std=c99", "-ffp-contract=off"])
     ffi, header = FFI(), (folder / "spba.h").read_text()
-    members = header.split("typedef struct {")[1].split("}")[0].replace("spba_ERRORS", "21")
+    members = header.split("typedef struct {")[1].split("}")[0].replace("SPBA_ERRORS", "21")
     ffi.cdef(
         f"typedef {ctype} spba_sig; typedef struct {{ {members} }} spba_state;"
         "void spba_init(spba_state *); void spba_reset(spba_state *, spba_sig, spba_sig, spba_sig);"
@@ -282,7 +282,8 @@ def test_the_test_survives_fast_math(arithmetic, name, flags, tmp_path: Path):
     plan = build_plan(lead(), arithmetic)
     write_files(tmp_path, {**folder_files(plan, controller_text(plan.controller).encode()), "fast.c": _FAST})
     sources = [tmp_path / "fast.c", tmp_path / "lead.c"]
-    run(*compiler(name, *flags), "-std=c99", *flags, *sources, "-o", tmp_path / "fast.exe", "-lm")
+    options = ["-std=c99", "-DFOC_FLAGS_CHECKED", *flags]
+    run(*compiler(name, *flags), *options, *sources, "-o", tmp_path / "fast.exe", "-lm")
     assert run(tmp_path / "fast.exe").split() == ["16"] * 6 + ["0"] * 2
 
 

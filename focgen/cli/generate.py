@@ -48,6 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--selftest", action="store_true", help="add NAME_selftest(), which a board runs: 0 if it agrees"
     )
+    parser.add_argument(
+        "--no-float", action="store_true", help="leave out NAME_ref_from_f32() and the other conversions"
+    )
     parser.add_argument("--for", dest="package", choices=PACKAGES, default="plain", help="build files to add")
 
 
@@ -65,6 +68,7 @@ def run(args: argparse.Namespace) -> Outcome:
         args.tolerance,
         args.horizon,
         args.selftest,
+        args.no_float,
     )
     return Outcome(made.manifest, _text(made))
 

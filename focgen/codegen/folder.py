@@ -188,6 +188,7 @@ class ExampleContext:
     name: str
     title: UserText
     fixed: bool
+    counting: bool
     scheduled: bool
     integral: bool
     real: str
@@ -198,8 +199,10 @@ class ExampleContext:
     suffix: str
 
 
-def example_context(plan: Plan, title: str) -> ExampleContext:
-    """Prepare the example: a step of the reference within its range, half way up."""
+def example_context(plan: Plan, title: str, floats: bool = True) -> ExampleContext:
+    """Prepare the example: a step of the reference within its range, half way up; without conversions in the
+    header (``floats``) it has its own.
+    """
     ranges, units = plan.controller.ranges, plan.controller.units
     middle = 0.5 * (ranges.reference[0] + ranges.reference[1])
     at = sum(ranges.schedule) / 2 if plan.schedule else 0.0
@@ -207,6 +210,7 @@ def example_context(plan: Plan, title: str) -> ExampleContext:
         name=plan.name,
         title=UserText(title),
         fixed=not plan.floating,
+        counting=not plan.floating and not floats,
         scheduled=plan.schedule is not None,
         integral=plan.integrator is not None,
         real="double" if plan.arithmetic != "f32" else "float",

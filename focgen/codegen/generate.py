@@ -50,6 +50,7 @@ def generate(
     tolerance: float | None = None,
     horizon: int | None = None,
     selftest: bool = False,
+    no_float: bool = False,
 ) -> Generated:
     """Write C for a controller into the folder ``out``, whole or not at all; what an earlier run wrote there
     for it and this one does not, goes.
@@ -59,6 +60,7 @@ def generate(
     and ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier) default to the
     controller's own. ``selftest`` adds NAME_selftest.c and .h. ``target`` names a core whose own instructions
     the history sums shall use; without it they take their portable form. The bits are the same.
+    ``no_float`` leaves the conversions from and to physical values out of the header.
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
@@ -71,7 +73,7 @@ def generate(
     _check_form(made.memory if memory is None else memory, length, tolerance, horizon)
     called = check_name(made.name if name is None else name, where)
     plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon)
-    files = folder_files(plan, text, selftest, kernels)
+    files = folder_files(plan, text, selftest, kernels, not no_float)
     old = leftovers(Path(out), called, files)
     check_apart(old, [controller])
     write_files(out, files, [controller])
@@ -81,7 +83,11 @@ def generate(
 
 
 def folder_files(
-    plan: Plan, controller_toml: bytes, selftest: bool = False, kernels: Kernels = PORTABLE
+    plan: Plan,
+    controller_toml: bytes,
+    selftest: bool = False,
+    kernels: Kernels = PORTABLE,
+    floats: bool = True,
 ) -> dict[str, str | bytes]:
     """Name and content of every file of a generated folder; the same plan gives the same bytes.
 
@@ -94,15 +100,15 @@ def folder_files(
         for name in runtime_files(plan, kernels)
     }
     inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
-    manifest = manifest_of(plan, inputs, selftest, kernels)
+    manifest = manifest_of(plan, inputs, selftest, kernels, floats)
     return {
-        f"{plan.name}.h": render("controller.h.jinja", header_context(plan, title, digest, kernels)),
+        f"{plan.name}.h": render("controller.h.jinja", header_context(plan, title, digest, kernels, floats)),
         f"{plan.name}.c": render("controller.c.jinja", source_context(plan, title, digest, kernels)),
         **runtime,
         "controller.toml": controller_toml,
         "manifest.json": json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "README.md": render("README.md.jinja", readme_context(plan, title, selftest, kernels)),
-        "example/main.c": render("main.c.jinja", example_context(plan, title)),
+        "example/main.c": render("main.c.jinja", example_context(plan, title, floats)),
         **(selftest_files(plan, digest) if selftest else {}),
     }
 

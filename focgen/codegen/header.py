@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import focgen
+from focgen.codegen.conversions import Conversion, Counted, conversions, counted, period_us, to_float
 from focgen.codegen.formulas import transfer_text
 from focgen.codegen.guard import unusable_text
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import constant, literal, power_of_two, quantity
+from focgen.codegen.manifest import flags
+from focgen.codegen.saved import saved_bytes
 from focgen.codegen.state import Member, members, state_bytes
 from focgen.codegen.texts import UserText, comment
 from focgen.plan.model import Format, Plan
@@ -36,7 +39,7 @@ class HeaderContext:
     fixed: bool
     unusable: str
     signal: str
-    sample_time: Define
+    times: list[Define]
     scales: list[Define]
     limits: list[Define]
     sizes: list[Define]
@@ -44,10 +47,18 @@ class HeaderContext:
     state_bytes: int
     integral: bool
     scheduled: bool
+    counted: Counted | None
+    conversions: list[Conversion]
+    to_float: str
+    aliases: list[str]
 
 
-def header_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTABLE) -> HeaderContext:
-    """Prepare NAME.h; ``sha256`` is of the controller's file."""
+def header_context(
+    plan: Plan, title: str, sha256: str, kernels: Kernels = PORTABLE, floats: bool = True
+) -> HeaderContext:
+    """Prepare NAME.h; ``sha256`` is of the controller's file; ``floats``: with conversions from and to
+    physical values.
+    """
     return HeaderContext(
         name=plan.name,
         title=UserText(title),
@@ -58,7 +69,7 @@ def header_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         fixed=not plan.floating,
         unusable=unusable_text(plan) if plan.floating else "",
         signal=plan.output.ctype,
-        sample_time=Define("SAMPLE_TIME", _sample_time(plan), "s: call step this often"),
+        times=_times(plan),
         scales=_scales(plan),
         limits=_limits(plan),
         sizes=_sizes(plan, kernels),
@@ -66,7 +77,27 @@ def header_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         state_bytes=state_bytes(plan, kernels),
         integral=plan.integrator is not None,
         scheduled=plan.schedule is not None,
+        counted=None if plan.floating else counted(plan.output),
+        conversions=conversions(plan) if floats else [],
+        to_float=to_float(plan),
+        aliases=_aliases(plan, kernels),
     )
+
+
+def _times(plan: Plan) -> list[Define]:
+    found = [Define("SAMPLE_TIME", _sample_time(plan), "s: call step this often")]
+    period = period_us(plan)
+    return found + [Define("PERIOD_US", f"{period}u", "the same in microseconds")] * (period is not None)
+
+
+def _aliases(plan: Plan, kernels: Kernels) -> list[str]:
+    """The macros that programs may know by the controller's name as it is spelled; none where that is in
+    capitals anyway.
+    """
+    if plan.name == plan.name.upper():
+        return []
+    listed = (*_times(plan)[:1], *_scales(plan), *_limits(plan), *_sizes(plan, kernels)[:-1])
+    return [*(define.name for define in listed), *(f"FLAG_{flag}" for flag in flags(plan))]
 
 
 def _sample_time(plan: Plan) -> str:
@@ -117,8 +148,9 @@ def _ends(name: str, form: Format, physical: tuple[float, float], unit: str) -> 
 
 
 def _sizes(plan: Plan, kernels: Kernels) -> list[Define]:
+    saved = Define("SAVED_BYTES", f"{saved_bytes(plan, kernels)}u", f"what {plan.name}_save writes")
     found = [Define("ERRORS", str(kernels.slots(plan, "error")), "the present error and those before it")]
     if plan.feedback:
         about = "the same of the filtered error"
         found.append(Define("FILTERED", str(kernels.slots(plan, "filtered")), about))
-    return found
+    return [*found, saved]

@@ -33,9 +33,14 @@ def sha256(data: str | bytes) -> str:
 
 
 def manifest_of(
-    plan: Plan, inputs: dict[str, str], selftest: bool = False, kernels: Kernels = PORTABLE
+    plan: Plan,
+    inputs: dict[str, str],
+    selftest: bool = False,
+    kernels: Kernels = PORTABLE,
+    floats: bool = True,
 ) -> dict[str, Any]:
     """The manifest of a plan; ``inputs`` maps every input to its SHA-256; ``selftest``: has it one?
+    ``floats``: has its header conversions?
 
     ``kernels`` leave a mark only where a target was named.
     """
@@ -57,6 +62,7 @@ def manifest_of(
         **({"kernels": kernel_entry(plan, kernels)} if kernels.target else {}),
         "sizes": sizes(plan, kernels),
         **({"selftest": selftest_entry(plan)} if selftest else {}),
+        **({} if floats else {"no_float": True}),
         "inputs": inputs,
     }
 

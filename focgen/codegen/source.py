@@ -8,8 +8,9 @@ import focgen
 from focgen.codegen.expressions import CLAMP, LONGEST_SHIFT, bound, converted, saturated, scaled_up, shifted
 from focgen.codegen.formulas import memory_about, step_formulas, transfer_text, weights_about
 from focgen.codegen.guard import GuardText, guard_text
-from focgen.codegen.kernels import PORTABLE, Kernels
+from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
 from focgen.codegen.literals import constant, literal, quantity, scale
+from focgen.codegen.saved import SavedText, saved_text
 from focgen.codegen.state import carries, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
 from focgen.codegen.texts import UserText, comment
@@ -44,13 +45,15 @@ class FeedbackText:
 
 @dataclass(frozen=True)
 class IntegralText:
-    """The controller's integrator; ``from_output`` takes ``u_applied`` to its counts."""
+    """The controller's integrator; ``within`` is ``u_applied`` between the limits,
+    ``from_output`` the integral that follows it."""
 
     ctype: str
     clamp: str
     about: str
     start: str
     start_about: str
+    within: str
     from_output: str
     starting: bool
 
@@ -101,11 +104,13 @@ class SourceContext:
     increment_about: str
     product: str
     kernels: tuple[str, ...]
+    runtime: tuple[str, ...]
     target: str
     error_start: str
     filtered_start: str
     integral: IntegralText | None
     guard: GuardText | None
+    saved: SavedText
     output: str
 
 
@@ -143,18 +148,20 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         increment_about=_increment_about(plan),
         product=_product(plan),
         kernels=kernels.headers(plan)[:-1],
+        runtime=runtime_files(plan, kernels),
         target=kernels.target or "",
         error_start=_start(plan, kernels, "error"),
         filtered_start=_start(plan, kernels, "filtered"),
         integral=_integral(plan),
         guard=guard_text(plan),
+        saved=saved_text(plan, sha256, kernels),
         output=_output(plan),
     )
 
 
 def _start(plan: Plan, kernels: Kernels, history: str) -> str:
     """The slot of the latest sample after a reset: before a group where there are groups."""
-    size = f"{plan.name}_{'ERRORS' if history == 'error' else 'FILTERED'}"
+    size = f"{plan.name.upper()}_{'ERRORS' if history == 'error' else 'FILTERED'}"
     return f"{size} - 1u" if kernels.grouped(plan, history) else "0"
 
 
@@ -259,7 +266,7 @@ def quantity_unit(unit: str) -> str:
 
 def _product(plan: Plan) -> str:
     """d from ``gain`` and ``v``, by the cheapest product that is exact."""
-    gain = "gain" if plan.schedule else f"{plan.name}_GAIN"
+    gain = "gain" if plan.schedule else f"{plan.name.upper()}_GAIN"
     if plan.floating:
         return f"{gain} * v"
     if plan.gain.ctype == "int16_t" and plan.filtered.ctype == "int32_t":
@@ -278,14 +285,16 @@ def _integral(plan: Plan) -> IntegralText | None:
     ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
     total = f"s->integral + ({converted('d', plan.increment.ctype, state.ctype)} + s->increment)"
     start = min(max(0, state.low), state.high)
-    clamped = f"{CLAMP[u.ctype]}(u_applied, {plan.name}_U_MIN, {plan.name}_U_MAX)"
+    clamped = f"{CLAMP[u.ctype]}(u_applied, {plan.name.upper()}_U_MIN, {plan.name.upper()}_U_MAX)"
+    applied = clamped if plan.floating else "u"
     return IntegralText(
         ctype=state.ctype,
         clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
         about=_proved(plan, "integrator sum", state.bits),
         start=literal(start, state.ctype),
         start_about=quantity(start * state.lsb, plan.controller.units.output),
-        from_output=converted(clamped, u.ctype, state.ctype) + scaled_up(state.ctype, by),
+        within=clamped,
+        from_output=converted(applied, u.ctype, state.ctype) + scaled_up(state.ctype, by),
         starting=starts(plan),
     )
 
@@ -297,4 +306,4 @@ def _output(plan: Plan) -> str:
         state = plan.integrator.state.ctype
         return saturated(shifted("s->integral", state, plan.integrator.to_output), state, u)
     d = plan.increment.ctype
-    return converted(f"{CLAMP[d]}(d, {plan.name}_U_MIN, {plan.name}_U_MAX)", d, u)
+    return converted(f"{CLAMP[d]}(d, {plan.name.upper()}_U_MIN, {plan.name.upper()}_U_MAX)", d, u)

@@ -55,12 +55,12 @@ def _histories(plan: Plan, kernels: Kernels) -> list[Member]:
         "error",
         f"ring of ref - meas{_counts(plan.error)}",
         kernels.slots(plan, "error"),
-        f"{plan.name}_ERRORS",
+        f"{plan.name.upper()}_ERRORS",
     )
     slots = [error, Member("uint16_t", "error_now", "slot of the latest error")]
     if plan.feedback:
         about = f"ring of the filtered error{_counts(plan.filtered)}"
-        size = f"{plan.name}_FILTERED"
+        size = f"{plan.name.upper()}_FILTERED"
         slots.append(Member(plan.filtered.ctype, "filtered", about, kernels.slots(plan, "filtered"), size))
         slots.append(Member("uint16_t", "filtered_now", "slot of the latest filtered error"))
     return slots
@@ -120,7 +120,7 @@ def _integral(plan: Plan) -> list[Member]:
 
 def _bytes(plan: Plan) -> list[Member]:
     found = [Member(plan.output.ctype, "output", "what the latest step has returned")] if holds(plan) else []
-    found += [Member("uint8_t", "flags", f"{plan.name}_FLAG_...")]
+    found += [Member("uint8_t", "flags", f"{plan.name.upper()}_FLAG_...")]
     if starts(plan):
         found.append(Member("uint8_t", "starting", "1 from reset to the first step"))
     return found

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.plan.damage import mended
 from focgen.plan.execute import Run, execute
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Reset, Scenario, Trace, Track
@@ -40,6 +41,7 @@ class Ending:
 
 def endings(plan: Plan, scenario: Scenario) -> tuple[Trace, tuple[Ending, ...]]:
     """Run a plan as :func:`focgen.plan.execute.execute` does; what it answers, and how each lane ends."""
+    scenario = mended(plan, scenario, execute)
     invalid = invalid_samples(plan, scenario)
     if not invalid.any():
         run = Run(plan, scenario)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.plan.damage import mended
 from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest, Recursion
 from focgen.plan.model import (
@@ -32,6 +33,7 @@ from focgen.plan.usable import holding, invalid_samples, usable
 
 def execute(plan: Plan, scenario: Scenario) -> Trace:
     """Run a plan on raw inputs; returns raw u and d and the flags, shape (lanes, samples)."""
+    scenario = mended(plan, scenario, execute)
     invalid = invalid_samples(plan, scenario)
     return holding(plan, scenario, invalid, _executed) if invalid.any() else _executed(plan, scenario)
 

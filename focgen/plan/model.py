@@ -114,6 +114,14 @@ An argument is usable where its magnitude is below 2^48 (float) or 2^512 (double
   are usable follows the latest such one as if there had been nothing in between.
 - A reset takes e = 0 where ref or meas is not usable, and u0 = 0 where u0 is not; the flags are bit 4 then.
 - A track of what is not usable raises bit 4 and does nothing else.
+
+A step with usable inputs whose I + (d_k + d_{k−1}) (without an integrator: d_k) is NaN or infinite, or that
+finds I beyond the output's limits, has a state that no step can have left: a flipped bit, memory that nothing
+has initialised. It is left out in the same way; the output that stands is 0, clamped, where I (or the output
+kept) is no number within the limits. Then the past is as after a reset to this sample's error and that output
+(:mod:`focgen.plan.damage`).
+
+In the integer arithmetics a reset or a track whose argument is beyond its range raises bit 3.
 """
 
 from __future__ import annotations

@@ -25,18 +25,30 @@ def running_response(plan: Plan, omega, schedule_value: float | None = None) -> 
     scheduled. Physical units. Neither sample and hold nor computation delay is in it, nor rounding of
     signals, nor clamps.
     """
-    omega = np.asarray(omega, dtype=float)
-    back = np.exp(-1j * omega * plan.sample_time)
-    trapezoid = (1.0 + back) / (1.0 - back)
-    total = np.zeros(omega.shape, complex)
+    total = filtered_response(plan, omega) * running_gain(plan, schedule_value)
+    return total * _trapezoid(_back(plan, omega)) if plan.integrator else total
+
+
+def filtered_response(plan: Plan, omega) -> np.ndarray:
+    """From the error to the filtered error v alone, likewise: the transfer function as the plan runs it."""
+    back = _back(plan, omega)
+    total = np.zeros(back.shape, complex)
     if plan.direct:
         total = total + _response(plan.direct, back)
     if plan.inner:
-        total = total + _response(plan.inner.rest, back) * trapezoid
+        total = total + _response(plan.inner.rest, back) * _trapezoid(back)
     if plan.feedback:
         total = total / (1.0 + _response(plan.feedback.table, back))
-    total = total * running_gain(plan, schedule_value)
-    return total * trapezoid if plan.integrator else total
+    return total
+
+
+def _back(plan: Plan, omega) -> np.ndarray:
+    """z⁻¹."""
+    return np.exp(-1j * np.asarray(omega, dtype=float) * plan.sample_time)
+
+
+def _trapezoid(back: np.ndarray) -> np.ndarray:
+    return (1.0 + back) / (1.0 - back)
 
 
 def running_gain(plan: Plan, schedule_value: float | None = None) -> float:

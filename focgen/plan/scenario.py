@@ -11,13 +11,18 @@ from focgen.plan.model import Format, Plan
 
 @dataclass(frozen=True)
 class Reset:
-    """``reset(ref, meas, u0)`` of one lane before sample ``sample``; the values like the scenario's."""
+    """``reset(ref, meas, u0)`` of one lane before sample ``sample``; the values like the scenario's.
+
+    ``keeps``, of the reference alone: it has begun anew by itself, and the output that stands is ``u0``
+    without an integrator, too.
+    """
 
     lane: int
     sample: int
     ref: float
     meas: float
     u0: float
+    keeps: bool = False
 
 
 @dataclass(frozen=True)
@@ -30,11 +35,24 @@ class Track:
 
 
 @dataclass(frozen=True)
+class Damage:
+    """What a run cannot do, in a floating state before sample ``sample``, whose inputs can be used: ``what``
+    is the latest "error", which becomes NaN, the "integral", which leaves its limits, or "all", every byte
+    becoming 0xff.
+    """
+
+    lane: int
+    sample: int
+    what: str = "error"
+
+
+@dataclass(frozen=True)
 class Scenario:
     """Inputs of several independent runs ("lanes"), shape (lanes, samples), each starting from init.
 
     Raw: counts (integers) or the type's floating values, as the C takes them. Physical: the same in physical
-    units. ``sched`` is None where nothing is scheduled. At most one reset and one track a lane and sample.
+    units. ``sched`` is None where nothing is scheduled. At most one reset and one track a lane and sample;
+    at most one damage, without a reset.
     """
 
     ref: np.ndarray
@@ -42,6 +60,7 @@ class Scenario:
     sched: np.ndarray | None = None
     resets: tuple[Reset, ...] = ()
     tracks: tuple[Track, ...] = ()
+    damages: tuple[Damage, ...] = ()
 
     @property
     def lanes(self) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 
 from focgen.errors import PlanError
 from focgen.fractional.elementary import l1
-from focgen.plan.model import FLAG_HIGH, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
+from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
 from focgen.plan.proofs import inverse_of_recursion
 from focgen.plan.scenario import Reset, Scenario, Trace, Track
 
@@ -161,7 +161,33 @@ def _hold(plan: Plan, scenario: Scenario, lane: int, invalid: np.ndarray, u: np.
         for event in happening.get(k, ()):
             if isinstance(event, Reset):
                 now = start
-            given = event.u0 if isinstance(event, Reset) else event.u
-            if plan.integrator and usable(given, plan.output):
+            given, keeps = (event.u0, event.keeps) if isinstance(event, Reset) else (event.u, False)
+            if (plan.integrator or keeps) and usable(given, plan.output):
                 now = min(max(kind(given), kind(low)), kind(high))
         now = u[k] = now if invalid[k] else u[k]
+
+
+def refused_events(plan: Plan, scenario: Scenario, flags: np.ndarray) -> np.ndarray:
+    """Ahead of which samples a reset or a track has left INPUT or INVALID raised; ``flags`` of every step and
+    the result have the shape (lanes, samples).
+
+    A track leaves what the step before has raised, a reset does not.
+    """
+    raised, found = FLAG_INVALID | FLAG_INPUT, np.zeros(flags.shape, bool)
+    for event in events(scenario):
+        at = event.lane, event.sample
+        if isinstance(event, Reset):
+            found[at] = _refused(plan, (event.ref, plan.reference), (event.meas, plan.measurement))
+            given = event.u0
+        else:
+            reset = any((r.lane, r.sample) == at for r in scenario.resets)
+            found[at] |= not reset and event.sample > 0 and bool(flags[event.lane, event.sample - 1] & raised)
+            given = event.u
+        found[at] |= plan.integrator is not None and _refused(plan, (given, plan.output))
+    return found
+
+
+def _refused(plan: Plan, *values: tuple[float, Format]) -> bool:
+    if plan.floating:
+        return not all(usable(value, form) for value, form in values)
+    return not all(form.low <= value <= form.high for value, form in values)

@@ -24,7 +24,7 @@ from focgen.studies.costs import costs
 from focgen.studies.model import Curves, Ideal, Loop, PlantRow, Row, Setup, Variant
 from focgen.studies.operator import fractional_terms, measure, variant_of
 from focgen.studies.plant import plant_of, plant_row
-from focgen.studies.spectrum import Spectrum, memory_spectrum, sampling_spectrum
+from focgen.studies.spectrum import Spectrum, memory_spectrum, omegas, sampling_spectrum
 
 _FORMAT = 1  # of a stored answer
 
@@ -83,7 +83,8 @@ def _row(setup: Setup, variant: Variant) -> dict[str, Any]:
 
 def _measured(setup: Setup, variant: Variant, plan: Plan) -> tuple[Row, Curves]:
     controller = plan.controller
-    opened = measure(controller, plan, setup.controller.sample_time, setup.samples)
+    at = omegas(setup.band, controller.sample_time)
+    opened = measure(controller, plan, setup.controller.sample_time, setup.samples, at)
     spectrum = memory_spectrum(controller, plan, setup.band)
     cost = costs(plan, setup.target)
     base, steps = replace(setup.controller, sample_time=variant.sample_time), None
@@ -96,6 +97,7 @@ def _measured(setup: Setup, variant: Variant, plan: Plan) -> tuple[Row, Curves]:
         errors=opened.errors,
         bound=opened.bound,
         error_ahead=opened.error_ahead,
+        error_s=opened.error_s,
         dc_bias=_dc_bias(plan),
         operator_bias=_operator_bias(plan),
         phase_error_deg=float(np.abs(spectrum.phase_deg).max()),

@@ -90,7 +90,8 @@ class Row:
     ``error``: of the memory operator alone (each fractional power in turn, the worst), the largest over a
     step, a ramp, a sine and noise of its largest error relative to the largest exact output, against infinite
     memory; ``errors`` has them by input. ``bound``: what that error provably cannot exceed. ``error_ahead``:
-    the same of the whole controller's signal ahead of its integrator.
+    the same of the whole controller's signal ahead of its integrator. ``error_s``: of the memory operator
+    alone against s^α itself, the largest |H/(jω)^α − 1| over the band.
     ``dc_bias``: what the controller's transfer function yields for a constant, less what it should, relative
     to what it should; ``operator_bias``: Γ(L+1−α)/(Γ(1−α)L!), what D^α with step 1 yields for 1, largest over
     the powers.
@@ -113,6 +114,7 @@ class Row:
     errors: dict[str, float] | None = None
     bound: float | None = None
     error_ahead: float | None = None
+    error_s: float | None = None
     dc_bias: float | None = None
     operator_bias: float | None = None
     phase_error_deg: float | None = None

@@ -13,6 +13,7 @@ from focgen.plan.canonical import realise
 from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
 from focgen.plan.model import Plan
+from focgen.plan.response import filtered_response
 from focgen.plan.scenario import Scenario, physical_trace, to_raw
 from focgen.studies.model import INPUTS, Variant
 from focgen.studies.signals import Inputs, exact_power, inputs, relative_errors, signed
@@ -25,6 +26,7 @@ class OpenLoop:
     errors: dict[str, float]
     bound: float | None
     error_ahead: float | None
+    error_s: float
 
     @property
     def error(self) -> float:
@@ -55,21 +57,22 @@ def variant_of(controller: Controller, variant: Variant) -> Controller:
     )
 
 
-def measure(controller: Controller, plan: Plan, own: float, samples: int) -> OpenLoop:
+def measure(controller: Controller, plan: Plan, own: float, samples: int, omega: np.ndarray) -> OpenLoop:
     """Run the operator and the controller's ``plan`` on the four inputs.
 
-    ``controller`` is the variant; ``own`` and ``samples`` as :func:`focgen.studies.signals.inputs` has them.
+    ``controller`` is the variant; ``own`` and ``samples`` as :func:`focgen.studies.signals.inputs` has them;
+    ``omega`` (rad/s): where the operator is compared with (jω)^α.
     Raises PlanError where the operator alone has no plan in this arithmetic.
     """
     both = signed(controller)
     plan = plan if both is controller else build_plan(both)
     controller, given = both, inputs(both, own, samples)
-    each = [_power(controller, term, given) for term in fractional_terms(controller)]
-    errors = {name: max(found[name] for found, _ in each) for name in INPUTS}
-    bounds = [bound for _, bound in each]
+    each = [_power(controller, term, given, omega) for term in fractional_terms(controller)]
+    errors = {name: max(found[name] for found, _, _ in each) for name in INPUTS}
+    bounds = [bound for _, bound, _ in each]
     exact = ideal(controller, given.scenario).d
     ahead = max(relative_errors(_ahead(plan, given.scenario), exact).values(), default=None)
-    return OpenLoop(errors, None if None in bounds else max(bounds), ahead)
+    return OpenLoop(errors, None if None in bounds else max(bounds), ahead, max(s for _, _, s in each))
 
 
 def _ahead(plan: Plan, scenario: Scenario) -> np.ndarray:
@@ -88,13 +91,22 @@ def operator_alone(controller: Controller, term: Term) -> Controller:
     )
 
 
-def _power(controller: Controller, term: Term, given: Inputs) -> tuple[dict[str, float], float | None]:
-    """The errors of one power by input, and what proves that they are no larger."""
+def _power(
+    controller: Controller, term: Term, given: Inputs, omega: np.ndarray
+) -> tuple[dict[str, float], float | None, float]:
+    """The errors of one power by input, what proves that they are no larger, and the error against s^α."""
     alone = operator_alone(controller, term)
     plan = build_plan(alone)
     exact = alone.gain * term.coefficient * exact_power(term.order, alone.sample_time, given.error)
     scenario = replace(given.scenario, sched=None)
-    return relative_errors(_ahead(plan, scenario), exact), _proved(plan, np.abs(exact))
+    errors = relative_errors(_ahead(plan, scenario), exact)
+    return errors, _proved(plan, np.abs(exact)), _continuous(plan, term, omega)
+
+
+def _continuous(plan: Plan, term: Term, omega: np.ndarray) -> float:
+    """The largest |H(e^jωh) / (jω)^α − 1| of a power that stands alone."""
+    exact = term.coefficient * (1j * omega) ** term.order
+    return float(np.abs(filtered_response(plan, omega) / exact - 1.0).max())
 
 
 def _proved(plan: Plan, sizes: np.ndarray) -> float | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.codegen.conversions import period_us, tried_conversions
 from focgen.codegen.manifest import lsbs
 from focgen.codegen.render import render
 from focgen.plan.model import Plan
@@ -18,7 +19,10 @@ DTYPES = {
     "int32_t": np.int32,
     "int16_t": np.int16,
 }
-_RESET, _TRACK = 1, 2
+_RESET, _TRACK, _SAVE = 1, 2, 64
+_DAMAGES = {"error": 16, "all": 32, "integral": 48}
+REFUSED = 128
+"""Beside the flags of a step: a reset or a track ahead of it has raised INPUT or INVALID."""
 RESUME = 4
 """Event of a first sample: go on from the state that is there, without init."""
 
@@ -33,6 +37,9 @@ class DriverContext:
     integral: bool
     held: str
     scales: tuple[str, ...]
+    conversions: tuple[str, ...]
+    fixed: bool
+    refusing: str
 
 
 def driver(plan: Plan) -> str:
@@ -43,15 +50,29 @@ def driver(plan: Plan) -> str:
 def driver_context(plan: Plan) -> DriverContext:
     """What a driver asks for of a plan."""
     scheduled, integral = plan.schedule is not None, plan.integrator is not None
-    held = f"({plan.name}_flags(state) & {plan.name}_FLAG_INVALID) ? 0 : " if plan.floating else ""
-    scales = tuple(header_scales(plan))
-    return DriverContext(plan.name, plan.increment.ctype, scheduled, integral, held, scales)
+    held = f"({plan.name}_flags(state) & {plan.name.upper()}_FLAG_INVALID) ? 0 : " if plan.floating else ""
+    scales = tuple(f"{plan.name.upper()}_{macro}" for macro in _scales(plan))
+    tried = tuple(expression for expression, _ in tried_conversions(plan).values())
+    refusing = f"{plan.name.upper()}_FLAG_{'INVALID' if plan.floating else 'INPUT'}"
+    fixed = not plan.floating
+    return DriverContext(
+        plan.name, plan.increment.ctype, scheduled, integral, held, scales, tried, fixed, refusing
+    )
 
 
 def header_scales(plan: Plan) -> dict[str, float]:
-    """The values that the header's macros for LSBs and sample time must have, by name."""
+    """The values that the header's macros for LSBs, sample time and period must have, by name; and what its
+    conversions must give, which are NaN in a header that has none.
+    """
+    return {**_scales(plan), **{call: value for call, (_, value) in tried_conversions(plan).items()}}
+
+
+def _scales(plan: Plan) -> dict[str, float]:
     exact = plan.arithmetic == "f64"
-    return {**lsbs(plan), "SAMPLE_TIME": plan.sample_time if exact else float(np.float32(plan.sample_time))}
+    time = plan.sample_time if exact else float(np.float32(plan.sample_time))
+    period = period_us(plan)
+    periods = {} if period is None else {"PERIOD_US": float(period)}
+    return {**lsbs(plan), "SAMPLE_TIME": time, **periods}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +105,8 @@ def lane_of(plan: Plan, scenario: Scenario, lane: int) -> Lane:
 def _events(scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np.ndarray]:
     """What happens ahead of each sample, and its values (ref, meas, u0, u applied)."""
     event, given = np.zeros(scenario.samples, np.uint8), np.zeros((scenario.samples, 4), signal)
+    for at in (scenario.samples // 3, 2 * scenario.samples // 3):
+        event[at] |= _SAVE if at else 0
     for r in scenario.resets:
         if r.lane == lane:
             event[r.sample] |= _RESET
@@ -92,4 +115,8 @@ def _events(scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np
         if t.lane == lane:
             event[t.sample] |= _TRACK
             given[t.sample, 3] = t.u
+    for d in scenario.damages:
+        if d.lane == lane:
+            event[d.sample] |= _DAMAGES[d.what]
+            given[d.sample, 0] = np.nan
     return event, given

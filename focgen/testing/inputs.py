@@ -24,7 +24,9 @@ class Trial:
 
 def exact_trials(plan: Plan, samples: int, seed: int, plain: bool) -> list[Trial]:
     """Those of ``verify``; for a ``plain`` step all in one run without events."""
-    found = [Trial(label, s, to_physical(plan, s)) for label, s in raw_scenarios(plan, samples, seed).items()]
+    scenarios = raw_scenarios(plan, samples, seed)
+    whole = {label: replace(s, damages=()) for label, s in scenarios.items()}  # a state is its owner's affair
+    found = [Trial(label, s, to_physical(plan, s)) for label, s in whole.items()]
     return [_one_run(plan, found)] if plain else found
 
 

@@ -12,7 +12,8 @@ from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.plan.ending import Ending, endings
 from focgen.plan.model import ErrorBound, Plan
 from focgen.plan.scenario import Scenario, Trace, to_raw
-from focgen.targets.driver import Answers, header_scales
+from focgen.plan.usable import refused_events
+from focgen.targets.driver import REFUSED, Answers, header_scales
 from focgen.verification.apart import Crashed, TimedOut, apart
 from focgen.verification.errors_seen import ErrorsSeen, MaxError, errors_seen
 from focgen.verification.folder import GeneratedFolder
@@ -168,13 +169,13 @@ def judged(
     bound, kernels = (plan.error_bound, kernels) if read is None else (read.bound, read.kernels)
     total, mismatches, first, states = 0, 0, None, 0
     for case, answer in zip(cases.cases, seen, strict=True):
-        wrong = _differs(plan, answer.trace, case.expected)
+        wrong = _differs(plan, answer.trace, _said(plan, case))
         total += wrong.size
         mismatches += int(np.count_nonzero(wrong))
         left = _states(plan, case, answer, kernels, alignment)
         mismatches, states = mismatches + len(left), states + len(answer.states)
         if first is None and (wrong.any() or left):
-            first = _described(case, answer.trace, wrong) if wrong.any() else left[0]
+            first = _described(plan, case, answer.trace, wrong) if wrong.any() else left[0]
     errors = _errors(plan, cases, seen[-1].trace, bound)
     limits = {"operator": bound.operator, "output_per_sample": bound.output_per_sample}
     found = TargetResult(total, mismatches, errors.largest, limits, errors.within, first, states=states)
@@ -193,7 +194,7 @@ def _header(plan: Plan, found: dict[str, float]) -> tuple[str, ...]:
     return tuple(
         f"{plan.name}_{key} is {found[key]!r}, the controller gives {value!r}"
         for key, value in header_scales(plan).items()
-        if found[key] != value
+        if found[key] != value and not np.isnan(found[key])
     )
 
 
@@ -211,9 +212,16 @@ def _bits(values: np.ndarray) -> np.ndarray:
     return positive.view(np.int32 if values.dtype.itemsize == 4 else np.int64)
 
 
-def _described(case: Case, seen: Trace, wrong: np.ndarray) -> str:
+def _said(plan: Plan, case: Case) -> Trace:
+    """What is expected; beside the flags, whether a reset or a track ahead of the step has raised its own."""
+    flags = case.expected.flags
+    refused = refused_events(plan, case.scenario, flags)
+    return replace(case.expected, flags=np.where(refused, flags | REFUSED, flags).astype(np.uint8))
+
+
+def _described(plan: Plan, case: Case, seen: Trace, wrong: np.ndarray) -> str:
     lane, sample = (int(i) for i in np.argwhere(wrong)[np.argmin(np.argwhere(wrong)[:, 1])])
-    at, expected = (lane, sample), case.expected
+    at, expected = (lane, sample), _said(plan, case)
     return (
         f"{case.label}, run {lane}, sample {sample}: C gives {_answer(seen, at)}; "
         f"the reference {_answer(expected, at)} "

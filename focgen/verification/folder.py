@@ -56,7 +56,7 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     options = recorded.length, recorded.name, recorded.memory, recorded.tolerance, recorded.horizon
     plan = build_plan(controller, recorded.arithmetic, *options)
     given = _bytes(path / "controller.toml")
-    files = folder_files(plan, given, recorded.selftest, recorded.kernels)
+    files = folder_files(plan, given, recorded.selftest, recorded.kernels, recorded.floats)
     for name in files:
         if name not in BESIDE and not (path / name).is_file():
             raise InputError(str(path), f"lacks {name}", AGAIN)

@@ -28,6 +28,7 @@ _SHAPE = {
     "error_bound": {"quantisation": _QUANTISATION, "truncation": {"operator": (float, None)}},
     "kernels?": {"target": str},
     "selftest?": dict,
+    "no_float?": bool,
     "inputs": dict,
 }
 _EXPONENTIAL = {"tolerance": float, "horizon": int}
@@ -35,8 +36,8 @@ _EXPONENTIAL = {"tolerance": float, "horizon": int}
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """A manifest: the ``name`` of the C, the options of the plan and of its C, the ``bound`` it claims, and
-    ``content``, all of it.
+    """A manifest: the ``name`` of the C, the options of the plan and of its C (``floats``: whether its header
+    has conversions), the ``bound`` it claims, and ``content``, all of it.
 
     ``length`` is None with an exponential memory, ``tolerance`` and ``horizon`` are with a short one.
     """
@@ -50,6 +51,7 @@ class Recorded:
     kernels: Kernels
     selftest: bool
     bound: ErrorBound
+    floats: bool
     content: Mapping[str, Any]
 
 
@@ -74,7 +76,8 @@ def read_recorded(folder: Path) -> Recorded:
         check_choice(f"{where} [kernels]", target, TARGETS)
     name = check_name(found["name"], where)
     options = found["arithmetic"], found["memory"], *_memory(path, found)
-    return Recorded(name, *options, Kernels(target), "selftest" in found, _bound(found["error_bound"]), found)
+    bound, floats = _bound(found["error_bound"]), not found.get("no_float", False)
+    return Recorded(name, *options, Kernels(target), "selftest" in found, bound, floats, found)
 
 
 def _check_shape(path: Path, found: Any, shape: dict[str, Any]) -> None:

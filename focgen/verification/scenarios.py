@@ -26,7 +26,7 @@ def mixed(controller: Controller, samples: int, seed: int, beyond: bool = False)
     ranges = controller.ranges
     ref, meas = (_signals(rng, span, each, beyond) for span in (ranges.reference, ranges.measurement))
     sched = _signals(rng, ranges.schedule, each, beyond) if controller.scheduled else None
-    return Scenario(ref, meas, sched, _resets(rng, controller, each), _tracks(rng, controller, each))
+    return Scenario(ref, meas, sched, _resets(rng, controller, each, beyond), _tracks(rng, controller, each))
 
 
 def _signals(rng: np.random.Generator, span: tuple[float, float], count: int, beyond: bool) -> np.ndarray:
@@ -66,12 +66,18 @@ def _held(rng, count):
 _KINDS = (_noise, _steps, _extremes, _sine, _wander, _held)
 
 
-def _resets(rng, controller: Controller, count: int) -> tuple[Reset, ...]:
-    spans = controller.ranges.reference, controller.ranges.measurement, controller.ranges.output
+def _resets(rng, controller: Controller, count: int, beyond: bool) -> tuple[Reset, ...]:
+    inputs = controller.ranges.reference, controller.ranges.measurement
+    spans = *((_wider(span) for span in inputs) if beyond else inputs), controller.ranges.output
     places = [
         (lane, int(at)) for lane in range(1, LANES) for at in rng.choice(count, min(2, count), replace=False)
     ]
     return tuple(Reset(lane, at, *(float(rng.uniform(*span)) for span in spans)) for lane, at in places)
+
+
+def _wider(span: tuple[float, float]) -> tuple[float, float]:
+    margin = _BEYOND * (span[1] - span[0])
+    return span[0] - margin, span[1] + margin
 
 
 def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:

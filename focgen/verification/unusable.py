@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.plan.model import Plan
-from focgen.plan.scenario import Scenario
-from focgen.plan.usable import EXPONENT
+from focgen.plan.scenario import Damage, Scenario
+from focgen.plan.usable import EXPONENT, invalid_samples
 
 _SHARE = 0.1  # of the samples of an input
 _LONGEST = 12  # samples in a row
@@ -16,7 +16,7 @@ _LONGEST = 12  # samples in a row
 
 def strewn(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
     """A raw floating scenario in which inputs cannot be used now and then, alone and in rows; nor can an
-    argument of every other reset and track.
+    argument of every other reset and track; nor, twice a lane, the state.
 
     The first lane begins so, and the last holds some of the largest values that can be used.
     """
@@ -33,7 +33,9 @@ def strewn(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
     first[:] = bad[: first.size]
     others = [values[-1] for name, values in signals.items() if name != "meas"]
     _largest(rng, signals["meas"][-1], others, kind(limit(plan)))
-    return Scenario(**signals, resets=_resets(rng, scenario, bad), tracks=_tracks(rng, scenario, bad))
+    resets, tracks = _resets(rng, scenario, bad), _tracks(rng, scenario, bad)
+    made = Scenario(**signals, resets=resets, tracks=tracks)
+    return replace(made, damages=_damages(plan, made, rng))
 
 
 def limit(plan: Plan) -> float:
@@ -60,6 +62,21 @@ def _largest(rng: np.random.Generator, values: np.ndarray, others: list[np.ndarr
     if late.size:
         places = rng.choice(late, min(3, late.size), replace=False)
         values[places] = np.nextafter(bound, values.dtype.type(0)) * rng.choice([-1, 1], places.size)
+
+
+def _damages(plan: Plan, scenario: Scenario, rng: np.random.Generator) -> tuple[Damage, ...]:
+    """Of every lane's state one or two, ahead of samples that can be used; a plan without a past has none."""
+    if not (plan.error_lags or plan.feedback or plan.integrator):
+        return ()
+    good, begun = ~invalid_samples(plan, scenario), {(r.lane, r.sample) for r in scenario.resets}
+    kinds = ["error"] * bool(plan.error_lags) + ["all"] + ["integral"] * bool(plan.integrator)
+    found = []
+    for lane in range(scenario.lanes):
+        places = [k for k in np.flatnonzero(good[lane]).tolist() if (lane, k) not in begun]
+        last = [k for k in places if not good[lane, min(k + 1, scenario.samples - 1)]]  # ahead of bad ones
+        chosen = {int(rng.choice(some)) for some in (places, last) if some}
+        found += [Damage(lane, k, kinds[(lane + i) % len(kinds)]) for i, k in enumerate(sorted(chosen))]
+    return tuple(found)
 
 
 def _resets(rng: np.random.Generator, scenario: Scenario, bad: np.ndarray) -> tuple:

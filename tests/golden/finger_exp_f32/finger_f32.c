@@ -21,9 +21,26 @@
 
 #include "foc_memory.h"
 #include "foc_rt.h"
+#include "foc_save.h"
 
-#if FOC_RT_VERSION != 1
+#if FOC_RT_VERSION != 2
 #error "foc_rt.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
+#endif
+#if FOC_SAVE_VERSION != 2
+#error "foc_save.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
+#endif
+#if FOC_MEMORY_VERSION != 2
+#error "foc_memory.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
+#endif
+
+/* The bits are those of the reference where each operation is rounded once. */
+#ifndef FOC_FLAGS_CHECKED
+#ifdef __FAST_MATH__
+#error "finger_f32.c: build without -ffast-math (and -Ofast), or define FOC_FLAGS_CHECKED"
+#endif
+#if defined(__FP_FAST_FMAF) && !defined(__clang__) && !defined(__STRICT_ANSI__)
+#warning "finger_f32.c: build with -ffp-contract=off, then define FOC_FLAGS_CHECKED"
+#endif
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
@@ -170,7 +187,7 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     float x;
     float v;
 
-    s->error_now = foc_ring_next(s->error_now, finger_f32_ERRORS);
+    s->error_now = foc_ring_next(s->error_now, FINGER_F32_ERRORS);
     s->error[s->error_now] = e;
     x = finger_f32_numerator_sum(s);
 
@@ -180,7 +197,7 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     s->inner_input = r;
     x += s->inner;
 
-    s->filtered_now = foc_ring_next(s->filtered_now, finger_f32_FILTERED);
+    s->filtered_now = foc_ring_next(s->filtered_now, FINGER_F32_FILTERED);
     x -= finger_f32_denominator_sum(s);
     v = x;
     s->filtered[s->filtered_now] = v;
@@ -198,11 +215,11 @@ static uint8_t finger_f32_ends(float u)
 {
     unsigned flags = 0;
 
-    if (u >= finger_f32_U_MAX) {
-        flags |= finger_f32_FLAG_HIGH;
+    if (u >= FINGER_F32_U_MAX) {
+        flags |= FINGER_F32_FLAG_HIGH;
     }
-    if (u <= finger_f32_U_MIN) {
-        flags |= finger_f32_FLAG_LOW;
+    if (u <= FINGER_F32_U_MIN) {
+        flags |= FINGER_F32_FLAG_LOW;
     }
     return (uint8_t)flags;
 }
@@ -213,7 +230,7 @@ static void finger_f32_settle(finger_f32_state *s, float e)
     const float v = 1.0f * e; /* e times 1 */
     uint16_t i;
 
-    for (i = 0; i < finger_f32_ERRORS; i++) {
+    for (i = 0; i < FINGER_F32_ERRORS; i++) {
         s->error[i] = e;
     }
     s->error_now = 0;
@@ -231,7 +248,7 @@ static void finger_f32_settle(finger_f32_state *s, float e)
         s->integrand_slow_means[i] = e;
         s->integrand_slow_rests[i] = 0.0f;
     }
-    for (i = 0; i < finger_f32_FILTERED; i++) {
+    for (i = 0; i < FINGER_F32_FILTERED; i++) {
         s->filtered[i] = v;
     }
     s->filtered_now = 0;
@@ -250,12 +267,31 @@ static void finger_f32_settle(finger_f32_state *s, float e)
     s->flags = 0;
 }
 
+/* Whether an output is one that a step can have left: NaN is not. */
+static uint8_t finger_f32_within(float u)
+{
+    return (uint8_t)(foc_finite_f32(u) && u >= FINGER_F32_U_MIN && u <= FINGER_F32_U_MAX);
+}
+
 /* An input of the step cannot be used: the output stays, and so does everything else. */
 static finger_f32_sig finger_f32_hold(finger_f32_state *s)
 {
-    const float u = s->integral;
+    const float known = s->integral;
+    const float u = finger_f32_within(known) ? known : 0.0f;
 
-    s->flags = (uint8_t)(finger_f32_FLAG_INVALID | finger_f32_ends(u));
+    s->flags = (uint8_t)(FINGER_F32_FLAG_INVALID | finger_f32_ends(u));
+    return u;
+}
+
+/* The state is not one that a step has left: the output stays, the memory begins anew with the error e. */
+static finger_f32_sig finger_f32_recover(finger_f32_state *s, float e)
+{
+    const float u = finger_f32_hold(s);
+    const uint8_t flags = s->flags;
+
+    finger_f32_settle(s, e);
+    s->integral = u;
+    s->flags = flags;
     return u;
 }
 
@@ -273,7 +309,7 @@ void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig me
     s->integral = 0.0f; /* where u0 cannot be used */
     finger_f32_track(s, u0);
     if (!known) {
-        s->flags = finger_f32_FLAG_INVALID;
+        s->flags = FINGER_F32_FLAG_INVALID;
     }
 }
 
@@ -295,12 +331,15 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
         s->increment = finger_f32_increment(gain, s->resting);
         s->starting = 0;
     }
+    if (!foc_finite_f32(s->integral + (d + s->increment)) || !finger_f32_within(s->integral)) {
+        return finger_f32_recover(s, ref - meas);
+    }
     s->integral = foc_clamp_f32(s->integral + (d + s->increment), 0.0f, 10.0f);
     s->increment = d;
     u = s->integral;
 
     if (sched < finger_f32_points[0] || sched > finger_f32_points[2]) {
-        flags |= finger_f32_FLAG_SCHEDULE;
+        flags |= FINGER_F32_FLAG_SCHEDULE;
     }
     s->flags = (uint8_t)(flags | finger_f32_ends(u));
     return u;
@@ -309,13 +348,124 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
 void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied)
 {
     if (!foc_usable_f32(u_applied)) {
-        s->flags = (uint8_t)(s->flags | finger_f32_FLAG_INVALID);
+        s->flags = (uint8_t)(s->flags | FINGER_F32_FLAG_INVALID);
         return;
     }
-    s->integral = foc_clamp_f32(u_applied, finger_f32_U_MIN, finger_f32_U_MAX);
+    s->integral = foc_clamp_f32(u_applied, FINGER_F32_U_MIN, FINGER_F32_U_MAX);
 }
 
 uint8_t finger_f32_flags(const finger_f32_state *s)
 {
     return s->flags;
+}
+
+/* What gives a saved state its meaning, in 64 bits: the controller and how it is computed. */
+#define FINGER_F32_CONFIGURATION 0xf3ca411cfb07f878u
+
+void finger_f32_save(const finger_f32_state *s, uint8_t *to)
+{
+    uint32_t at = foc_put(to, 0, FINGER_F32_CONFIGURATION, 8);
+    uint16_t i;
+
+    at = foc_put(to, at, foc_bits_f32(s->integral), 4);
+    at = foc_put(to, at, foc_bits_f32(s->increment), 4);
+    at = foc_put(to, at, foc_bits_f32(s->resting), 4);
+    at = foc_put(to, at, foc_bits_f32(s->inner), 4);
+    at = foc_put(to, at, foc_bits_f32(s->inner_input), 4);
+    at = foc_put(to, at, (uint64_t)s->error_now, 2);
+    at = foc_put(to, at, (uint64_t)s->filtered_now, 2);
+    at = foc_put(to, at, (uint64_t)s->flags, 1);
+    at = foc_put(to, at, (uint64_t)s->starting, 1);
+    for (i = 0; i < FINGER_F32_ERRORS; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->error[i]), 4);
+    }
+    for (i = 0; i < FINGER_F32_FILTERED; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->filtered[i]), 4);
+    }
+    for (i = 0; i < 3; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->numerator_means[i]), 4);
+    }
+    for (i = 0; i < 8; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->numerator_slow_means[i]), 4);
+    }
+    for (i = 0; i < 8; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->numerator_slow_rests[i]), 4);
+    }
+    for (i = 0; i < 3; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->integrand_means[i]), 4);
+    }
+    for (i = 0; i < 8; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->integrand_slow_means[i]), 4);
+    }
+    for (i = 0; i < 8; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->integrand_slow_rests[i]), 4);
+    }
+    for (i = 0; i < 4; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->denominator_means[i]), 4);
+    }
+    for (i = 0; i < 8; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->denominator_slow_means[i]), 4);
+    }
+    for (i = 0; i < 8; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->denominator_slow_rests[i]), 4);
+    }
+    (void)foc_put(to, at, foc_crc32(to, at), 4);
+}
+
+uint8_t finger_f32_restore(finger_f32_state *s, const uint8_t *from)
+{
+    const uint32_t sum = foc_crc32(from, FINGER_F32_SAVED_BYTES - 4u);
+    uint32_t at = FINGER_F32_SAVED_BYTES - 4u;
+    uint16_t i;
+
+    if (foc_get(from, &at, 4) != sum) {
+        return 2;
+    }
+    at = 0;
+    if (foc_get(from, &at, 8) != FINGER_F32_CONFIGURATION) {
+        return 1;
+    }
+    s->integral = foc_float_f32(foc_get(from, &at, 4));
+    s->increment = foc_float_f32(foc_get(from, &at, 4));
+    s->resting = foc_float_f32(foc_get(from, &at, 4));
+    s->inner = foc_float_f32(foc_get(from, &at, 4));
+    s->inner_input = foc_float_f32(foc_get(from, &at, 4));
+    s->error_now = (uint16_t)foc_get(from, &at, 2);
+    s->filtered_now = (uint16_t)foc_get(from, &at, 2);
+    s->flags = (uint8_t)foc_get(from, &at, 1);
+    s->starting = (uint8_t)foc_get(from, &at, 1);
+    for (i = 0; i < FINGER_F32_ERRORS; i++) {
+        s->error[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < FINGER_F32_FILTERED; i++) {
+        s->filtered[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 3; i++) {
+        s->numerator_means[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 8; i++) {
+        s->numerator_slow_means[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 8; i++) {
+        s->numerator_slow_rests[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 3; i++) {
+        s->integrand_means[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 8; i++) {
+        s->integrand_slow_means[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 8; i++) {
+        s->integrand_slow_rests[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 4; i++) {
+        s->denominator_means[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 8; i++) {
+        s->denominator_slow_means[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < 8; i++) {
+        s->denominator_slow_rests[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    return 0;
 }

@@ -17,9 +17,23 @@
 #include "finger_f32.h"
 
 #include "foc_rt.h"
+#include "foc_save.h"
 
-#if FOC_RT_VERSION != 1
+#if FOC_RT_VERSION != 2
 #error "foc_rt.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
+#endif
+#if FOC_SAVE_VERSION != 2
+#error "foc_save.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
+#endif
+
+/* The bits are those of the reference where each operation is rounded once. */
+#ifndef FOC_FLAGS_CHECKED
+#ifdef __FAST_MATH__
+#error "finger_f32.c: build without -ffast-math (and -Ofast), or define FOC_FLAGS_CHECKED"
+#endif
+#if defined(__FP_FAST_FMAF) && !defined(__clang__) && !defined(__STRICT_ANSI__)
+#warning "finger_f32.c: build with -ffp-contract=off, then define FOC_FLAGS_CHECKED"
+#endif
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
@@ -107,7 +121,7 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     float x;
     float v;
 
-    s->error_now = foc_ring_next(s->error_now, finger_f32_ERRORS);
+    s->error_now = foc_ring_next(s->error_now, FINGER_F32_ERRORS);
     s->error[s->error_now] = e;
     x = finger_f32_numerator_sum(s);
 
@@ -117,7 +131,7 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     s->inner_input = r;
     x += s->inner;
 
-    s->filtered_now = foc_ring_next(s->filtered_now, finger_f32_FILTERED);
+    s->filtered_now = foc_ring_next(s->filtered_now, FINGER_F32_FILTERED);
     x -= finger_f32_denominator_sum(s);
     v = x;
     s->filtered[s->filtered_now] = v;
@@ -135,11 +149,11 @@ static uint8_t finger_f32_ends(float u)
 {
     unsigned flags = 0;
 
-    if (u >= finger_f32_U_MAX) {
-        flags |= finger_f32_FLAG_HIGH;
+    if (u >= FINGER_F32_U_MAX) {
+        flags |= FINGER_F32_FLAG_HIGH;
     }
-    if (u <= finger_f32_U_MIN) {
-        flags |= finger_f32_FLAG_LOW;
+    if (u <= FINGER_F32_U_MIN) {
+        flags |= FINGER_F32_FLAG_LOW;
     }
     return (uint8_t)flags;
 }
@@ -150,11 +164,11 @@ static void finger_f32_settle(finger_f32_state *s, float e)
     const float v = 1.29602933f * e; /* e times 1.29603 */
     uint16_t i;
 
-    for (i = 0; i < finger_f32_ERRORS; i++) {
+    for (i = 0; i < FINGER_F32_ERRORS; i++) {
         s->error[i] = e;
     }
     s->error_now = 0;
-    for (i = 0; i < finger_f32_FILTERED; i++) {
+    for (i = 0; i < FINGER_F32_FILTERED; i++) {
         s->filtered[i] = v;
     }
     s->filtered_now = 0;
@@ -166,12 +180,31 @@ static void finger_f32_settle(finger_f32_state *s, float e)
     s->flags = 0;
 }
 
+/* Whether an output is one that a step can have left: NaN is not. */
+static uint8_t finger_f32_within(float u)
+{
+    return (uint8_t)(foc_finite_f32(u) && u >= FINGER_F32_U_MIN && u <= FINGER_F32_U_MAX);
+}
+
 /* An input of the step cannot be used: the output stays, and so does everything else. */
 static finger_f32_sig finger_f32_hold(finger_f32_state *s)
 {
-    const float u = s->integral;
+    const float known = s->integral;
+    const float u = finger_f32_within(known) ? known : 0.0f;
 
-    s->flags = (uint8_t)(finger_f32_FLAG_INVALID | finger_f32_ends(u));
+    s->flags = (uint8_t)(FINGER_F32_FLAG_INVALID | finger_f32_ends(u));
+    return u;
+}
+
+/* The state is not one that a step has left: the output stays, the memory begins anew with the error e. */
+static finger_f32_sig finger_f32_recover(finger_f32_state *s, float e)
+{
+    const float u = finger_f32_hold(s);
+    const uint8_t flags = s->flags;
+
+    finger_f32_settle(s, e);
+    s->integral = u;
+    s->flags = flags;
     return u;
 }
 
@@ -189,7 +222,7 @@ void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig me
     s->integral = 0.0f; /* where u0 cannot be used */
     finger_f32_track(s, u0);
     if (!known) {
-        s->flags = finger_f32_FLAG_INVALID;
+        s->flags = FINGER_F32_FLAG_INVALID;
     }
 }
 
@@ -211,12 +244,15 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
         s->increment = finger_f32_increment(gain, s->resting);
         s->starting = 0;
     }
+    if (!foc_finite_f32(s->integral + (d + s->increment)) || !finger_f32_within(s->integral)) {
+        return finger_f32_recover(s, ref - meas);
+    }
     s->integral = foc_clamp_f32(s->integral + (d + s->increment), 0.0f, 10.0f);
     s->increment = d;
     u = s->integral;
 
     if (sched < finger_f32_points[0] || sched > finger_f32_points[2]) {
-        flags |= finger_f32_FLAG_SCHEDULE;
+        flags |= FINGER_F32_FLAG_SCHEDULE;
     }
     s->flags = (uint8_t)(flags | finger_f32_ends(u));
     return u;
@@ -225,13 +261,70 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
 void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied)
 {
     if (!foc_usable_f32(u_applied)) {
-        s->flags = (uint8_t)(s->flags | finger_f32_FLAG_INVALID);
+        s->flags = (uint8_t)(s->flags | FINGER_F32_FLAG_INVALID);
         return;
     }
-    s->integral = foc_clamp_f32(u_applied, finger_f32_U_MIN, finger_f32_U_MAX);
+    s->integral = foc_clamp_f32(u_applied, FINGER_F32_U_MIN, FINGER_F32_U_MAX);
 }
 
 uint8_t finger_f32_flags(const finger_f32_state *s)
 {
     return s->flags;
+}
+
+/* What gives a saved state its meaning, in 64 bits: the controller and how it is computed. */
+#define FINGER_F32_CONFIGURATION 0x0024cf91729eb099u
+
+void finger_f32_save(const finger_f32_state *s, uint8_t *to)
+{
+    uint32_t at = foc_put(to, 0, FINGER_F32_CONFIGURATION, 8);
+    uint16_t i;
+
+    at = foc_put(to, at, foc_bits_f32(s->integral), 4);
+    at = foc_put(to, at, foc_bits_f32(s->increment), 4);
+    at = foc_put(to, at, foc_bits_f32(s->resting), 4);
+    at = foc_put(to, at, foc_bits_f32(s->inner), 4);
+    at = foc_put(to, at, foc_bits_f32(s->inner_input), 4);
+    at = foc_put(to, at, (uint64_t)s->error_now, 2);
+    at = foc_put(to, at, (uint64_t)s->filtered_now, 2);
+    at = foc_put(to, at, (uint64_t)s->flags, 1);
+    at = foc_put(to, at, (uint64_t)s->starting, 1);
+    for (i = 0; i < FINGER_F32_ERRORS; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->error[i]), 4);
+    }
+    for (i = 0; i < FINGER_F32_FILTERED; i++) {
+        at = foc_put(to, at, foc_bits_f32(s->filtered[i]), 4);
+    }
+    (void)foc_put(to, at, foc_crc32(to, at), 4);
+}
+
+uint8_t finger_f32_restore(finger_f32_state *s, const uint8_t *from)
+{
+    const uint32_t sum = foc_crc32(from, FINGER_F32_SAVED_BYTES - 4u);
+    uint32_t at = FINGER_F32_SAVED_BYTES - 4u;
+    uint16_t i;
+
+    if (foc_get(from, &at, 4) != sum) {
+        return 2;
+    }
+    at = 0;
+    if (foc_get(from, &at, 8) != FINGER_F32_CONFIGURATION) {
+        return 1;
+    }
+    s->integral = foc_float_f32(foc_get(from, &at, 4));
+    s->increment = foc_float_f32(foc_get(from, &at, 4));
+    s->resting = foc_float_f32(foc_get(from, &at, 4));
+    s->inner = foc_float_f32(foc_get(from, &at, 4));
+    s->inner_input = foc_float_f32(foc_get(from, &at, 4));
+    s->error_now = (uint16_t)foc_get(from, &at, 2);
+    s->filtered_now = (uint16_t)foc_get(from, &at, 2);
+    s->flags = (uint8_t)foc_get(from, &at, 1);
+    s->starting = (uint8_t)foc_get(from, &at, 1);
+    for (i = 0; i < FINGER_F32_ERRORS; i++) {
+        s->error[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    for (i = 0; i < FINGER_F32_FILTERED; i++) {
+        s->filtered[i] = foc_float_f32(foc_get(from, &at, 4));
+    }
+    return 0;
 }

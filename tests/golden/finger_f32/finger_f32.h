@@ -17,27 +17,29 @@
 extern "C" {
 #endif
 
-#define finger_f32_SAMPLE_TIME 0.01f /* s: call step this often */
+#define FINGER_F32_SAMPLE_TIME 0.01f  /* s: call step this often */
+#define FINGER_F32_PERIOD_US   10000u /* the same in microseconds */
 
 /* Every signal is in its physical unit: a count is 1. */
 typedef float finger_f32_sig;
 
-#define finger_f32_REF_LSB   1.0f /* 1/mm, of reference and measurement */
-#define finger_f32_SCHED_LSB 1.0f /* bar, of the scheduling signal */
-#define finger_f32_U_LSB     1.0f /* V, of the output */
+#define FINGER_F32_REF_LSB   1.0f /* 1/mm, of reference and measurement */
+#define FINGER_F32_SCHED_LSB 1.0f /* bar, of the scheduling signal */
+#define FINGER_F32_U_LSB     1.0f /* V, of the output */
 
 /* The output never leaves these ends. */
-#define finger_f32_U_MIN 0.0f  /* 0 V */
-#define finger_f32_U_MAX 10.0f /* 10 V */
+#define FINGER_F32_U_MIN 0.0f  /* 0 V */
+#define FINGER_F32_U_MAX 10.0f /* 10 V */
 
 /* What finger_f32_flags says of the latest step. */
-#define finger_f32_FLAG_HIGH     1u /* the output is at its upper end */
-#define finger_f32_FLAG_LOW      2u /* the output is at its lower end */
-#define finger_f32_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
-#define finger_f32_FLAG_INVALID  16u /* an input was NaN, infinite or beyond 2^48: the step was left out */
+#define FINGER_F32_FLAG_HIGH     1u /* the output is at its upper end */
+#define FINGER_F32_FLAG_LOW      2u /* the output is at its lower end */
+#define FINGER_F32_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
+#define FINGER_F32_FLAG_INVALID  16u /* left out: an input could not be used, or the state was damaged */
 
-#define finger_f32_ERRORS   41 /* the present error and those before it */
-#define finger_f32_FILTERED 41 /* the same of the filtered error */
+#define FINGER_F32_ERRORS      41   /* the present error and those before it */
+#define FINGER_F32_FILTERED    41   /* the same of the filtered error */
+#define FINGER_F32_SAVED_BYTES 366u /* what finger_f32_save writes */
 
 /* One controller. It belongs to the caller: one for each loop, 356 bytes each. Its members may
    change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
@@ -50,10 +52,10 @@ typedef struct {
     float inner_input;                   /* what was added to it last, half a trapezoid */
     uint16_t error_now;                  /* slot of the latest error */
     uint16_t filtered_now;               /* slot of the latest filtered error */
-    uint8_t flags;                       /* finger_f32_FLAG_... */
+    uint8_t flags;                       /* FINGER_F32_FLAG_... */
     uint8_t starting;                    /* 1 from reset to the first step */
-    float error[finger_f32_ERRORS];      /* ring of ref - meas */
-    float filtered[finger_f32_FILTERED]; /* ring of the filtered error */
+    float error[FINGER_F32_ERRORS];      /* ring of ref - meas */
+    float filtered[FINGER_F32_FILTERED]; /* ring of the filtered error */
 } finger_f32_state;
 
 /* Start at rest: no error so far, output 0 or the end nearest to it. */
@@ -64,7 +66,8 @@ void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig me
 
 /* One sample: reference, measurement and scheduling signal in, the output back.
    An input that is NaN, infinite or beyond 2^48 holds the output and leaves the step out: the next good
-   sample goes on as if there had been nothing in between. */
+   sample goes on as if there had been nothing in between. So does a state in which there is what no step has
+   left there (NaN, infinity, an output beyond its ends); it begins anew, as after a reset to this sample. */
 finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas,
                                finger_f32_sig sched);
 
@@ -72,11 +75,57 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
    step. */
 void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied);
 
-/* finger_f32_FLAG_... of the latest step, 0 after init and reset (to usable values). */
+/* FINGER_F32_FLAG_... of the latest step, 0 after init and reset (to usable values). */
 uint8_t finger_f32_flags(const finger_f32_state *s);
+
+/* Write FINGER_F32_SAVED_BYTES: the state, its configuration and a check sum, the same on every core;
+   for when the power fails. */
+void finger_f32_save(const finger_f32_state *s, uint8_t *to);
+
+/* Go on from what was saved, and return 0. 1: it is of another configuration, 2: it is damaged; then *s stays
+   as it is. Where the plant has moved on in the meantime, reset instead. */
+uint8_t finger_f32_restore(finger_f32_state *s, const uint8_t *from);
+
+/* Without the functions below: generate --no-float. */
+#define FINGER_F32_HAS_F32 1
+
+/* Physical values in single precision. NaN stays NaN, which a step leaves out. */
+static inline finger_f32_sig finger_f32_ref_from_f32(float value)
+{
+    return value;
+}
+
+static inline finger_f32_sig finger_f32_meas_from_f32(float value)
+{
+    return value;
+}
+
+static inline finger_f32_sig finger_f32_sched_from_f32(float value)
+{
+    return value;
+}
+
+static inline float finger_f32_u_to_f32(finger_f32_sig u)
+{
+    return u;
+}
 
 #ifdef __cplusplus
 }
 #endif
+
+/* The same by the names of before. */
+#define finger_f32_SAMPLE_TIME   FINGER_F32_SAMPLE_TIME
+#define finger_f32_REF_LSB       FINGER_F32_REF_LSB
+#define finger_f32_SCHED_LSB     FINGER_F32_SCHED_LSB
+#define finger_f32_U_LSB         FINGER_F32_U_LSB
+#define finger_f32_U_MIN         FINGER_F32_U_MIN
+#define finger_f32_U_MAX         FINGER_F32_U_MAX
+#define finger_f32_ERRORS        FINGER_F32_ERRORS
+#define finger_f32_FILTERED      FINGER_F32_FILTERED
+#define finger_f32_FLAG_HIGH     FINGER_F32_FLAG_HIGH
+#define finger_f32_FLAG_LOW      FINGER_F32_FLAG_LOW
+#define finger_f32_FLAG_SCHEDULE FINGER_F32_FLAG_SCHEDULE
+#define finger_f32_FLAG_INVALID  FINGER_F32_FLAG_INVALID
 
 #endif

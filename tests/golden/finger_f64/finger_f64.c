@@ -17,9 +17,23 @@
 #include "finger_f64.h"
 
 #include "foc_rt.h"
+#include "foc_save.h"
 
-#if FOC_RT_VERSION != 1
+#if FOC_RT_VERSION != 2
 #error "foc_rt.h is not the one that came with finger_f64.c: run focgen generate again and copy both"
+#endif
+#if FOC_SAVE_VERSION != 2
+#error "foc_save.h is not the one that came with finger_f64.c: run focgen generate again and copy both"
+#endif
+
+/* The bits are those of the reference where each operation is rounded once. */
+#ifndef FOC_FLAGS_CHECKED
+#ifdef __FAST_MATH__
+#error "finger_f64.c: build without -ffast-math (and -Ofast), or define FOC_FLAGS_CHECKED"
+#endif
+#if defined(__FP_FAST_FMA) && !defined(__clang__) && !defined(__STRICT_ANSI__)
+#warning "finger_f64.c: build with -ffp-contract=off, then define FOC_FLAGS_CHECKED"
+#endif
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
@@ -107,7 +121,7 @@ static double finger_f64_filter(finger_f64_state *s, double e)
     double x;
     double v;
 
-    s->error_now = foc_ring_next(s->error_now, finger_f64_ERRORS);
+    s->error_now = foc_ring_next(s->error_now, FINGER_F64_ERRORS);
     s->error[s->error_now] = e;
     x = finger_f64_numerator_sum(s);
 
@@ -118,7 +132,7 @@ static double finger_f64_filter(finger_f64_state *s, double e)
     s->inner_input = r;
     x += s->inner;
 
-    s->filtered_now = foc_ring_next(s->filtered_now, finger_f64_FILTERED);
+    s->filtered_now = foc_ring_next(s->filtered_now, FINGER_F64_FILTERED);
     x -= finger_f64_denominator_sum(s);
     v = x;
     s->filtered[s->filtered_now] = v;
@@ -136,11 +150,11 @@ static uint8_t finger_f64_ends(double u)
 {
     unsigned flags = 0;
 
-    if (u >= finger_f64_U_MAX) {
-        flags |= finger_f64_FLAG_HIGH;
+    if (u >= FINGER_F64_U_MAX) {
+        flags |= FINGER_F64_FLAG_HIGH;
     }
-    if (u <= finger_f64_U_MIN) {
-        flags |= finger_f64_FLAG_LOW;
+    if (u <= FINGER_F64_U_MIN) {
+        flags |= FINGER_F64_FLAG_LOW;
     }
     return (uint8_t)flags;
 }
@@ -151,11 +165,11 @@ static void finger_f64_settle(finger_f64_state *s, double e)
     const double v = 1.296029363699654 * e; /* e times 1.29603 */
     uint16_t i;
 
-    for (i = 0; i < finger_f64_ERRORS; i++) {
+    for (i = 0; i < FINGER_F64_ERRORS; i++) {
         s->error[i] = e;
     }
     s->error_now = 0;
-    for (i = 0; i < finger_f64_FILTERED; i++) {
+    for (i = 0; i < FINGER_F64_FILTERED; i++) {
         s->filtered[i] = v;
     }
     s->filtered_now = 0;
@@ -167,12 +181,31 @@ static void finger_f64_settle(finger_f64_state *s, double e)
     s->flags = 0;
 }
 
+/* Whether an output is one that a step can have left: NaN is not. */
+static uint8_t finger_f64_within(double u)
+{
+    return (uint8_t)(foc_finite_f64(u) && u >= FINGER_F64_U_MIN && u <= FINGER_F64_U_MAX);
+}
+
 /* An input of the step cannot be used: the output stays, and so does everything else. */
 static finger_f64_sig finger_f64_hold(finger_f64_state *s)
 {
-    const double u = s->integral;
+    const double known = s->integral;
+    const double u = finger_f64_within(known) ? known : 0.0;
 
-    s->flags = (uint8_t)(finger_f64_FLAG_INVALID | finger_f64_ends(u));
+    s->flags = (uint8_t)(FINGER_F64_FLAG_INVALID | finger_f64_ends(u));
+    return u;
+}
+
+/* The state is not one that a step has left: the output stays, the memory begins anew with the error e. */
+static finger_f64_sig finger_f64_recover(finger_f64_state *s, double e)
+{
+    const double u = finger_f64_hold(s);
+    const uint8_t flags = s->flags;
+
+    finger_f64_settle(s, e);
+    s->integral = u;
+    s->flags = flags;
     return u;
 }
 
@@ -190,7 +223,7 @@ void finger_f64_reset(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig me
     s->integral = 0.0; /* where u0 cannot be used */
     finger_f64_track(s, u0);
     if (!known) {
-        s->flags = finger_f64_FLAG_INVALID;
+        s->flags = FINGER_F64_FLAG_INVALID;
     }
 }
 
@@ -212,12 +245,15 @@ finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f
         s->increment = finger_f64_increment(gain, s->resting);
         s->starting = 0;
     }
+    if (!foc_finite_f64(s->integral + (d + s->increment)) || !finger_f64_within(s->integral)) {
+        return finger_f64_recover(s, ref - meas);
+    }
     s->integral = foc_clamp_f64(s->integral + (d + s->increment), 0.0, 10.0);
     s->increment = d;
     u = s->integral;
 
     if (sched < finger_f64_points[0] || sched > finger_f64_points[2]) {
-        flags |= finger_f64_FLAG_SCHEDULE;
+        flags |= FINGER_F64_FLAG_SCHEDULE;
     }
     s->flags = (uint8_t)(flags | finger_f64_ends(u));
     return u;
@@ -226,13 +262,70 @@ finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f
 void finger_f64_track(finger_f64_state *s, finger_f64_sig u_applied)
 {
     if (!foc_usable_f64(u_applied)) {
-        s->flags = (uint8_t)(s->flags | finger_f64_FLAG_INVALID);
+        s->flags = (uint8_t)(s->flags | FINGER_F64_FLAG_INVALID);
         return;
     }
-    s->integral = foc_clamp_f64(u_applied, finger_f64_U_MIN, finger_f64_U_MAX);
+    s->integral = foc_clamp_f64(u_applied, FINGER_F64_U_MIN, FINGER_F64_U_MAX);
 }
 
 uint8_t finger_f64_flags(const finger_f64_state *s)
 {
     return s->flags;
+}
+
+/* What gives a saved state its meaning, in 64 bits: the controller and how it is computed. */
+#define FINGER_F64_CONFIGURATION 0x92c302c8bb2fbcbdu
+
+void finger_f64_save(const finger_f64_state *s, uint8_t *to)
+{
+    uint32_t at = foc_put(to, 0, FINGER_F64_CONFIGURATION, 8);
+    uint16_t i;
+
+    at = foc_put(to, at, foc_bits_f64(s->integral), 8);
+    at = foc_put(to, at, foc_bits_f64(s->increment), 8);
+    at = foc_put(to, at, foc_bits_f64(s->resting), 8);
+    at = foc_put(to, at, foc_bits_f64(s->inner), 8);
+    at = foc_put(to, at, foc_bits_f64(s->inner_input), 8);
+    at = foc_put(to, at, (uint64_t)s->error_now, 2);
+    at = foc_put(to, at, (uint64_t)s->filtered_now, 2);
+    at = foc_put(to, at, (uint64_t)s->flags, 1);
+    at = foc_put(to, at, (uint64_t)s->starting, 1);
+    for (i = 0; i < FINGER_F64_ERRORS; i++) {
+        at = foc_put(to, at, foc_bits_f64(s->error[i]), 8);
+    }
+    for (i = 0; i < FINGER_F64_FILTERED; i++) {
+        at = foc_put(to, at, foc_bits_f64(s->filtered[i]), 8);
+    }
+    (void)foc_put(to, at, foc_crc32(to, at), 4);
+}
+
+uint8_t finger_f64_restore(finger_f64_state *s, const uint8_t *from)
+{
+    const uint32_t sum = foc_crc32(from, FINGER_F64_SAVED_BYTES - 4u);
+    uint32_t at = FINGER_F64_SAVED_BYTES - 4u;
+    uint16_t i;
+
+    if (foc_get(from, &at, 4) != sum) {
+        return 2;
+    }
+    at = 0;
+    if (foc_get(from, &at, 8) != FINGER_F64_CONFIGURATION) {
+        return 1;
+    }
+    s->integral = foc_float_f64(foc_get(from, &at, 8));
+    s->increment = foc_float_f64(foc_get(from, &at, 8));
+    s->resting = foc_float_f64(foc_get(from, &at, 8));
+    s->inner = foc_float_f64(foc_get(from, &at, 8));
+    s->inner_input = foc_float_f64(foc_get(from, &at, 8));
+    s->error_now = (uint16_t)foc_get(from, &at, 2);
+    s->filtered_now = (uint16_t)foc_get(from, &at, 2);
+    s->flags = (uint8_t)foc_get(from, &at, 1);
+    s->starting = (uint8_t)foc_get(from, &at, 1);
+    for (i = 0; i < FINGER_F64_ERRORS; i++) {
+        s->error[i] = foc_float_f64(foc_get(from, &at, 8));
+    }
+    for (i = 0; i < FINGER_F64_FILTERED; i++) {
+        s->filtered[i] = foc_float_f64(foc_get(from, &at, 8));
+    }
+    return 0;
 }

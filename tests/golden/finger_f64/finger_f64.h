@@ -17,27 +17,29 @@
 extern "C" {
 #endif
 
-#define finger_f64_SAMPLE_TIME 0.01 /* s: call step this often */
+#define FINGER_F64_SAMPLE_TIME 0.01   /* s: call step this often */
+#define FINGER_F64_PERIOD_US   10000u /* the same in microseconds */
 
 /* Every signal is in its physical unit: a count is 1. */
 typedef double finger_f64_sig;
 
-#define finger_f64_REF_LSB   1.0 /* 1/mm, of reference and measurement */
-#define finger_f64_SCHED_LSB 1.0 /* bar, of the scheduling signal */
-#define finger_f64_U_LSB     1.0 /* V, of the output */
+#define FINGER_F64_REF_LSB   1.0 /* 1/mm, of reference and measurement */
+#define FINGER_F64_SCHED_LSB 1.0 /* bar, of the scheduling signal */
+#define FINGER_F64_U_LSB     1.0 /* V, of the output */
 
 /* The output never leaves these ends. */
-#define finger_f64_U_MIN 0.0  /* 0 V */
-#define finger_f64_U_MAX 10.0 /* 10 V */
+#define FINGER_F64_U_MIN 0.0  /* 0 V */
+#define FINGER_F64_U_MAX 10.0 /* 10 V */
 
 /* What finger_f64_flags says of the latest step. */
-#define finger_f64_FLAG_HIGH     1u /* the output is at its upper end */
-#define finger_f64_FLAG_LOW      2u /* the output is at its lower end */
-#define finger_f64_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
-#define finger_f64_FLAG_INVALID  16u /* an input was NaN, infinite or beyond 2^512: the step was left out */
+#define FINGER_F64_FLAG_HIGH     1u /* the output is at its upper end */
+#define FINGER_F64_FLAG_LOW      2u /* the output is at its lower end */
+#define FINGER_F64_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
+#define FINGER_F64_FLAG_INVALID  16u /* left out: an input could not be used, or the state was damaged */
 
-#define finger_f64_ERRORS   41 /* the present error and those before it */
-#define finger_f64_FILTERED 41 /* the same of the filtered error */
+#define FINGER_F64_ERRORS      41   /* the present error and those before it */
+#define FINGER_F64_FILTERED    41   /* the same of the filtered error */
+#define FINGER_F64_SAVED_BYTES 714u /* what finger_f64_save writes */
 
 /* One controller. It belongs to the caller: one for each loop, 704 bytes each. Its members may
    change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
@@ -50,10 +52,10 @@ typedef struct {
     double inner_input;                   /* what was added to it last, half a trapezoid */
     uint16_t error_now;                   /* slot of the latest error */
     uint16_t filtered_now;                /* slot of the latest filtered error */
-    uint8_t flags;                        /* finger_f64_FLAG_... */
+    uint8_t flags;                        /* FINGER_F64_FLAG_... */
     uint8_t starting;                     /* 1 from reset to the first step */
-    double error[finger_f64_ERRORS];      /* ring of ref - meas */
-    double filtered[finger_f64_FILTERED]; /* ring of the filtered error */
+    double error[FINGER_F64_ERRORS];      /* ring of ref - meas */
+    double filtered[FINGER_F64_FILTERED]; /* ring of the filtered error */
 } finger_f64_state;
 
 /* Start at rest: no error so far, output 0 or the end nearest to it. */
@@ -64,7 +66,8 @@ void finger_f64_reset(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig me
 
 /* One sample: reference, measurement and scheduling signal in, the output back.
    An input that is NaN, infinite or beyond 2^512 holds the output and leaves the step out: the next good
-   sample goes on as if there had been nothing in between. */
+   sample goes on as if there had been nothing in between. So does a state in which there is what no step has
+   left there (NaN, infinity, an output beyond its ends); it begins anew, as after a reset to this sample. */
 finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f64_sig meas,
                                finger_f64_sig sched);
 
@@ -72,11 +75,57 @@ finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f
    step. */
 void finger_f64_track(finger_f64_state *s, finger_f64_sig u_applied);
 
-/* finger_f64_FLAG_... of the latest step, 0 after init and reset (to usable values). */
+/* FINGER_F64_FLAG_... of the latest step, 0 after init and reset (to usable values). */
 uint8_t finger_f64_flags(const finger_f64_state *s);
+
+/* Write FINGER_F64_SAVED_BYTES: the state, its configuration and a check sum, the same on every core;
+   for when the power fails. */
+void finger_f64_save(const finger_f64_state *s, uint8_t *to);
+
+/* Go on from what was saved, and return 0. 1: it is of another configuration, 2: it is damaged; then *s stays
+   as it is. Where the plant has moved on in the meantime, reset instead. */
+uint8_t finger_f64_restore(finger_f64_state *s, const uint8_t *from);
+
+/* Without the functions below: generate --no-float. */
+#define FINGER_F64_HAS_F32 1
+
+/* Physical values in single precision. NaN stays NaN, which a step leaves out. */
+static inline finger_f64_sig finger_f64_ref_from_f32(float value)
+{
+    return (double)value;
+}
+
+static inline finger_f64_sig finger_f64_meas_from_f32(float value)
+{
+    return (double)value;
+}
+
+static inline finger_f64_sig finger_f64_sched_from_f32(float value)
+{
+    return (double)value;
+}
+
+static inline float finger_f64_u_to_f32(finger_f64_sig u)
+{
+    return (float)u;
+}
 
 #ifdef __cplusplus
 }
 #endif
+
+/* The same by the names of before. */
+#define finger_f64_SAMPLE_TIME   FINGER_F64_SAMPLE_TIME
+#define finger_f64_REF_LSB       FINGER_F64_REF_LSB
+#define finger_f64_SCHED_LSB     FINGER_F64_SCHED_LSB
+#define finger_f64_U_LSB         FINGER_F64_U_LSB
+#define finger_f64_U_MIN         FINGER_F64_U_MIN
+#define finger_f64_U_MAX         FINGER_F64_U_MAX
+#define finger_f64_ERRORS        FINGER_F64_ERRORS
+#define finger_f64_FILTERED      FINGER_F64_FILTERED
+#define finger_f64_FLAG_HIGH     FINGER_F64_FLAG_HIGH
+#define finger_f64_FLAG_LOW      FINGER_F64_FLAG_LOW
+#define finger_f64_FLAG_SCHEDULE FINGER_F64_FLAG_SCHEDULE
+#define finger_f64_FLAG_INVALID  FINGER_F64_FLAG_INVALID
 
 #endif

@@ -17,13 +17,23 @@
 #include "finger_m4.h"
 
 #include "foc_rt.h"
+#include "foc_save.h"
 #include "foc_m4_q15.h" /* the sums in cortex-m4's own instructions; the same bits everywhere */
 #include "foc_ahead_q15.h"
 
-#if FOC_RT_VERSION != 1
+#if FOC_RT_VERSION != 2
 #error "foc_rt.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
 #endif
-#if FOC_TILES_VERSION != 1
+#if FOC_SAVE_VERSION != 2
+#error "foc_save.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
+#endif
+#if FOC_M4_Q15_VERSION != 2
+#error "foc_m4_q15.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
+#endif
+#if FOC_AHEAD_Q15_VERSION != 2
+#error "foc_ahead_q15.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
+#endif
+#if FOC_TILES_VERSION != 2
 #error "foc_tiles.h is not the one that came with finger_m4.c: run focgen generate again and copy both"
 #endif
 
@@ -254,7 +264,7 @@ static int16_t finger_m4_filter(finger_m4_state *s, int16_t e)
     int32_t rounded;
     int16_t v;
 
-    s->error_now = foc_ring_next(s->error_now, finger_m4_ERRORS);
+    s->error_now = foc_ring_next(s->error_now, FINGER_M4_ERRORS);
     s->error[s->error_now] = e;
     foc_ahead_q15(s->numerator_ahead, finger_m4_numerator_far, finger_m4_numerator_runs,
                   finger_m4_numerator_slices, s->error, finger_m4_ERRORS, s->error_now);
@@ -269,7 +279,7 @@ static int16_t finger_m4_filter(finger_m4_state *s, int16_t e)
     s->inner_input = r;
     x += (int32_t)foc_shift64(s->inner, 13);
 
-    s->filtered_now = foc_ring_next(s->filtered_now, finger_m4_FILTERED);
+    s->filtered_now = foc_ring_next(s->filtered_now, FINGER_M4_FILTERED);
     foc_ahead_q15(s->denominator_ahead, finger_m4_denominator_far, finger_m4_denominator_runs,
                   finger_m4_denominator_slices, s->filtered, finger_m4_FILTERED, s->filtered_now);
     x = x - finger_m4_denominator_sum(s) + s->carry; /* |x| <= 1017606997 < 2^31 */
@@ -291,11 +301,11 @@ static uint8_t finger_m4_ends(int16_t u)
 {
     unsigned flags = 0;
 
-    if (u >= finger_m4_U_MAX) {
-        flags |= finger_m4_FLAG_HIGH;
+    if (u >= FINGER_M4_U_MAX) {
+        flags |= FINGER_M4_FLAG_HIGH;
     }
-    if (u <= finger_m4_U_MIN) {
-        flags |= finger_m4_FLAG_LOW;
+    if (u <= FINGER_M4_U_MIN) {
+        flags |= FINGER_M4_FLAG_LOW;
     }
     return (uint8_t)flags;
 }
@@ -306,14 +316,14 @@ static void finger_m4_settle(finger_m4_state *s, int16_t e)
     const int16_t v = foc_sat16(foc_shift32((int32_t)20082 * e, 21)); /* e times 1.22571 */
     uint16_t i;
 
-    for (i = 0; i < finger_m4_ERRORS; i++) {
+    for (i = 0; i < FINGER_M4_ERRORS; i++) {
         s->error[i] = e;
     }
-    s->error_now = finger_m4_ERRORS - 1u;
-    for (i = 0; i < finger_m4_FILTERED; i++) {
+    s->error_now = FINGER_M4_ERRORS - 1u;
+    for (i = 0; i < FINGER_M4_FILTERED; i++) {
         s->filtered[i] = v;
     }
-    s->filtered_now = finger_m4_FILTERED - 1u;
+    s->filtered_now = FINGER_M4_FILTERED - 1u;
     s->carry = 0;
     foc_rest_q15(s->numerator_ahead, finger_m4_numerator_far, finger_m4_numerator_runs,
                  finger_m4_numerator_slices, s->error, finger_m4_ERRORS);
@@ -337,19 +347,22 @@ void finger_m4_init(finger_m4_state *s)
 
 void finger_m4_reset(finger_m4_state *s, finger_m4_sig ref, finger_m4_sig meas, finger_m4_sig u0)
 {
-    const int16_t r = foc_clamp16(ref, finger_m4_REF_MIN, finger_m4_REF_MAX);
-    const int16_t m = foc_clamp16(meas, finger_m4_MEAS_MIN, finger_m4_MEAS_MAX);
+    const int16_t r = foc_clamp16(ref, FINGER_M4_REF_MIN, FINGER_M4_REF_MAX);
+    const int16_t m = foc_clamp16(meas, FINGER_M4_MEAS_MIN, FINGER_M4_MEAS_MAX);
 
     finger_m4_settle(s, (int16_t)(r - m));
     finger_m4_track(s, u0);
+    if (r != ref || m != meas) {
+        s->flags = FINGER_M4_FLAG_INPUT;
+    }
 }
 
 finger_m4_sig finger_m4_step(finger_m4_state *s, finger_m4_sig ref, finger_m4_sig meas,
                              finger_m4_sig sched)
 {
-    const int16_t r = foc_clamp16(ref, finger_m4_REF_MIN, finger_m4_REF_MAX);
-    const int16_t m = foc_clamp16(meas, finger_m4_MEAS_MIN, finger_m4_MEAS_MAX);
-    const int16_t at = foc_clamp16(sched, finger_m4_SCHED_MIN, finger_m4_SCHED_MAX);
+    const int16_t r = foc_clamp16(ref, FINGER_M4_REF_MIN, FINGER_M4_REF_MAX);
+    const int16_t m = foc_clamp16(meas, FINGER_M4_MEAS_MIN, FINGER_M4_MEAS_MAX);
+    const int16_t at = foc_clamp16(sched, FINGER_M4_SCHED_MIN, FINGER_M4_SCHED_MAX);
     const int16_t gain = foc_schedule_q15(at, finger_m4_points, finger_m4_gains, finger_m4_slopes,
                                           finger_m4_shifts, 3);
     const int16_t v = finger_m4_filter(s, (int16_t)(r - m));
@@ -367,10 +380,10 @@ finger_m4_sig finger_m4_step(finger_m4_state *s, finger_m4_sig ref, finger_m4_si
     u = foc_sat16(foc_shift32(s->integral, 15));
 
     if (r != ref || m != meas || at != sched) {
-        flags |= finger_m4_FLAG_INPUT;
+        flags |= FINGER_M4_FLAG_INPUT;
     }
     if (at < finger_m4_points[0] || at > finger_m4_points[2]) {
-        flags |= finger_m4_FLAG_SCHEDULE;
+        flags |= FINGER_M4_FLAG_SCHEDULE;
     }
     s->flags = (uint8_t)(flags | finger_m4_ends(u));
     return u;
@@ -378,10 +391,92 @@ finger_m4_sig finger_m4_step(finger_m4_state *s, finger_m4_sig ref, finger_m4_si
 
 void finger_m4_track(finger_m4_state *s, finger_m4_sig u_applied)
 {
-    s->integral = (int32_t)foc_clamp16(u_applied, finger_m4_U_MIN, finger_m4_U_MAX) * ((int32_t)1 << 15);
+    const int16_t u = foc_clamp16(u_applied, FINGER_M4_U_MIN, FINGER_M4_U_MAX);
+
+    s->integral = (int32_t)u * ((int32_t)1 << 15);
+    if (u != u_applied) {
+        s->flags = (uint8_t)(s->flags | FINGER_M4_FLAG_INPUT);
+    }
 }
 
 uint8_t finger_m4_flags(const finger_m4_state *s)
 {
     return s->flags;
+}
+
+/* What gives a saved state its meaning, in 64 bits: the controller and how it is computed. */
+#define FINGER_M4_CONFIGURATION 0x35809c78d1d28092u
+
+void finger_m4_save(const finger_m4_state *s, uint8_t *to)
+{
+    uint32_t at = foc_put(to, 0, FINGER_M4_CONFIGURATION, 8);
+    uint16_t i;
+
+    at = foc_put(to, at, (uint64_t)s->inner, 8);
+    at = foc_put(to, at, (uint64_t)s->integral, 4);
+    at = foc_put(to, at, (uint64_t)s->increment, 4);
+    at = foc_put(to, at, (uint64_t)s->inner_input, 4);
+    at = foc_put(to, at, (uint64_t)s->carry, 4);
+    at = foc_put(to, at, (uint64_t)s->resting, 2);
+    at = foc_put(to, at, (uint64_t)s->error_now, 2);
+    at = foc_put(to, at, (uint64_t)s->filtered_now, 2);
+    at = foc_put(to, at, (uint64_t)s->flags, 1);
+    at = foc_put(to, at, (uint64_t)s->starting, 1);
+    for (i = 0; i < 12; i++) {
+        at = foc_put(to, at, (uint64_t)s->numerator_ahead[i], 4);
+    }
+    for (i = 0; i < 12; i++) {
+        at = foc_put(to, at, (uint64_t)s->integrand_ahead[i], 4);
+    }
+    for (i = 0; i < 12; i++) {
+        at = foc_put(to, at, (uint64_t)s->denominator_ahead[i], 4);
+    }
+    for (i = 0; i < FINGER_M4_ERRORS; i++) {
+        at = foc_put(to, at, (uint64_t)s->error[i], 2);
+    }
+    for (i = 0; i < FINGER_M4_FILTERED; i++) {
+        at = foc_put(to, at, (uint64_t)s->filtered[i], 2);
+    }
+    (void)foc_put(to, at, foc_crc32(to, at), 4);
+}
+
+uint8_t finger_m4_restore(finger_m4_state *s, const uint8_t *from)
+{
+    const uint32_t sum = foc_crc32(from, FINGER_M4_SAVED_BYTES - 4u);
+    uint32_t at = FINGER_M4_SAVED_BYTES - 4u;
+    uint16_t i;
+
+    if (foc_get(from, &at, 4) != sum) {
+        return 2;
+    }
+    at = 0;
+    if (foc_get(from, &at, 8) != FINGER_M4_CONFIGURATION) {
+        return 1;
+    }
+    s->inner = (int64_t)foc_get(from, &at, 8);
+    s->integral = (int32_t)foc_get(from, &at, 4);
+    s->increment = (int32_t)foc_get(from, &at, 4);
+    s->inner_input = (int32_t)foc_get(from, &at, 4);
+    s->carry = (int32_t)foc_get(from, &at, 4);
+    s->resting = (int16_t)foc_get(from, &at, 2);
+    s->error_now = (uint16_t)foc_get(from, &at, 2);
+    s->filtered_now = (uint16_t)foc_get(from, &at, 2);
+    s->flags = (uint8_t)foc_get(from, &at, 1);
+    s->starting = (uint8_t)foc_get(from, &at, 1);
+    for (i = 0; i < 12; i++) {
+        s->numerator_ahead[i] = (int32_t)foc_get(from, &at, 4);
+    }
+    for (i = 0; i < 12; i++) {
+        s->integrand_ahead[i] = (int32_t)foc_get(from, &at, 4);
+    }
+    for (i = 0; i < 12; i++) {
+        s->denominator_ahead[i] = (int32_t)foc_get(from, &at, 4);
+    }
+    for (i = 0; i < FINGER_M4_ERRORS; i++) {
+        s->error[i] = (int16_t)foc_get(from, &at, 2);
+    }
+    for (i = 0; i < FINGER_M4_FILTERED; i++) {
+        s->filtered[i] = (int16_t)foc_get(from, &at, 2);
+    }
+    return 0;
 }

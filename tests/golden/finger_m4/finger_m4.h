@@ -17,34 +17,36 @@
 extern "C" {
 #endif
 
-#define finger_m4_SAMPLE_TIME 0.01f /* s: call step this often */
+#define FINGER_M4_SAMPLE_TIME 0.01f  /* s: call step this often */
+#define FINGER_M4_PERIOD_US   10000u /* the same in microseconds */
 
 /* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest
    integer. */
 typedef int16_t finger_m4_sig;
 
-#define finger_m4_REF_LSB   9.5367431640625e-07f /* 1/mm, of reference and measurement */
-#define finger_m4_SCHED_LSB 1.52587890625e-05f   /* bar, of the scheduling signal */
-#define finger_m4_U_LSB     0.00048828125f       /* V, of the output */
+#define FINGER_M4_REF_LSB   9.5367431640625e-07f /* 1/mm, of reference and measurement */
+#define FINGER_M4_SCHED_LSB 1.52587890625e-05f   /* bar, of the scheduling signal */
+#define FINGER_M4_U_LSB     0.00048828125f       /* V, of the output */
 
 /* Inputs beyond these ends are taken for the nearest end; the output never leaves its own. */
-#define finger_m4_REF_MIN   0       /* 0 1/mm */
-#define finger_m4_REF_MAX   20972   /* 0.02 1/mm */
-#define finger_m4_MEAS_MIN  (-5243) /* -0.005 1/mm */
-#define finger_m4_MEAS_MAX  20972   /* 0.02 1/mm */
-#define finger_m4_SCHED_MIN 0       /* 0 bar */
-#define finger_m4_SCHED_MAX 16384   /* 0.25 bar */
-#define finger_m4_U_MIN     0       /* 0 V */
-#define finger_m4_U_MAX     20480   /* 10 V */
+#define FINGER_M4_REF_MIN   0       /* 0 1/mm */
+#define FINGER_M4_REF_MAX   20972   /* 0.02 1/mm */
+#define FINGER_M4_MEAS_MIN  (-5243) /* -0.005 1/mm */
+#define FINGER_M4_MEAS_MAX  20972   /* 0.02 1/mm */
+#define FINGER_M4_SCHED_MIN 0       /* 0 bar */
+#define FINGER_M4_SCHED_MAX 16384   /* 0.25 bar */
+#define FINGER_M4_U_MIN     0       /* 0 V */
+#define FINGER_M4_U_MAX     20480   /* 10 V */
 
 /* What finger_m4_flags says of the latest step. */
-#define finger_m4_FLAG_HIGH     1u /* the output is at its upper end */
-#define finger_m4_FLAG_LOW      2u /* the output is at its lower end */
-#define finger_m4_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
-#define finger_m4_FLAG_INPUT    8u /* an input was out of range */
+#define FINGER_M4_FLAG_HIGH     1u /* the output is at its upper end */
+#define FINGER_M4_FLAG_LOW      2u /* the output is at its lower end */
+#define FINGER_M4_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
+#define FINGER_M4_FLAG_INPUT    8u /* an input, or what reset or track was given, was out of range */
 
-#define finger_m4_ERRORS   68 /* the present error and those before it */
-#define finger_m4_FILTERED 68 /* the same of the filtered error */
+#define FINGER_M4_ERRORS      68   /* the present error and those before it */
+#define FINGER_M4_FILTERED    68   /* the same of the filtered error */
+#define FINGER_M4_SAVED_BYTES 460u /* what finger_m4_save writes */
 
 /* One controller. It belongs to the caller: one for each loop, 448 bytes each. Its members may
    change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
@@ -58,13 +60,13 @@ typedef struct {
     int16_t resting;                      /* filtered error that reset has left, until a step */
     uint16_t error_now;                   /* slot of the latest error */
     uint16_t filtered_now;                /* slot of the latest filtered error */
-    uint8_t flags;                        /* finger_m4_FLAG_... */
+    uint8_t flags;                        /* FINGER_M4_FLAG_... */
     uint8_t starting;                     /* 1 from reset to the first step */
     int32_t numerator_ahead[12];          /* sums that look ahead: of this group, of the next, of a block */
     int32_t integrand_ahead[12];          /* sums that look ahead: of this group, of the next, of a block */
     int32_t denominator_ahead[12];        /* sums that look ahead: of this group, of the next, of a block */
-    int16_t error[finger_m4_ERRORS];      /* ring of ref - meas, counts of 2^-20 1/mm */
-    int16_t filtered[finger_m4_FILTERED]; /* ring of the filtered error, counts of 2^-13 */
+    int16_t error[FINGER_M4_ERRORS];      /* ring of ref - meas, counts of 2^-20 1/mm */
+    int16_t filtered[FINGER_M4_FILTERED]; /* ring of the filtered error, counts of 2^-13 */
 } finger_m4_state;
 
 /* Start at rest: no error so far, output 0 or the end nearest to it. */
@@ -81,11 +83,81 @@ finger_m4_sig finger_m4_step(finger_m4_state *s, finger_m4_sig ref, finger_m4_si
    step. */
 void finger_m4_track(finger_m4_state *s, finger_m4_sig u_applied);
 
-/* finger_m4_FLAG_... of the latest step, 0 after init and reset. */
+/* FINGER_M4_FLAG_... of the latest step, 0 after init and reset (to values in range). */
 uint8_t finger_m4_flags(const finger_m4_state *s);
+
+/* Write FINGER_M4_SAVED_BYTES: the state, its configuration and a check sum, the same on every core;
+   for when the power fails. */
+void finger_m4_save(const finger_m4_state *s, uint8_t *to);
+
+/* Go on from what was saved, and return 0. 1: it is of another configuration, 2: it is damaged; then *s stays
+   as it is. Where the plant has moved on in the meantime, reset instead. */
+uint8_t finger_m4_restore(finger_m4_state *s, const uint8_t *from);
+
+/* Without the functions below: generate --no-float. */
+#define FINGER_M4_HAS_F32 1
+
+/* Physical values in single precision. A count is the nearest one, halves away from zero; what is beyond the
+   type becomes its end, NaN the lower one: a step takes these for the ends of its ranges, and says so. */
+static inline finger_m4_sig finger_m4_count(float scaled)
+{
+    finger_m4_sig whole;
+
+    if (scaled >= 32767.0f) {
+        whole = INT16_MAX;
+    } else if (scaled > -32768.0f) {
+        const finger_m4_sig part = (finger_m4_sig)scaled; /* towards zero */
+        const float rest = scaled - (float)part; /* exact */
+
+        whole = (finger_m4_sig)(part + (rest >= 0.5f ? 1 : 0) - (rest <= -0.5f ? 1 : 0));
+    } else {
+        whole = INT16_MIN;
+    }
+    return whole;
+}
+
+static inline finger_m4_sig finger_m4_ref_from_f32(float value)
+{
+    return finger_m4_count(value * 1048576.0f);
+}
+
+static inline finger_m4_sig finger_m4_meas_from_f32(float value)
+{
+    return finger_m4_count(value * 1048576.0f);
+}
+
+static inline finger_m4_sig finger_m4_sched_from_f32(float value)
+{
+    return finger_m4_count(value * 65536.0f);
+}
+
+static inline float finger_m4_u_to_f32(finger_m4_sig u)
+{
+    return (float)u * FINGER_M4_U_LSB;
+}
 
 #ifdef __cplusplus
 }
 #endif
+
+/* The same by the names of before. */
+#define finger_m4_SAMPLE_TIME   FINGER_M4_SAMPLE_TIME
+#define finger_m4_REF_LSB       FINGER_M4_REF_LSB
+#define finger_m4_SCHED_LSB     FINGER_M4_SCHED_LSB
+#define finger_m4_U_LSB         FINGER_M4_U_LSB
+#define finger_m4_REF_MIN       FINGER_M4_REF_MIN
+#define finger_m4_REF_MAX       FINGER_M4_REF_MAX
+#define finger_m4_MEAS_MIN      FINGER_M4_MEAS_MIN
+#define finger_m4_MEAS_MAX      FINGER_M4_MEAS_MAX
+#define finger_m4_SCHED_MIN     FINGER_M4_SCHED_MIN
+#define finger_m4_SCHED_MAX     FINGER_M4_SCHED_MAX
+#define finger_m4_U_MIN         FINGER_M4_U_MIN
+#define finger_m4_U_MAX         FINGER_M4_U_MAX
+#define finger_m4_ERRORS        FINGER_M4_ERRORS
+#define finger_m4_FILTERED      FINGER_M4_FILTERED
+#define finger_m4_FLAG_HIGH     FINGER_M4_FLAG_HIGH
+#define finger_m4_FLAG_LOW      FINGER_M4_FLAG_LOW
+#define finger_m4_FLAG_SCHEDULE FINGER_M4_FLAG_SCHEDULE
+#define finger_m4_FLAG_INPUT    FINGER_M4_FLAG_INPUT
 
 #endif

@@ -17,9 +17,13 @@
 #include "finger_q15.h"
 
 #include "foc_rt.h"
+#include "foc_save.h"
 
-#if FOC_RT_VERSION != 1
+#if FOC_RT_VERSION != 2
 #error "foc_rt.h is not the one that came with finger_q15.c: run focgen generate again and copy both"
+#endif
+#if FOC_SAVE_VERSION != 2
+#error "foc_save.h is not the one that came with finger_q15.c: run focgen generate again and copy both"
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
@@ -168,7 +172,7 @@ static int16_t finger_q15_filter(finger_q15_state *s, int16_t e)
     int32_t rounded;
     int16_t v;
 
-    s->error_now = foc_ring_next(s->error_now, finger_q15_ERRORS);
+    s->error_now = foc_ring_next(s->error_now, FINGER_Q15_ERRORS);
     s->error[s->error_now] = e;
     x = finger_q15_numerator_sum(s);
 
@@ -179,7 +183,7 @@ static int16_t finger_q15_filter(finger_q15_state *s, int16_t e)
     s->inner_input = r;
     x += (int32_t)foc_shift64(s->inner, 13);
 
-    s->filtered_now = foc_ring_next(s->filtered_now, finger_q15_FILTERED);
+    s->filtered_now = foc_ring_next(s->filtered_now, FINGER_Q15_FILTERED);
     x = x - finger_q15_denominator_sum(s) + s->carry; /* |x| <= 1016441913 < 2^31 */
     rounded = foc_shift32(x, 15);
     s->carry = x - rounded * ((int32_t)1 << 15); /* the next sample takes up what rounding drops */
@@ -199,11 +203,11 @@ static uint8_t finger_q15_ends(int16_t u)
 {
     unsigned flags = 0;
 
-    if (u >= finger_q15_U_MAX) {
-        flags |= finger_q15_FLAG_HIGH;
+    if (u >= FINGER_Q15_U_MAX) {
+        flags |= FINGER_Q15_FLAG_HIGH;
     }
-    if (u <= finger_q15_U_MIN) {
-        flags |= finger_q15_FLAG_LOW;
+    if (u <= FINGER_Q15_U_MIN) {
+        flags |= FINGER_Q15_FLAG_LOW;
     }
     return (uint8_t)flags;
 }
@@ -214,11 +218,11 @@ static void finger_q15_settle(finger_q15_state *s, int16_t e)
     const int16_t v = foc_sat16(foc_shift32((int32_t)21235 * e, 21)); /* e times 1.29608 */
     uint16_t i;
 
-    for (i = 0; i < finger_q15_ERRORS; i++) {
+    for (i = 0; i < FINGER_Q15_ERRORS; i++) {
         s->error[i] = e;
     }
     s->error_now = 0;
-    for (i = 0; i < finger_q15_FILTERED; i++) {
+    for (i = 0; i < FINGER_Q15_FILTERED; i++) {
         s->filtered[i] = v;
     }
     s->filtered_now = 0;
@@ -239,19 +243,22 @@ void finger_q15_init(finger_q15_state *s)
 
 void finger_q15_reset(finger_q15_state *s, finger_q15_sig ref, finger_q15_sig meas, finger_q15_sig u0)
 {
-    const int16_t r = foc_clamp16(ref, finger_q15_REF_MIN, finger_q15_REF_MAX);
-    const int16_t m = foc_clamp16(meas, finger_q15_MEAS_MIN, finger_q15_MEAS_MAX);
+    const int16_t r = foc_clamp16(ref, FINGER_Q15_REF_MIN, FINGER_Q15_REF_MAX);
+    const int16_t m = foc_clamp16(meas, FINGER_Q15_MEAS_MIN, FINGER_Q15_MEAS_MAX);
 
     finger_q15_settle(s, (int16_t)(r - m));
     finger_q15_track(s, u0);
+    if (r != ref || m != meas) {
+        s->flags = FINGER_Q15_FLAG_INPUT;
+    }
 }
 
 finger_q15_sig finger_q15_step(finger_q15_state *s, finger_q15_sig ref, finger_q15_sig meas,
                                finger_q15_sig sched)
 {
-    const int16_t r = foc_clamp16(ref, finger_q15_REF_MIN, finger_q15_REF_MAX);
-    const int16_t m = foc_clamp16(meas, finger_q15_MEAS_MIN, finger_q15_MEAS_MAX);
-    const int16_t at = foc_clamp16(sched, finger_q15_SCHED_MIN, finger_q15_SCHED_MAX);
+    const int16_t r = foc_clamp16(ref, FINGER_Q15_REF_MIN, FINGER_Q15_REF_MAX);
+    const int16_t m = foc_clamp16(meas, FINGER_Q15_MEAS_MIN, FINGER_Q15_MEAS_MAX);
+    const int16_t at = foc_clamp16(sched, FINGER_Q15_SCHED_MIN, FINGER_Q15_SCHED_MAX);
     const int16_t gain = foc_schedule_q15(at, finger_q15_points, finger_q15_gains, finger_q15_slopes,
                                           finger_q15_shifts, 3);
     const int16_t v = finger_q15_filter(s, (int16_t)(r - m));
@@ -269,10 +276,10 @@ finger_q15_sig finger_q15_step(finger_q15_state *s, finger_q15_sig ref, finger_q
     u = foc_sat16(foc_shift32(s->integral, 15));
 
     if (r != ref || m != meas || at != sched) {
-        flags |= finger_q15_FLAG_INPUT;
+        flags |= FINGER_Q15_FLAG_INPUT;
     }
     if (at < finger_q15_points[0] || at > finger_q15_points[2]) {
-        flags |= finger_q15_FLAG_SCHEDULE;
+        flags |= FINGER_Q15_FLAG_SCHEDULE;
     }
     s->flags = (uint8_t)(flags | finger_q15_ends(u));
     return u;
@@ -280,10 +287,74 @@ finger_q15_sig finger_q15_step(finger_q15_state *s, finger_q15_sig ref, finger_q
 
 void finger_q15_track(finger_q15_state *s, finger_q15_sig u_applied)
 {
-    s->integral = (int32_t)foc_clamp16(u_applied, finger_q15_U_MIN, finger_q15_U_MAX) * ((int32_t)1 << 15);
+    const int16_t u = foc_clamp16(u_applied, FINGER_Q15_U_MIN, FINGER_Q15_U_MAX);
+
+    s->integral = (int32_t)u * ((int32_t)1 << 15);
+    if (u != u_applied) {
+        s->flags = (uint8_t)(s->flags | FINGER_Q15_FLAG_INPUT);
+    }
 }
 
 uint8_t finger_q15_flags(const finger_q15_state *s)
 {
     return s->flags;
+}
+
+/* What gives a saved state its meaning, in 64 bits: the controller and how it is computed. */
+#define FINGER_Q15_CONFIGURATION 0xae3f414e4af0f563u
+
+void finger_q15_save(const finger_q15_state *s, uint8_t *to)
+{
+    uint32_t at = foc_put(to, 0, FINGER_Q15_CONFIGURATION, 8);
+    uint16_t i;
+
+    at = foc_put(to, at, (uint64_t)s->inner, 8);
+    at = foc_put(to, at, (uint64_t)s->integral, 4);
+    at = foc_put(to, at, (uint64_t)s->increment, 4);
+    at = foc_put(to, at, (uint64_t)s->inner_input, 4);
+    at = foc_put(to, at, (uint64_t)s->carry, 4);
+    at = foc_put(to, at, (uint64_t)s->resting, 2);
+    at = foc_put(to, at, (uint64_t)s->error_now, 2);
+    at = foc_put(to, at, (uint64_t)s->filtered_now, 2);
+    at = foc_put(to, at, (uint64_t)s->flags, 1);
+    at = foc_put(to, at, (uint64_t)s->starting, 1);
+    for (i = 0; i < FINGER_Q15_ERRORS; i++) {
+        at = foc_put(to, at, (uint64_t)s->error[i], 2);
+    }
+    for (i = 0; i < FINGER_Q15_FILTERED; i++) {
+        at = foc_put(to, at, (uint64_t)s->filtered[i], 2);
+    }
+    (void)foc_put(to, at, foc_crc32(to, at), 4);
+}
+
+uint8_t finger_q15_restore(finger_q15_state *s, const uint8_t *from)
+{
+    const uint32_t sum = foc_crc32(from, FINGER_Q15_SAVED_BYTES - 4u);
+    uint32_t at = FINGER_Q15_SAVED_BYTES - 4u;
+    uint16_t i;
+
+    if (foc_get(from, &at, 4) != sum) {
+        return 2;
+    }
+    at = 0;
+    if (foc_get(from, &at, 8) != FINGER_Q15_CONFIGURATION) {
+        return 1;
+    }
+    s->inner = (int64_t)foc_get(from, &at, 8);
+    s->integral = (int32_t)foc_get(from, &at, 4);
+    s->increment = (int32_t)foc_get(from, &at, 4);
+    s->inner_input = (int32_t)foc_get(from, &at, 4);
+    s->carry = (int32_t)foc_get(from, &at, 4);
+    s->resting = (int16_t)foc_get(from, &at, 2);
+    s->error_now = (uint16_t)foc_get(from, &at, 2);
+    s->filtered_now = (uint16_t)foc_get(from, &at, 2);
+    s->flags = (uint8_t)foc_get(from, &at, 1);
+    s->starting = (uint8_t)foc_get(from, &at, 1);
+    for (i = 0; i < FINGER_Q15_ERRORS; i++) {
+        s->error[i] = (int16_t)foc_get(from, &at, 2);
+    }
+    for (i = 0; i < FINGER_Q15_FILTERED; i++) {
+        s->filtered[i] = (int16_t)foc_get(from, &at, 2);
+    }
+    return 0;
 }

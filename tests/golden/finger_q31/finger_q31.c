@@ -17,9 +17,13 @@
 #include "finger_q31.h"
 
 #include "foc_rt.h"
+#include "foc_save.h"
 
-#if FOC_RT_VERSION != 1
+#if FOC_RT_VERSION != 2
 #error "foc_rt.h is not the one that came with finger_q31.c: run focgen generate again and copy both"
+#endif
+#if FOC_SAVE_VERSION != 2
+#error "foc_save.h is not the one that came with finger_q31.c: run focgen generate again and copy both"
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
@@ -168,7 +172,7 @@ static int32_t finger_q31_filter(finger_q31_state *s, int32_t e)
     int64_t rounded;
     int32_t v;
 
-    s->error_now = foc_ring_next(s->error_now, finger_q31_ERRORS);
+    s->error_now = foc_ring_next(s->error_now, FINGER_Q31_ERRORS);
     s->error[s->error_now] = e;
     x = finger_q31_numerator_sum(s);
 
@@ -180,7 +184,7 @@ static int32_t finger_q31_filter(finger_q31_state *s, int32_t e)
     s->inner_input = r;
     x += foc_shift64(s->inner, 3);
 
-    s->filtered_now = foc_ring_next(s->filtered_now, finger_q31_FILTERED);
+    s->filtered_now = foc_ring_next(s->filtered_now, FINGER_Q31_FILTERED);
     x = x - finger_q31_denominator_sum(s) + s->carry; /* |x| <= 4365631219347433601 < 2^63 */
     rounded = foc_shift64(x, 31);
     s->carry = x - rounded * ((int64_t)1 << 31); /* the next sample takes up what rounding drops */
@@ -200,11 +204,11 @@ static uint8_t finger_q31_ends(int32_t u)
 {
     unsigned flags = 0;
 
-    if (u >= finger_q31_U_MAX) {
-        flags |= finger_q31_FLAG_HIGH;
+    if (u >= FINGER_Q31_U_MAX) {
+        flags |= FINGER_Q31_FLAG_HIGH;
     }
-    if (u <= finger_q31_U_MIN) {
-        flags |= finger_q31_FLAG_LOW;
+    if (u <= FINGER_Q31_U_MIN) {
+        flags |= FINGER_Q31_FLAG_LOW;
     }
     return (uint8_t)flags;
 }
@@ -215,11 +219,11 @@ static void finger_q31_settle(finger_q31_state *s, int32_t e)
     const int32_t v = foc_sat32(foc_shift64((int64_t)1391600931 * e, 37)); /* e times 1.29603 */
     uint16_t i;
 
-    for (i = 0; i < finger_q31_ERRORS; i++) {
+    for (i = 0; i < FINGER_Q31_ERRORS; i++) {
         s->error[i] = e;
     }
     s->error_now = 0;
-    for (i = 0; i < finger_q31_FILTERED; i++) {
+    for (i = 0; i < FINGER_Q31_FILTERED; i++) {
         s->filtered[i] = v;
     }
     s->filtered_now = 0;
@@ -240,19 +244,22 @@ void finger_q31_init(finger_q31_state *s)
 
 void finger_q31_reset(finger_q31_state *s, finger_q31_sig ref, finger_q31_sig meas, finger_q31_sig u0)
 {
-    const int32_t r = foc_clamp32(ref, finger_q31_REF_MIN, finger_q31_REF_MAX);
-    const int32_t m = foc_clamp32(meas, finger_q31_MEAS_MIN, finger_q31_MEAS_MAX);
+    const int32_t r = foc_clamp32(ref, FINGER_Q31_REF_MIN, FINGER_Q31_REF_MAX);
+    const int32_t m = foc_clamp32(meas, FINGER_Q31_MEAS_MIN, FINGER_Q31_MEAS_MAX);
 
     finger_q31_settle(s, r - m);
     finger_q31_track(s, u0);
+    if (r != ref || m != meas) {
+        s->flags = FINGER_Q31_FLAG_INPUT;
+    }
 }
 
 finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q31_sig meas,
                                finger_q31_sig sched)
 {
-    const int32_t r = foc_clamp32(ref, finger_q31_REF_MIN, finger_q31_REF_MAX);
-    const int32_t m = foc_clamp32(meas, finger_q31_MEAS_MIN, finger_q31_MEAS_MAX);
-    const int32_t at = foc_clamp32(sched, finger_q31_SCHED_MIN, finger_q31_SCHED_MAX);
+    const int32_t r = foc_clamp32(ref, FINGER_Q31_REF_MIN, FINGER_Q31_REF_MAX);
+    const int32_t m = foc_clamp32(meas, FINGER_Q31_MEAS_MIN, FINGER_Q31_MEAS_MAX);
+    const int32_t at = foc_clamp32(sched, FINGER_Q31_SCHED_MIN, FINGER_Q31_SCHED_MAX);
     const int32_t gain = foc_schedule_q31(at, finger_q31_points, finger_q31_gains, finger_q31_slopes,
                                           finger_q31_shifts, 3);
     const int32_t v = finger_q31_filter(s, r - m);
@@ -270,10 +277,10 @@ finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q
     u = foc_sat32(foc_shift64(s->integral, 31));
 
     if (r != ref || m != meas || at != sched) {
-        flags |= finger_q31_FLAG_INPUT;
+        flags |= FINGER_Q31_FLAG_INPUT;
     }
     if (at < finger_q31_points[0] || at > finger_q31_points[2]) {
-        flags |= finger_q31_FLAG_SCHEDULE;
+        flags |= FINGER_Q31_FLAG_SCHEDULE;
     }
     s->flags = (uint8_t)(flags | finger_q31_ends(u));
     return u;
@@ -281,10 +288,74 @@ finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q
 
 void finger_q31_track(finger_q31_state *s, finger_q31_sig u_applied)
 {
-    s->integral = (int64_t)foc_clamp32(u_applied, finger_q31_U_MIN, finger_q31_U_MAX) * ((int64_t)1 << 31);
+    const int32_t u = foc_clamp32(u_applied, FINGER_Q31_U_MIN, FINGER_Q31_U_MAX);
+
+    s->integral = (int64_t)u * ((int64_t)1 << 31);
+    if (u != u_applied) {
+        s->flags = (uint8_t)(s->flags | FINGER_Q31_FLAG_INPUT);
+    }
 }
 
 uint8_t finger_q31_flags(const finger_q31_state *s)
 {
     return s->flags;
+}
+
+/* What gives a saved state its meaning, in 64 bits: the controller and how it is computed. */
+#define FINGER_Q31_CONFIGURATION 0xa1048b11397f7099u
+
+void finger_q31_save(const finger_q31_state *s, uint8_t *to)
+{
+    uint32_t at = foc_put(to, 0, FINGER_Q31_CONFIGURATION, 8);
+    uint16_t i;
+
+    at = foc_put(to, at, (uint64_t)s->integral, 8);
+    at = foc_put(to, at, (uint64_t)s->increment, 8);
+    at = foc_put(to, at, (uint64_t)s->inner, 8);
+    at = foc_put(to, at, (uint64_t)s->inner_input, 8);
+    at = foc_put(to, at, (uint64_t)s->carry, 8);
+    at = foc_put(to, at, (uint64_t)s->resting, 4);
+    at = foc_put(to, at, (uint64_t)s->error_now, 2);
+    at = foc_put(to, at, (uint64_t)s->filtered_now, 2);
+    at = foc_put(to, at, (uint64_t)s->flags, 1);
+    at = foc_put(to, at, (uint64_t)s->starting, 1);
+    for (i = 0; i < FINGER_Q31_ERRORS; i++) {
+        at = foc_put(to, at, (uint64_t)s->error[i], 4);
+    }
+    for (i = 0; i < FINGER_Q31_FILTERED; i++) {
+        at = foc_put(to, at, (uint64_t)s->filtered[i], 4);
+    }
+    (void)foc_put(to, at, foc_crc32(to, at), 4);
+}
+
+uint8_t finger_q31_restore(finger_q31_state *s, const uint8_t *from)
+{
+    const uint32_t sum = foc_crc32(from, FINGER_Q31_SAVED_BYTES - 4u);
+    uint32_t at = FINGER_Q31_SAVED_BYTES - 4u;
+    uint16_t i;
+
+    if (foc_get(from, &at, 4) != sum) {
+        return 2;
+    }
+    at = 0;
+    if (foc_get(from, &at, 8) != FINGER_Q31_CONFIGURATION) {
+        return 1;
+    }
+    s->integral = (int64_t)foc_get(from, &at, 8);
+    s->increment = (int64_t)foc_get(from, &at, 8);
+    s->inner = (int64_t)foc_get(from, &at, 8);
+    s->inner_input = (int64_t)foc_get(from, &at, 8);
+    s->carry = (int64_t)foc_get(from, &at, 8);
+    s->resting = (int32_t)foc_get(from, &at, 4);
+    s->error_now = (uint16_t)foc_get(from, &at, 2);
+    s->filtered_now = (uint16_t)foc_get(from, &at, 2);
+    s->flags = (uint8_t)foc_get(from, &at, 1);
+    s->starting = (uint8_t)foc_get(from, &at, 1);
+    for (i = 0; i < FINGER_Q31_ERRORS; i++) {
+        s->error[i] = (int32_t)foc_get(from, &at, 4);
+    }
+    for (i = 0; i < FINGER_Q31_FILTERED; i++) {
+        s->filtered[i] = (int32_t)foc_get(from, &at, 4);
+    }
+    return 0;
 }

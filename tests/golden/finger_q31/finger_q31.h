@@ -17,34 +17,36 @@
 extern "C" {
 #endif
 
-#define finger_q31_SAMPLE_TIME 0.01f /* s: call step this often */
+#define FINGER_Q31_SAMPLE_TIME 0.01f  /* s: call step this often */
+#define FINGER_Q31_PERIOD_US   10000u /* the same in microseconds */
 
 /* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest
    integer. */
 typedef int32_t finger_q31_sig;
 
-#define finger_q31_REF_LSB   1.4551915228366852e-11f /* 1/mm, of reference and measurement */
-#define finger_q31_SCHED_LSB 2.3283064365386963e-10f /* bar, of the scheduling signal */
-#define finger_q31_U_LSB     7.4505805969238281e-09f /* V, of the output */
+#define FINGER_Q31_REF_LSB   1.4551915228366852e-11f /* 1/mm, of reference and measurement */
+#define FINGER_Q31_SCHED_LSB 2.3283064365386963e-10f /* bar, of the scheduling signal */
+#define FINGER_Q31_U_LSB     7.4505805969238281e-09f /* V, of the output */
 
 /* Inputs beyond these ends are taken for the nearest end; the output never leaves its own. */
-#define finger_q31_REF_MIN   0            /* 0 1/mm */
-#define finger_q31_REF_MAX   1374389535   /* 0.02 1/mm */
-#define finger_q31_MEAS_MIN  (-343597384) /* -0.005 1/mm */
-#define finger_q31_MEAS_MAX  1374389535   /* 0.02 1/mm */
-#define finger_q31_SCHED_MIN 0            /* 0 bar */
-#define finger_q31_SCHED_MAX 1073741824   /* 0.25 bar */
-#define finger_q31_U_MIN     0            /* 0 V */
-#define finger_q31_U_MAX     1342177280   /* 10 V */
+#define FINGER_Q31_REF_MIN   0            /* 0 1/mm */
+#define FINGER_Q31_REF_MAX   1374389535   /* 0.02 1/mm */
+#define FINGER_Q31_MEAS_MIN  (-343597384) /* -0.005 1/mm */
+#define FINGER_Q31_MEAS_MAX  1374389535   /* 0.02 1/mm */
+#define FINGER_Q31_SCHED_MIN 0            /* 0 bar */
+#define FINGER_Q31_SCHED_MAX 1073741824   /* 0.25 bar */
+#define FINGER_Q31_U_MIN     0            /* 0 V */
+#define FINGER_Q31_U_MAX     1342177280   /* 10 V */
 
 /* What finger_q31_flags says of the latest step. */
-#define finger_q31_FLAG_HIGH     1u /* the output is at its upper end */
-#define finger_q31_FLAG_LOW      2u /* the output is at its lower end */
-#define finger_q31_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
-#define finger_q31_FLAG_INPUT    8u /* an input was out of range */
+#define FINGER_Q31_FLAG_HIGH     1u /* the output is at its upper end */
+#define FINGER_Q31_FLAG_LOW      2u /* the output is at its lower end */
+#define FINGER_Q31_FLAG_SCHEDULE 4u /* the scheduling signal is beyond the breakpoints: the gain is held */
+#define FINGER_Q31_FLAG_INPUT    8u /* an input, or what reset or track was given, was out of range */
 
-#define finger_q31_ERRORS   41 /* the present error and those before it */
-#define finger_q31_FILTERED 41 /* the same of the filtered error */
+#define FINGER_Q31_ERRORS      41   /* the present error and those before it */
+#define FINGER_Q31_FILTERED    41   /* the same of the filtered error */
+#define FINGER_Q31_SAVED_BYTES 390u /* what finger_q31_save writes */
 
 /* One controller. It belongs to the caller: one for each loop, 384 bytes each. Its members may
    change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
@@ -58,10 +60,10 @@ typedef struct {
     int32_t resting;                       /* filtered error that reset has left, until a step */
     uint16_t error_now;                    /* slot of the latest error */
     uint16_t filtered_now;                 /* slot of the latest filtered error */
-    uint8_t flags;                         /* finger_q31_FLAG_... */
+    uint8_t flags;                         /* FINGER_Q31_FLAG_... */
     uint8_t starting;                      /* 1 from reset to the first step */
-    int32_t error[finger_q31_ERRORS];      /* ring of ref - meas, counts of 2^-36 1/mm */
-    int32_t filtered[finger_q31_FILTERED]; /* ring of the filtered error, counts of 2^-29 */
+    int32_t error[FINGER_Q31_ERRORS];      /* ring of ref - meas, counts of 2^-36 1/mm */
+    int32_t filtered[FINGER_Q31_FILTERED]; /* ring of the filtered error, counts of 2^-29 */
 } finger_q31_state;
 
 /* Start at rest: no error so far, output 0 or the end nearest to it. */
@@ -78,11 +80,81 @@ finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q
    step. */
 void finger_q31_track(finger_q31_state *s, finger_q31_sig u_applied);
 
-/* finger_q31_FLAG_... of the latest step, 0 after init and reset. */
+/* FINGER_Q31_FLAG_... of the latest step, 0 after init and reset (to values in range). */
 uint8_t finger_q31_flags(const finger_q31_state *s);
+
+/* Write FINGER_Q31_SAVED_BYTES: the state, its configuration and a check sum, the same on every core;
+   for when the power fails. */
+void finger_q31_save(const finger_q31_state *s, uint8_t *to);
+
+/* Go on from what was saved, and return 0. 1: it is of another configuration, 2: it is damaged; then *s stays
+   as it is. Where the plant has moved on in the meantime, reset instead. */
+uint8_t finger_q31_restore(finger_q31_state *s, const uint8_t *from);
+
+/* Without the functions below: generate --no-float. */
+#define FINGER_Q31_HAS_F32 1
+
+/* Physical values in single precision. A count is the nearest one, halves away from zero; what is beyond the
+   type becomes its end, NaN the lower one: a step takes these for the ends of its ranges, and says so. */
+static inline finger_q31_sig finger_q31_count(float scaled)
+{
+    finger_q31_sig whole;
+
+    if (scaled >= 2.14748365e+09f) {
+        whole = INT32_MAX;
+    } else if (scaled > -2.14748365e+09f) {
+        const finger_q31_sig part = (finger_q31_sig)scaled; /* towards zero */
+        const float rest = scaled - (float)part; /* exact */
+
+        whole = (finger_q31_sig)(part + (rest >= 0.5f ? 1 : 0) - (rest <= -0.5f ? 1 : 0));
+    } else {
+        whole = INT32_MIN;
+    }
+    return whole;
+}
+
+static inline finger_q31_sig finger_q31_ref_from_f32(float value)
+{
+    return finger_q31_count(value * 68719476736.0f);
+}
+
+static inline finger_q31_sig finger_q31_meas_from_f32(float value)
+{
+    return finger_q31_count(value * 68719476736.0f);
+}
+
+static inline finger_q31_sig finger_q31_sched_from_f32(float value)
+{
+    return finger_q31_count(value * 4294967296.0f);
+}
+
+static inline float finger_q31_u_to_f32(finger_q31_sig u)
+{
+    return (float)u * FINGER_Q31_U_LSB;
+}
 
 #ifdef __cplusplus
 }
 #endif
+
+/* The same by the names of before. */
+#define finger_q31_SAMPLE_TIME   FINGER_Q31_SAMPLE_TIME
+#define finger_q31_REF_LSB       FINGER_Q31_REF_LSB
+#define finger_q31_SCHED_LSB     FINGER_Q31_SCHED_LSB
+#define finger_q31_U_LSB         FINGER_Q31_U_LSB
+#define finger_q31_REF_MIN       FINGER_Q31_REF_MIN
+#define finger_q31_REF_MAX       FINGER_Q31_REF_MAX
+#define finger_q31_MEAS_MIN      FINGER_Q31_MEAS_MIN
+#define finger_q31_MEAS_MAX      FINGER_Q31_MEAS_MAX
+#define finger_q31_SCHED_MIN     FINGER_Q31_SCHED_MIN
+#define finger_q31_SCHED_MAX     FINGER_Q31_SCHED_MAX
+#define finger_q31_U_MIN         FINGER_Q31_U_MIN
+#define finger_q31_U_MAX         FINGER_Q31_U_MAX
+#define finger_q31_ERRORS        FINGER_Q31_ERRORS
+#define finger_q31_FILTERED      FINGER_Q31_FILTERED
+#define finger_q31_FLAG_HIGH     FINGER_Q31_FLAG_HIGH
+#define finger_q31_FLAG_LOW      FINGER_Q31_FLAG_LOW
+#define finger_q31_FLAG_SCHEDULE FINGER_Q31_FLAG_SCHEDULE
+#define finger_q31_FLAG_INPUT    FINGER_Q31_FLAG_INPUT
 
 #endif

@@ -19,11 +19,11 @@ int main(void)
     int k;
 
     finger_f32_init(&controller);
-    for (k = 0; k < 10; k++) { /* a timer calls this every finger_f32_SAMPLE_TIME seconds */
+    for (k = 0; k < 10; k++) { /* a timer calls this every FINGER_F32_SAMPLE_TIME seconds */
         const finger_f32_sig u = finger_f32_step(&controller, ref, meas, sched);
 
-        printf("%2d  %.9g V%s\n", k, (double)u * (double)finger_f32_U_LSB,
-               finger_f32_flags(&controller) & finger_f32_FLAG_HIGH ? "  at its upper end" : "");
+        printf("%2d  %.9g V%s\n", k, (double)u * (double)FINGER_F32_U_LSB,
+               finger_f32_flags(&controller) & FINGER_F32_FLAG_HIGH ? "  at its upper end" : "");
     }
     return 0;
 }

@@ -19,11 +19,11 @@ int main(void)
     int k;
 
     finger_f64_init(&controller);
-    for (k = 0; k < 10; k++) { /* a timer calls this every finger_f64_SAMPLE_TIME seconds */
+    for (k = 0; k < 10; k++) { /* a timer calls this every FINGER_F64_SAMPLE_TIME seconds */
         const finger_f64_sig u = finger_f64_step(&controller, ref, meas, sched);
 
-        printf("%2d  %.9g V%s\n", k, (double)u * (double)finger_f64_U_LSB,
-               finger_f64_flags(&controller) & finger_f64_FLAG_HIGH ? "  at its upper end" : "");
+        printf("%2d  %.9g V%s\n", k, (double)u * (double)FINGER_F64_U_LSB,
+               finger_f64_flags(&controller) & FINGER_F64_FLAG_HIGH ? "  at its upper end" : "");
     }
     return 0;
 }

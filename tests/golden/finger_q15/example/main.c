@@ -10,28 +10,20 @@
 
 #include "finger_q15.h"
 
-/* The nearest count to a physical value. On the controller's own hardware this is the scale of the ADC. */
-static finger_q15_sig counts(double value, double lsb)
-{
-    const double scaled = value / lsb;
-
-    return (finger_q15_sig)(scaled < 0.0 ? scaled - 0.5 : scaled + 0.5);
-}
-
 int main(void)
 {
     static finger_q15_state controller; /* too large for some stacks */
-    const finger_q15_sig ref = counts(0.01, (double)finger_q15_REF_LSB); /* 0.01 1/mm */
-    const finger_q15_sig meas = counts(0.0, (double)finger_q15_REF_LSB);
-    const finger_q15_sig sched = counts(0.125, (double)finger_q15_SCHED_LSB);
+    const finger_q15_sig ref = finger_q15_ref_from_f32(0.01f); /* 0.01 1/mm */
+    const finger_q15_sig meas = finger_q15_meas_from_f32(0.0f);
+    const finger_q15_sig sched = finger_q15_sched_from_f32(0.125f);
     int k;
 
     finger_q15_init(&controller);
-    for (k = 0; k < 10; k++) { /* a timer calls this every finger_q15_SAMPLE_TIME seconds */
+    for (k = 0; k < 10; k++) { /* a timer calls this every FINGER_Q15_SAMPLE_TIME seconds */
         const finger_q15_sig u = finger_q15_step(&controller, ref, meas, sched);
 
-        printf("%2d  %.9g V%s\n", k, (double)u * (double)finger_q15_U_LSB,
-               finger_q15_flags(&controller) & finger_q15_FLAG_HIGH ? "  at its upper end" : "");
+        printf("%2d  %.9g V%s\n", k, (double)finger_q15_u_to_f32(u),
+               finger_q15_flags(&controller) & FINGER_Q15_FLAG_HIGH ? "  at its upper end" : "");
     }
     return 0;
 }

@@ -1,0 +1,48 @@
+"""States that no run has left, in the floating arithmetics, as the reference sees them.
+
+A step that finds such a state is left out, as one with an unusable input is: the output stands, or is the
+one before any step where that is damaged, too. The memory then begins anew, as after a reset to this sample's
+error and the output that stands. So a damage is a reset ahead of a sample that is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from focgen.plan.model import Plan
+from focgen.plan.scenario import Damage, Reset, Scenario, Trace
+
+
+def mended(plan: Plan, scenario: Scenario, execute: Callable[[Plan, Scenario], Trace]) -> Scenario:
+    """The scenario without its damages; ``execute`` runs one that has none, to find what stands."""
+    while scenario.damages:
+        first: dict[int, Damage] = {}
+        for damage in sorted(scenario.damages, key=lambda damage: damage.sample):
+            first.setdefault(damage.lane, damage)
+        now = tuple(first.values())
+        rest = tuple(d for d in scenario.damages if d not in now)
+        scenario = replace(_mended(plan, replace(scenario, damages=()), now, execute), damages=rest)
+    return scenario
+
+
+def _mended(plan: Plan, scenario: Scenario, damages: tuple[Damage, ...], execute) -> Scenario:
+    """The same of at most one damage a lane."""
+    left_out = scenario.ref.copy()
+    for d in damages:
+        left_out[d.lane, d.sample] = np.nan
+    without = replace(scenario, ref=left_out)
+    standing = execute(plan, without).u
+    start = min(max(0.0, plan.output.low), plan.output.high)
+    stands = [standing[d.lane, d.sample] if d.what == "error" else start for d in damages]
+    resets = [_begun(scenario, damage, u0) for damage, u0 in zip(damages, stands)]
+    places = {(d.lane, d.sample) for d in damages}
+    tracks = tuple(t for t in scenario.tracks if (t.lane, t.sample) not in places)
+    return replace(without, resets=(*scenario.resets, *resets), tracks=tracks)
+
+
+def _begun(scenario: Scenario, damage: Damage, u0) -> Reset:
+    at = damage.lane, damage.sample
+    return Reset(*at, scenario.ref[at], scenario.meas[at], u0, keeps=True)
