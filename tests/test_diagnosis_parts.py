@@ -434,7 +434,7 @@ def test_behind_a_hidden_curve_the_likeliest_that_is_not_hidden_leads():
 )
 def test_a_delay_is_not_shared_with_columns_out_of_step(stage, late, entry, exit, off):
     logs = [replace(log, signals=_later(log.signals, late, 3)) for log in session(3, noise=1e-4)]
-    bare = problem_of(RIG, replace(make(logs, entry, exit), held=False), logs)
+    bare = problem_of(RIG, replace(make(logs, entry, exit), between=False), logs)
     delay = bare.with_clues([Clue("transport_delay", library()["transport_delay"].forms[0], stage)])
     found = fit(delay, np.r_[bare.nominal(), delay.starts(delay.clues[0])[1]], WHITE)
     assert found.vector[len(delay.own_start)] == 0.0 < bare.bounds()[1][len(bare.own_start)]

@@ -12,7 +12,7 @@ from focgen.report.diagnosis_summary import diagnosis_story
 from focgen.report.figures import Axis, Bars, Figure, Line, Panel, Rule
 from focgen.report.page import Page, Section, TableOf
 from focgen.report.pages.parts import notes, number, sentence, warnings
-from focgen.report.style import CYCLE, with_unit
+from focgen.report.style import with_unit
 
 SWEEPING = 20  # of 50 places in its range: an input that visits fewer only steps
 _GAP = 0.02  # of the session: between experiments that follow each other at once
