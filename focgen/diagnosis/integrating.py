@@ -46,7 +46,8 @@ def counted(of: Fit, against: Fit) -> float:
         return np.inf
     n = max(sum(_independent(part) for part in against.residual()), 2.0)
     before, after = (float(np.mean(f.weighed**2)) for f in (against, of))
-    return 0.5 * n * np.log(max(before, 1e-300) / max(after, 1e-300)) - 0.5 * (of.size - against.size) * np.log(n)
+    gain = 0.5 * n * np.log(max(before, 1e-300) / max(after, 1e-300))
+    return gain - 0.5 * (of.size - against.size) * np.log(n)
 
 
 def _independent(left: np.ndarray) -> float:

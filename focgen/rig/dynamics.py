@@ -86,7 +86,8 @@ class Dynamics:
         """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, and of
         the drag."""
         bend = self.bend
-        return bend.first / gain, bend.second / gain, bend.scale, self.place, self.stiffness / gain, *self.drag.held
+        obstacle = self.place, self.stiffness / gain
+        return bend.first / gain, bend.second / gain, bend.scale, *obstacle, *self.drag.held
 
 
 UNCHANGED = Dynamics()

@@ -88,8 +88,8 @@ class Chain:
     ) -> np.ndarray:
         """What leaves stage ``last`` when ``x`` (n,) enters stage ``first``.
 
-        ``between``: what the input does from one sample to the next. ``tap`` receives what leaves each stage, ``left`` what outlives
-        the session, one for each of ``placed``.
+        ``between``: what the input does from one sample to the next. ``tap`` receives what leaves each stage,
+        ``left`` what outlives the session, one for each of ``placed``.
         """
         if left is not None:
             left[:] = [{} for _ in self.placed]

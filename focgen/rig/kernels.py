@@ -1,4 +1,4 @@
-"""The compiled loops of the chain simulator (``kernels.c``, ``bending.c``, ``plant.c``), as functions of arrays.
+"""The compiled loops of the chain simulator (``kernels.c``, ``bending.c``, ``plant.c``) as functions.
 
 The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
 behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), 1 where an experiment begins
