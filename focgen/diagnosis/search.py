@@ -22,6 +22,7 @@ _ADRIFT = 1.15  # of a fit's mean square without a colour
 _NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
 _FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
 _TRIED = 3  # start values of a form that are fitted, where it has more
+_FIRST, _THEN = 2, 3  # iterations from each start value, and from the best
 _BENT = 4.0  # nats against own parameters that make up for what is missing: then started as given, too
 _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
 
@@ -165,18 +166,22 @@ def family(of: Fit) -> str:
 
 
 def best_start(problem: Problem, base: np.ndarray, clue: Clue, known: np.ndarray | None = None) -> Fit | None:
-    """The best of the fits from the clue's start values, a few iterations each; ``known``: the rows of the
-    Jacobian at ``base``."""
+    """The best of the fits from the clue's start values, a few iterations each, and a few more for the best
+    of them; ``known``: the rows of the Jacobian at ``base``."""
     extended = problem.with_clues([*problem.clues, clue])
     starts, fits = extended.starts(clue), []
     bent = problem.own.doubt(base) > _BENT
     if len(starts) > _TRIED:
         starts = _likeliest(extended, base, starts, known)
     for start in starts:
-        fits.append(fit(extended, np.r_[base, start], WHITE, 5, tolerance=0.1, known=known))
+        fits.append(fit(extended, np.r_[base, start], WHITE, _FIRST, tolerance=0.1, known=known))
         if bent:
             fits.append(fit(extended, np.r_[_as_given(problem, base), start], WHITE, 5, tolerance=0.1))
-    return min((f for f in fits if np.isfinite(f.sse)), key=lambda f: f.sse, default=None)
+    best = min((f for f in fits if np.isfinite(f.sse)), key=lambda f: f.sse, default=None)
+    if best is None:
+        return None
+    further = fit(extended, best.vector, WHITE, _THEN, tolerance=0.1, known=known)
+    return min(best, further, key=lambda f: f.sse)
 
 
 def _as_given(problem: Problem, base: np.ndarray) -> np.ndarray:
