@@ -1,4 +1,4 @@
-"""A spring whose stiffness depends on the response, in the plant's own equation, against solvers of its own."""
+"""A spring whose stiffness depends on the response, in the plant's own equation, against other solvers."""
 
 from dataclasses import replace
 
@@ -41,7 +41,11 @@ def spring(y):
 def test_a_first_order_plant_solves_its_own_equation():
     for actuator in (FIRST, Actuator(0.5, 1.0, (2.0,))):
         exact = solve_ivp(
-            lambda t, y: (2.0 * np.interp(t, T, X) - spring(y)) / 0.5, (0, T[-1]), [0.0], t_eval=T, max_step=H / 4
+            lambda t, y: (2.0 * np.interp(t, T, X) - spring(y)) / 0.5,
+            (0, T[-1]),
+            [0.0],
+            t_eval=T,
+            max_step=H / 4,
         ).y[0]
         np.testing.assert_allclose(made_by(actuator), exact, atol=2e-4)
 

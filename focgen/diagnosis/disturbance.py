@@ -108,8 +108,8 @@ def _paced(parts: list[np.ndarray], h: float, response: float) -> float:
 
 def _line(parts: list[np.ndarray], h: float, response: float) -> float:
     """The part of the power within two bins of the strongest line, slow ones left out; the median over
-    experiments. Slow is a period beyond four responses, whatever the samples, or beyond a hundred samples where
-    these are more."""
+    experiments. Slow is a period beyond four responses, whatever the samples, or beyond a
+    hundred samples where these are more."""
     shares, slow = [], max(100.0, 4.0 * response / h)
     for p in parts:
         if len(p) >= _LONG:

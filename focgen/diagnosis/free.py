@@ -67,7 +67,7 @@ class Free:
     def _usual(self) -> tuple[np.ndarray, np.ndarray]:
         """Three times the actuator's uncertainty about what was given; any offset."""
         known, start, a = self.rig.uncertainty.actuator, self.start(), self.rig.actuator
-        gain, time = (np.log([max(1.0 - WITHIN * u, LEAST), 1.0 + WITHIN * u]) for u in (known.gain, known.time))
+        gain, time = (_factor(known.gain), _factor(known.time))
         if isinstance(a, Actuator):
             off = WITHIN * known.gain * np.abs(start[2:-1]).sum()
             order = WITHIN * known.alpha * start[1]
@@ -141,3 +141,8 @@ class Free:
         num = [(float(c), t.order) for c, t in zip(moved, transfer.num)]
         den = [(float(c), t.order) for c, t in zip(moved[count:], transfer.den)]
         return TransferFunction(num, [*den, tuple(transfer.den[-1])])
+
+
+def _factor(known: float) -> np.ndarray:
+    """The logarithms of the factors (2,) that three times an uncertainty lets a number have."""
+    return np.log([max(1.0 - WITHIN * known, LEAST), 1.0 + WITHIN * known])

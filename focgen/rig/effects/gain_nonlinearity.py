@@ -39,7 +39,8 @@ _SECOND = Parameter("second", lower=-0.3, upper=50.0, starts=(0.0, 0.0, 1.0), ze
 EFFECT = Effect(
     name="gain_nonlinearity",
     stage="actuator",
-    meaning="the static gain departs smoothly from the line K(p): stiffening, ballooning, whether on the way to the spring or in it",
+    meaning="the static gain departs smoothly from the line K(p): stiffening, ballooning, "
+    "whether on the way to the spring or in it",
     reveals="six or more levels, up and down, in mixed order: the residual depends on level only",
     confused_with=("dead_zone", "contact", "softening", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",

@@ -29,7 +29,7 @@ _AGAIN = 6  # times that a design which cannot show its effect is drawn
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a case is played on: the true rig, its full command and spans, the experiments and their clocks."""
+    """What a case is played on: the true rig, its full command and spans, experiments and clocks."""
 
     true: EngineRig
     full: float

@@ -1,4 +1,4 @@
-"""What the owner of a rig in the engine believes of it: a line through its healthy motion, and data sheets."""
+"""What the owner of a rig in the engine believes of it: a line through its healthy motion, data sheets."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _coefficients(v: np.ndarray) -> tuple[list[float], list[float]]:
 
 
 def believed(rig: Rig, rng: np.random.Generator) -> Rig:
-    """The rig with regulator and sensor as their data sheets have them: times 3 to 10 % off, gains up to 1 %."""
+    """The rig with regulator and sensor as in their data sheets: times 3 to 10 % off, gains up to 1 %."""
 
     def off() -> Relative:
         time = rng.uniform(*_TIMES) * rng.choice((-1.0, 1.0))
