@@ -34,6 +34,7 @@ _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a faul
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
 _RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
 _FREED = 0.7  # of the mean square left: an actuator far from the one given has to leave less
+_BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 
 
@@ -266,7 +267,10 @@ def _widened_beside(best: Fit, threshold: float) -> Fit:
         return best
     wide = replace(problem, own=replace(problem.own, wide=True))
     now, then = (fit(p, best.vector, WHITE, 8) for p in (problem, wide))
-    return then if evidence(then, now) > threshold else best
+    known = problem.own.precision > 0.0
+    moved = np.abs(then.vector[: len(known)] - problem.own_start)[known]
+    away = moved * np.sqrt(problem.own.precision[known])
+    return then if evidence(then, now) > threshold and np.max(away) < _BELIEVED else best
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
