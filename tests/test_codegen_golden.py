@@ -58,6 +58,7 @@ def test_the_text_is_the_golden_one(form, tmp_path, request):
     memory = [("foc_memory.h", "c_runtime/foc_memory.h")] * form.startswith("exp")
     for copied, source in (
         ("foc_rt.h", "c_runtime/foc_rt.h"),
+        ("foc_save.h", "c_runtime/foc_save.h"),
         ("controller.toml", "tests/golden/finger.toml"),
         *memory,
     ):

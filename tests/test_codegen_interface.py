@@ -2,6 +2,7 @@
 
 import json
 import re
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -158,7 +159,8 @@ def test_a_state_comes_back_and_goes_on(c):
     ffi, library, _ = c
     state, saved = state_of(c, 1), ffi.new("uint8_t[]", library.saved_bytes())
     library.spba_save(state, saved)
-    other = state_of(c, 2)
+    other, content = state_of(c, 2), bytes(ffi.buffer(saved))
+    assert int.from_bytes(content[-4:], "little") == zlib.crc32(content[:-4]), "as elsewhere"
     assert library.spba_restore(other, saved) == 0
     inputs = library.of_ref(0.01), library.of_meas(0.002), library.of_sched(0.1)
     for _ in range(30):

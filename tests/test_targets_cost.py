@@ -93,6 +93,7 @@ def test_bytes_of_25_more_taps(folders):
     assert long.ram_bytes - short.ram_bytes == 100
     assert long.flash["constants"] - short.flash["constants"] == 100
     assert short.flash["compiler"] == 0 and short.flash_bytes == sum(short.flash.values())
+    assert 100 < short.save_bytes < 2000 and 100 < long.save_bytes < 2000
 
 
 def test_flash_is_what_the_toolchain_says(folders):
@@ -108,7 +109,8 @@ def test_flash_is_what_the_toolchain_says(folders):
         said = subprocess.run(["arm-none-eabi-size", read.path / "object.o"], capture_output=True, text=True)
         text, data, bss = map(int, said.stdout.splitlines()[1].split()[:3])
         sizes, _ = object_sizes(elf)
-        exception_index = text - sizes["code"] - sizes["constants"]
+        exception_index = text - sizes["code"] - sizes["save"] - sizes["constants"]
+        assert sizes["save"] > 100
         assert 0 <= exception_index <= 8 * 12 and data + bss == sizes["data"] == 0
 
 

@@ -39,6 +39,7 @@ class ReadmeContext:
     version: str
     arithmetic: str
     fixed: bool
+    floats: bool
     unusable: str
     ctype: str
     transfer: str
@@ -65,9 +66,9 @@ class ReadmeContext:
 
 
 def readme_context(
-    plan: Plan, title: str, selftest: bool = False, kernels: Kernels = PORTABLE
+    plan: Plan, title: str, selftest: bool = False, kernels: Kernels = PORTABLE, floats: bool = True
 ) -> ReadmeContext:
-    """Prepare the folder's README; ``selftest``: whether it tells of one."""
+    """Prepare the folder's README; ``selftest`` and ``floats``: whether it tells of one, of conversions."""
     size, bound, unit = sizes(plan, kernels), plan.error_bound, plan.controller.units.output
     operator_unit = f"{unit}/s" if plan.integrator and unit else unit
     return ReadmeContext(
@@ -76,6 +77,7 @@ def readme_context(
         version=focgen.__version__,
         arithmetic=plan.arithmetic,
         fixed=not plan.floating,
+        floats=floats,
         unusable=unusable_text(plan) if plan.floating else "",
         ctype=plan.output.ctype,
         transfer=transfer_text(plan),

@@ -107,7 +107,7 @@ def folder_files(
         **runtime,
         "controller.toml": controller_toml,
         "manifest.json": json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
-        "README.md": render("README.md.jinja", readme_context(plan, title, selftest, kernels)),
+        "README.md": render("README.md.jinja", readme_context(plan, title, selftest, kernels, floats)),
         "example/main.c": render("main.c.jinja", example_context(plan, title, floats)),
         **(selftest_files(plan, digest) if selftest else {}),
     }

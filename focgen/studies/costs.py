@@ -83,4 +83,4 @@ def _on_host(folder: Path, name: str) -> dict:
     if subprocess.run(command, capture_output=True).returncode:
         raise BuildError("flash", "the C does not compile here", "set CC to another compiler")
     found, _ = object_sizes(made.read_bytes())
-    return {"flash_bytes": sum(found.values()), "compiled_for": f"{platform.machine()}, -Os"}
+    return {"flash_bytes": sum(found.values()) - found["save"], "compiled_for": f"{platform.machine()}, -Os"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from focgen.targets.toolchains import Toolchain, compile_object
 COUNTED = "executed instructions, counted in the emulator"
 _INTERFACE = ("init", "reset", "step", "track", "flags")
 _UNWINDING = (".ARM.", ".eh_frame", ".note", ".riscv")
+_SAVING = re.compile(r"\w+_(save|restore)|foc_(put|get|crc32|crc_bit|bits_f\d\d|float_f\d\d)")
 _FEW = 128  # steps, where floating point without a unit makes them long
 
 
@@ -40,7 +42,8 @@ class Cost:
     """What a controller costs on a core, built by ``compiler``.
 
     ``flash_bytes``: machine code and constants of the controller and of the compiler's own functions that it
-    calls (``flash`` has the parts). ``ram_bytes``: one state, and what else the controller keeps.
+    calls (``flash`` has the parts), without ``save_bytes``, the code of NAME_save and NAME_restore, which a
+    linker leaves out where they are not called (-ffunction-sections, --gc-sections). ``ram_bytes``: one state, and what else the controller keeps.
     ``stack_bytes``: the most that a call of its interface uses, from machine code, ``stack_path``: the
     functions on that path, each with its bytes; ``stack_seen``: the most that the measured steps have used.
     ``cycles_per_step`` is None for a core whose timings are not published. ``skipped``: why nothing was
@@ -57,6 +60,7 @@ class Cost:
     stack_path: tuple[str, ...] | None = None
     stack_seen: int | None = None
     skipped: str | None = None
+    save_bytes: int | None = None
 
 
 def cost_of(entry: dict[str, Any]) -> Cost:
@@ -82,7 +86,7 @@ def cost_on(core: Core, chain: Toolchain, plan: Plan, folder: Path) -> Cost:
     except ValueError as reason:
         raise BuildError(str(folder), f"the stack on {core.name} cannot be told: {reason}",
                          "generate the folder again") from None  # fmt: skip
-    flash, kept = _sizes(core, chain, plan, folder, library, stack)
+    flash, kept, save = _sizes(core, chain, plan, folder, library, stack)
     return Cost(
         chain.title,
         _per_step(costs.instructions, COUNTED),
@@ -93,6 +97,7 @@ def cost_on(core: Core, chain: Toolchain, plan: Plan, folder: Path) -> Cost:
         deepest.bytes,
         deepest.path,
         _stack_seen(plan, stack, costs),
+        save_bytes=save,
     )
 
 
@@ -109,16 +114,17 @@ def cost_on_avr(plan: Plan, folder: Path) -> Cost:
     run = library.run(exercise(plan, min(around, _FEW) + 1, 0))
     sizes, _ = object_sizes(library.object)
     own = {key: sizes[key] for key in ("code", "constants")}
-    flash = {**own, "compiler": library.flash - sum(own.values())}
+    flash = {**own, "compiler": library.flash - sizes["save"] - sum(own.values())}
     return Cost(
         compiler=avr.tools(),
         cycles_per_step=_per_step(run.cycles[0, 1:], avr.HOW),
-        flash_bytes=library.flash,
+        flash_bytes=sum(flash.values()),
         flash=flash,
         ram_bytes=len(run.answers.states[0]) + sizes["data"],
         stack_bytes=run.stack,
         stack_path=(f"as used by the measured steps {run.stack}",),
         stack_seen=run.stack,
+        save_bytes=sizes["save"],
     )
 
 
@@ -140,16 +146,18 @@ def _stack_seen(plan: Plan, stack: Stack, costs: StepCosts) -> int:
 
 
 def _sizes(core: Core, chain: Toolchain, plan: Plan, folder: Path, library: TargetLibrary,
-           stack: Stack) -> tuple[dict[str, int], int]:  # fmt: skip
-    """Bytes of flash by part, and of memory besides the state."""
+           stack: Stack) -> tuple[dict[str, int], int, int]:  # fmt: skip
+    """Bytes of flash by part, of memory besides the state, and of what saves it."""
     sizes, own = object_sizes(compile_object(chain, core, folder / f"{plan.name}.c", [folder]))
     reached = stack.reached([f"{plan.name}_{part}" for part in _INTERFACE])
     helpers = sum(library.program[name].size for name in reached - own)
-    return {"code": sizes["code"], "constants": sizes["constants"], "compiler": helpers}, sizes["data"]
+    flash = {"code": sizes["code"], "constants": sizes["constants"], "compiler": helpers}
+    return flash, sizes["data"], sizes["save"]
 
 
 def object_sizes(elf: bytes) -> tuple[dict[str, int], set[str]]:
-    """Bytes of code, constants and data in an object file, and the names of its functions.
+    """Bytes of code, constants, data and of the code that saves states, in an object file; and the names of
+    its functions.
 
     Raises MissingExtra without pyelftools.
     """
@@ -164,4 +172,6 @@ def object_sizes(elf: bytes) -> tuple[dict[str, int], set[str]]:
             sizes["code" if flags & 4 else "data" if flags & 1 else "constants"] += section["sh_size"]
     functions = [s for s in file.get_section_by_name(".symtab").iter_symbols()
                  if s["st_info"]["type"] == "STT_FUNC" and s["st_shndx"] != "SHN_UNDEF"]  # fmt: skip
+    sizes["save"] = sum(s["st_size"] for s in functions if _SAVING.fullmatch(s.name))
+    sizes["code"] -= sizes["save"]
     return sizes, {s.name for s in functions}
