@@ -125,11 +125,11 @@ def test_pointing_at_a_curve_tells_its_numbers_and_its_name(wide):
     page.mouse.move(at["left"] + 0.27 * at["w"], at["top"] + 0.8 * at["h"])
     page.wait_for_timeout(300)
     told = page.evaluate(
-        """[...document.querySelectorAll(".plot")].flatMap(function texts(node) {
+        """(function texts(node) {
           const below = [...(node.shadowRoot ? node.shadowRoot.children : []), ...node.children];
-          const own = node.classList.contains("bk-Tooltip") ? [node.shadowRoot.textContent] : [];
+          const own = node.matches(".bk-Tooltip, .bk-tooltip") ? [(node.shadowRoot ?? node).textContent] : [];
           return [...own, ...below.flatMap(texts)];
-        }).join(" ")"""
+        })(document.body).join(" ")"""
     )
     assert "as given" in told and "pressure → output" in told and "10" in told and heard == []
 
