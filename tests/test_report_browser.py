@@ -2,8 +2,11 @@
 
 import shutil
 
+import numpy as np
 import pytest
 
+from focgen.report.figures import Axis, Figure, Line, Panel
+from focgen.report.page import Page, Section, TableOf
 from focgen.report.pages.diagnosis import diagnosis_page
 from tests.report_samples import NAMES, diagnosis, signals
 
@@ -119,19 +122,38 @@ def test_dragging_zooms_all_panels_and_the_button_resets(wide):
     assert ends(page) == pytest.approx(before)
 
 
+def tooltip(page):
+    """What hovering shows, as text."""
+    return page.evaluate(
+        """(function texts(node) {
+          const below = [...(node.shadowRoot ? node.shadowRoot.children : []), ...node.children];
+          const own = node.matches(".bk-Tooltip") ? [(node.shadowRoot ?? node).textContent] : [];
+          return [...own, ...below.flatMap(texts)];
+        })(document.body).join(" ")"""
+    )
+
+
 def test_pointing_at_a_curve_tells_its_numbers_and_its_name(wide):
     page, heard = wide
     at = centre(page, 1)
     page.mouse.move(at["left"] + 0.27 * at["w"], at["top"] + 0.8 * at["h"])
     page.wait_for_timeout(300)
-    told = page.evaluate(
-        """(function texts(node) {
-          const below = [...(node.shadowRoot ? node.shadowRoot.children : []), ...node.children];
-          const own = node.matches(".bk-Tooltip, .bk-tooltip") ? [(node.shadowRoot ?? node).textContent] : [];
-          return [...own, ...below.flatMap(texts)];
-        })(document.body).join(" ")"""
-    )
+    told = tooltip(page)
     assert "as given" in told and "pressure → output" in told and "10" in told and heard == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_curve_of_any_name_tells_it_as_it_is(chromium, tmp_path, name):
+    x = np.array([0.0, 1.0])
+    panel = Panel(Axis(name), Axis(name), (Line(name, x, x, "model"), Line("b", x, x + 9.0, "bad")), name)
+    figure = Figure(name, name, name, (panel,), TableOf((name,), ((name,),), name))
+    (tmp_path / "page.html").write_text(Page(name, name, (Section(name, figures=(figure,)),)).self_contained(), "utf-8")
+    page, heard = opened(chromium, tmp_path / "page.html", 900)
+    at = centre(page, 1)
+    page.mouse.move(at["left"] + 0.5 * at["w"], at["top"] + at["h"] * (1.0 - 1.1 / 11.2))
+    page.wait_for_timeout(300)
+    assert name in tooltip(page) and heard == []
+    page.context.close()
 
 
 def test_the_legend_hides_and_shows_a_curve(wide):
