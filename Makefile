@@ -13,7 +13,7 @@ help:            ## this list
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[plots]'
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[plots,report]'
 	@touch $@
 
 $(VENV)/ready-test: $(VENV)/ready

@@ -19,7 +19,7 @@ from focgen.identification.model import Identification
 from focgen.loop.design import Design, design
 from focgen.loop.simulate import Simulation, simulate
 from focgen.output import new_folder
-from focgen.progress import led_by, say
+from focgen.progress import led_by, step
 from focgen.report.control import design_pictures, simulation_pictures
 from focgen.report.demo_page import demo_page
 from focgen.report.identification import identification_pictures
@@ -92,7 +92,7 @@ def demo(out: str | Path) -> Demo:
 
 def _chain(folder: Path) -> Demo:
     rig, controller = folder / "identified.toml", folder / "controller.toml"
-    say("1/7  identify: a fractional model from six steps of pressure, and six integer-order ones beside it")
+    step("1/7  identify: a fractional model from six steps of pressure, and six integer-order ones beside it")
     found = identify(
         [folder / "logs/steps.csv"],
         folder / "rig.toml",
@@ -100,18 +100,18 @@ def _chain(folder: Path) -> Demo:
         last=_LOADED,
         unseen=[folder / "logs/sines.csv"],
     )
-    say("2/7  design: the model inverted, and a gain schedule as quick as the loop allows")
+    step("2/7  design: the model inverted, and a gain schedule as quick as the loop allows")
     designed = design(rig, controller)
-    say("3/7  simulate: the closed loop at seven set points, bit for bit as it will run")
+    step("3/7  simulate: the closed loop at seven set points, bit for bit as it will run")
     simulated = simulate(rig, controller)
-    say("4/7  study memory: a few lengths of it, and the exponential form")
+    step("4/7  study memory: a few lengths of it, and the exponential form")
     own = (designed.controller.sample_time,)
     memory = study("memory", controller, folder / "memory", sample_times=own, **_MEMORIES)
-    say(f"5/7  generate: C in {', '.join(ARITHMETICS)}")
+    step(f"5/7  generate: C in {', '.join(ARITHMETICS)}")
     generated = {a: generate(controller, folder / "firmware" / a, a) for a in ARITHMETICS}
-    say("6/7  verify: the C against the Python reference, sample for sample")
+    step("6/7  verify: the C against the Python reference, sample for sample")
     verified = {a: verify(folder / "firmware" / a) for a in ARITHMETICS}
-    say("7/7  diagnose: another rig, whose logs hold an effect that its model lacks, under seal")
+    step("7/7  diagnose: another rig, whose logs hold an effect that its model lacks, under seal")
     diagnosis, sealed = _blind(folder / "diagnosis")
     return Demo(
         folder,

@@ -18,8 +18,14 @@ _lead: ContextVar[str] = ContextVar("lead", default="")  # what stands before ev
 
 
 def say(line: str) -> None:
-    """Print one line of progress; results go to stdout, this does not."""
+    """Print one line that everyone has to see; results go to stdout, this does not."""
     print(f"{_lead.get()}{line}", file=sys.stderr, flush=True)
+
+
+def step(line: str) -> None:
+    """Say what is being done now; silent where stderr is not a terminal."""
+    if sys.stderr.isatty():
+        say(line)
 
 
 @contextmanager

@@ -12,11 +12,11 @@ from focgen.cli.main import commands, main, parser
 from focgen.errors import InputError
 from focgen.jsontext import to_json
 from focgen.output import new_folder, write_file, write_files
-from focgen.progress import bar, led_by, say
+from focgen.progress import bar, led_by, say, step
 
 
 @pytest.mark.parametrize(
-    "argv", [["nonsense"], [], ["design"], ["design", "missing.toml", "--out", "x.toml"]]
+    "argv", [["nonsense"], ["design"], ["design", "missing.toml", "--out", "x.toml"]]
 )
 def test_unusable_input_is_one_line_and_status_2(argv, capsys):
     assert main(argv) == 2
@@ -24,6 +24,36 @@ def test_unusable_input_is_one_line_and_status_2(argv, capsys):
     assert captured.out == ""
     assert captured.err.startswith("focgen: error: ") and captured.err.count("\n") == 1
     assert "Traceback" not in captured.err
+
+
+def test_alone_it_says_what_there_is(capsys):
+    assert main([]) == 0
+    printed = capsys.readouterr()
+    assert printed.err == "" and all(f"\n  {name} " in printed.out for name in commands())
+
+
+@pytest.mark.parametrize(
+    "argv, meant",
+    [
+        (["identfy"], "did you mean identify?"),
+        (["design", "rig.toml", "--out", "c.toml", "--setling", "1"], "did you mean --settling?"),
+        (["verify", "--sample=9", "--tarmac=all"], "did you mean --target?"),
+    ],
+)
+def test_a_mistyped_word_gets_the_one_that_was_meant(argv, meant, capsys):
+    assert main(argv) == 2
+    line = capsys.readouterr().err
+    assert meant in line and line.count("\n") == 1
+
+
+def test_a_word_like_none_gets_no_guess(capsys):
+    assert main(["xyzzy"]) == 2
+    assert "did you mean" not in capsys.readouterr().err
+
+
+def test_what_follows_two_dashes_is_no_option(capsys):
+    assert main(["replay", "--", "--nothing.toml", "--log.csv"]) == 2
+    assert "--nothing.toml: cannot be read" in capsys.readouterr().err
 
 
 def test_every_command_shows_a_worked_example(capsys):
@@ -93,6 +123,14 @@ def test_a_step_leads_the_lines_of_its_parts(capsys):
         say("command to pressure")
     say("next")
     assert capsys.readouterr() == ("", "  from command to pressure\nnext\n")
+
+
+def test_progress_is_for_terminals(capsys, monkeypatch):
+    step("command to pressure")
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    step("command to pressure")
+    assert capsys.readouterr() == ("", "command to pressure\n")
 
 
 def test_a_bar_shows_how_far_and_how_long():

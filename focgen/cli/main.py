@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from pkgutil import iter_modules
 
@@ -50,9 +51,37 @@ def commands() -> tuple[str, ...]:
 class _Parser(argparse.ArgumentParser):
     """Reports a wrong argument the way every other error is reported."""
 
+    def parse_known_args(self, args=None, namespace=None):
+        """As argparse does, but an option that is mistyped is said first, not what is missing for want of it."""
+        if self._subparsers is None:
+            self._check_options(sys.argv[1:] if args is None else args)
+        return super().parse_known_args(args, namespace)
+
+    def _check_options(self, args: Sequence[str]) -> None:
+        known = self._option_string_actions
+        for word in args[: args.index("--")] if "--" in args else args:
+            option = word.partition("=")[0]
+            if option.startswith("--") and not any(one.startswith(option) for one in known):
+                raise FocgenError(self.prog.partition(" ")[2], f"has no option {option}", _meant(option, known, self.prog))
+
     def error(self, message: str):
         command = self.prog.partition(" ")[2] or "arguments"
         raise FocgenError(command, message, f"see `{self.prog} --help`")
+
+
+def _meant(word: str, known: Iterable[str], prog: str) -> str:
+    """The remedy for a word that is not known: the one most like it, where one is, and the help."""
+    near = get_close_matches(word, list(known), 1)
+    help_text = f"see `{prog} --help`"
+    return f"did you mean {near[0]}? else {help_text}" if near else help_text
+
+
+def _short_help() -> str:
+    """What there is, in one screen."""
+    helps = {name: import_module(f"focgen.cli.{name}").HELP for name in commands()}
+    width = max(map(len, helps))
+    lines = [f"  {name:{width}s}  {text}" for name, text in helps.items()]
+    return "\n".join([_PROLOGUE, "commands:", *lines, "", "`focgen COMMAND --help` shows an example of each."])
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
@@ -80,6 +109,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns 0 (done), 1 (a check does not hold) or 2 (unusable input)."""
     try:
         argv = sys.argv[1:] if argv is None else list(argv)
+        if not argv:
+            print(_short_help())
+            return 0
+        if not argv[0].startswith("-") and argv[0] not in commands():
+            raise FocgenError(argv[0], "is no command", _meant(argv[0], commands(), "focgen"))
         args = parser(argv[0] if argv else None).parse_args(argv)
         outcome = args.run(args)
         sys.stdout.write(to_json(outcome.payload) if args.json else outcome.text.rstrip("\n") + "\n")

@@ -25,7 +25,7 @@ from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import each_of
 from focgen.output import check_apart
-from focgen.progress import say
+from focgen.progress import step
 from focgen.rig.effects import library
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
@@ -115,7 +115,7 @@ def explain_all(
     roles, x, found, trusted = cuts(logs), None, [], True
     for entry, exit in zip(roles, roles[1:]):
         segment = loosened(rig, make(logs, entry, exit, x, carried(found[-1]) if found else None))
-        say(f"{entry} to {exit}")
+        step(f"{entry} to {exit}")
         e = explain(rig, segment, logs, threshold, only, trusted)
         if draws > 1 and e.causes and only is None:
             clues = [c for c in clues_for(e.segment, rig) if c.form.seen is None]

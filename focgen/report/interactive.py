@@ -37,8 +37,9 @@ def library() -> str:
     return path.read_text(encoding="utf-8").replace("</script", "<\\/script")
 
 
-def document(figure: Figure, most: int = MOST) -> dict[str, Any]:
+def document(figure: Figure, most: int = MOST, name: str = "figure") -> dict[str, Any]:
     """The figure as a document of BokehJS, with about ``most`` points a curve; equal figures give equal documents.
+    ``name`` tells its models from those of the page's other figures.
     Raises MissingExtra where Bokeh is not installed.
     """
     _bokeh()
@@ -48,7 +49,7 @@ def document(figure: Figure, most: int = MOST) -> dict[str, Any]:
     plots = _plots(figure, most)
     made = Document()
     made.add_root(column(*plots, sizing_mode="stretch_width", spacing=4))
-    return _numbered(made.to_json(deferred=False))
+    return _numbered(made.to_json(deferred=False), name)
 
 
 def legend(figure: Figure) -> list[dict[str, str]]:
@@ -266,18 +267,18 @@ def _source(**columns):
 # ------------------------------------------------------------------------------------------------- JSON
 
 
-def _numbered(value: Any) -> Any:
-    """The same with the models numbered from 1: Bokeh counts on from page to page."""
+def _numbered(value: Any, name: str) -> Any:
+    """The same with the models numbered from 1 behind ``name``: Bokeh counts on from page to page."""
     numbers: dict[str, str] = {}
 
     def again(part: Any) -> Any:
-        if isinstance(part, list):
+        if isinstance(part, (list, tuple)):
             return [again(one) for one in part]
         if not isinstance(part, dict):
             return part
         found = {key: again(one) for key, one in part.items() if key != "id"}
         if "id" in part:
-            return {"id": numbers.setdefault(part["id"], f"m{len(numbers) + 1}")} | found
+            return {"id": numbers.setdefault(part["id"], f"{name}-{len(numbers) + 1}")} | found
         return found
 
     return again(value)

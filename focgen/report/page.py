@@ -81,7 +81,8 @@ class Page:
 
     def _with_figures(self, most: int) -> str:
         figures = [figure for section in self.sections for figure in section.figures]
-        documents = {f"figure{i}": document(figure, most) for i, figure in enumerate(figures, 1)}
+        names = [f"figure{i}" for i in range(1, len(figures) + 1)]
+        documents = {name: document(figure, most, name) for name, figure in zip(names, figures)}
         template = _environment().get_template("report/page.html")
         values = {"documents": data(documents), "library": library(), "most": most}
         legends = [legend(figure) for figure in figures]

@@ -8,7 +8,8 @@
     "#000000": "#f0f3f5", "#0072b2": "#56b4e9", "#d55e00": "#ff8a3d", "#009e73": "#2fd3a2", "#7f7f7f": "#a3abb2",
     "#dddddd": "#4a535b", "#cc79a7": "#e79cc6", "#56b4e9": "#9bd3f5", "#e69f00": "#ffbf3f",
   };
-  const drawn = {};  // by figure: its document in BokehJS
+  const drawn = {}, views = {};  // by figure: its document in BokehJS, and what shows it
+  window.figures = views;  // for scripts that look at the page
   const inks = new WeakMap();  // by model: its colours on white paper
 
   const ink = (colour, night) => (night && onDark[String(colour).toLowerCase()]) || colour;
@@ -81,21 +82,21 @@
     const place = document.getElementById(name + "-plot");
     const json = documents[name];
     const items = [{ docid: name, roots: { [json.roots[0].id]: place }, root_ids: [json.roots[0].id] }];
-    const [view] = await Bokeh.embed.embed_items({ [name]: json }, items);
-    drawn[name] = (view && view.model ? view : view.roots ? view.roots[0] : [...view][0]).model.document;
+    const [manager] = await Bokeh.embed.embed_items({ [name]: json }, items);
+    views[name] = manager.roots[0];
+    drawn[name] = views[name].model.document;
     fit(drawn[name], place);
   }
 
   // Paper has no canvas: while it is printed, a picture stands in each one's place.
   function beforePrint() {
     paint(false);
-    for (const place of document.querySelectorAll(".plot")) {
+    for (const [name, view] of Object.entries(views)) {
+      const place = document.getElementById(name + "-plot");
       for (const old of place.querySelectorAll(":scope > img")) old.remove();
-      const found = Object.values(Bokeh.index).find((view) => place.contains(view.el));
-      if (!found) continue;
       const picture = new Image();
       picture.alt = "";
-      picture.src = found.export("png", true).canvas.toDataURL();
+      picture.src = view.export("png", true).canvas.toDataURL();
       place.append(picture);
       place.classList.add("printed");
     }

@@ -161,7 +161,7 @@ def verification_section(found: Mapping[str, Any]) -> Section:
     ran = {name: one for name, one in found["targets"].items() if "skipped" not in one}
     rows = tuple(_compared(name, one) for name, one in found["targets"].items())
     verdict = "holds" if found["holds"] else "does NOT hold"
-    skipped = [f"{name} was skipped: {one['skipped']}" for name, one in found["targets"].items() if "skipped" in one]
+    skipped = [f"skipped on {name}: {one['skipped']}" for name, one in found["targets"].items() if "skipped" in one]
     told = (f"The comparison of {found['name']} ({found['arithmetic']}) with the reference {verdict}.", *warnings(found["differences"]))
     table = TableOf(("target", "samples equal", "largest error", "proven bound"), rows, "The C against the reference, ahead of the integrator")
     figures = (_used(ran, table),) if ran else ()
