@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -81,6 +81,11 @@ class Answers:
 
     trace: Trace
     states: tuple[bytes, ...]
+
+
+def steps_alone(trace: Trace) -> Trace:
+    """A trace from C with the flags of its steps, without what resets and tracks have raised."""
+    return replace(trace, flags=trace.flags & np.uint8(REFUSED - 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.targets.cores import Core
-from focgen.targets.driver import DTYPES, RESUME, Answers, driver, header_scales, lane_of
+from focgen.targets.driver import DTYPES, RESUME, Answers, driver, header_scales, lane_of, steps_alone
 from focgen.targets.emulator import Executed, Machine, TargetFault
 from focgen.targets.legality import forbidden
 from focgen.targets.program import WORK_SIZE, Program, build
@@ -114,7 +114,7 @@ class TargetLibrary:
 
         Raises TargetFault where the program faults, does not return, or accesses memory as the core must not.
         """
-        return self.answers(plan, scenario).trace
+        return steps_alone(self.answers(plan, scenario).trace)
 
     def answers(self, plan: Plan, scenario: Scenario) -> Answers:
         """The same, with the state's bytes after every lane."""

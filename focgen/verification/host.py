@@ -13,7 +13,7 @@ from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
-from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of
+from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of, steps_alone
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 """Bit equality of the floating forms needs contraction off."""
@@ -59,7 +59,7 @@ class Library:
 
         Without an integrator d cannot be read from outside and is u.
         """
-        return self.answers(plan, scenario).trace
+        return steps_alone(self.answers(plan, scenario).trace)
 
     def answers(self, plan: Plan, scenario: Scenario) -> Answers:
         """The same, with the state's bytes after every lane."""
