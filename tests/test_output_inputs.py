@@ -144,6 +144,7 @@ def test_a_study_spares_its_inputs(tmp_path, monkeypatch):
 
     monkeypatch.setattr(study_write, "payload", lambda study: {})
     monkeypatch.setattr(study_write, "_shown", lambda study: {})
+    monkeypatch.setattr(study_write, "curves_text", lambda study: "")
     mine = tmp_path / "study.json"
     mine.write_text("mine")
     with pytest.raises(InputError, match="is the input"):
@@ -151,7 +152,7 @@ def test_a_study_spares_its_inputs(tmp_path, monkeypatch):
     assert mine.read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", ("diagnosis.json", "refitted.toml", "augmented.toml"))
+@pytest.mark.parametrize("name", ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml"))
 def test_a_diagnosis_of_an_earlier_result_is_refused(files, name, capsys):
     """diagnose gap/refitted.toml … --out gap: the next rig would replace the one it was found from."""
     rig = files["rig.toml"].rename(files["rig.toml"].with_name(name))
@@ -170,6 +171,8 @@ def test_what_a_diagnosis_writes_is_known_beforehand(tmp_path, monkeypatch):
 
     monkeypatch.setattr(module, "to_json", lambda diagnosis: "{}")
     monkeypatch.setattr(module, "rig_table", lambda rig: {})
+    monkeypatch.setattr(module, "drawn_of", lambda *given: None)
+    monkeypatch.setattr(module, "drawn_text", lambda drawn: "{}")
     found = object.__new__(Diagnosis)
     for key, name in (("refitted_rig", "refitted.toml"), ("augmented_rig", "augmented.toml")):
         object.__setattr__(found, key, name)
