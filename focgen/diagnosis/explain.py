@@ -169,7 +169,7 @@ def explain(
         return found
     freed, asked = replace(problem, own=replace(problem.own, far=True), memory={}), _FREED * found.square
     beside = freed.with_clues(found.best.problem.clues)
-    if np.mean(fit(beside, found.best.vector, Weighing(found.ar)).weighed ** 2) > asked:
+    if beside.clues and np.mean(fit(beside, found.best.vector, Weighing(found.ar)).weighed ** 2) > asked:
         return found
     other = _explained(rig, freed, threshold, only, trusted)
     return other if other.square < asked else found
