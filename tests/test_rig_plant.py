@@ -14,7 +14,7 @@ from focgen.rig.engine import Chain, Placed, fits_in
 from focgen.rig.files import read_rig, write_rig
 from focgen.rig.kernels import BALANCED
 from focgen.rig.model import Actuator, LinearActuator, Rig, Signals
-from focgen.rig.dynamics import Bend, Dynamics, Friction, Spring
+from focgen.rig.dynamics import Bend, Dynamics, Friction, Rise, Spring
 from focgen.rig.modes import respond as lag
 from focgen.rig.plant import Plant, plant_of, respond
 from focgen.rig.replay import replay
@@ -113,7 +113,13 @@ def _integrated(plant, spring, x, t):
 
 
 @pytest.mark.parametrize(
-    "spring", [Spring(0.5, -4.0, 25.0), Spring(0.9, 6.0, 25.0), Spring(0.5, 4.0, 25.0, 1.5, 0.1)]
+    "spring",
+    [
+        Spring(0.5, -4.0, 25.0),
+        Spring(0.9, 6.0, 25.0),
+        Spring(0.5, 4.0, 25.0, 1.5, 0.1),
+        Spring(0.5, 1.0, 3.0, 0.8, 0.1),
+    ],
 )
 def test_a_hysteretic_spring_against_an_integrator(spring):
     t = H * np.arange(120)
@@ -123,6 +129,24 @@ def test_a_hysteretic_spring_against_an_integrator(spring):
     np.testing.assert_allclose(made, exact, atol=1e-6 * np.max(np.abs(exact)))
     plain = respond(plant, x, rest(len(x)), H)
     assert np.max(np.abs(made - plain)) > 0.05 * np.max(np.abs(exact))
+
+
+@pytest.mark.parametrize("rise", [Rise(0.4, 0.5), Rise(0.3, 0.004)])
+def test_friction_that_rises_with_the_speed_against_an_integrator(rise):
+    """It rises from nothing, so that nothing sticks."""
+    t = H * np.arange(150)
+    x, plant = 2 * np.sin(3 * t) + 1.2 * np.sin(7.3 * t), Plant(2, 0.5, 0.3, 40.0)
+
+    def slope(now, state):
+        y, v = state
+        taken = np.sign(v) * rise.size * (1.0 - np.exp(-abs(v) / rise.speed))
+        return [v, (np.interp(now, t, x) - plant.k * y - plant.c * v - taken) / plant.m]
+
+    how = dict(t_eval=t, method="Radau", rtol=1e-9, atol=1e-12, max_step=H)
+    exact = solve_ivp(slope, (0.0, t[-1]), [0.0, 0.0], **how).y[0]
+    made = respond(plant, x, rest(len(x)), H, Dynamics(rise=rise))
+    np.testing.assert_allclose(made, exact, atol=2e-5 * np.max(np.abs(exact)))
+    assert np.max(np.abs(made - respond(plant, x, rest(len(x)), H))) > 0.01 * np.max(np.abs(exact))
 
 
 def test_a_spring_in_equilibrium_stays_there():

@@ -14,48 +14,76 @@
 #include "bent.h"
 
 enum { BALANCED = 2, DIPS = 3 };
+static const double NEAR = 0.1, BESIDE = 0.03; /* how far Taylor series go: of q, as a part of it; of powers and exponentials */
+static const double FEW = 0.1;      /* part of its steepness that q loses where it is taken from the way since 0 */
+static const double NOTHING = 40.0; /* speeds at which an exponential is 0 */
 
 typedef struct {
     int order, base, last;
     double h, m, c, k, slide, stick, soft, loading, unloading, power, scale, rise, speed;
     const double *bend, *tables;
-    int curved; /* whether there is a w, or friction that depends on the speed */
+    int bends, curved; /* whether the spring bends; whether there is a w, or friction that depends on the speed */
 } Plant;
 
 typedef struct {
-    double y, v, q;
-    int moving; /* the sign of the velocity, 0: stuck */
+    double y, v, q, grown; /* grown: |q|^power scale^(1 - power) */
+    double speed, spared;  /* a magnitude of the velocity and exp(-|v|/speed) there */
+    int moving;            /* the sign of the velocity, 0: stuck */
 } State;
 
 static double taken(const Plant *p, const State *s)
 {
     double slope;
-    return p->curved ? p->soft * (s->q - s->y) + bent(p->bend, s->y, &slope) : 0.0;
+    return (p->soft != 0.0 ? p->soft * (s->q - s->y) : 0.0) + (p->bends ? bent(p->bend, s->y, &slope) : 0.0);
+}
+
+/* |q|^power scale^(1 - power), from `then` where it was so at `old`: near there by the binomial series. */
+static double grown(const Plant *p, double q, double old, double then)
+{
+    double n = p->power, e = (q - old) / old;
+    if (n == 1.0) return fabs(q);
+    if (!(fabs(e) < BESIDE)) return p->scale * pow(fabs(q) / p->scale, n);
+    double last = 1.0 + (n - 3.0) / 4.0 * e * (1.0 + (n - 4.0) / 5.0 * e);
+    return then * (1.0 + n * e * (1.0 + (n - 1.0) / 2.0 * e * (1.0 + (n - 2.0) / 3.0 * e * last)));
 }
 
 /* dq/dy where q in the direction of motion is `q`. */
-static double steepness(const Plant *p, double q)
+static double steepness(const Plant *p, double q, double grown) { return 1.0 - (q > 0.0 ? p->loading : -p->unloading) * grown; }
+
+/* exp(-|v|/speed) at the state's velocity, from where it was known: near there by its series. */
+static double spared(const Plant *p, State *s)
 {
-    double grown = p->power == 1.0 ? fabs(q) : fabs(q) * pow(fabs(q) / p->scale, p->power - 1.0);
-    return 1.0 - (q > 0.0 ? p->loading : -p->unloading) * grown;
+    double now = fabs(s->v), e = (s->speed - now) / p->speed;
+    s->speed = now;
+    if (now > NOTHING * p->speed) { /* kept, it would shrink to numbers that processors are slow with */
+        s->speed = INFINITY;
+        return 0.0;
+    }
+    double end = 1.0 + e / 4.0 * (1.0 + e / 5.0 * (1.0 + e / 6.0));
+    if (fabs(e) < BESIDE) s->spared *= 1.0 + e * (1.0 + e / 2.0 * (1.0 + e / 3.0 * end));
+    else s->spared = exp(-now / p->speed);
+    return s->spared;
 }
 
-/* What friction has risen by, against the side `sign`, and what it rises by with the speed. */
-static double risen(const Plant *p, const State *s, int sign)
-{
-    return p->rise != 0.0 ? -sign * p->rise * expm1(-fabs(s->v) / p->speed) : 0.0;
-}
+/* What friction has risen by, against the side `sign`. */
+static double risen(const Plant *p, State *s, int sign) { return p->rise != 0.0 ? sign * p->rise * (1.0 - spared(p, s)) : 0.0; }
 
-static double rising(const Plant *p, const State *s) { return p->rise != 0.0 ? p->rise / p->speed * exp(-fabs(s->v) / p->speed) : 0.0; }
-
-/* The rate of w and of what friction has risen by, times `span`, where it moves to the side `sign` under the input `u`. */
-static double yielding(const Plant *p, const State *s, int sign, double u, double span)
+/* What w and what friction has risen by take from the input `u` where it moves to the side `sign`, and in `rate` their rate, times
+ * `span`. */
+static double yielded(const Plant *p, State *s, int sign, double u, double span, double *rate)
 {
-    double slope;
-    if (!p->curved) return 0.0;
-    bent(p->bend, s->y, &slope);
-    double gained = (u - p->k * s->y - p->c * s->v - taken(p, s) - risen(p, s, sign) - sign * p->slide) / p->m;
-    return span * (s->v * (p->soft * (steepness(p, sign * s->q) - 1.0) + slope) + gained * rising(p, s));
+    double slope = 0.0, held = p->bends ? bent(p->bend, s->y, &slope) : 0.0, gained = 0.0;
+    if (p->soft != 0.0) {
+        held += p->soft * (s->q - s->y);
+        slope += p->soft * (steepness(p, sign * s->q, s->grown) - 1.0);
+    }
+    if (p->rise != 0.0) {
+        double left = spared(p, s);
+        held += sign * p->rise * (1.0 - left);
+        gained = (u - p->k * s->y - p->c * s->v - held - sign * p->slide) / p->m * p->rise / p->speed * left;
+    }
+    *rate = span * (s->v * slope + gained);
+    return held;
 }
 
 /* q after `way` >= 0 in its direction, on one side of 0, for a power of 1. */
@@ -66,22 +94,53 @@ static double along(double q, double way, double bend)
     return q + (1.0 - bend * q) * mean * way;
 }
 
-/* q after the displacement `move`. */
-static double wound(const Plant *p, double q, double move)
+/* The same on both sides. */
+static double across(const Plant *p, double q, double way)
 {
-    double side = move < 0.0 ? -1.0 : 1.0, way = fabs(move);
-    q *= side;
-    if (p->power != 1.0) {
-        double one = steepness(p, q), two = steepness(p, q + 0.5 * way * one), three = steepness(p, q + 0.5 * way * two);
-        return side * (q + way / 6.0 * (one + 2.0 * two + 2.0 * three + steepness(p, q + way * three)));
+    if (q >= 0.0) return along(q, way, p->loading);
+    double bend = p->unloading, there = along(q, way, bend), inside = -bend * q;
+    if (there <= 0.0) return there;
+    return along(0.0, way - (fabs(inside) < 1e-9 ? -q : log1p(inside) / bend), p->loading);
+}
+
+/* The way from 0 to q, `lost` being the part of its steepness that q has lost there: the integral of 1/(1 - lost). */
+static double since(const Plant *p, double q, double lost)
+{
+    double n = p->power;
+    return q * (1.0 + lost * (1.0 / (n + 1.0) + lost * (1.0 / (2.0 * n + 1.0) + lost * (1.0 / (3.0 * n + 1.0) + lost / (4.0 * n + 1.0)))));
+}
+
+/* The same for another power, `size` being what it has grown to: by its Taylor series; about 0, where that has none, by the way since
+ * 0; what is too steep for both by Runge and Kutta's rule. */
+static double curving(const Plant *p, double q, double size, double way)
+{
+    double n = p->power, one = steepness(p, q, size), r = 1.0 / q;
+    if (way * (fabs(one) + n * fabs(1.0 - one)) < NEAR * fabs(q)) {
+        double first = n * (one - 1.0) * r, second = first * (n - 1.0) * r, third = second * (n - 2.0) * r;
+        double fourth = first * first * first + one * (4.0 * first * second + one * third);
+        return q + way * one * (1.0 + way / 2.0 * (first + way / 3.0 * (first * first + one * second + way / 4.0 * fourth)));
     }
-    if (q < 0.0) {
-        double bend = p->unloading, inside = -bend * q, to_zero = INFINITY;
-        if (inside > -1.0) to_zero = fabs(inside) < 1e-9 ? -q : log1p(inside) / bend;
-        if (way <= to_zero) return side * along(q, way, bend);
-        way -= to_zero, q = 0.0;
+    double goal = since(p, q, 1.0 - one) + way, at = goal, lost = 1.0 - one;
+    for (int turn = 0; turn < 3 && fabs(lost) < FEW; turn++) {
+        lost = 1.0 - steepness(p, at, grown(p, at, q, size));
+        at -= (since(p, at, lost) - goal) * (1.0 - lost);
     }
-    return side * along(q, way, p->loading);
+    if (fabs(lost) < FEW) return at;
+    at = q + 0.5 * way * one;
+    double two = steepness(p, at, grown(p, at, q, size));
+    at = q + 0.5 * way * two;
+    double three = steepness(p, at, grown(p, at, q, size));
+    at = q + way * three;
+    return q + way / 6.0 * (one + 2.0 * two + 2.0 * three + steepness(p, at, grown(p, at, q, size)));
+}
+
+/* q of the state after the displacement `move`. */
+static void wind(const Plant *p, State *s, double move)
+{
+    double side = move < 0.0 ? -1.0 : 1.0, was = s->q;
+    if (p->soft == 0.0) return;
+    s->q = side * (p->power == 1.0 ? across(p, side * was, fabs(move)) : curving(p, side * was, s->grown, fabs(move)));
+    s->grown = grown(p, s->q, was, s->grown);
 }
 
 /* The state after a step of `level` with the input `d` (4 coefficients over the step), friction at `sign` times `slide`. */
@@ -89,20 +148,19 @@ static State stepped(const Plant *p, State s, const double *d, int level, int si
 {
     const double *t = p->tables + 12 * (level - p->base);
     double span = p->h / (double)(1 << level), f[4] = {d[0] - sign * p->slide, d[1], d[2], d[3]};
-    double at_end = d[0] + d[1] + d[2] + d[3] - sign * p->slide, before = taken(p, &s) + risen(p, &s, sign);
-    double slope = yielding(p, &s, sign, d[0], span);
-    State to = s;
+    double at_end = d[0] + d[1] + d[2] + d[3] - sign * p->slide, slope = 0.0;
+    double before = p->curved ? yielded(p, &s, sign, d[0], span, &slope) : 0.0;
     double then = before + slope, steep = slope;
+    State to = s;
     for (int round = 0; round < (p->curved ? 2 : 1); round++) {
         double g[4] = {f[0] - before, f[1] - slope, f[2] - 3.0 * (then - before) + 2.0 * slope + steep,
                        f[3] - slope - steep + 2.0 * (then - before)};
-        if (!p->curved) for (int i = 0; i < 4; i++) g[i] = f[i];
         to.y = t[0] * s.y + t[1] * s.v + t[4] * g[0] + t[5] * g[1] + t[6] * g[2] + t[7] * g[3];
         if (p->order == 2) to.v = t[2] * s.y + t[3] * s.v + t[8] * g[0] + t[9] * g[1] + t[10] * g[2] + t[11] * g[3];
         if (!p->curved) break;
-        if (p->soft != 0.0) to.q = wound(p, s.q, to.y - s.y);
-        then = taken(p, &to) + risen(p, &to, sign);
-        steep = yielding(p, &to, sign, at_end + sign * p->slide, span);
+        to.q = s.q, to.grown = s.grown;
+        wind(p, &to, to.y - s.y);
+        then = yielded(p, &to, sign, at_end + sign * p->slide, span, &steep);
     }
     if (p->order == 1) to.v = (at_end - p->k * to.y - taken(p, &to)) / p->m;
     return to;
@@ -114,10 +172,11 @@ static double push(const Plant *p, const State *s, double u) { return u - p->k *
 /* Stuck, moving on, or turned round, by what pushes it. */
 static void decide(const Plant *p, State *s, double u)
 {
+    if (s->moving && p->order == 2) return;
     double pushed = push(p, s, u);
     int stopped = p->order == 1 && s->moving && s->moving * pushed <= p->slide;
     if (s->moving && !stopped) {
-        if (p->order == 1) s->v = (pushed - s->moving * p->slide) / p->m;
+        s->v = (pushed - s->moving * p->slide) / p->m;
         return;
     }
     s->moving = fabs(pushed) > p->stick ? (pushed > 0.0 ? 1 : -1) : 0;
@@ -127,7 +186,7 @@ static void decide(const Plant *p, State *s, double u)
 static void rolled(State *s, const Plant *p, double way)
 {
     s->y += way;
-    if (p->soft != 0.0) s->q = wound(p, s->q, way);
+    wind(p, s, way);
 }
 
 /* From 0 velocity on for `time`, so short that the push changes in a line, from `first` of the input to `u`. */
@@ -141,13 +200,13 @@ static void started(const Plant *p, State *s, double first, double u, double tim
 }
 
 /* Whether a step that ended well may have turned round twice on its way. */
-static int dips(const Plant *p, const State *s, const State *to, const double *d)
+static int dips(const Plant *p, State *s, State *to, const double *d)
 {
     if (p->order == 1) return 0;
     int sign = s->moving;
     double first = push(p, s, d[0]) - p->c * s->v - sign * p->slide - risen(p, s, sign);
-    double last = push(p, to, d[0] + d[1] + d[2] + d[3]) - p->c * to->v - sign * p->slide - risen(p, to, sign);
-    return sign * first < 0.0 && sign * last > 0.0;
+    if (sign * first >= 0.0) return 0;
+    return sign * (push(p, to, d[0] + d[1] + d[2] + d[3]) - p->c * to->v - sign * p->slide - risen(p, to, sign)) > 0.0;
 }
 
 /* The input's coefficients over the step that begins at `at` and is `part` of the sample. */
@@ -197,22 +256,28 @@ static void sample(const Plant *p, State *s, const double *c)
     }
 }
 
+/* The plant at `y`, come there from 0 in one go. */
+static State come(const Plant *p, double y)
+{
+    State s = {0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0};
+    for (int j = 0; j < 32; j++) wind(p, &s, y / 32.0);
+    s.y = y;
+    return s;
+}
+
 /* Where the plant rests under `u` when it has come there from 0. */
 static State balanced(const Plant *p, double u)
 {
-    State s = {0.0, 0.0, 0.0, 0};
     double left = fabs(u) - p->slide, side = u < 0.0 ? -1.0 : 1.0;
-    if (left <= 0.0 || p->k <= 0.0) return s;
-    double low = 0.0, high = p->curved ? 20.0 * left / p->k : left / p->k, slope;
+    if (left <= 0.0 || p->k <= 0.0) return come(p, 0.0);
+    double low = 0.0, high = p->curved ? 20.0 * left / p->k : left / p->k;
     for (int i = 0; i < 60 && p->curved; i++) {
-        double y = 0.5 * (low + high), q = 0.0;
-        for (int j = 0; j < 32; j++) q = wound(p, q, y / 32.0);
-        if (p->k * y + p->soft * (q - y) + bent(p->bend, y, &slope) < left) low = y;
+        double y = 0.5 * (low + high);
+        State s = come(p, y);
+        if (p->k * y + taken(p, &s) < left) low = y;
         else high = y;
     }
-    for (int j = 0; j < 32; j++) s.q = wound(p, s.q, side * high / 32.0);
-    s.y = side * high;
-    return s;
+    return come(p, side * high);
 }
 
 /* n samples of the input: `line`, `bend` and `twist` are what it changes by in a line in the sample that ends at each, and the
@@ -221,13 +286,14 @@ void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, 
                   int order, int base, int last, const double *numbers, const double *tables)
 {
     const double *a = numbers;
+    int bends = a[13] != 0.0 || a[14] != 0.0;
     Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a + 13, tables,
-               a[6] != 0.0 || a[11] != 0.0 || a[13] != 0.0 || a[14] != 0.0};
-    State s = {0.0, 0.0, 0.0, 0};
+               bends, bends || a[6] != 0.0 || a[11] != 0.0};
+    State s = come(&p, 0.0);
     for (int k = 0; k < n; k++) {
         double c[4] = {0.0, 0.0, 0.0, 0.0};
         if (rest[k]) {
-            s = rest[k] == BALANCED ? balanced(&p, x[k]) : (State){0.0, 0.0, 0.0, 0};
+            s = rest[k] == BALANCED ? balanced(&p, x[k]) : come(&p, 0.0);
             c[1] = line[k];
             if (line[k] != 0.0) sample(&p, &s, c);
         } else {

@@ -9,7 +9,7 @@ z = α q, power 1: z' = α y' − β (γ |y'| z + δ y' |z|), loading = β (γ +
 
 Between two events (a velocity of 0, a friction that gives way) a plant with friction alone is linear, and a
 step over a whole sample is exact; events are found by halving it. The hysteretic spring is integrated by
-steps so small that its own error is about 1e-7 of its force.
+steps so small that its own error is below 1e-6 of its force.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from focgen.rig.courses import course
 from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 _HALVED = 10  # times that a step is halved for an event: what is left is run along a line
-_SHORT = 0.1  # of a radian of the plant's motion: a step of the hysteretic spring
+_SHORT = 0.2  # of a radian of the plant's motion: a step of the hysteretic spring
 _YIELDS = 0.2  # of the time in which friction that rises stops what moves: a step
 _SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
 _MOST = 7  # halvings at most of a step before any event
