@@ -27,7 +27,8 @@ def relative(memory: ContinuousMemory, theta) -> mp.mpc:
     theta = mp.mpf(float(theta))
     delay = mp.e ** (mp.mpc(0, -1) * theta)
     modes = mp.fsum(mp.mpf(w) / (1 - mp.mpf(p) * delay) for w, p in zip(memory.weights, memory.poles))
-    return (1 - delay) ** memory.differences * (memory.lead + delay * modes) / mp.mpc(0, theta) ** memory.order
+    whole = (1 - delay) ** memory.differences
+    return whole * (memory.lead + delay * modes) / mp.mpc(0, theta) ** memory.order
 
 
 def in_band(memory: ContinuousMemory, count: int = 100) -> float:

@@ -1,12 +1,12 @@
 """A fractional operator fitted to s^α itself, over a band of frequencies, at the price of a few states.
 
-The Grünwald–Letnikov weights follow s^α only as far as sampling lets them: (1 − z⁻¹)^α lags by α h/2, which is
-9.4 % at a tenth of the Nyquist frequency for α = 0.6, whatever the memory. The form of
+The Grünwald–Letnikov weights follow s^α only as far as sampling lets them: (1 − z⁻¹)^α lags by α h/2, 9.4 %
+at a tenth of the Nyquist frequency for α = 0.6, whatever the memory. The form of
 :mod:`focgen.fractional.exponential`, m whole differences and a sum of exponentials behind them, can be fitted
 to (jω)^α directly. A few of its modes then make up for the lag. A constant gives exactly zero, as there.
 
 The error is told in the band: |H(e^{jωh}) / (jω)^α − 1|. Below the band the response falls with ω^m and ends
-in exact rest; above it |H| stays within ``GROWTH`` times |jω|^α. Both are certified between all frequencies.
+in exact rest; above it |H| stays within 2 |jω|^α, 4 where α > 1. Both are certified between all frequencies.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from focgen.fractional.continuous_certificate import BandCertificate, certify_ba
 from focgen.fractional.continuous_fit import Band, best_rates, best_weights
 
 Rounding = Callable[[np.ndarray], np.ndarray]
+OPERATORS = ("gl", "continuous")
 HIGHEST = 0.5 * math.pi  # rad per sample: half of the Nyquist frequency
 RATIOS = (10.0, 1e6)  # of a band's ends
 DEFAULT_BAND = (math.pi * 1e-5, 0.1 * math.pi)
@@ -89,7 +90,8 @@ def fit_band(
     """
     _check(order, low, high)
     if not _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]:
-        raise ValueError(f"the tolerance {tolerance} is not between {_TOLERANCES[0]:g} and {_TOLERANCES[1]:g}")
+        ends = " and ".join(f"{end:g}" for end in _TOLERANCES)
+        raise ValueError(f"the tolerance {tolerance} is not between {ends}")
     band, smallest = Band(order, low, high), math.inf
     for states in range(2, MOST_STATES + 1):
         _, error = best_rates(band, states, _HELD_BACK[0], _SCREENED)

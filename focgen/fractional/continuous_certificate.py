@@ -4,7 +4,8 @@ With t = ln θ, a basis function B = (1 − z⁻¹)^m z⁻¹ / (1 − p z⁻¹) 
 d²B/dt² = B (L² + dL/dt), where L = m f − jθ − g − α, f = jθ/(e^{jθ} − 1), g = jθ p/(e^{jθ} − p). On (0, π]:
 |f| = (θ/2)/sin(θ/2) =: κ, |df/dt| ≤ κ + κ². Since e^{jθ} is at least sin θ away from [0, 1] up to π/2 and 1
 beyond, |jθ/(e^{jθ} − p)| ≤ γ with γ = θ/sin θ or θ, so |g| ≤ γ and |dg/dt| ≤ γ + γ². Hence |L| ≤ K and
-|dL/dt| ≤ K' with K = m κ + γ + θ + |α|, K' = m (κ + κ²) + γ + γ² + θ; all rise with θ, γ up to π/2 and then on.
+|dL/dt| ≤ K' with K = m κ + γ + θ + |α| and K' = m (κ + κ²) + γ + γ² + θ. All rise with θ, if γ keeps π/2
+beyond π/2 until θ is larger.
 
 Between two lines δ apart in t the error departs from its chord by at most δ²/8 of the largest second
 derivative, and |B| grows by at most e^{Kδ}. So the largest error is a finite computation.

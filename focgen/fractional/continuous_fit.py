@@ -1,9 +1,9 @@
 """Modes whose frequency response follows (jθ)^α over a band, θ = ωh in rad per sample.
 
-The response is (1 − z⁻¹)^m (c₀ + z⁻¹ Σ c_i / (1 − p_i z⁻¹)) at z = e^{jθ}, divided by (jθ)^α and compared with 1.
+The response is (1 − z⁻¹)^m (c₀ + z⁻¹ Σ c_i / (1 − p_i z⁻¹)) at z = e^{jθ}; over (jθ)^α it is compared with 1.
 Rates of the poles move on a logarithmic scale by Gauss and Newton's method, c₀ and the c_i follow by least
-squares, and what weighs how much is shifted to where the error is largest (Lawson's rule), so that the largest
-error falls. Above the band the response is only held back: it weighs ``above`` there, which trades error in
+squares. Weight is shifted to where the error is largest (Lawson's rule), so that the largest error falls.
+Above the band the response is only held back: it weighs ``above`` there, which trades error in
 the band for moderate growth beyond. Two poles that meet would need huge weights of opposite signs; a fixed
 point could not hold them, so neighbours keep a distance.
 
@@ -70,7 +70,7 @@ class Lines:
         sine, cosine = elementary.sine_cosine(0.5 * theta)
         self.departure = np.stack([2.0 * sine * sine, 2.0 * sine * cosine])
         self.delay = np.stack([1.0 - self.departure[0], -self.departure[1]])
-        lead = _inverse_power(order, theta)
+        lead = power_of(-order, theta)
         for _ in range(math.ceil(order)):
             lead = _product(lead, self.departure)
         self.lead = lead
@@ -115,12 +115,11 @@ def _over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return _product(a, np.stack([b[..., 0, :], -b[..., 1, :]], axis=-2)) / square[..., None, :]
 
 
-def _inverse_power(order: float, theta: np.ndarray) -> np.ndarray:
-    """(jθ)^−α."""
+def power_of(order: float, omega: np.ndarray) -> np.ndarray:
+    """Return (jω)^``order`` for ω > 0 and orders in (−2, 2): real and imaginary part, shape (2, points)."""
     sine, cosine = elementary.sine_cosine(0.25 * math.pi * order)
-    turn = 1.0 - 2.0 * sine * sine, -2.0 * sine * cosine
-    magnitude = elementary.exp(-order * elementary.log(theta))
-    return np.stack([magnitude * turn[0], magnitude * turn[1]])
+    magnitude = elementary.exp(order * elementary.log(omega))
+    return np.stack([magnitude * (1.0 - 2.0 * sine * sine), magnitude * (2.0 * sine * cosine)])
 
 
 def rates_of(log_rates: np.ndarray) -> np.ndarray:
