@@ -73,6 +73,12 @@ def test_by_default_the_band_is_four_decades_up_to_a_tenth_of_nyquist():
     assert plan.states <= 8
 
 
+def test_the_tolerance_of_weights_is_not_taken_for_one_of_the_response():
+    controller = simple(LEAD, ranges=RANGES, sample_time=0.01, tolerance=1e-7)
+    plan = build_plan(controller, "f64", memory="exponential", operator="continuous", band=(1.0, 30.0))
+    assert plan.tolerance == 1e-3 and 1e-5 < plan.memories[0].tolerance <= 1e-3
+
+
 @pytest.mark.parametrize(
     "more, said",
     [

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="E",
         help="largest relative error of the exponential memory's weights; "
-        "default: the controller's, else 1e-4",
+        "default: the controller's, else 1e-4; of --operator continuous: of its response, default 1e-3",
     )
     parser.add_argument(
         "--horizon",

@@ -65,7 +65,8 @@ def generate(
     the history sums shall use; without it they take their portable form. The bits are the same.
     ``no_float`` leaves the conversions from and to physical values out of the header. ``operator``
     "continuous" fits the exponential memory to (jω)^α itself within ``tolerance`` over ``band`` (rad/s; None:
-    four decades up to a tenth of the Nyquist frequency), and has no horizon; "gl" to the weights of eq. (11).
+    four decades up to a tenth of the Nyquist frequency); it has no horizon, and a tolerance of 1e-3 unless
+    another is given. "gl" fits it to the weights of eq. (11).
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be

@@ -26,6 +26,7 @@ OPERATORS = ("gl", "continuous")
 HIGHEST = 0.5 * math.pi  # rad per sample: half of the Nyquist frequency
 RATIOS = (10.0, 1e6)  # of a band's ends
 DEFAULT_BAND = (math.pi * 1e-5, 0.1 * math.pi)
+DEFAULT_TOLERANCE = 1e-3
 MOST_STATES = 20
 _TOLERANCES = (1e-6, 0.1)
 _CLOSEST_TO_INTEGER = 1e-7
@@ -102,28 +103,29 @@ def fit_band(
             smallest = min(smallest, memory.tolerance)
             if memory.tolerance <= tolerance:
                 return memory
-    raise ValueError(
-        f"{MOST_STATES} modes miss the tolerance {tolerance:g} in this band, {smallest:.2g} is within reach;"
-        " allow more"
-    )
+    reach = f"{smallest:.2g} is within reach"
+    raise ValueError(f"{MOST_STATES} modes miss the tolerance {tolerance:g} in this band, {reach}")
 
 
 @functools.lru_cache(maxsize=256)
 def fit_band_states(
     order: float, low: float, high: float, states: int, rounded: Rounding = _unrounded
 ) -> ContinuousMemory:
-    """Find a memory with this many exponentials; its ``tolerance`` is what its certificate proves. Of those
-    that keep the limit above the band it is the one that was held back least there.
+    """Find a memory with this many exponentials; its ``tolerance`` is what its certificate proves.
 
     Arguments and limits as of :func:`fit_band`; ``states`` 2 … ``MOST_STATES``.
     """
     _check(order, low, high)
     if not 2 <= states <= MOST_STATES:
         raise ValueError(f"{states} modes are not 2 to {MOST_STATES}")
-    found = next(_candidates(Band(order, low, high), states, rounded, math.inf), None)
-    if found is None:
+    best = None
+    for memory in _candidates(Band(order, low, high), states, rounded, math.inf):
+        if best is not None and memory.tolerance > best.tolerance:
+            break
+        best = memory
+    if best is None:
         raise ValueError(f"no {states} modes keep within {growth_limit(order):g} |jω|^α above the band")
-    return found
+    return best
 
 
 def _candidates(band: Band, states: int, rounded: Rounding, goal: float) -> Iterator[ContinuousMemory]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.errors import PlanError
+from focgen.fractional.continuous import DEFAULT_TOLERANCE
 from focgen.plan import fixed, floating
 from focgen.plan.bounds import error_bound
 from focgen.plan.canonical import Tables, realise, tables
@@ -41,11 +42,13 @@ def build_plan(
     … 1e8 samples (:class:`focgen.fractional.exponential.ExponentialMemory`). ``operator`` "gl", or
     "continuous": then an exponential memory follows (jω)^α itself within ``tolerance``, relative, over
     ``band`` in rad/s, a factor of 10 to 1e6 wide and at most to half of the Nyquist frequency; by default
-    four decades up to a tenth of it. It has no horizon.
+    four decades up to a tenth of it. It has no horizon, and its ``tolerance`` defaults to 1e-3.
 
     Raises PlanError where the transfer function cannot be realised, its truncated recursion is not stable, a
     range cannot be represented, or a node cannot be proved; the remedy says what would work.
     """
+    if operator == "continuous" and tolerance is None:
+        tolerance = DEFAULT_TOLERANCE  # the controller's own is one of weights
     given = dict(arithmetic=arithmetic, length=length, memory=memory, tolerance=tolerance, horizon=horizon)
     wanted = replace(controller, **{key: value for key, value in given.items() if value is not None})
     _check(wanted)

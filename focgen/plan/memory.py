@@ -124,12 +124,16 @@ def band_memories_of(
 
     Raises PlanError where an order is beyond 2, or the tolerance cannot be met in the band.
     """
-    orders, (low, high) = _fractional_orders(controller), (end * controller.sample_time for end in band)
-    try:
-        return tuple(fit_band(order, low, high, tolerance, ROUNDED[arithmetic]) for order in orders)
-    except ValueError as reason:
-        remedy = "allow a larger tolerance, another band, or use the operator gl"
-        raise PlanError(controller.name, f"has no memory that follows s^α: {reason}", remedy) from None
+    low, high = (end * controller.sample_time for end in band)
+    found = []
+    for order in _fractional_orders(controller):
+        try:
+            found.append(fit_band(order, low, high, tolerance, ROUNDED[arithmetic]))
+        except ValueError as reason:
+            remedy = "allow a larger tolerance, another band, or use the operator gl"
+            what = f"order {order:g} has no memory that follows it: {reason}"
+            raise PlanError(controller.name, what, remedy) from None
+    return tuple(found)
 
 
 def _fractional_orders(controller: Controller) -> list[float]:
