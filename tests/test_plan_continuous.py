@@ -32,7 +32,7 @@ BOTH = TransferFunction([(0.02, 1.4), (0.3, 0.5), (1.0, 0.0)], [(0.1, 0.9), (1.0
 def planned(transfer, arithmetic, **more):
     h = 0.01
     controller = simple(transfer, name=f"c_{arithmetic}", ranges=RANGES, sample_time=h)
-    return build_plan(controller, arithmetic, band=(0.3, 0.1 * math.pi / h), **{**ASKED, **more})
+    return build_plan(controller, arithmetic, **{**ASKED, "band": (0.3, 0.1 * math.pi / h), **more})
 
 
 @pytest.mark.parametrize("transfer", [LEAD, BOTH], ids=["lead", "both"])
@@ -52,6 +52,11 @@ def test_the_power_as_it_is_quantised_follows_s_to_the_alpha(arithmetic, roundin
     error = np.abs(filtered_response(plan, omega) / (1j * omega) ** 0.6 - 1.0).max()
     assert error <= plan.memories[0].tolerance + rounding <= ASKED["tolerance"] + rounding
     assert plan.direct.total.lsb and abs(sum(plan.direct.values)) < 1e-12 * sum(map(abs, plan.direct.values))
+
+
+def test_without_a_fractional_power_nothing_is_left_out():
+    plan = planned(TransferFunction([(0.1, 1.0), (1.0, 0.0)]), "f64")
+    assert plan.states == 0 and plan.error_bound.truncation == 0.0
 
 
 @pytest.mark.parametrize("transfer", [LEAD, BOTH, LAG], ids=["lead", "both", "lag"])
@@ -83,8 +88,10 @@ def test_the_tolerance_of_weights_is_not_taken_for_one_of_the_response():
     "more, said",
     [
         (dict(operator="tustin"), "tustin"),
-        (dict(operator="gl"), "belongs to the operator continuous"),
+        (dict(operator="gl", band=(0.3, 30.0)), "belongs to the operator continuous"),
         (dict(memory="short"), "exponential"),
+        (dict(band=(-1.0, 3.0)), "does not rise"),
+        (dict(band=(1.0, 1e9)), "half of the Nyquist"),
         (dict(tolerance=2e-6), "allow a larger tolerance"),
     ],
 )

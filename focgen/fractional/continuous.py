@@ -159,6 +159,11 @@ def _held(band: Band, poles: np.ndarray, above: float) -> ContinuousMemory | Non
 def _check(order: float, low: float, high: float) -> None:
     if not (-1.0 < order < 2.0 and abs(order - round(order)) >= _CLOSEST_TO_INTEGER):
         raise ValueError(f"the order {order} is not between -1 and 2, or within 1e-7 of a whole one")
+    check_band(low, high)
+
+
+def check_band(low: float, high: float) -> None:
+    """Raise ValueError for a band, in rad per sample, that nothing can be fitted in."""
     if not (0.0 < low < high <= HIGHEST * (1.0 + 1e-12)):
         raise ValueError("the band does not rise from above 0 to at most half of the Nyquist frequency")
     if not RATIOS[0] * (1 - 1e-12) <= high / low <= RATIOS[1] * (1 + 1e-12):

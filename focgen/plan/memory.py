@@ -15,7 +15,13 @@ import numpy as np
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.fractional.elementary import power, total
-from focgen.fractional.continuous import DEFAULT_BAND, OPERATORS, ContinuousMemory, fit_band
+from focgen.fractional.continuous import (
+    DEFAULT_BAND,
+    OPERATORS,
+    ContinuousMemory,
+    check_band,
+    fit_band,
+)
 from focgen.fractional.exponential import ExponentialMemory
 from focgen.fractional.exponential_rounded import fit_rounded
 from focgen.fractional.transfer import Polynomial, Term
@@ -114,6 +120,10 @@ def checked_band(
     if controller.memory != "exponential":
         raise PlanError(where, "the operator continuous needs exponential memory", "choose that memory")
     low, high = band or (end / step for end in DEFAULT_BAND)
+    try:
+        check_band(low * step, high * step)
+    except ValueError as reason:
+        raise PlanError(where, f"has the band {low:g} to {high:g} rad/s: {reason}", "give another") from None
     return float(low), float(high)
 
 
