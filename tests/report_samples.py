@@ -5,7 +5,7 @@ import numpy as np
 from focgen.diagnosis.drawn import Drawn, Mean, Rivals, SegmentError, Trace
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, NextExperiment, PlainFit, Where
 
-NAMES = ("<script>alert(1)</script>", "$$\\alpha$$ & @x{y} \"q\"</title>")
+NAMES = ("<script>alert(1)</script>", '$$\\alpha$$ & @x{y} "q"</title>')
 
 
 def diagnosis() -> Diagnosis:

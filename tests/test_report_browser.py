@@ -11,14 +11,22 @@ from focgen.report.pages.diagnosis import diagnosis_page
 from tests.report_samples import NAMES, diagnosis, signals
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-_QUIET = ("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-sync")
+_QUIET = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-sync",
+)
 _PLOTS = "figures.figure5.model.children"  # of the session's figure
 
 
 @pytest.fixture(scope="module")
 def chromium():
     pytest.importorskip("bokeh", reason="Bokeh, which draws on pages, is not installed")
-    api = pytest.importorskip("playwright.sync_api", reason="playwright, which drives a browser, is not installed")
+    api = pytest.importorskip(
+        "playwright.sync_api", reason="playwright, which drives a browser, is not installed"
+    )
     path = next(filter(None, map(shutil.which, _NAMES)), None)
     if path is None:
         pytest.skip("no Chromium on this machine")
@@ -77,7 +85,9 @@ def centre(page, figure, panel=0):
 def test_it_opens_offline_without_a_word(wide):
     page, heard = wide
     assert heard == []
-    assert page.evaluate("document.documentElement.dataset.drawn") == str(page.locator(".plot").count()) == "6"
+    assert (
+        page.evaluate("document.documentElement.dataset.drawn") == str(page.locator(".plot").count()) == "6"
+    )
 
 
 def test_every_figure_has_ink_on_its_canvas(wide):
@@ -147,7 +157,9 @@ def test_a_curve_of_any_name_tells_it_as_it_is(chromium, tmp_path, name):
     x = np.array([0.0, 1.0])
     panel = Panel(Axis(name), Axis(name), (Line(name, x, x, "model"), Line("b", x, x + 9.0, "bad")), name)
     figure = Figure(name, name, name, (panel,), TableOf((name,), ((name,),), name))
-    (tmp_path / "page.html").write_text(Page(name, name, (Section(name, figures=(figure,)),)).self_contained(), "utf-8")
+    (tmp_path / "page.html").write_text(
+        Page(name, name, (Section(name, figures=(figure,)),)).self_contained(), "utf-8"
+    )
     page, heard = opened(chromium, tmp_path / "page.html", 900)
     at = centre(page, 1)
     page.mouse.move(at["left"] + 0.5 * at["w"], at["top"] + at["h"] * (1.0 - 1.1 / 11.2))
@@ -158,7 +170,7 @@ def test_a_curve_of_any_name_tells_it_as_it_is(chromium, tmp_path, name):
 
 def test_the_legend_hides_and_shows_a_curve(wide):
     page, _ = wide
-    button = page.locator('#figure5 .legend button', has_text="measured")
+    button = page.locator("#figure5 .legend button", has_text="measured")
     seen = f"{_PLOTS}[0].renderers.filter((one) => one.tags.includes('g0')).map((one) => one.visible)"
     assert page.evaluate(seen) == [True]
     button.click()
@@ -178,7 +190,10 @@ def test_links_lead_to_parts_that_are_there(wide):
 
 def test_who_cannot_see_is_told(wide):
     page, _ = wide
-    assert page.locator("main, header, footer, nav[aria-label]").count() == 4 and page.locator("html[lang]").count() == 1
+    assert (
+        page.locator("main, header, footer, nav[aria-label]").count() == 4
+        and page.locator("html[lang]").count() == 1
+    )
     alts = page.locator(".plot").evaluate_all("(all) => all.map((one) => one.getAttribute('aria-label'))")
     assert len(alts) == 6 and all(len(alt) > 20 for alt in alts)
     assert page.locator("figure").count() == page.locator("figure details table").count() == 6
@@ -194,7 +209,9 @@ def test_nothing_is_cut_on_a_phone(chromium, file, scheme):
              .filter((one) => one.getBoundingClientRect().right > 400).map((one) => one.outerHTML.slice(0, 80))"""
     )
     widths = page.evaluate("Object.values(figures).map((v) => v.el.getBoundingClientRect().right)")
-    drags = page.evaluate("Object.values(figures).flatMap((v) => v.model.children.map((p) => p.toolbar.active_drag))")
+    drags = page.evaluate(
+        "Object.values(figures).flatMap((v) => v.model.children.map((p) => p.toolbar.active_drag))"
+    )
     assert out == [] and max(widths) <= 400 and set(drags) == {None} and heard == []
     page.context.close()
 

@@ -66,7 +66,10 @@ def test_bars_begin_at_zero(tops, end, across):
     bars = Bars("b", np.arange(2.0), np.array(tops), "good", across=across)
     made = document(figure(bars, **axes))
     ranges = [r.get("attributes", {}) for r in models(made, "Range1d")]
-    assert any(r.get(end, 0) == 0 and max(abs(r["start"] if "start" in r else 0), abs(r.get("end", 1))) > 7 for r in ranges)
+    assert any(
+        r.get(end, 0) == 0 and max(abs(r["start"] if "start" in r else 0), abs(r.get("end", 1))) > 7
+        for r in ranges
+    )
 
 
 def test_equal_figures_give_equal_documents():
@@ -85,7 +88,9 @@ def test_no_text_is_left_to_the_librarys_own_markup():
     made = document(figure(Line(name, np.arange(3.0), np.arange(3.0), "model"), y=Axis(name, places=(name,))))
     plain = [m.get("attributes", {}).get("text") for m in models(made, "PlainText")]
     assert plain.count(name) == 2  # the axis and its place
-    assert not models(made, "TeX") and name not in [m.get("attributes", {}).get("text") for m in models(made, "Title")]
+    assert not models(made, "TeX") and name not in [
+        m.get("attributes", {}).get("text") for m in models(made, "Title")
+    ]
 
 
 @pytest.mark.parametrize("text", ["</script><script>alert(1)", "<!--<script>", "&lt;", "\u2028", '"\\'])
@@ -119,10 +124,18 @@ def test_a_page_stays_below_its_size():
 
 def test_a_page_says_where_which_how_far_and_what_next():
     page = diagnosis_page(diagnosis(), signals(), "spba")
-    assert [s.title for s in page.sections][:5] == ["Where", "Which", "How far", "What next", "What the numbers mean"]
+    assert [s.title for s in page.sections][:5] == [
+        "Where",
+        "Which",
+        "How far",
+        "What next",
+        "What the numbers mean",
+    ]
     which, ahead = page.sections[1], page.sections[3]
     assert ("hysteresis", "1", "actuator", "80%", "width", "0.4", "0.3 to 0.5", "bar") in which.tables[0].rows
     assert "a slow sine" in ahead.sentences[0]
     assert all(figure.numbers.rows and figure.alt for section in page.sections for figure in section.figures)
-    labels = [panel.y.label for section in page.sections for figure in section.figures for panel in figure.panels]
+    labels = [
+        panel.y.label for section in page.sections for figure in section.figures for panel in figure.panels
+    ]
     assert "output (mm)" in labels and "pressure (bar)" in labels

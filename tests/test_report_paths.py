@@ -2,7 +2,6 @@
 
 import json
 import sys
-from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -32,7 +31,10 @@ def gap(tmp_path):
 def test_what_is_drawn_is_read_back(gap):
     given, found = signals(), read_drawn(gap / "signals.json")
     assert (found.entry, found.units, found.worst) == (given.entry, given.units, given.worst)
-    assert (found.segments, [r.effects for r in found.rivals]) == (given.segments, [r.effects for r in given.rivals])
+    assert (found.segments, [r.effects for r in found.rivals]) == (
+        given.segments,
+        [r.effects for r in given.rivals],
+    )
     for one, other in zip(found.traces, given.traces, strict=True):
         assert (one.name, one.start) == (other.name, other.start)
         for key in ("time", "input", "measured", "as_given", "refitted", "explained"):
@@ -98,7 +100,9 @@ def test_a_chain_is_shown_in_its_order(tmp_path):
     (tmp_path / "v.json").write_text(json.dumps(found | {"targets": targets}))
     paths = [tmp_path / name for name in ("v.json", "controller.toml", "rig.toml")]
     text = focgen.report(paths, tmp_path / "a.html").read_text(encoding="utf-8")
-    heads = [text.index(f">{head}</a></h2>") for head in ("Model", "Controller", "Closed loop", "Verification")]
+    heads = [
+        text.index(f">{head}</a></h2>") for head in ("Model", "Controller", "Closed loop", "Verification")
+    ]
     assert heads == sorted(heads)
     assert "97 of 100" in text and "does NOT hold" in text and "Skipped on avr: no simavr" in text
 
@@ -126,7 +130,9 @@ def test_a_page_replaces_nothing_that_it_is_made_of(gap, capsys):
     assert "is the input" in capsys.readouterr().err and (gap / "diagnosis.json").read_bytes() == before
 
 
-@pytest.mark.parametrize("command", [["report", "gap"], ["design", "rig.toml", "--out", "c.toml", "--report", "r.html"]])
+@pytest.mark.parametrize(
+    "command", [["report", "gap"], ["design", "rig.toml", "--out", "c.toml", "--report", "r.html"]]
+)
 def test_without_the_library_the_remedy_is_one_line(command, monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "bokeh", None)

@@ -62,7 +62,9 @@ class _Parser(argparse.ArgumentParser):
         for word in args[: args.index("--")] if "--" in args else args:
             option = word.partition("=")[0]
             if option.startswith("--") and not any(one.startswith(option) for one in known):
-                raise FocgenError(self.prog.partition(" ")[2], f"has no option {option}", _meant(option, known, self.prog))
+                raise FocgenError(
+                    self.prog.partition(" ")[2], f"has no option {option}", _meant(option, known, self.prog)
+                )
 
     def error(self, message: str):
         command = self.prog.partition(" ")[2] or "arguments"
@@ -81,7 +83,9 @@ def _short_help() -> str:
     helps = {name: import_module(f"focgen.cli.{name}").HELP for name in commands()}
     width = max(map(len, helps))
     lines = [f"  {name:{width}s}  {text}" for name, text in helps.items()]
-    return "\n".join([_PROLOGUE, "commands:", *lines, "", "`focgen COMMAND --help` shows an example of each."])
+    return "\n".join(
+        [_PROLOGUE, "commands:", *lines, "", "`focgen COMMAND --help` shows an example of each."]
+    )
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:

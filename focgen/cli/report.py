@@ -27,4 +27,6 @@ def run(args: Namespace) -> Outcome:
     """Write the page."""
     made = focgen.report(args.paths, args.out)
     size = made.stat().st_size
-    return Outcome({"page": made, "bytes": size}, f"wrote {made} ({size / 1e6:.1f} MB); open it in any browser")
+    return Outcome(
+        {"page": made, "bytes": size}, f"wrote {made} ({size / 1e6:.1f} MB); open it in any browser"
+    )

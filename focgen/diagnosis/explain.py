@@ -32,8 +32,10 @@ _OUT_OF_STEP = 0.05
 _MUCH = 0.4  # of a residual's mean square foretold by inputs: then effects of other stages are tried too
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
+_SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
 _RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
-_FREED = 0.7  # of the mean square left: an actuator far from the one given has to leave less
+_FREED = 0.7  # of the mean square left: what is unlikely, such as an actuator far from the one given, has to
+# leave less
 _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 
@@ -167,7 +169,7 @@ def explain(
         return found
     freed, asked = replace(problem, own=replace(problem.own, far=True), memory={}), _FREED * found.square
     beside = freed.with_clues(found.best.problem.clues)
-    if np.mean(fit(beside, found.best.vector, Weighing(found.ar)).weighed ** 2) > asked:
+    if beside.clues and np.mean(fit(beside, found.best.vector, Weighing(found.ar)).weighed ** 2) > asked:
         return found
     other = _explained(rig, freed, threshold, only, trusted)
     return other if other.square < asked else found
@@ -209,14 +211,15 @@ def _explained(
 
 def _between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:
     """Both fits with the command running between its samples as suits what was found: a nominal rig far from
-    what it models may be suited by another way."""
+    what it models may be suited by another way. That has to leave much less: half a sample more or less may
+    make up for a little of whatever a model lacks."""
     segment = best.problem.segment
     if rig.between is not None or segment.entry != "command" or not best.problem.clues:
         return best, nominal
-    others = [replace(segment, between=way) for way in _WAYS if way != segment.between]
+    others = [replace(segment, between=way) for way in _ways(segment) if way != segment.between]
     tried = [_moved_to(best, other, weighing) for other in others]
     closest = min([best, *tried], key=lambda f: f.sse)
-    if closest is best:
+    if closest.sse > _FREED * best.sse:
         return best, nominal
     return closest, _moved_to(nominal, closest.problem.segment, weighing)
 
@@ -276,16 +279,23 @@ def _widened_beside(best: Fit, threshold: float) -> Fit:
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     """The problem with the command as a staircase, as a polygon or as a smooth curve, whichever the log was,
     where the rig does not say it: loggers differ."""
-    ways = [segment.between] if segment.entry != "command" else list(_WAYS)
+    ways = [segment.between] if segment.entry != "command" else _ways(segment)
     if rig.between is not None:
         ways = [rig.between]
-    elif len(ways) > 1 and np.mean(np.diff(segment.x) == 0.0) > _RESTS:
-        ways.remove(Between.SMOOTH)
     problems = [problem_of(rig, replace(segment, between=way), logs) for way in ways]
     if len(problems) == 1:
         return problems[0]
-    fits = [fit(p, p.nominal(), WHITE, 6) for p in problems]
-    return min(fits, key=lambda f: f.sse).problem
+    *plain, last = [fit(p, p.nominal(), WHITE, 6) for p in problems]
+    closest = min(plain, key=lambda f: f.sse)
+    if ways[-1] == Between.SMOOTH and last.sse > _SMOOTHER * closest.sse:
+        return closest.problem
+    return min(closest, last, key=lambda f: f.sse).problem
+
+
+def _ways(segment: Segment) -> list[Between]:
+    """What a command may do between its samples."""
+    rests = np.mean(np.diff(segment.x) == 0.0) > _RESTS
+    return [way for way in _WAYS if not (rests and way == Between.SMOOTH)]
 
 
 def _gauged(problem: Problem) -> Problem:

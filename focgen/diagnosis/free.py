@@ -43,8 +43,9 @@ class Free:
             return np.r_[self._from_transfer(a.dynamics), bias, a.offset / self.level_out]
         return np.zeros(0)
 
-    def bounds(self, far: bool = True) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds of the vector; not ``far``: of an actuator, three times its uncertainty.
+    def bounds(self, far: bool = True, bent: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the vector; not ``far``: of an actuator, three times its uncertainty;
+        ``bent``: but for the gain.
 
         A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead
         zone.
@@ -52,24 +53,27 @@ class Free:
         low, high = self._utmost()
         if not self.has_offset:
             return low, high
-        near = self._usual()
+        near = self._usual(bent)
         kept = np.logical_not(far) | (near[0] == near[1])  # what is known exactly does not move
         return np.where(kept, np.maximum(low, near[0]), low), np.where(kept, np.minimum(high, near[1]), high)
 
-    def beyond(self, vector: np.ndarray) -> bool:
+    def beyond(self, vector: np.ndarray, bent: bool = False) -> bool:
         """Whether a number stands at an end of what is usual, or further off."""
         if not self.has_offset:
             return False
-        low, high = self._usual()
+        low, high = self._usual(bent)
         ends = (vector < low + _SLACK) | (vector > high - _SLACK)
         return bool(np.any(ends & (low < high)))
 
-    def _usual(self) -> tuple[np.ndarray, np.ndarray]:
-        """Three times the actuator's uncertainty about what was given; any offset."""
+    def _usual(self, bent: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Three times the actuator's uncertainty about what was given; any offset, and ``bent`` any gain that
+        is not known exactly."""
         known, start, a = self.rig.uncertainty.actuator, self.start(), self.rig.actuator
         gain, time = (_factor(known.gain), _factor(known.time))
+        if bent and known.gain:
+            gain = np.array([-np.inf, np.inf])
         if isinstance(a, Actuator):
-            off = WITHIN * known.gain * np.abs(start[2:-1]).sum()
+            off = np.inf if bent and known.gain else WITHIN * known.gain * np.abs(start[2:-1]).sum()
             order = WITHIN * known.alpha * start[1]
             moves = [time, (-order, order), *[(-off, off)] * (len(start) - 3)]
         else:

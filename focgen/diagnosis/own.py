@@ -24,7 +24,7 @@ class Own:
     """Turns the own parameters of a segment's ``stages`` into a vector and back: those of ``freely``, the
     stage that is refitted freely, then a logarithm for each of the others' factors; levels are the segment's
     largest magnitudes. ``wide``: what no effect stands for may go beyond three times its uncertainty, ``far``:
-    so may the actuator's own; ``held``: nothing moves."""
+    so may the actuator's own, ``bent``: its gain; ``held``: nothing moves."""
 
     rig: Rig
     stages: tuple[str, ...]
@@ -33,6 +33,7 @@ class Own:
     level_out: float
     wide: bool = False
     far: bool = False
+    bent: bool = False
     held: bool = False
 
     @cached_property
@@ -66,7 +67,7 @@ class Own:
         """Lower and upper bounds of the vector."""
         if self.held:
             return self.start(), self.start()
-        free = self._free.bounds(self.far) if self._free else (np.zeros(0), np.zeros(0))
+        free = self._free.bounds(self.far, self.bent) if self._free else (np.zeros(0), np.zeros(0))
         ends = np.array([f.bounds(self.wide) for f in self.factors]).reshape(-1, 2).T
         return np.r_[free[0], ends[0]], np.r_[free[1], ends[1]]
 
@@ -86,7 +87,7 @@ class Own:
     def strained(self, vector: np.ndarray) -> bool:
         """Whether the actuator's own are three times their uncertainty off, or more."""
         count = len(self._first)
-        return bool(count) and self._free.beyond(vector[:count])
+        return bool(count) and self._free.beyond(vector[:count], self.bent)
 
     def beyond(self, vector: np.ndarray) -> bool:
         """Whether a factor stands at an end that it could pass if it were ``wide``, or the actuator's own at

@@ -91,8 +91,10 @@ class Problem:
         return [c for c in clues if c not in self.clues and not c.form.seen]
 
     def with_clues(self, clues: Sequence[Clue]) -> Problem:
-        """The same segment under other effects."""
-        return replace(self, clues=tuple(clues))
+        """The same segment under other effects. A curve is as steep at zero as before, whatever it does
+        further on, so that the gain makes up for it."""
+        bent = any(library()[c.effect].bends for c in clues)
+        return replace(self, clues=tuple(clues), own=replace(self.own, bent=bent))
 
     def thinned(self, factor: int) -> Problem:
         """The same on means of ``factor`` samples at a time."""

@@ -52,7 +52,14 @@ _MANIFEST = {
 }
 _ERROR = ({"operator": float}, None)
 _RAN = {"samples": int, "mismatches": int, "max_error": _ERROR, "error_bound": _ERROR}
-_VERIFIED = {"name": str, "arithmetic": str, "targets": dict, "differences": [str], "notes": [str], "holds": bool}
+_VERIFIED = {
+    "name": str,
+    "arithmetic": str,
+    "targets": dict,
+    "differences": [str],
+    "notes": [str],
+    "holds": bool,
+}
 
 
 @dataclass
@@ -82,7 +89,9 @@ def report(paths: Sequence[str | Path], out: str | Path) -> Path:
 
 
 def _files(path: Path) -> list[Path]:
-    return sorted(p for p in path.iterdir() if p.is_file() and p.suffix != ".html") if path.is_dir() else [path]
+    return (
+        sorted(p for p in path.iterdir() if p.is_file() and p.suffix != ".html") if path.is_dir() else [path]
+    )
 
 
 def page_of(paths: Sequence[Path]) -> Page:
@@ -166,7 +175,9 @@ def _manifest(path: Path) -> dict[str, Any]:
 def _verified(path: Path) -> dict[str, Any]:
     remedy = "name what `focgen verify DIR --json` printed"
     value = read_json(path, remedy)
-    if not fits(value, _VERIFIED) or not all(fits(one, ({"skipped": str}, _RAN)) for one in value["targets"].values()):
+    if not fits(value, _VERIFIED) or not all(
+        fits(one, ({"skipped": str}, _RAN)) for one in value["targets"].values()
+    ):
         raise InputError(str(path), "is no verification", remedy)
     return value
 

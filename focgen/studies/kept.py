@@ -32,7 +32,8 @@ def curves_text(study: Study) -> str:
         "controller": controller_table(study.controller),
         "rows": [_thin(c) for c in study.curves],
         "ideal": [_thin(c) for c in study.ideal_curves],
-        "plant": plant and {"time": plant.time, "exact": plant.exact, "outputs": [r.output for r in plant.rows]},
+        "plant": plant
+        and {"time": plant.time, "exact": plant.exact, "outputs": [r.output for r in plant.rows]},
     }
     return json.dumps(plain(value), ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
 
@@ -43,7 +44,9 @@ def _thin(curves: Curves) -> dict[str, Any]:
     for parts in (("omega", "phase_deg", "magnitude_db"), ("time", "output")):
         signals = [np.asarray(found[name], float) for name in parts]
         kept = thinned(*signals[1:], most=MOST) if len(signals[0]) else []
-        found |= {name: [_rounded(v) for v in signal[kept]] for name, signal in zip(parts, signals) if len(signal)}
+        found |= {
+            name: [_rounded(v) for v in signal[kept]] for name, signal in zip(parts, signals) if len(signal)
+        }
     return found
 
 

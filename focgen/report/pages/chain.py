@@ -28,7 +28,10 @@ _TIME = Axis("time (s)")
 def rig_section(rig: Rig) -> Section:
     """The model: its parameters, how well they are known, and how it answers steps."""
     effects = [str(effect.get("name", "")) for effect in rig.effects]
-    told = (f"The rig {rig.name}, sampled every {rig.sample_time:g} s" + (f", with {', '.join(effects)}." if effects else "."),)
+    told = (
+        f"The rig {rig.name}, sampled every {rig.sample_time:g} s"
+        + (f", with {', '.join(effects)}." if effects else "."),
+    )
     figures = (_answers(rig),) if isinstance(rig.actuator, Actuator) else ()
     return Section("Model", told, (_stages(rig),), figures=figures)
 
@@ -39,8 +42,17 @@ def _stages(rig: Rig) -> TableOf:
         known, delay = getattr(rig.uncertainty, stage), getattr(rig.delays, stage)
         made = _actuator_text(rig) if stage == "actuator" else str(getattr(rig, stage))
         alpha = f"; α ± {known.alpha:.1%}" if stage == "actuator" else ""
-        rows.append((stage, made, f"{delay:g} s" if delay else "–", f"gain ± {known.gain:.1%}; time ± {known.time:.1%}{alpha}"))
-    return TableOf(("stage", "model", "dead time", "known to"), tuple(rows), "The chain, and how well it is known")
+        rows.append(
+            (
+                stage,
+                made,
+                f"{delay:g} s" if delay else "–",
+                f"gain ± {known.gain:.1%}; time ± {known.time:.1%}{alpha}",
+            )
+        )
+    return TableOf(
+        ("stage", "model", "dead time", "known to"), tuple(rows), "The chain, and how well it is known"
+    )
 
 
 def _actuator_text(rig: Rig) -> str:
@@ -58,16 +70,28 @@ def _answers(rig: Rig) -> Figure:
     low, high = rig.ranges.pressure or (0.0, 1.0)
     levels = np.linspace(0.0, 1.0, _STEPS + 1)[1:] * (high if high else low)
     h = max(rig.sample_time, 12.0 * rig.actuator.T ** (1.0 / rig.actuator.alpha) / _SAMPLES)
-    held = [Experiment(f"{p:.4g}", h, {"pressure": np.full(_SAMPLES, p)}, start=2.0 * i * _SAMPLES * h) for i, p in enumerate(levels)]
+    held = [
+        Experiment(f"{p:.4g}", h, {"pressure": np.full(_SAMPLES, p)}, start=2.0 * i * _SAMPLES * h)
+        for i, p in enumerate(levels)
+    ]
     made = [simulate_session(rig, [one], (), False)[0]["output"] for one in held]
-    marks = tuple(curve(f"to {e.name}", e.time, y, CYCLE[i % len(CYCLE)], width=1.8) for i, (e, y) in enumerate(zip(held, made)))
+    marks = tuple(
+        curve(f"to {e.name}", e.time, y, CYCLE[i % len(CYCLE)], width=1.8)
+        for i, (e, y) in enumerate(zip(held, made))
+    )
     unit = unit_of_role(rig.signals, "pressure")
     return Figure(
         "How it answers steps of pressure",
         "From rest, by the nominal model without effects. A fractional order rises fast, then creeps.",
         "Curves over time: the output after steps of pressure to five levels.",
-        (Panel(_TIME, Axis(with_unit("output", unit_of_role(rig.signals, "output")), from_zero=True), marks),),
-        curves_table("Output after a step", [(f"pressure {with_unit(e.name, unit)}", y) for e, y in zip(held, made)]),
+        (
+            Panel(
+                _TIME, Axis(with_unit("output", unit_of_role(rig.signals, "output")), from_zero=True), marks
+            ),
+        ),
+        curves_table(
+            "Output after a step", [(f"pressure {with_unit(e.name, unit)}", y) for e, y in zip(held, made)]
+        ),
     )
 
 
@@ -81,12 +105,17 @@ def replay_section(rig: Rig, logs: Sequence[Experiment], found: Replay) -> Secti
         tops.append(curve(f"{log.name}, the rig", log.time, made, "ideal", width=1.1, group="the rig"))
         errors.append(curve(log.name, log.time, log["output"] - made, colour, width=1.1))
     rows = tuple((name, number(one.gof), number(one.rmse)) for name, one in found.logs.items())
-    table = TableOf(("experiment", "GOF", with_unit("RMSE", unit)), rows, "The output, measured and simulated")
+    table = TableOf(
+        ("experiment", "GOF", with_unit("RMSE", unit)), rows, "The output, measured and simulated"
+    )
     figure = Figure(
         "Logs, and the rig on their inputs",
         "Every experiment in colour, the rig in black; below, what it leaves.",
         f"Curves over time: {', '.join(log.name for log in logs)} as measured, and simulated.",
-        (Panel(_TIME, Axis(with_unit("output", unit)), tuple(tops), height=340), Panel(_TIME, Axis(with_unit("error", unit)), (*errors, Rule(0.0)), height=190)),
+        (
+            Panel(_TIME, Axis(with_unit("output", unit)), tuple(tops), height=340),
+            Panel(_TIME, Axis(with_unit("error", unit)), (*errors, Rule(0.0)), height=190),
+        ),
         table,
     )
     return Section("Logs", (*warnings(found.warnings), *notes(found.notes)), figures=(figure,))
@@ -99,11 +128,15 @@ def controller_section(controller: Controller) -> Section:
     """What a controller.toml says."""
     integral = ", then the integrator" if controller.integrator else ""
     gain = "the gain schedule" if controller.scheduled else f"{controller.gain:.4g}"
-    told = (f"{controller.name}: error → {controller.transfer} → × {gain}{integral}, every {controller.sample_time:g} s.",)
+    told = (
+        f"{controller.name}: error → {controller.transfer} → × {gain}{integral}, every {controller.sample_time:g} s.",
+    )
     spans = vars(controller.ranges).items()
     rows = tuple((name, f"{span[0]:g} to {span[1]:g}") for name, span in spans if span is not None)
     tables = (TableOf(("signal", "range"), rows, "What the signals can reach"),)
-    return Section("Controller", told, tables, figures=(_schedule(controller),) if controller.scheduled else ())
+    return Section(
+        "Controller", told, tables, figures=(_schedule(controller),) if controller.scheduled else ()
+    )
 
 
 def _schedule(controller: Controller) -> Figure:
@@ -116,8 +149,19 @@ def _schedule(controller: Controller) -> Figure:
         "The gain schedule",
         "Straight between breakpoints, held beyond them.",
         "Curve: the gain over the scheduling signal.",
-        (Panel(Axis(with_unit("scheduling signal", unit)), Axis("gain", from_zero=True), (table, dots), height=260),),
-        TableOf((with_unit("at", unit), "gain"), tuple((number(p), number(g)) for p, g in zip(at, gains)), "The schedule"),
+        (
+            Panel(
+                Axis(with_unit("scheduling signal", unit)),
+                Axis("gain", from_zero=True),
+                (table, dots),
+                height=260,
+            ),
+        ),
+        TableOf(
+            (with_unit("at", unit), "gain"),
+            tuple((number(p), number(g)) for p, g in zip(at, gains)),
+            "The schedule",
+        ),
     )
 
 
@@ -133,9 +177,12 @@ def firmware_section(manifest: Mapping[str, Any]) -> Section:
         f"float64 the signal ahead of the integrator is off by {bound['operator']:.3g} at most, which is proved.",
     )
     rows = tuple(
-        (p["node"], number(p["worst"]), p["type"], number(p["margin_bits"]), p["how"]) for p in manifest["proofs"]
+        (p["node"], number(p["worst"]), p["type"], number(p["margin_bits"]), p["how"])
+        for p in manifest["proofs"]
     )
-    table = TableOf(("sum or signal", "worst case (counts)", "type", "margin (bits)", "how it was proved"), rows, "Proofs")
+    table = TableOf(
+        ("sum or signal", "worst case (counts)", "type", "margin (bits)", "how it was proved"), rows, "Proofs"
+    )
     proved = [p for p in manifest["proofs"] if p["margin_bits"] is not None]
     figures = (_margins(proved, table),) if proved else ()
     return Section(f"C in {manifest['arithmetic']}", told, () if figures else (table,), figures=figures)
@@ -144,8 +191,15 @@ def firmware_section(manifest: Mapping[str, Any]) -> Section:
 def _margins(proofs: Sequence[Mapping[str, Any]], table: TableOf) -> Figure:
     names = tuple(p["node"] for p in proofs)[::-1]
     bits = np.array([p["margin_bits"] for p in proofs], float)[::-1]
-    bars = Bars("margin", np.arange(len(names), dtype=float), bits, "good", names=names, across=True, width=0.7)
-    panel = Panel(Axis("bits left in the worst case", from_zero=True), Axis("", places=names), (bars,), height=90 + 24 * len(names))
+    bars = Bars(
+        "margin", np.arange(len(names), dtype=float), bits, "good", names=names, across=True, width=0.7
+    )
+    panel = Panel(
+        Axis("bits left in the worst case", from_zero=True),
+        Axis("", places=names),
+        (bars,),
+        height=90 + 24 * len(names),
+    )
     return Figure(
         "How far every sum stays from overflow",
         "Bits between the proved worst case and the largest number of its type, for any input whatever.",
@@ -161,9 +215,18 @@ def verification_section(found: Mapping[str, Any]) -> Section:
     ran = {name: one for name, one in found["targets"].items() if "skipped" not in one}
     rows = tuple(_compared(name, one) for name, one in found["targets"].items())
     verdict = "holds" if found["holds"] else "does NOT hold"
-    skipped = [f"skipped on {name}: {one['skipped']}" for name, one in found["targets"].items() if "skipped" in one]
-    told = (f"The comparison of {found['name']} ({found['arithmetic']}) with the reference {verdict}.", *warnings(found["differences"]))
-    table = TableOf(("target", "samples equal", "largest error", "proven bound"), rows, "The C against the reference, ahead of the integrator")
+    skipped = [
+        f"skipped on {name}: {one['skipped']}" for name, one in found["targets"].items() if "skipped" in one
+    ]
+    told = (
+        f"The comparison of {found['name']} ({found['arithmetic']}) with the reference {verdict}.",
+        *warnings(found["differences"]),
+    )
+    table = TableOf(
+        ("target", "samples equal", "largest error", "proven bound"),
+        rows,
+        "The C against the reference, ahead of the integrator",
+    )
     figures = (_used(ran, table),) if ran else ()
     return Section("Verification", (*told, *notes([*skipped, *found["notes"]])), (table,), figures=figures)
 
@@ -179,12 +242,21 @@ def _compared(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
 def _used(ran: Mapping[str, Any], table: TableOf) -> Figure:
     """How much of the proven bound the largest error seen takes."""
     names = tuple(name for name, one in ran.items() if one["max_error"] and one["error_bound"])
-    shares = np.array([100.0 * ran[n]["max_error"]["operator"] / ran[n]["error_bound"]["operator"] for n in names])
+    shares = np.array(
+        [100.0 * ran[n]["max_error"]["operator"] / ran[n]["error_bound"]["operator"] for n in names]
+    )
     bars = Bars("largest error", np.arange(len(names), dtype=float), shares, "model", names=names, width=0.5)
     return Figure(
         "The largest error seen, as a share of the proven bound",
         "Beyond 100 % the proof would be wrong; far below it, the inputs did not find the worst case.",
         f"Bars: largest error as a share of the bound on {', '.join(names)}.",
-        (Panel(Axis("target", places=names), Axis("share of the bound (%)", from_zero=True), (bars,), height=260),),
+        (
+            Panel(
+                Axis("target", places=names),
+                Axis("share of the bound (%)", from_zero=True),
+                (bars,),
+                height=260,
+            ),
+        ),
         table,
     )

@@ -38,7 +38,11 @@ _LOWEST, _HIGHEST = 1e-5, 1e3  # of |L|: what is drawn
 def design_page(design: Design, rig: Rig) -> Page:
     """The page of a design."""
     verdict = sentence(wish_line(design))
-    return Page(f"A controller for {rig.name}", f"{sentence(schedule_lines(design)[0])} {verdict}", design_sections(design, rig))
+    return Page(
+        f"A controller for {rig.name}",
+        f"{sentence(schedule_lines(design)[0])} {verdict}",
+        design_sections(design, rig),
+    )
 
 
 def design_sections(design: Design, rig: Rig) -> tuple[Section, ...]:
@@ -48,7 +52,12 @@ def design_sections(design: Design, rig: Rig) -> tuple[Section, ...]:
     worst = tuple(map(sentence, worst_sentences(design.worst)))
     return (
         Section("Controller", (*told, *notes(design.notes)), (points_table(design),), figures=schedule),
-        Section("Margins", worst, (margins_table(design), worst_table(design.worst)), figures=(_bode(design, rig),)),
+        Section(
+            "Margins",
+            worst,
+            (margins_table(design), worst_table(design.worst)),
+            figures=(_bode(design, rig),),
+        ),
     )
 
 
@@ -62,13 +71,27 @@ def _schedule(design: Design, rig: Rig) -> Figure:
     gains = (
         Line("schedule table", beyond, design.controller.gain_at(beyond), "running", width=2.4),
         Line("K_o(p)/K(p)", inside, wanted / rig.actuator.K(inside), "ideal", width=1.1),
-        Line("breakpoints", np.array(schedule.breakpoints), np.array(schedule.gains), "running", "none", dots=7.0),
+        Line(
+            "breakpoints",
+            np.array(schedule.breakpoints),
+            np.array(schedule.gains),
+            "running",
+            "none",
+            dots=7.0,
+        ),
         Rule(schedule.lower_limit, GREY, "dotted", upright=True),
     )
     places = np.array([p.pressure for p in design.points])
     line = (
         Line("K_o(p)", inside, wanted, "controller", width=1.8),
-        Line("operating points", places, np.array([p.K_o for p in design.points]), "controller", "none", dots=8.0),
+        Line(
+            "operating points",
+            places,
+            np.array([p.K_o for p in design.points]),
+            "controller",
+            "none",
+            dots=8.0,
+        ),
     )
     rows = tuple((number(p), number(g)) for p, g in zip(schedule.breakpoints, schedule.gains))
     return Figure(
@@ -101,7 +124,11 @@ def bode_figure(loops: Shapes, worst: PointMargins, controller: Controller, numb
         tops.append(curve(name, loop.omega[kept], size[kept], colour, width=1.8))
         bottoms.append(curve(name, loop.omega[kept], phase[kept], colour, width=1.8))
         at, where = np.array([margin.crossover_rad_s]), np.array([-180.0 + margin.phase_deg])
-        bottoms.append(Line(f"{name}: {margin.phase_deg:.1f}°", at, where, colour, "none", dots=9.0, group="phase margin"))
+        bottoms.append(
+            Line(
+                f"{name}: {margin.phase_deg:.1f}°", at, where, colour, "none", dots=9.0, group="phase margin"
+            )
+        )
     at = f"p = {worst.pressure:.4g} {controller.units.schedule}".rstrip()
     x = Axis("frequency (rad/s)", log=True)
     return Figure(
@@ -176,7 +203,9 @@ def _stays_at(limit: float, command: np.ndarray) -> bool:
 
 def _interesting(simulation: Simulation) -> float:
     times = [r.settling_s for r in simulation.setpoints]
-    return min(simulation.duration, 2.5 * max(times)) if all(map(math.isfinite, times)) else simulation.duration
+    return (
+        min(simulation.duration, 2.5 * max(times)) if all(map(math.isfinite, times)) else simulation.duration
+    )
 
 
 def _from_rest(simulation: Simulation) -> tuple[list, list]:
@@ -188,7 +217,9 @@ def _from_rest(simulation: Simulation) -> tuple[list, list]:
         tops.append(curve(f"to {name}", run.time[kept], run.output[kept, i], colour, width=1.8, group=name))
         tops += _other(simulation, i, kept)
         tops += _settled(run.time, run.output[:, i], 0.0, result.settling_s, colour)
-        bottoms.append(curve(f"to {name}", run.time[kept], run.command[kept, i], colour, steps=True, group=name))
+        bottoms.append(
+            curve(f"to {name}", run.time[kept], run.command[kept, i], colour, steps=True, group=name)
+        )
     return tops, bottoms
 
 
@@ -208,7 +239,9 @@ def _in_a_row(simulation: Simulation) -> tuple[list, list]:
         tops += _settled(run.time, run.output[:, 0], span[0], span[0] + result.settling_s, "output")
     tops.append(curve("output", run.time, run.output[:, 0], "output", width=1.8))
     if simulation.nominal is not None:
-        tops.append(curve("without the effects", run.time, simulation.nominal.output[:, 0], GREY, dash="dotted"))
+        tops.append(
+            curve("without the effects", run.time, simulation.nominal.output[:, 0], GREY, dash="dotted")
+        )
     return tops, [curve("command", run.time, run.command[:, 0], "command", steps=True)]
 
 

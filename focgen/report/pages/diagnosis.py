@@ -18,7 +18,11 @@ SWEEPING = 20  # of 50 places in its range: an input that visits fewer only step
 _GAP = 0.02  # of the session: between experiments that follow each other at once
 _MOST_RIVALS = 8
 _TIED = 2.0  # standard deviations
-_STATES = (("as_given", "as given", "measured"), ("refitted", "refitted", "bad"), ("explained", "with the effects", "good"))
+_STATES = (
+    ("as_given", "as given", "measured"),
+    ("refitted", "refitted", "bad"),
+    ("explained", "with the effects", "good"),
+)
 _CONFIDENCE = (
     "A confidence is a probability. It was measured on simulated rigs whose effects were sealed until the diagnosis was "
     "made: of the names given there at 90 %, about nine in ten were right. So 96 % means that of a hundred diagnoses like "
@@ -42,17 +46,30 @@ def diagnosis_sections(found: Diagnosis, drawn: Drawn | None) -> tuple[Section, 
     story = diagnosis_story(found, units)
     figures = _figures(found, drawn, units)
     parts = [
-        Section("Where", _told(story["where"]), (_shares(found),) if found.where.share else (), figures=figures["where"]),
+        Section(
+            "Where",
+            _told(story["where"]),
+            (_shares(found),) if found.where.share else (),
+            figures=figures["where"],
+        ),
         Section("Which", _told(story["which"]), _sizes(found, units), figures=figures["which"]),
         Section("How far", _told(story["far"]), (), figures=figures["far"]),
     ]
     ahead = (*_told(story["next"]), *(_files(found) if found.verdict != "none" else ()))
-    parts.append(Section("What next", ahead, (), (), ("diagnosis.json", found.refitted_rig, found.augmented_rig)))
+    parts.append(
+        Section("What next", ahead, (), (), ("diagnosis.json", found.refitted_rig, found.augmented_rig))
+    )
     meaning = (_CONFIDENCE,) * bool(found.causes) + (_SHRINK,) * (found.shrink is not None)
     if meaning:
         parts.append(Section("What the numbers mean", meaning))
     said = (*warnings(found.warnings), *notes(found.notes))
-    said += () if drawn else notes(("the folder holds no signals.json, so that no signals are drawn; diagnose again for them",))
+    said += (
+        ()
+        if drawn
+        else notes(
+            ("the folder holds no signals.json, so that no signals are drawn; diagnose again for them",)
+        )
+    )
     return (*parts, Section("What has to be said", said)) if said else tuple(parts)
 
 
@@ -97,7 +114,9 @@ def _sizes(found: Diagnosis, units: Mapping[str, str]) -> tuple[TableOf, ...]:
     for i, cause in enumerate(found.causes, 1):
         for candidate in cause.candidates:
             head = (candidate.effect, str(i), cause.stage, f"{candidate.confidence:.0%}")
-            known = [(name, e) for name, e in candidate.parameters.items() if name != "scale"] or [("–", None)]
+            known = [(name, e) for name, e in candidate.parameters.items() if name != "scale"] or [
+                ("–", None)
+            ]
             for name, estimate in known:
                 rows.append((*head, name, *_cells(estimate, units)))
     if not rows:
@@ -119,11 +138,15 @@ def _cells(estimate, units: Mapping[str, str]) -> tuple[str, str, str]:
 # ---------------------------------------------------------------------------------------------- figures
 
 
-def _figures(found: Diagnosis, drawn: Drawn | None, units: Mapping[str, str]) -> dict[str, tuple[Figure, ...]]:
+def _figures(
+    found: Diagnosis, drawn: Drawn | None, units: Mapping[str, str]
+) -> dict[str, tuple[Figure, ...]]:
     far = (_waterfall(found),)
     if drawn is None:
         return {"where": (), "which": (), "far": far}
-    which = tuple(_behind(rivals) for rivals in drawn.rivals if len(rivals.effects) > 1) + (_means(drawn, units),)
+    which = tuple(_behind(rivals) for rivals in drawn.rivals if len(rivals.effects) > 1) + (
+        _means(drawn, units),
+    )
     loops = _loops(drawn, units)
     signals = (_session(drawn, units), *((loops,) if loops else ()))
     return {"where": (_ladder(drawn),), "which": which, "far": (*far, *signals)}
@@ -133,16 +156,31 @@ def _ladder(drawn: Drawn) -> Figure:
     names = tuple(f"{s.entry} → {s.exit}" for s in drawn.segments)
     at = np.arange(len(names))
     bars = tuple(
-        Bars(label, at + 0.27 * (i - 1), np.array([getattr(s, key) for s in drawn.segments]), colour, width=0.25, names=names)
+        Bars(
+            label,
+            at + 0.27 * (i - 1),
+            np.array([getattr(s, key) for s in drawn.segments]),
+            colour,
+            width=0.25,
+            names=names,
+        )
         for i, (key, label, colour) in enumerate(_STATES)
     )
-    rows = tuple((n, *(number(getattr(s, key)) for key, _, _ in _STATES)) for n, s in zip(names, drawn.segments))
+    rows = tuple(
+        (n, *(number(getattr(s, key)) for key, _, _ in _STATES)) for n, s in zip(names, drawn.segments)
+    )
     return Figure(
         "The error of each stage on its own measured input",
         "Root-mean-square error between two logged signals, in percent of the range of the second. A stage that is as the "
         "model says leaves noise only.",
         f"Bars: the error of {', '.join(names)}, as given, refitted, and with the effects found.",
-        (Panel(Axis("from one logged signal to the next", places=names), Axis("error (% of range)", from_zero=True), bars),),
+        (
+            Panel(
+                Axis("from one logged signal to the next", places=names),
+                Axis("error (% of range)", from_zero=True),
+                bars,
+            ),
+        ),
         TableOf(("stage", *(label for _, label, _ in _STATES)), rows, "Error, % of the signal's range"),
     )
 
@@ -153,12 +191,22 @@ def _behind(rivals: Rivals) -> Figure:
     tied = np.array([value < _TIED for _, value in shown])
     values, at = np.array([value for _, value in shown]), np.arange(len(shown))
     bars = tuple(
-        Bars(label, at[which], values[which], colour, names=tuple(np.array(names)[which]), across=True, width=0.7)
+        Bars(
+            label,
+            at[which],
+            values[which],
+            colour,
+            names=tuple(np.array(names)[which]),
+            across=True,
+            width=0.7,
+        )
         for label, which, colour in (("tied with the best", tied, "good"), ("behind", ~tied, "measured"))
         if which.any()
     )
     panel = Panel(
-        Axis("standard deviations behind the best", from_zero=True, high=max(4.0, 1.08 * float(values.max()))),
+        Axis(
+            "standard deviations behind the best", from_zero=True, high=max(4.0, 1.08 * float(values.max()))
+        ),
         Axis("", places=names),
         (*bars, Rule(_TIED, "limit", upright=True)),
         height=90 + 30 * len(shown),
@@ -169,7 +217,11 @@ def _behind(rivals: Rivals) -> Figure:
         "told from the best by these logs.",
         f"Bars: standard deviations by which {', '.join(names[::-1])} are behind {rivals.found}.",
         (panel,),
-        TableOf(("effect", "σ behind"), tuple((n, number(v)) for n, v in shown[::-1]), "Standard deviations behind the best"),
+        TableOf(
+            ("effect", "σ behind"),
+            tuple((n, number(v)) for n, v in shown[::-1]),
+            "Standard deviations behind the best",
+        ),
         linked=False,
     )
 
@@ -188,11 +240,21 @@ def _means(drawn: Drawn, units: Mapping[str, str]) -> Figure:
     }
     y = Axis(with_unit("mean error", units.get(exit, "")))
     panels = tuple(
-        Panel(Axis(labels[over]), y, (*(_mean(m) for m in drawn.means if m.over == over), Rule(0.0)), f"Over {_OVER[over]}", 240)
+        Panel(
+            Axis(labels[over]),
+            y,
+            (*(_mean(m) for m in drawn.means if m.over == over), Rule(0.0)),
+            f"Over {_OVER[over]}",
+            240,
+        )
         for over in _OVER
     )
     rows = tuple(
-        (f"{_said(m.of)}, over {_OVER[m.over]}{'' if m.way == 'any' else ', ' + m.way}", number(_least(m.mean)), number(_most(m.mean)))
+        (
+            f"{_said(m.of)}, over {_OVER[m.over]}{'' if m.way == 'any' else ', ' + m.way}",
+            number(_least(m.mean)),
+            number(_most(m.mean)),
+        )
         for m in drawn.means
     )
     return Figure(
@@ -214,7 +276,15 @@ def _mean(mean: Mean) -> Line:
     dash = "dashed" if mean.way == "falling" else "solid"
     way = "" if mean.way == "any" else f", {mean.way}"
     colour = "bad" if mean.of == "refitted" else "good"
-    return Line(_said(mean.of) + way, mean.place, mean.mean, colour, dash, dots=4.0, group=_said(mean.of) + (", falling" if dash == "dashed" else ""))
+    return Line(
+        _said(mean.of) + way,
+        mean.place,
+        mean.mean,
+        colour,
+        dash,
+        dots=4.0,
+        group=_said(mean.of) + (", falling" if dash == "dashed" else ""),
+    )
 
 
 def _least(values: np.ndarray) -> float | None:
@@ -243,15 +313,28 @@ def _session(drawn: Drawn, units: Mapping[str, str]) -> Figure:
     panels = (
         Panel(time, Axis(shown), tuple(outputs), height=300),
         Panel(time, Axis(with_unit("error", units.get("output", ""))), (*errors, Rule(0.0)), height=190),
-        Panel(time, Axis(with_unit(entry, units.get(entry, ""))), (Line(entry, clock, whole(lambda t: t.input), "command"),), height=170),
+        Panel(
+            time,
+            Axis(with_unit(entry, units.get(entry, ""))),
+            (Line(entry, clock, whole(lambda t: t.input), "command"),),
+            height=170,
+        ),
     )
-    thin = f" Of {drawn.samples} samples {drawn.kept} are kept, every peak among them." if drawn.kept < drawn.samples else ""
+    thin = (
+        f" Of {drawn.samples} samples {drawn.kept} are kept, every peak among them."
+        if drawn.kept < drawn.samples
+        else ""
+    )
     return Figure(
         "The session: measured, and simulated from the first logged input",
         f"Drag over a stretch to look at it closely; the panels move together.{thin}",
         f"Curves over the session's time: the measured output and two simulations of it, their errors, and the {entry}.",
         panels,
-        TableOf(("experiment", "begins at (s)", "lasts (s)", "RMS error refitted", "with the effects"), _rows(drawn, begins), "Experiments"),
+        TableOf(
+            ("experiment", "begins at (s)", "lasts (s)", "RMS error refitted", "with the effects"),
+            _rows(drawn, begins),
+            "Experiments",
+        ),
     )
 
 
@@ -310,7 +393,13 @@ def _loops(drawn: Drawn, units: Mapping[str, str]) -> Figure | None:
         panels,
         TableOf(
             ("experiment", f"{drawn.entry}, smallest", "largest", "output, smallest", "largest"),
-            tuple((t.name, *map(number, (_least(t.input), _most(t.input), _least(t.measured), _most(t.measured)))) for t in sweeping[:2]),
+            tuple(
+                (
+                    t.name,
+                    *map(number, (_least(t.input), _most(t.input), _least(t.measured), _most(t.measured))),
+                )
+                for t in sweeping[:2]
+            ),
             "What they sweep",
         ),
         linked=False,
@@ -347,5 +436,9 @@ def _waterfall(found: Diagnosis) -> Figure:
         f"{gof['explained']:.3f} of a possible {gof['possible']:.3f}.",
         "Bars that add up: how much of the mean square error parameters, effects, what stays unexplained, and noise make.",
         (Panel(Axis("", places=names), Axis("mean square error (%)", from_zero=True), bars),),
-        TableOf(("part", f"RMS error before it is taken away{unit}", "share (%)"), rows, "Parts of the mean square error"),
+        TableOf(
+            ("part", f"RMS error before it is taken away{unit}", "share (%)"),
+            rows,
+            "Parts of the mean square error",
+        ),
     )

@@ -20,7 +20,13 @@ from focgen.jsontext import fits, read_json
 
 _SPAN = [(float, None)]
 _ESTIMATE = {"value": (float, None), "ci95": _SPAN, "unit": str}
-_CANDIDATE = {"effect": str, "confidence": float, "form": str, "parameters": dict, "separation": (float, None)}
+_CANDIDATE = {
+    "effect": str,
+    "confidence": float,
+    "form": str,
+    "parameters": dict,
+    "separation": (float, None),
+}
 _FOUND = {"stage": str, "candidates": [_CANDIDATE], "shrink": (float, None), "shrink_interval": _SPAN}
 _GAP = {key: float for key in ("as_given", "refitted", "explained", "floor")} | {
     "unit": str,
@@ -57,7 +63,8 @@ def read_diagnosis(path: Path) -> Diagnosis:
         causes=tuple(map(_found, value["causes"])),
         gap=Gap(**{key: value["gap"][key] for key in _GAP}),
         shrink_interval=_pair(value["shrink_interval"]),
-        next_experiment=ahead and NextExperiment(ahead["why"], ahead["what"], _real(ahead["expected_separation"])),
+        next_experiment=ahead
+        and NextExperiment(ahead["why"], ahead["what"], _real(ahead["expected_separation"])),
         tied=tuple(map(tuple, value["tied"])),
         notes=tuple(value["notes"]),
         fits=tuple(PlainFit(one["effect"], _real(one["error"])) for one in value["fits"]),

@@ -70,15 +70,31 @@ def _fits(found: Identification) -> Figure:
     for i, fit in enumerate(found.experiments):
         joint = found.joint.simulated[fit.name]
         tops.append(curve(fit.name, fit.time, fit.measured, _RUNS[i % len(_RUNS)], width=1.4))
-        tops.append(curve(f"{fit.name}, by itself", fit.time, fit.simulated, "ideal", dash="dotted", width=1.2, group="each by itself"))
+        tops.append(
+            curve(
+                f"{fit.name}, by itself",
+                fit.time,
+                fit.simulated,
+                "ideal",
+                dash="dotted",
+                width=1.2,
+                group="each by itself",
+            )
+        )
         tops.append(curve(f"{fit.name}, the rig", fit.time, joint, "ideal", width=1.2, group="the rig"))
         errors.append(curve(fit.name, fit.time, fit.measured - joint, _RUNS[i % len(_RUNS)], width=1.1))
     panels = (
         Panel(_TIME, Axis(named(found, fitted)), tuple(tops), height=340),
-        Panel(_TIME, Axis(with_unit("error", unit_of_role(found.rig.signals, fitted))), (*errors, Rule(0.0)), height=190),
+        Panel(
+            _TIME,
+            Axis(with_unit("error", unit_of_role(found.rig.signals, fitted))),
+            (*errors, Rule(0.0)),
+            height=190,
+        ),
     )
     rows = tuple(
-        (fit.name, number(fit.level), number(found.gof["rig"].get(fit.name)), number(fit.gof)) for fit in found.experiments
+        (fit.name, number(fit.level), number(found.gof["rig"].get(fit.name)), number(fit.gof))
+        for fit in found.experiments
     )
     return Figure(
         "Measured and identified",
@@ -126,8 +142,22 @@ def _parameters(found: Identification) -> tuple[Figure, ...]:
     for key, label in (("K", with_unit("K", gain_unit(found))), ("T", "T (s^α)"), ("alpha", "α")):
         spans = np.array([[a, b, np.nan] for a, b in (fit.ci95[key] for fit in steps)])
         marks = [
-            Line("95 % interval", np.repeat(levels, 3), spans.ravel(), "model", width=1.4, group="each experiment"),
-            Line("each experiment", levels, np.array([getattr(f, key) for f in steps]), "model", "none", dots=8.0),
+            Line(
+                "95 % interval",
+                np.repeat(levels, 3),
+                spans.ravel(),
+                "model",
+                width=1.4,
+                group="each experiment",
+            ),
+            Line(
+                "each experiment",
+                levels,
+                np.array([getattr(f, key) for f in steps]),
+                "model",
+                "none",
+                dots=8.0,
+            ),
         ]
         if key == "K":
             line = np.polynomial.polynomial.polyval(reach, joint.gain)
@@ -156,14 +186,21 @@ def _models(found: Identification) -> Figure:
         tops.append(curve(label, fit.time, simulated, colour, width=1.3))
         errors.append(curve(label, fit.time, fit.measured - simulated, colour, width=1.1))
     left = [(line.label, line.y) for line in errors]
-    rows = tuple((name, number(float(np.sqrt(np.mean(y**2)))), number(float(np.abs(y).max()))) for name, y in left)
+    rows = tuple(
+        (name, number(float(np.sqrt(np.mean(y**2)))), number(float(np.abs(y).max()))) for name, y in left
+    )
     return Figure(
         f"Experiment {fit.name}: models of different kind",
         "Above, the measured output and the models fitted to it; below, what each leaves.",
         f"Curves of experiment {fit.name}: measured, and by each model; and their errors.",
         (
             Panel(_TIME, Axis(named(found, fit.fitted)), tuple(tops)),
-            Panel(_TIME, Axis(with_unit("error", unit_of_role(found.rig.signals, fit.fitted))), (*errors, Rule(0.0)), height=190),
+            Panel(
+                _TIME,
+                Axis(with_unit("error", unit_of_role(found.rig.signals, fit.fitted))),
+                (*errors, Rule(0.0)),
+                height=190,
+            ),
         ),
         TableOf(("model", "RMS error", "largest error"), rows, f"What the models leave of {fit.name}"),
     )
@@ -201,7 +238,9 @@ def _stage(found: Identification, fit: StageFit) -> Figure:
     marks = []
     for i, (time, measured, simulated) in enumerate(fit.traces):
         marks.append(curve(fit.names[i], time, measured, _RUNS[i % len(_RUNS)], width=1.4))
-        marks.append(curve(f"{fit.names[i]}, identified", time, simulated, "ideal", width=1.1, group="identified"))
+        marks.append(
+            curve(f"{fit.names[i]}, identified", time, simulated, "ideal", width=1.1, group="identified")
+        )
     rows = tuple((name, number(value), f"± {number(half)}") for name, (value, half) in fit.parameters.items())
     return Figure(
         f"The {fit.stage}",

@@ -53,10 +53,18 @@ def study_sections(study: Study, pictures: Collection[str] = ()) -> tuple[Sectio
     loops = (_frequency(study),) if any(c.omega for c in study.curves) else ()
     loops += (_loops(study),) if _closed(study) else ()
     drawn = beside("frequency.png", "loops.png")
-    parts.append(Section("In the loop", (f"The band is {band_text(study)}.",), (ideal_table(study),), drawn, figures=loops))
+    parts.append(
+        Section(
+            "In the loop", (f"The band is {band_text(study)}.",), (ideal_table(study),), drawn, figures=loops
+        )
+    )
     if study.plant is not None:
         told = "A short memory forgets in the denominator, too: the simulated plant ends elsewhere, for good."
-        parts.append(Section("In a plant", (told,), (plant_table(study),), beside("plant.png"), figures=(_plant(study),)))
+        parts.append(
+            Section(
+                "In a plant", (told,), (plant_table(study),), beside("plant.png"), figures=(_plant(study),)
+            )
+        )
     if study.notes:
         parts.append(Section("What has to be said", notes(study.notes)))
     return tuple(parts)
@@ -75,13 +83,17 @@ def _accuracy(study: Study, memory: str) -> Figure:
     """Error and proven bound against length, or against the number of exponentials."""
     marks, place = [], PLACES[memory]
     for arithmetic, colour in ARITHMETIC_COLOURS.items():
-        rows = sorted((r for r in _of(study, memory) if r.arithmetic == arithmetic), key=lambda r: getattr(r, place))
+        rows = sorted(
+            (r for r in _of(study, memory) if r.arithmetic == arithmetic), key=lambda r: getattr(r, place)
+        )
         if rows:
             x = np.array([getattr(r, place) for r in rows], float)
             bounds = np.array([np.nan if r.bound is None else r.bound for r in rows])
             marks.append(Line(arithmetic, x, np.array([r.error for r in rows]), colour, dots=7.0))
             marks.append(Line(f"{arithmetic}, bound", x, bounds, colour, "dotted", 1.3, group="proven bound"))
-    rows = tuple((r.variant.label, r.arithmetic, number(r.error), number(r.bound)) for r in _of(study, memory))
+    rows = tuple(
+        (r.variant.label, r.arithmetic, number(r.error), number(r.bound)) for r in _of(study, memory)
+    )
     return Figure(
         f"{memory.capitalize()} memory: what it leaves",
         "Error of the memory operator: the worst of a step, a ramp, a sine and noise, each relative to its largest exact "
@@ -107,7 +119,11 @@ def _fronts(study: Study) -> tuple[Figure, ...]:
             "Every variant by what it costs and what it leaves; the grey line joins those that no other beats in both.",
             "Points on logarithmic axes: error over cost of every variant, and the line of the best.",
             panels,
-            TableOf(("memory", "arithmetic", SHARES[first], SHARES["ram_bytes"], "error"), rows, "Best at their cost"),
+            TableOf(
+                ("memory", "arithmetic", SHARES[first], SHARES["ram_bytes"], "error"),
+                rows,
+                "Best at their cost",
+            ),
             linked=False,
         ),
     )
@@ -116,7 +132,14 @@ def _fronts(study: Study) -> tuple[Figure, ...]:
 def _front(study: Study, cost: str) -> Panel:
     best = [study.rows[i] for i in study.pareto[cost]]
     marks: list[Mark] = [
-        Line("best at its cost", _costs(best, cost), np.array([r.error for r in best]), GREY, width=1.2, steps=True)
+        Line(
+            "best at its cost",
+            _costs(best, cost),
+            np.array([r.error for r in best]),
+            GREY,
+            width=1.2,
+            steps=True,
+        )
     ]
     for memory in PLACES:
         for arithmetic, colour in ARITHMETIC_COLOURS.items():
@@ -125,7 +148,11 @@ def _front(study: Study, cost: str) -> Panel:
             if rows:
                 size = 7.0 if memory == "short" else 11.0
                 name = f"{arithmetic}, {memory}{' (large)' if memory == 'exponential' else ''}"
-                marks.append(Line(name, _costs(rows, cost), np.array([r.error for r in rows]), colour, "none", dots=size))
+                marks.append(
+                    Line(
+                        name, _costs(rows, cost), np.array([r.error for r in rows]), colour, "none", dots=size
+                    )
+                )
     return Panel(Axis(SHARES[cost], log=True), _ERROR, tuple(marks))
 
 
@@ -156,7 +183,9 @@ def _frequency(study: Study) -> Figure:
             Panel(x, Axis("phase error (°)"), (within, *tops, *rules)),
             Panel(x, Axis("magnitude error (dB)"), (*bottoms, *rules), height=230),
         ),
-        TableOf(("memory", "largest phase error (°)", "largest magnitude error (dB)"), rows, "Within the band"),
+        TableOf(
+            ("memory", "largest phase error (°)", "largest magnitude error (dB)"), rows, "Within the band"
+        ),
     )
 
 
@@ -172,16 +201,27 @@ def _loops(study: Study) -> Figure:
         tops.append(curve(row_label(row), curves.time, curves.output, **_how(row, colour)))
         bottoms.append(curve(row_label(row), curves.time, np.maximum(off, LEAST), **_how(row, colour)))
     time = Axis("time (s)")
-    rows = tuple((row_label(r), number(r.settling_s), number(r.overshoot_pct), number(r.margin_deg)) for r, _, _ in lines)
+    rows = tuple(
+        (row_label(r), number(r.settling_s), number(r.overshoot_pct), number(r.margin_deg))
+        for r, _, _ in lines
+    )
     return Figure(
         f"A step of the closed loop, {lines[0][0].arithmetic}",
         "Above, the step by memory; below, how far it is off the loop with infinite memory.",
         "Curves over time: the output of the closed loop by memory, and its distance from infinite memory.",
         (
-            Panel(time, Axis(with_unit("output", study.controller.units.measurement)), (*tops, Rule(ideal.reference, GREY))),
+            Panel(
+                time,
+                Axis(with_unit("output", study.controller.units.measurement)),
+                (*tops, Rule(ideal.reference, GREY)),
+            ),
             Panel(time, Axis("off the ideal (% of step)", log=True), tuple(bottoms), height=230),
         ),
-        TableOf(("memory", "settling (s)", "overshoot (%)", "margin (°)"), rows, "The closed loop over all set points"),
+        TableOf(
+            ("memory", "settling (s)", "overshoot (%)", "margin (°)"),
+            rows,
+            "The closed loop over all set points",
+        ),
     )
 
 

@@ -27,11 +27,18 @@ def trials_page(sets: Sequence[Scores]) -> Page:
 
 def _section(scores: Scores) -> Section:
     table = TableOf(
-        ("score", "value", "90 % interval", "cases", "to reach", "reached"), tuple(map(_line, scores.rows)), title(scores)
+        ("score", "value", "90 % interval", "cases", "to reach", "reached"),
+        tuple(map(_line, scores.rows)),
+        title(scores),
     )
     figures = (_reliability(scores),) if len(scores.stated) >= LEAST else ()
     figures += (_calls(scores),) if scores.confusions else ()
-    return Section(f"Signals {scores.signals}, suite {scores.suite}", (sentence(title(scores)),), (table,), figures=figures)
+    return Section(
+        f"Signals {scores.signals}, suite {scores.suite}",
+        (sentence(title(scores)),),
+        (table,),
+        figures=figures,
+    )
 
 
 def _line(row: Row) -> tuple[str, ...]:
@@ -52,13 +59,22 @@ def _reliability(scores: Scores) -> Figure:
         Line("90 % of calibrated tools", np.repeat(stated, 3), spans, "measured", width=6.0),
         Line("measured", stated, rate, "model", dots=8.0),
     )
-    rows = tuple((number(s), number(r), f"{number(a)} to {number(b)}") for s, r, a, b in zip(stated, rate, low, high))
+    rows = tuple(
+        (number(s), number(r), f"{number(a)} to {number(b)}") for s, r, a, b in zip(stated, rate, low, high)
+    )
     return Figure(
         "What a stated confidence is worth",
         f"How often causes stated at each confidence are so, of {whole['cases']}: calibration error {whole['error']:.3f}, "
         f"that of perfect calibration {whole['perfect']:.3f}, p = {whole['p']:.2f}.",
         "Curve: how often a cause is right over the confidence stated, near the diagonal of perfect calibration.",
-        (Panel(Axis("stated confidence", low=0.0, high=1.03), Axis("how often it is so", low=0.0, high=1.05), marks, height=360),),
+        (
+            Panel(
+                Axis("stated confidence", low=0.0, high=1.03),
+                Axis("how often it is so", low=0.0, high=1.05),
+                marks,
+                height=360,
+            ),
+        ),
         TableOf(("stated", "so", "90 % of calibrated tools"), rows, "Reliability, bins of equal count"),
     )
 
@@ -68,11 +84,25 @@ def _calls(scores: Scores) -> Figure:
     true = tuple(scores.confusions)[::-1]
     counts = [(scores.confusions[t].get(t, 0), sum(scores.confusions[t].values())) for t in true]
     shares = np.array([100.0 * hits / max(1, count) for hits, count in counts])
-    bars = Bars("called by its name", np.arange(len(true), dtype=float), shares, "good", names=true, across=True, width=0.7)
-    panel = Panel(
-        Axis("called by its name (%)", from_zero=True, high=102.0), Axis("", places=true), (bars,), height=90 + 24 * len(true)
+    bars = Bars(
+        "called by its name",
+        np.arange(len(true), dtype=float),
+        shares,
+        "good",
+        names=true,
+        across=True,
+        width=0.7,
     )
-    rows = tuple((t, str(sum(calls.values())), ", ".join(f"{c} {n}" for c, n in calls.items())) for t, calls in scores.confusions.items())
+    panel = Panel(
+        Axis("called by its name (%)", from_zero=True, high=102.0),
+        Axis("", places=true),
+        (bars,),
+        height=90 + 24 * len(true),
+    )
+    rows = tuple(
+        (t, str(sum(calls.values())), ", ".join(f"{c} {n}" for c, n in calls.items()))
+        for t, calls in scores.confusions.items()
+    )
     return Figure(
         "What each effect was called",
         "Visible single effects: how many were called by their own name, the strongest candidate counting. The table says what "

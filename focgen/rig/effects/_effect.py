@@ -154,7 +154,9 @@ class Effect:
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
     ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone;
-    ``shifts``: it does what columns out of step do, which then are a part of it. ``uneven``: the family that it is as well where it is uneven; ``smooth``: its curves have no kinks.
+    ``shifts``: it does what columns out of step do, which then are a part of it. ``uneven``: the family that
+    it is as well where it is uneven; ``smooth``: its curves have no kinks; ``bends``: they leave the gain at
+    zero as it is, and change it elsewhere.
     """
 
     name: str
@@ -172,3 +174,4 @@ class Effect:
     shifts: bool = False
     uneven: str = ""
     smooth: bool = False
+    bends: bool = False

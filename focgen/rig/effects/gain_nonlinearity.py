@@ -45,6 +45,7 @@ EFFECT = Effect(
     confused_with=("dead_zone", "contact", "softening", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
     also=("regulator",),
+    bends=True,
     forms=[
         Form(
             "cubic",
