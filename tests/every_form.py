@@ -20,6 +20,8 @@ from tests.test_codegen_golden import CONTROLLER, EXPONENTIAL, FORMS, options
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "rig.toml"
 FURTHER = {f"exp_{a}": ["--arithmetic", a, "--name", f"finger_{a}", *EXPONENTIAL] for a in ("q15", "f64")}
+BAND = ["--memory", "exponential", "--operator", "continuous", "--tolerance", "1e-2", "--band", "0.3", "30"]
+FURTHER["band_q31"] = ["--arithmetic", "q31", "--name", "finger_q31", *BAND]
 WISHES = {"example": [], "fastest": ["--overshoot", "10"]}
 
 

@@ -8,6 +8,7 @@ from focgen.cli.outcome import Outcome
 from focgen.codegen.generate import PACKAGES, Generated, generate
 from focgen.codegen.kernels import TARGETS
 from focgen.control.controller import ARITHMETICS, MEMORIES
+from focgen.fractional.continuous import OPERATORS
 from focgen.plan.model import Plan
 
 HELP = "Write C99 for a controller, with proofs and error bounds in its manifest."
@@ -35,13 +36,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="E",
         help="largest relative error of the exponential memory's weights; "
-        "default: the controller's, else 1e-4",
+        "default: the controller's, else 1e-4; of --operator continuous: of its response, default 1e-3",
     )
     parser.add_argument(
         "--horizon",
         type=int,
         metavar="N",
         help="samples back to which --tolerance holds; default: the controller's, else 1000000",
+    )
+    parser.add_argument(
+        "--operator",
+        choices=OPERATORS,
+        default="gl",
+        help="what the exponential memory follows: the weights of Gruenwald and Letnikov (gl, the default),"
+        " or s^alpha itself over a band of frequencies, within --tolerance of it",
+    )
+    parser.add_argument(
+        "--band",
+        type=float,
+        nargs=2,
+        metavar=("LOW", "HIGH"),
+        help="of --operator continuous, in rad/s; default: four decades up to a tenth of Nyquist",
     )
     parser.add_argument("--target", metavar="CORE", help=f"sums for a core: {', '.join(TARGETS)}")
     parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
@@ -69,6 +84,8 @@ def run(args: argparse.Namespace) -> Outcome:
         args.horizon,
         args.selftest,
         args.no_float,
+        args.operator,
+        args.band and tuple(args.band),
     )
     return Outcome(made.manifest, _text(made))
 
@@ -85,7 +102,7 @@ def _text(made: Generated) -> str:
         f"{plan.name}: {plan.arithmetic}, {_memory(plan)}, {size['state_bytes']} bytes of state,"
         f" {size['table_bytes']} bytes of tables",
         f"error ahead of the {ahead}: {grows}at most {bound.operator:.3g} {rate}".rstrip()
-        + f"; by {plan.memory} memory at most {truncation}{within}",
+        + f"; {_whose(plan)} at most {truncation}{within}",
         *(
             f"short memory: {b['coefficient']:.6g} s^{b['order']:g} is {b['bias']:.3g} at rest instead of 0"
             for b in manifest["memory_bias"]
@@ -97,10 +114,19 @@ def _text(made: Generated) -> str:
     return "\n".join(lines)
 
 
+def _whose(plan: Plan) -> str:
+    """What the second error is owed to."""
+    return "against s^α, for a sine in the band," if plan.band else f"by {plan.memory} memory"
+
+
 def _memory(plan: Plan) -> str:
     if not plan.exponential:
         return f"{plan.length} past samples"
-    return f"exponential memory of {plan.states} modes, {plan.multiplies} multiplications a step"
+    said = f"exponential memory of {plan.states} modes, {plan.multiplies} multiplications a step"
+    if not plan.band:
+        return said
+    worst = max((memory.tolerance for memory in plan.memories), default=0.0)
+    return f"{said}, {100.0 * worst:.2g} % of s^α from {plan.band[0]:.4g} to {plan.band[1]:.4g} rad/s"
 
 
 def _within(bound: float | None, unit: str) -> str:

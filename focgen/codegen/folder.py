@@ -47,8 +47,10 @@ class ReadmeContext:
     length: int
     exponential: bool
     memory: str
+    horizon: bool
     within_horizon: UserText
     memory_section: str
+    against: str
     signals: list[Signal]
     scheduled: bool
     integral: bool
@@ -85,8 +87,10 @@ def readme_context(
         length=plan.length,
         exponential=plan.exponential,
         memory=_memory(plan),
+        horizon=plan.horizon is not None,
         within_horizon=_quantity(bound.within_horizon or 0.0, operator_unit),
         memory_section=_memory_section(plan),
+        against="s^α itself, for a sine in the band" if plan.band else "an infinite memory",
         signals=_signals(plan),
         scheduled=plan.schedule is not None,
         integral=plan.integrator is not None,
@@ -143,16 +147,30 @@ def _memory_section(plan: Plan) -> str:
     """What an exponential memory is and what holds of it, as a paragraph; empty for a short one."""
     if not plan.states:
         return ""
-    orders = ", ".join(f"s^{m.order:g} to {m.tolerance:.2g} with {m.states} modes" for m in plan.memories)
     words = (
         "The memory is a sum of exponentials. Every fractional power of s keeps a few means of its history,"
-        f" each over a time of its own ({_times(plan)}); the weights that the past has through them follow"
-        f" the exact ones for {plan.horizon} samples: {orders} (relative error, proved for every lag)."
+        f" each over a time of its own ({_times(plan)}); {_followed(plan)}"
         " Nothing is cut off, so a constant is remembered without an error, and a step costs the same however"
         " far the memory reaches. Means cannot leave the range of what they average: the bounds above hold"
         f" for any number of samples.{_SLOW[plan.arithmetic] * _has_slow(plan)}"
     )
     return "\n".join(wrapped(words.split(" "), 116))
+
+
+def _followed(plan: Plan) -> str:
+    """What the memories are close to, and how close."""
+    orders = ", ".join(f"s^{m.order:g} to {m.tolerance:.2g} with {m.states} modes" for m in plan.memories)
+    if plan.band:
+        low, high = plan.band
+        return (
+            f"with them its response follows (jω)^α itself from {low:.4g} to {high:.4g} rad/s: {orders}"
+            " (relative error, proved for every frequency of the band). Above the band it stays within twice"
+            " |jω|^α, four times where α > 1."
+        )
+    return (
+        "the weights that the past has through them follow"
+        f" the exact ones for {plan.horizon} samples: {orders} (relative error, proved for every lag)."
+    )
 
 
 _SLOW = {

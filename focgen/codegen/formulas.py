@@ -53,7 +53,7 @@ def _output_formulas(plan: Plan) -> list[str]:
 def weights_about(plan: Plan, terms: Polynomial, table: Sum, what: str, half_step: bool = False) -> list[str]:
     """What a weight table holds: its polynomial, formula and order."""
     factor = " times h/2" if half_step else ""
-    over = normaliser(plan.controller)
+    over = normaliser(plan.controller, {memory.order: memory.lead for memory in plan.memories})
     if over != 1.0:
         factor += f" over {over:.6g}, the denominator's weight of lag 0"
     lags = f"lags {table.last} ... {table.first}" if table.last > table.first else f"lag {table.first} only"
@@ -63,9 +63,10 @@ def weights_about(plan: Plan, terms: Polynomial, table: Sum, what: str, half_ste
         f" the weight of lag j is their sum{factor}. Oldest first, {lags}."
     )
     if table.banks:
+        led = f", times {_leads(plan)}" if plan.band else ""
         formula = (
-            "Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up,"
-            f" h = {quantity(plan.sample_time, 's')}; the modes below remember the rest."
+            "Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up"
+            f"{led}, h = {quantity(plan.sample_time, 's')}; the modes below remember the rest."
             f" The weight of lag j is their sum{factor}. Oldest first, {lags}."
         )
     return [f"{what}: {polynomial_text(terms)}.", *wrapped(formula.split(" "))]
@@ -75,7 +76,15 @@ def memory_about(plan: Plan) -> list[str]:
     """What the exponential memory is, for the head of the file; nothing with a short one."""
     if not plan.exponential:
         return []
-    head = f"Memory: exponential, {plan.states} modes with a mean each. The weights of every s^b are within"
     proved = max((memory.tolerance for memory in plan.memories), default=0.0)
+    if plan.band:
+        head = f"Memory: exponential, {plan.states} modes with a mean each, fitted to (jw)^b itself: within"
+        span = "from {:.4g} to {:.4g} rad/s".format(*plan.band)
+        return [head, f"{proved:.2g} of it {span}, and the gain at rest is exact."]
+    head = f"Memory: exponential, {plan.states} modes with a mean each. The weights of every s^b are within"
     rest = f"{proved:.2g} of the exact ones up to {plan.horizon} samples back, and the gain at rest is exact."
     return [head, rest]
+
+
+def _leads(plan: Plan) -> str:
+    return ", ".join(f"{memory.lead:.6g} for s^{memory.order:g}" for memory in plan.memories)

@@ -19,6 +19,7 @@ from focgen.codegen.source import source_context
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.control.files import controller_text, read_controller
 from focgen.errors import InputError, check_choice
+from focgen.fractional.continuous import HIGHEST, OPERATORS, RATIOS
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
 from focgen.output import check_apart, write_files
 from focgen.plan.build import build_plan
@@ -51,6 +52,8 @@ def generate(
     horizon: int | None = None,
     selftest: bool = False,
     no_float: bool = False,
+    operator: str = "gl",
+    band: tuple[float, float] | None = None,
 ) -> Generated:
     """Write C for a controller into the folder ``out``, whole or not at all; what an earlier run wrote there
     for it and this one does not, goes.
@@ -60,7 +63,10 @@ def generate(
     and ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier) default to the
     controller's own. ``selftest`` adds NAME_selftest.c and .h. ``target`` names a core whose own instructions
     the history sums shall use; without it they take their portable form. The bits are the same.
-    ``no_float`` leaves the conversions from and to physical values out of the header.
+    ``no_float`` leaves the conversions from and to physical values out of the header. ``operator``
+    "continuous" fits the exponential memory to (jω)^α itself within ``tolerance`` over ``band`` (rad/s; None:
+    four decades up to a tenth of the Nyquist frequency); it has no horizon, and a tolerance of 1e-3 unless
+    another is given. "gl" fits it to the weights of eq. (11).
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
@@ -70,9 +76,11 @@ def generate(
     kernels = _kernels(target)
     text, made, where = _source(controller)
     _check(arithmetic, memory, made.length if length is None else length)
-    _check_form(made.memory if memory is None else memory, length, tolerance, horizon)
+    form = made.memory if memory is None else memory
+    _check_form(form, length, tolerance, horizon)
+    _check_operator(form, operator, band, horizon, made.sample_time)
     called = check_name(made.name if name is None else name, where)
-    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon)
+    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band)
     files = folder_files(plan, text, selftest, kernels, not no_float)
     old = leftovers(Path(out), called, files)
     check_apart(old, [controller])
@@ -151,6 +159,28 @@ def _check_form(memory: str, length: int | None, tolerance: float | None, horizo
         raise InputError("--tolerance", f"is {tolerance:g}", f"give {TOLERANCES[0]:g} to {TOLERANCES[1]:g}")
     if horizon is not None and not (isinstance(horizon, int) and HORIZONS[0] <= horizon <= HORIZONS[1]):
         raise InputError("--horizon", f"is {horizon!r}", f"give {HORIZONS[0]} to {HORIZONS[1]} samples")
+
+
+def _check_operator(
+    memory: str, operator: str, band: tuple[float, float] | None, horizon: int | None, step: float
+) -> None:
+    """The band is in rad/s; ``step`` is the sample time in s."""
+    check_choice("--operator", operator, OPERATORS)
+    if operator == "gl":
+        if band is not None:
+            raise InputError("--band", "belongs to --operator continuous", "add that, or leave it out")
+        return
+    if memory != "exponential":
+        raise InputError("--operator", "continuous needs exponential memory", "add --memory exponential")
+    if horizon is not None:
+        raise InputError("--horizon", "belongs to --operator gl", "use --band, which the error is told of")
+    if band is None:
+        return
+    low, high, highest = *band, HIGHEST / step
+    if not (0.0 < low < high <= highest and RATIOS[0] <= high / low <= RATIOS[1]):
+        remedy = f"give two frequencies in rad/s, a factor of {RATIOS[0]:g} to {RATIOS[1]:g} apart"
+        what = f"is {low:g} to {high:g}"
+        raise InputError("--band", what, f"{remedy}, up to {highest:.6g}, half of the Nyquist frequency")
 
 
 def _refuse_what_is_missing(package) -> None:

@@ -50,6 +50,7 @@ def manifest_of(
         "arithmetic": plan.arithmetic,
         "memory": plan.memory,
         "length": plan.length,
+        "operator": plan.operator,
         **_exponential(plan),
         "sample_time": plan.sample_time,
         **lsbs(plan),
@@ -117,12 +118,13 @@ def bound_entry(bound: ErrorBound) -> dict[str, Any]:
 
 
 def _exponential(plan: Plan) -> dict[str, Any]:
-    """What was asked of an exponential memory, what it costs, and what is proved of each order's weights."""
+    """What was asked of an exponential memory, what it costs, and what is proved of each order: of its
+    weights, or of its response in the band (rad/s)."""
     if not plan.exponential:
         return {}
     return {
         "tolerance": plan.tolerance,
-        "horizon": plan.horizon,
+        **({"band": list(plan.band)} if plan.band else {"horizon": plan.horizon}),
         "states": plan.states,
         "multiplies": plan.multiplies,
         "orders": [

@@ -60,5 +60,6 @@ def _configuration(plan: Plan, sha256: str, kernels: Kernels) -> str:
     """A number of 64 bits in C: of all that gives a state its meaning."""
     settings: list = [focgen.__version__, sha256, plan.name, plan.arithmetic, plan.memory, plan.length]
     settings += [plan.tolerance, plan.horizon, kernels.target]
+    settings += [plan.operator, plan.band] if plan.band else []
     digest = hashlib.sha256(json.dumps(settings).encode()).digest()
     return f"0x{digest[:_NAMED].hex()}"

@@ -22,6 +22,8 @@ _FARTHEST = 1100.0  # |x| beyond which e^x is 0 or infinite
 _TINY = 2.0**-1000  # as good as 0 to any power
 _EXP = [1.0 / math.factorial(k) for k in range(6, 1, -1)]
 _LOG = [2.0 / (2 * k + 1) for k in range(11, 0, -1)]
+_SINE = [(-1.0) ** k / math.factorial(2 * k + 1) for k in range(11, -1, -1)]
+_COSINE = [(-1.0) ** k / math.factorial(2 * k) for k in range(12, -1, -1)]
 
 
 def _split(value: Decimal) -> tuple[float, float]:
@@ -83,6 +85,13 @@ def log(x) -> np.ndarray:
     square = s * s
     small = s * (half + square * _horner(_LOG, square)) + octave * _OCTAVE[1]
     return octave * _OCTAVE[0] + (over - (half - small))
+
+
+def sine_cosine(x) -> tuple[np.ndarray, np.ndarray]:
+    """Return sin x and cos x for |x| ≤ π/2, both of the shape of ``x``; off by less than 1e-15."""
+    x = np.asarray(x, dtype=float)
+    square = x * x
+    return x * _horner(_SINE, square), _horner(_COSINE, square)
 
 
 def power(base: float, exponent: float) -> float:

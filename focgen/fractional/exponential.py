@@ -52,6 +52,11 @@ class ExponentialMemory:
         return len(self.poles)
 
     @property
+    def lead(self) -> float:
+        """The weight of v_k itself."""
+        return 1.0
+
+    @property
     def multiplies(self) -> int:
         """Multiplications in one step; a factor in front of the operator costs one more."""
         return 2 * self.states

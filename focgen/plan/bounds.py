@@ -35,6 +35,7 @@ from focgen.plan.model import Bank, ErrorBound, Plan, Sum
 from focgen.plan.proofs import at_rest, reset_error
 from focgen.plan.stability import inverse_of
 from focgen.plan.truncation import largest_error, truncation
+from focgen.plan.truncation_band import band_truncation
 
 _UNIT = {"f64": 2.0**-53, "f32": 2.0**-24}
 _DOUBLE = 2.0**-53
@@ -63,8 +64,8 @@ def error_bound(plan: Plan, tables: Tables) -> ErrorBound:
     return ErrorBound(
         operator=operator,
         output_per_sample=account.output(static, growth, operator),
-        truncation=truncation(plan, tables),
-        within_horizon=truncation(plan, tables, past_horizon=False) if plan.exponential else None,
+        truncation=band_truncation(plan) if plan.band else truncation(plan, tables),
+        within_horizon=truncation(plan, tables, past_horizon=False) if plan.horizon else None,
         operator_per_sample=static + growth if growth else 0.0,
         parts=tuple((cause, value) for cause, value in parts.items() if value)
         + (("inner integral", ceiling),) * bool(ceiling),

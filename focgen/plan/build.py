@@ -9,12 +9,12 @@ import numpy as np
 
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.errors import PlanError
-from focgen.fractional.exponential import ExponentialMemory
+from focgen.fractional.continuous import DEFAULT_TOLERANCE
 from focgen.plan import fixed, floating
 from focgen.plan.bounds import error_bound
 from focgen.plan.canonical import Tables, realise, tables
 from focgen.plan.formats import WORDS
-from focgen.plan.memory import exponential_tables, memories_of
+from focgen.plan.memory import Memory, band_memories_of, checked_band, exponential_tables, memories_of
 from focgen.plan.model import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
 from focgen.plan.stability import check_stable
@@ -31,27 +31,36 @@ def build_plan(
     memory: str | None = None,
     tolerance: float | None = None,
     horizon: int | None = None,
+    operator: str = "gl",
+    band: tuple[float, float] | None = None,
 ) -> Plan:
     """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with ``memory`` "short", of ``length`` past
     samples, or "exponential", within ``tolerance`` up to ``horizon`` samples; all default to the
     controller's.
 
     ``tolerance``: 1e-8 … 0.1, the largest relative error of the exact memory's weights up to the horizon, 100
-    … 1e8 samples (:class:`focgen.fractional.exponential.ExponentialMemory`).
+    … 1e8 samples (:class:`focgen.fractional.exponential.ExponentialMemory`). ``operator`` "gl", or
+    "continuous": then an exponential memory follows (jω)^α itself within ``tolerance``, relative, over
+    ``band`` in rad/s, a factor of 10 to 1e6 wide and at most to half of the Nyquist frequency; by default
+    four decades up to a tenth of it. It has no horizon, and its ``tolerance`` defaults to 1e-3.
 
     Raises PlanError where the transfer function cannot be realised, its truncated recursion is not stable, a
     range cannot be represented, or a node cannot be proved; the remedy says what would work.
     """
+    if operator == "continuous" and tolerance is None:
+        tolerance = DEFAULT_TOLERANCE  # the controller's own is one of weights
     given = dict(arithmetic=arithmetic, length=length, memory=memory, tolerance=tolerance, horizon=horizon)
     wanted = replace(controller, **{key: value for key, value in given.items() if value is not None})
     _check(wanted)
-    folded, memories = _tables(wanted)
+    band = checked_band(wanted, operator, band)
+    folded, memories = _tables(wanted, band)
     check_stable(controller, folded, wanted.length)
     draft = _fixed if wanted.arithmetic in WORDS else _floating
     with np.errstate(over="ignore"):  # a number beyond the type has no room, and is refused for that below
         plan = draft(controller, wanted.arithmetic, wanted.length, name or controller.name, folded)
     if wanted.memory == "exponential":
-        asked = {"tolerance": wanted.tolerance, "horizon": wanted.horizon}
+        asked = {"tolerance": wanted.tolerance, "horizon": None if band else wanted.horizon}
+        asked.update(operator=operator, band=band)
         plan = replace(plan, memory="exponential", memories=memories, **asked)
         plan = replace(plan, length=max(plan.error_lags, plan.filtered_lags))
     _check_at_rest(plan, folded)
@@ -60,10 +69,14 @@ def build_plan(
     return replace(plan, error_bound=error_bound(plan, folded))
 
 
-def _tables(wanted: Controller) -> tuple[Tables, tuple[ExponentialMemory, ...]]:
+def _tables(wanted: Controller, band: tuple[float, float] | None) -> tuple[Tables, tuple[Memory, ...]]:
     if wanted.memory == "short":
         return tables(wanted, wanted.length), ()
-    memories = memories_of(wanted, wanted.arithmetic, wanted.tolerance, wanted.horizon)
+    memories: tuple[Memory, ...]
+    if band:
+        memories = band_memories_of(wanted, wanted.arithmetic, wanted.tolerance, band)
+    else:
+        memories = memories_of(wanted, wanted.arithmetic, wanted.tolerance, wanted.horizon)
     return exponential_tables(wanted, memories), memories
 
 

@@ -26,7 +26,7 @@ integrator it is clamped to what would take the output across its whole range in
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -149,10 +149,11 @@ def _whole(order: float) -> float:
     return float(round(order)) if abs(order - round(order)) < _WHOLE else order
 
 
-def normaliser(controller: Controller) -> float:
-    """The denominator's coefficient of the present sample, which all weights are divided by."""
-    h = controller.sample_time
-    return exact_sum([t.coefficient * power(h, -t.order) for t in realise(controller).den])
+def normaliser(controller: Controller, leads: Mapping[float, float]) -> float:
+    """The denominator's coefficient of the present sample, which all weights are divided by; ``leads``: what
+    each order's memory weighs the present sample with, 1 where none is given."""
+    h, den = controller.sample_time, realise(controller).den
+    return exact_sum([t.coefficient * power(h, -t.order) * leads.get(t.order, 1.0) for t in den])
 
 
 def tables(controller: Controller, length: int) -> Tables:

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.signal import fftconvolve, lfilter
 
 from focgen.control.controller import Controller
-from focgen.fractional.exponential import ExponentialMemory
 from focgen.fractional.transfer import Polynomial
 from focgen.plan.canonical import Realisation, inner_limits, realise
+from focgen.plan.memory import Memory
 from focgen.plan.scenario import Reset, Scenario, Trace
 
 _DIRECT = 4096  # taps up to which sums are taken one by one, not by transforms
@@ -29,7 +29,7 @@ def ideal(
     controller: Controller,
     scenario: Scenario,
     length: int | None = None,
-    memories: Sequence[ExponentialMemory] = (),
+    memories: Sequence[Memory] = (),
 ) -> Trace:
     """Run a controller on physical inputs; returns physical u and d (ahead of the integrator), no flags.
 
@@ -61,16 +61,17 @@ def _weights(order: float, count: int) -> np.ndarray:
 
 class _Sum:
     """Σ c h^−β w_j^(β), eq. (10)–(14): taps, without the zeros that whole orders end in, and modes where a
-    memory stands for an order: c h^−β ∇^m (1 + Σ_i w_i / (z − p_i)).
+    memory stands for an order: c h^−β ∇^m (w_0 + Σ_i w_i / (z − p_i)).
     """
 
-    def __init__(self, terms: Polynomial, step: float, count: int, memories: dict[float, ExponentialMemory]):
+    def __init__(self, terms: Polynomial, step: float, count: int, memories: dict[float, Memory]):
         total = np.zeros(max(count, 2) + 1)
         self.modes: list[tuple[float, float, int]] = []
         for t in terms:
             factor, memory = t.coefficient * step**-t.order, memories.get(t.order)
             order = t.order if memory is None else float(memory.differences)
-            total[: count + 1] += factor * _weights(order, count)
+            lead = 1.0 if memory is None else memory.lead
+            total[: count + 1] += factor * lead * _weights(order, count)
             for pole, weight in zip(memory.poles, memory.weights) if memory else ():
                 self.modes.append((pole, factor * weight, memory.differences))
         self.taps = np.trim_zeros(total, "b") if total.any() else total[:1]
@@ -134,7 +135,7 @@ class _Operator:
     """The transfer function, from e to v."""
 
     def __init__(
-        self, form: Realisation, controller: Controller, count: int, memories: dict[float, ExponentialMemory]
+        self, form: Realisation, controller: Controller, count: int, memories: dict[float, Memory]
     ):
         h, parts = controller.sample_time, (form.direct, form.rest, form.den)
         self.form, self.limits, self.half_step = form, inner_limits(controller), 0.5 * h

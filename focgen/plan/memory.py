@@ -15,6 +15,13 @@ import numpy as np
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.fractional.elementary import power, total
+from focgen.fractional.continuous import (
+    DEFAULT_BAND,
+    OPERATORS,
+    ContinuousMemory,
+    check_band,
+    fit_band,
+)
 from focgen.fractional.exponential import ExponentialMemory
 from focgen.fractional.exponential_rounded import fit_rounded
 from focgen.fractional.transfer import Polynomial, Term
@@ -23,6 +30,8 @@ from focgen.plan.canonical import Realisation, Table, Tables, realise, tables_by
 from focgen.plan.modes import Modes, response_of
 
 _LARGEST_ORDER = 2.0
+
+Memory = ExponentialMemory | ContinuousMemory
 
 
 @dataclass(frozen=True)
@@ -90,11 +99,59 @@ def memories_of(
 
     Raises PlanError where an order is beyond 2, or tolerance and horizon cannot be met.
     """
+    orders = _fractional_orders(controller)
+    return tuple(_fitted(controller, order, arithmetic, tolerance, horizon) for order in orders)
+
+
+def checked_band(
+    controller: Controller, operator: str, band: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """The band in rad/s that a controller's operator is fitted to, None for "gl".
+
+    Raises PlanError for an operator that is unknown or needs another memory, and for a band of "gl".
+    """
+    where, step = controller.name, controller.sample_time
+    if operator not in OPERATORS:
+        raise PlanError(where, f"the operator {operator!r} is unknown", f"choose {' or '.join(OPERATORS)}")
+    if operator == "gl":
+        if band is not None:
+            raise PlanError(where, "a band belongs to the operator continuous", "choose that or leave it out")
+        return None
+    if controller.memory != "exponential":
+        raise PlanError(where, "the operator continuous needs exponential memory", "choose that memory")
+    low, high = band or (end / step for end in DEFAULT_BAND)
+    try:
+        check_band(low * step, high * step)
+    except ValueError as reason:
+        raise PlanError(where, f"has the band {low:g} to {high:g} rad/s: {reason}", "give another") from None
+    return float(low), float(high)
+
+
+def band_memories_of(
+    controller: Controller, arithmetic: str, tolerance: float, band: tuple[float, float]
+) -> tuple[ContinuousMemory, ...]:
+    """The same, fitted to (jω)^β itself in a ``band`` in rad/s.
+
+    Raises PlanError where an order is beyond 2, or the tolerance cannot be met in the band.
+    """
+    low, high = (end * controller.sample_time for end in band)
+    found = []
+    for order in _fractional_orders(controller):
+        try:
+            found.append(fit_band(order, low, high, tolerance, ROUNDED[arithmetic]))
+        except ValueError as reason:
+            remedy = "allow a larger tolerance, another band, or use the operator gl"
+            what = f"order {order:g} has no memory that follows it: {reason}"
+            raise PlanError(controller.name, what, remedy) from None
+    return tuple(found)
+
+
+def _fractional_orders(controller: Controller) -> list[float]:
     orders = sorted({t.order for t in _terms(realise(controller)) if not t.order.is_integer()})
     if orders and orders[-1] > _LARGEST_ORDER:
         what = f"has the order {orders[-1]:g} over its lowest: exponential memory ends at 2"
         raise PlanError(f"{controller.name} [transfer]", what, "use memory short")
-    return tuple(_fitted(controller, order, arithmetic, tolerance, horizon) for order in orders)
+    return orders
 
 
 def _terms(form: Realisation) -> Polynomial:
@@ -112,20 +169,25 @@ def _fitted(
         raise PlanError(controller.name, what, remedy) from None
 
 
-def exponential_tables(controller: Controller, memories: tuple[ExponentialMemory, ...]) -> Tables:
+def exponential_tables(controller: Controller, memories: tuple[Memory, ...]) -> Tables:
     """The controller's terms as taps and modes. Raises PlanError as :func:`focgen.plan.canonical.tables`."""
     by_order = {memory.order: memory for memory in memories}
     return tables_by(controller, lambda terms: _folded(terms, controller.sample_time, by_order))
 
 
-def _folded(terms: Polynomial, step: float, memories: dict[float, ExponentialMemory]) -> Table:
+def _folded(terms: Polynomial, step: float, memories: dict[float, Memory]) -> Table:
     """Whole orders, and lag 0 of the others with their differences, as taps."""
     count = max(math.ceil(t.order) for t in terms)
-    each = [t.coefficient * power(step, -t.order) * _differences(math.ceil(t.order), count) for t in terms]
+    leads = [t.coefficient * power(step, -t.order) * _lead(t.order, memories) for t in terms]
+    each = [lead * _differences(math.ceil(t.order), count) for lead, t in zip(leads, terms)]
     taps, size = total(each), total(np.abs(each))
     keep = int(np.flatnonzero(size)[-1]) + 1
     modes = tuple(_modes(t, step, memories[t.order]) for t in terms if t.order in memories)
     return Table(taps[:keep], size[:keep], modes, response_of(taps[:keep], 0, modes))
+
+
+def _lead(order: float, memories: dict[float, Memory]) -> float:
+    return memories[order].lead if order in memories else 1.0
 
 
 def _differences(m: int, count: int) -> np.ndarray:
@@ -133,6 +195,6 @@ def _differences(m: int, count: int) -> np.ndarray:
     return gl_weights(float(m), count)
 
 
-def _modes(term: Term, step: float, memory: ExponentialMemory) -> Modes:
+def _modes(term: Term, step: float, memory: Memory) -> Modes:
     factor = term.coefficient * power(step, -term.order)
     return Modes(memory.order, 1.0 - np.array(memory.poles), factor * np.array(memory.weights))

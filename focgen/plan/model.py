@@ -63,7 +63,8 @@ Additions to an integral (z, I) are made in the type of its state, r and d widen
 
 Exponential memory ------------------ With ``memory`` "exponential" a sum's taps are short, and ``Sum.banks``
 remember the rest. A term c s^β, m − 1 < β < m, is c h^−β ∇^m (x_k + Σ_{j≥1} Σ_i w_i p_i^(j−1) x_{k−j})
-(:mod:`focgen.fractional.exponential`), ∇ the backward difference; its lag 0 and every whole order are taps. A
+(:mod:`focgen.fractional.exponential`), ∇ the backward difference; its lag 0 and every whole order are taps.
+With the operator "continuous" x_k has a weight of its own (:mod:`focgen.fractional.continuous`). A
 mode's part, ∇^m Σ_{j≥1} p^(j−1) x_{k−j}, is how far the history's past is from its own mean, weighted by p^j.
 So a mode keeps that mean, L: it never leaves the range of what it averages, and a constant is remembered
 without any error.
@@ -130,6 +131,7 @@ import math
 from dataclasses import dataclass
 
 from focgen.control.controller import Controller
+from focgen.fractional.continuous import ContinuousMemory
 from focgen.fractional.exponential import ExponentialMemory
 from focgen.plan.sums import Bank, Block, Count, Format, Sum
 
@@ -234,7 +236,8 @@ class ErrorBound:
     ``operator_per_sample``: with an inner integrator the error of its state adds up until its clamp ends it;
     n samples after a reset the operator's error is at most n times this (and ``operator``). 0 elsewhere.
     ``parts`` splits ``operator`` by cause, for reports. ``within_horizon``: ``truncation`` as long as no more
-    than the horizon's samples have passed since a reset to a constant; None for short memory.
+    than the horizon's samples have passed since a reset to a constant; None without a horizon.
+    With the operator "continuous" ``truncation`` is against s^α: see :mod:`focgen.plan.truncation_band`.
     """
 
     operator: float
@@ -256,6 +259,8 @@ class Plan:
     ``memory`` is "short", with ``length`` past samples, or "exponential": then ``memories`` has the operator
     of each fractional order, with the poles as the arithmetic holds them, ``horizon`` (samples) and
     ``tolerance`` are what was asked for, and ``length`` counts the past samples that the taps need.
+    ``operator`` is "gl" where they follow the Grünwald–Letnikov weights, or "continuous" where they follow
+    (jω)^α: then in the ``band``, in rad/s, and there is no horizon.
     """
 
     controller: Controller
@@ -283,9 +288,11 @@ class Plan:
     output: Format
     proofs: tuple[Proof, ...]
     error_bound: ErrorBound
-    memories: tuple[ExponentialMemory, ...] = ()
+    memories: tuple[ExponentialMemory | ContinuousMemory, ...] = ()
     tolerance: float | None = None
     horizon: int | None = None
+    operator: str = "gl"
+    band: tuple[float, float] | None = None
 
     @property
     def exponential(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from focgen.codegen.kernels import TARGETS, Kernels
 from focgen.codegen.names import check_name
 from focgen.control.controller import ARITHMETICS, MEMORIES
 from focgen.errors import InputError, check_choice
+from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
 from focgen.jsontext import fits, read_json
 from focgen.plan.model import LONGEST, ErrorBound
@@ -25,6 +26,7 @@ _SHAPE = {
     "arithmetic": str,
     "memory": str,
     "length": int,
+    "operator": str,
     "error_bound": {"quantisation": _QUANTISATION, "truncation": {"operator": (float, None)}},
     "kernels?": {"target": str},
     "selftest?": dict,
@@ -32,6 +34,7 @@ _SHAPE = {
     "inputs": dict,
 }
 _EXPONENTIAL = {"tolerance": float, "horizon": int}
+_CONTINUOUS = {"tolerance": float, "band": list}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,8 @@ class Recorded:
     """A manifest: the ``name`` of the C, the options of the plan and of its C (``floats``: whether its header
     has conversions), the ``bound`` it claims, and ``content``, all of it.
 
-    ``length`` is None with an exponential memory, ``tolerance`` and ``horizon`` are with a short one.
+    ``length`` is None with an exponential memory, ``tolerance`` and ``horizon`` are with a short one. The
+    ``operator`` "continuous" has a ``band`` (rad/s) and no horizon.
     """
 
     name: str
@@ -53,6 +57,8 @@ class Recorded:
     bound: ErrorBound
     floats: bool
     content: Mapping[str, Any]
+    operator: str = "gl"
+    band: tuple[float, float] | None = None
 
 
 def read_recorded(folder: Path) -> Recorded:
@@ -71,13 +77,15 @@ def read_recorded(folder: Path) -> Recorded:
     where = str(path)
     check_choice(f"{where} [arithmetic]", found["arithmetic"], ARITHMETICS)
     check_choice(f"{where} [memory]", found["memory"], MEMORIES)
+    check_choice(f"{where} [operator]", found["operator"], OPERATORS)
     target = found["kernels"]["target"] if "kernels" in found else None
     if target is not None:
         check_choice(f"{where} [kernels]", target, TARGETS)
     name = check_name(found["name"], where)
     options = found["arithmetic"], found["memory"], *_memory(path, found)
     bound, floats = _bound(found["error_bound"]), not found.get("no_float", False)
-    return Recorded(name, *options, Kernels(target), "selftest" in found, bound, floats, found)
+    recorded = Recorded(name, *options, Kernels(target), "selftest" in found, bound, floats, found)
+    return replace(recorded, operator=found["operator"], band=_band(path, found))
 
 
 def _check_shape(path: Path, found: Any, shape: dict[str, Any]) -> None:
@@ -98,14 +106,27 @@ def _check_version(path: Path, generator: str) -> None:
 
 
 def _memory(path: Path, found: dict[str, Any]) -> tuple[int | None, float | None, int | None]:
-    """Length, or tolerance and horizon."""
+    """Length, or tolerance and, where there is one, horizon."""
     if found["memory"] == "short":
         _check_span(path, "length", found["length"], (1, LONGEST))
         return found["length"], None, None
-    _check_shape(path, found, _EXPONENTIAL)
+    continuous = found["operator"] == "continuous"
+    _check_shape(path, found, _CONTINUOUS if continuous else _EXPONENTIAL)
     _check_span(path, "tolerance", found["tolerance"], TOLERANCES)
+    if continuous:
+        return None, found["tolerance"], None
     _check_span(path, "horizon", found["horizon"], HORIZONS)
     return None, found["tolerance"], found["horizon"]
+
+
+def _band(path: Path, found: dict[str, Any]) -> tuple[float, float] | None:
+    """Of the operator "continuous"; whether it can be fitted is the plan's to say."""
+    if found["operator"] == "gl":
+        return None
+    band = found["band"] if found["memory"] == "exponential" else None
+    if not (isinstance(band, list) and len(band) == 2 and all(type(end) is float for end in band)):
+        raise InputError(str(path), "lacks 'band' as it was written", AGAIN)
+    return band[0], band[1]
 
 
 def _check_span(path: Path, key: str, value: float, span: tuple[float, float]) -> None:
