@@ -15,9 +15,7 @@ from focgen.output import new_folder, write_file, write_files
 from focgen.progress import bar, led_by, say, step
 
 
-@pytest.mark.parametrize(
-    "argv", [["nonsense"], ["design"], ["design", "missing.toml", "--out", "x.toml"]]
-)
+@pytest.mark.parametrize("argv", [["nonsense"], ["design"], ["design", "missing.toml", "--out", "x.toml"]])
 def test_unusable_input_is_one_line_and_status_2(argv, capsys):
     assert main(argv) == 2
     captured = capsys.readouterr()

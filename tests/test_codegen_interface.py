@@ -77,7 +77,8 @@ def test_a_name_in_capitals_has_one_spelling(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "time, micros", ((0.01, 10_000), (0.0003, 300), (1e-6, 1), (1.5e-6, None), (1 / 3, None), (60.0, 60 * 10**6))
+    "time, micros",
+    ((0.01, 10_000), (0.0003, 300), (1e-6, 1), (1.5e-6, None), (1 / 3, None), (60.0, 60 * 10**6)),
 )
 def test_the_period_is_there_where_it_is_whole(time, micros):
     assert period_us(build_plan(paper_controller(5, sample_time=time), "f32")) == micros

@@ -22,7 +22,10 @@ from focgen.rig.replay import replay
 
 H = 0.02
 AXIS = Rig(
-    "axis", H, Signals("t", "q", "u"), LinearActuator(TransferFunction([(1.0, 0.0)], [(0.45, 2.0), (0.9, 1.0)]))
+    "axis",
+    H,
+    Signals("t", "q", "u"),
+    LinearActuator(TransferFunction([(1.0, 0.0)], [(0.45, 2.0), (0.9, 1.0)])),
 )
 
 
@@ -69,7 +72,9 @@ def test_friction_of_an_axis_that_integrates_has_its_size(zero, tmp_path):
     assert first.effect == "friction" and gain * force == pytest.approx(0.4 / 0.8, rel=0.15)
     assert gain * rig.actuator.bias == pytest.approx(zero / 0.8, abs=0.03)
     test = [axis_log(2, zero=zero)]
-    before, after = (replay(tmp_path / f"{n}.toml", test).logs["axis 2"].rmse for n in ("refitted", "augmented"))
+    before, after = (
+        replay(tmp_path / f"{n}.toml", test).logs["axis 2"].rmse for n in ("refitted", "augmented")
+    )
     assert after < 0.35 * before
 
 
@@ -112,7 +117,9 @@ def test_more_samples_than_the_response_needs_are_looked_at_in_fewer():
     assert len(kept) == 400 and same.between is None
 
 
-DATA = Path(os.environ.get("FOCGEN_DATA", Path(__file__).resolve().parents[1] / ".." / "shared" / "data" / "open"))
+DATA = Path(
+    os.environ.get("FOCGEN_DATA", Path(__file__).resolve().parents[1] / ".." / "shared" / "data" / "open")
+)
 
 
 @pytest.mark.long

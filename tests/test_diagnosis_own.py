@@ -192,7 +192,9 @@ def test_a_linear_actuator_moves_by_three_times_its_uncertainty(order):
     rig = replace(RIG, actuator=LinearActuator(TransferFunction([(3.0, 0.0)], den)))
     own = Own(rig, ("actuator",), "actuator", 1.0, 1.0)
     low, high = (own.put(rig, v).actuator.dynamics for v in own.bounds())
-    assert high.num[0].coefficient == pytest.approx(1.6 * 3.0) and low.num[0].coefficient == pytest.approx(1.2)
+    assert high.num[0].coefficient == pytest.approx(1.6 * 3.0) and low.num[0].coefficient == pytest.approx(
+        1.2
+    )
     for k, given in enumerate(den[:-1]):
         power = order - k
         assert high.den[k].coefficient == pytest.approx(1.6**power * given[0])

@@ -87,13 +87,17 @@ def test_an_axis_under_a_staircase_of_forces_breaks_away_and_coasts_to_rest():
     """m y'' = u − c y' − F: held by the breakaway force up to 0.9, then exponentials in closed form."""
     m, c, F, more = 0.5, 0.3, 0.6, 0.3
     x = np.repeat([0.0, 0.85, 0.95, 0.2], [10, 50, 100, 300])
-    y = respond(Plant(2, m, c, 0.0), x, rest(len(x)), H, Dynamics(drag=Friction(F, F + more)), between=Between.HELD)
+    y = respond(
+        Plant(2, m, c, 0.0), x, rest(len(x)), H, Dynamics(drag=Friction(F, F + more)), between=Between.HELD
+    )
     assert np.all(y[:61] == 0.0)
     t, tau, end = H * np.arange(101), m / c, (0.95 - F) / c
     np.testing.assert_allclose(y[60:161], end * (t - tau * (1 - np.exp(-t / tau))), atol=1e-7)
     v, brake = end * (1 - np.exp(-t[-1] / tau)), (0.2 - F) / c
     stops = tau * np.log((v - brake) / -brake)  # v decays towards `brake` and meets 0 there
-    assert y[-1] == pytest.approx(y[160] + brake * stops + (v - brake) * tau * (1 - np.exp(-stops / tau)), abs=1e-6)
+    assert y[-1] == pytest.approx(
+        y[160] + brake * stops + (v - brake) * tau * (1 - np.exp(-stops / tau)), abs=1e-6
+    )
     assert np.ptp(y[160 + int(stops / H) + 2 :]) == 0.0
 
 
@@ -154,7 +158,9 @@ def test_a_spring_in_equilibrium_stays_there():
     held = rest(400).copy()
     held[0] = BALANCED
     for side in (-1.0, 1.0):
-        y = respond(plant, np.full(400, side * 3.0), held, H, Dynamics(drag=Friction(0.4, 0.4), spring=spring))
+        y = respond(
+            plant, np.full(400, side * 3.0), held, H, Dynamics(drag=Friction(0.4, 0.4), spring=spring)
+        )
         np.testing.assert_allclose(y, y[0], rtol=1e-6)
         q = (1 - np.exp(-4.0 * abs(y[0]))) / 4.0  # wound from 0 in one go
         assert 40.0 * abs(y[0]) + 24.0 * (q - abs(y[0])) == pytest.approx(2.6, rel=1e-4)
@@ -266,7 +272,9 @@ def test_friction_of_a_fractional_lag_of_any_gain_is_in_the_units_of_its_input()
     """num/den of a real order: the same as the actuator with the gain ahead of the friction."""
     x = 2.0 * np.sin(0.05 * np.arange(600))
     run = Run.of([600], [0.0], H)
-    given = Rig("a", H, AXIS.signals, LinearActuator(TransferFunction([(4.0, 0.0)], [(0.5, 0.7), (1.0, 0.0)])))
+    given = Rig(
+        "a", H, AXIS.signals, LinearActuator(TransferFunction([(4.0, 0.0)], [(0.5, 0.7), (1.0, 0.0)]))
+    )
     other = Rig("b", H, AXIS.signals, Actuator(0.5, 0.7, (4.0,)))
     of = lambda force: (Placed("friction", form_of("friction", "coulomb"), "actuator", (force,)),)  # noqa: E731
     a = Chain(given, of(0.3)).run(x, "regulator", "sensor", run)
@@ -285,7 +293,9 @@ def test_friction_in_a_spring_that_bends():
     slow = respond(Plant(1, 0.3, 0.0, 1.0), x, first, h, both)
     np.testing.assert_allclose(lag(x, first, h, 0.3, 1.0, 6.0, both), slow, atol=3e-3)
     bent = respond(plant_of(of), x, first, h, Dynamics(bend=both.bend))
-    np.testing.assert_allclose(linear.run_bent(of, x, first, h, False, Dynamics(bend=both.bend)), bent, atol=1e-5)
+    np.testing.assert_allclose(
+        linear.run_bent(of, x, first, h, False, Dynamics(bend=both.bend)), bent, atol=1e-5
+    )
     assert np.max(np.abs(bent - exact)) > 0.1
 
 
@@ -300,7 +310,9 @@ def test_a_bent_spring_with_hysteresis_against_an_integrator():
         bent = y * (bend.first * abs(y) / 0.1 + bend.second * (y / 0.1) ** 2)
         return [v, (np.interp(now, t, x) - 40 * (y + bent + 0.5 * (q - y)) - 0.3 * v) / 0.5, v * steep]
 
-    exact = solve_ivp(slope, (0, t[-1]), [0, 0, 0], t_eval=t, method="DOP853", rtol=1e-9, atol=1e-12, max_step=H)
+    exact = solve_ivp(
+        slope, (0, t[-1]), [0, 0, 0], t_eval=t, method="DOP853", rtol=1e-9, atol=1e-12, max_step=H
+    )
     made = respond(plant, x, rest(len(x)), H, Dynamics(spring=spring, bend=bend))
     assert np.max(np.abs(exact.y[0])) < 0.11  # where the spring goes on straight
     np.testing.assert_allclose(made, exact.y[0], atol=2e-6 * np.max(np.abs(exact.y[0])))

@@ -35,7 +35,9 @@ class Rigs:
         x = np.concatenate([np.asarray(log[entry], float) for log in logs])
         first = "regulator" if entry == "command" else "actuator"
         run = session(logs, entry)
-        Chain(self.fitted, self.placed).run(x, first, "sensor", run, between_of(self.fitted, entry), left=left)
+        Chain(self.fitted, self.placed).run(
+            x, first, "sensor", run, between_of(self.fitted, entry), left=left
+        )
         clock = max(log.start + len(log) * log.sample_time for log in logs)
         told = {"learned": [float(f([f(log["output"]) for log in logs])) for f in (np.min, np.max)]}
         told |= {"promise": float(promise)} if promise is not None else {}

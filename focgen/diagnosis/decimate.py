@@ -45,5 +45,7 @@ def _thinned(log: Experiment, every: int) -> Experiment:
     entry = "command" if "command" in log else "pressure"
     signals = {role: np.asarray(values, float)[::every] for role, values in log.signals.items()}
     signals[entry] = uniform_filter1d(np.asarray(log[entry], float), every, mode="nearest")[::every]
-    note = f"has a sample every {log.sample_time:g} s, more than the response needs: one in {every} is looked at"
+    note = (
+        f"has a sample every {log.sample_time:g} s, more than the response needs: one in {every} is looked at"
+    )
     return replace(log, signals=signals, sample_time=log.sample_time * every, notes=(*log.notes, note))

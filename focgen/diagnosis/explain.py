@@ -81,7 +81,9 @@ class Explanation:
         """``rig`` with what its command does between samples, where that is not as usual."""
         between = self.segment.between
         entry = self.segment.entry
-        return rig if entry != "command" or between == between_of(rig, entry) else replace(rig, between=between)
+        return (
+            rig if entry != "command" or between == between_of(rig, entry) else replace(rig, between=between)
+        )
 
     def kept_by(self, given: Rig, refitted: Rig) -> bool:
         """Whether the refit of its own parameters is part of the rig ``refitted``."""

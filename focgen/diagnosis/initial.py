@@ -82,7 +82,9 @@ def _ways(rig: Rig, segment: Segment, first: int, last: int, begin: Begin) -> np
 
     def made(begin: Begin) -> np.ndarray:
         run = Run.of([last - first], [start], h, [begin])
-        return Chain(rig).run(segment.x[first:last], segment.stages[0], segment.stages[-1], run, segment.between)
+        return Chain(rig).run(
+            segment.x[first:last], segment.stages[0], segment.stages[-1], run, segment.between
+        )
 
     base = made(begin)
     changed = np.stack([made(other) - base for other in _beside(begin, _LEVEL * segment.level_in)])

@@ -43,7 +43,10 @@ class References:
 
     def scale(self, parameter, slot: str) -> float:
         """The physical size of 1 in units of this parameter."""
-        return self.levels[parameter.at or slot] ** parameter.level * self.clocks[parameter.clock] ** parameter.time
+        return (
+            self.levels[parameter.at or slot] ** parameter.level
+            * self.clocks[parameter.clock] ** parameter.time
+        )
 
 
 @dataclass(eq=False)

@@ -134,9 +134,7 @@ def _segments(scenario: Scenario) -> list[_Segment]:
 class _Operator:
     """The transfer function, from e to v."""
 
-    def __init__(
-        self, form: Realisation, controller: Controller, count: int, memories: dict[float, Memory]
-    ):
+    def __init__(self, form: Realisation, controller: Controller, count: int, memories: dict[float, Memory]):
         h, parts = controller.sample_time, (form.direct, form.rest, form.den)
         self.form, self.limits, self.half_step = form, inner_limits(controller), 0.5 * h
         self.direct, self.rest, self.den = (_Sum(terms, h, count, memories) for terms in parts)

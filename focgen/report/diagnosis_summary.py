@@ -92,7 +92,9 @@ def _unexplained(place: str, what: Mapping) -> str:
     """What is left, and what it goes with."""
     parts = [part for part in what.get("depends_on", ()) if part != "nothing"]
     parts += ["slow swings that no input foretells"] * bool(what.get("slow_swings"))
-    parts += ["something that pushes the rig at its own pace, foretold by no input"] * bool(what.get("pushed"))
+    parts += ["something that pushes the rig at its own pace, foretold by no input"] * bool(
+        what.get("pushed")
+    )
     on = f"; it goes with {', '.join(parts)}" if parts else ""
     return f"something from {place} that no effect of the library explains{on}."
 

@@ -10,7 +10,9 @@ from focgen.logs.between import Between, smooth_bends
 from focgen.rig.kernels import BALANCED
 
 _KEPT = 6
-_known: list[tuple] = []  # the last inputs by (input, rest, way), and their courses: reading one takes as long
+_known: list[
+    tuple
+] = []  # the last inputs by (input, rest, way), and their courses: reading one takes as long
 # as running a stage over it
 
 Course = tuple[np.ndarray, np.ndarray, np.ndarray]

@@ -196,7 +196,9 @@ def bent_modes(x, rest, a, b0, b1, pair, through: float, switching: bool, spring
     ffi, _ = _library()
     tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
     scratch = np.empty(tables[0].shape[1])
-    *pointers, own, room = [ffi.from_buffer("double[]", t) for t in (*tables, np.array(spring, float), scratch)]
+    *pointers, own, room = [
+        ffi.from_buffer("double[]", t) for t in (*tables, np.array(spring, float), scratch)
+    ]
     return _call(
         "focgen_bent_modes",
         x,

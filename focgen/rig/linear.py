@@ -75,7 +75,9 @@ def _bent(transfer: TransferFunction, h: float) -> tuple[np.ndarray, ...]:
     leave, over the denominator of :func:`_discrete`: from the first samples of the exact responses."""
     _, a = _discrete(transfer, h, True)
     count = len(a)
-    power = [_powers(transfer, h, k, count) for k in range(4)]  # of t^k within one sample, and of nothing after
+    power = [
+        _powers(transfer, h, k, count) for k in range(4)
+    ]  # of t^k within one sample, and of nothing after
     shapes = (power[1], power[2] - power[1], 2.0 * power[3] - 3.0 * power[2] + power[1])
     return tuple(np.convolve(a, shape)[:count] for shape in shapes)
 

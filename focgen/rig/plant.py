@@ -137,7 +137,9 @@ def _factorial(n: int) -> float:
 
 
 _FIRST = np.diag(0.5 ** np.arange(4))  # a cubic's coefficients over the first half of a step,
-_SECOND = np.array([[1, 0.5, 0.25, 0.125], [0, 0.5, 0.5, 0.375], [0, 0, 0.25, 0.375], [0, 0, 0, 0.125]])  # and
+_SECOND = np.array(
+    [[1, 0.5, 0.25, 0.125], [0, 0.5, 0.5, 0.375], [0, 0, 0.25, 0.375], [0, 0, 0, 0.125]]
+)  # and
 
 
 def _doubled(kept: np.ndarray, driven: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

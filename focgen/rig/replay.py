@@ -21,7 +21,9 @@ from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
-_CLOSER = 0.05  # of the mean square that a held command leaves: less, and another way is what the command does
+_CLOSER = (
+    0.05  # of the mean square that a held command leaves: less, and another way is what the command does
+)
 _BESIDES = ("name", "form", "stage", "clock", "carried", "promise", "learned")
 
 

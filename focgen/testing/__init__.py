@@ -1,9 +1,9 @@
 """Tests of C of your own, or of anything else that steps, against the reference of a generated controller.
 
-    from focgen.testing import assert_equivalent, from_c
+from focgen.testing import assert_equivalent, from_c
 
-    def test_my_port():
-        assert_equivalent("firmware", from_c(["port.c"], prefix="port"))
+def test_my_port():
+    assert_equivalent("firmware", from_c(["port.c"], prefix="port"))
 """
 
 from importlib import import_module

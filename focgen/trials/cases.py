@@ -205,9 +205,7 @@ class Bench:
         stage = self.stage
         session = Session(Machine(stage.rig, self.settings), _FINE)
         played, experiments = [], [*stage.seen, *stage.unseen]
-        for experiment, command, clock in zip(
-            experiments, stage.commands(experiments, _FINE), stage.clocks
-        ):
+        for experiment, command, clock in zip(experiments, stage.commands(experiments, _FINE), stage.clocks):
             trace = session.run(command, clock)
             played.append((experiment.name, self._sampled(trace, session, rng)))
         return played

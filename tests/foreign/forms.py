@@ -63,9 +63,7 @@ def _weak_supply(a, s, rng):
 
 
 def _seam(a, s, rng):
-    return Fault(
-        rate=lambda to, p, tau: (to - p - a * s.pressure * (max(p, 0.0) / s.pressure) ** 1.25) / tau
-    )
+    return Fault(rate=lambda to, p, tau: (to - p - a * s.pressure * (max(p, 0.0) / s.pressure) ** 1.25) / tau)
 
 
 def _jenkins(slot, level):
@@ -225,6 +223,4 @@ MOST = {  # amounts beyond which a form is no longer what it stands for; 12 else
     "gain_nonlinearity": 0.9,
     "sensor_nonlinearity": 0.6,
 }
-STAGE = {
-    name: "regulator" if i < 7 else "actuator" if i < 16 else "sensor" for i, name in enumerate(MAKE)
-}
+STAGE = {name: "regulator" if i < 7 else "actuator" if i < 16 else "sensor" for i, name in enumerate(MAKE)}

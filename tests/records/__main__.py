@@ -22,7 +22,15 @@ from focgen.rig.replay import experiments, replay
 from tests.records import made
 from tests.records.benchmarks import BENCHMARKS, Benchmark
 
-HEAD = ("benchmark", "verdict", "train, nominal refitted", "train", "test", "published (test)", "s of one core")
+HEAD = (
+    "benchmark",
+    "verdict",
+    "train, nominal refitted",
+    "train",
+    "test",
+    "published (test)",
+    "s of one core",
+)
 
 
 def main() -> None:
@@ -79,7 +87,9 @@ def _error(rig: Rig, logs, periods: int) -> float:
     logs = [_repeated(log, periods) for log in logs]
     simulated = replay(rig, logs).simulated
     last = [len(log) // periods * (periods - 1) for log in logs]
-    squares = [np.mean((log["output"] - simulated[log.name]["output"])[k:] ** 2) for log, k in zip(logs, last)]
+    squares = [
+        np.mean((log["output"] - simulated[log.name]["output"])[k:] ** 2) for log, k in zip(logs, last)
+    ]
     return float(np.sqrt(np.mean(squares)))
 
 

@@ -61,9 +61,7 @@ den = [[1.0, 2.0], [5.0, 1.0], [50.0, 0.0]]
 """
 
 BENCHMARKS = (
-    Benchmark(
-        "EMPS", "emps_train.csv", "emps_test.csv", _EMPS, "mm", 1e3, "LSTM 74, RNN 89, GRU 220"
-    ),
+    Benchmark("EMPS", "emps_train.csv", "emps_test.csv", _EMPS, "mm", 1e3, "LSTM 74, RNN 89, GRU 220"),
     Benchmark(
         "Bouc–Wen",
         "bouc_wen_test_multisine.csv",
