@@ -24,13 +24,15 @@ _STATES = (
     ("explained", "with the effects", "good"),
 )
 _CONFIDENCE = (
-    "A confidence is a probability. It was measured on simulated rigs whose effects were sealed until the diagnosis was "
-    "made: of the names given there at 90 %, about nine in ten were right. So 96 % means that of a hundred diagnoses like "
-    "this one about four name something else. It says how sure the name is, and nothing of how large the effect is."
+    "A confidence is a probability. It was measured on simulated rigs whose effects were sealed until the "
+    "diagnosis was made: of the names given there at 90 %, about nine in ten were right. So 96 % means that "
+    "of a hundred diagnoses like this one about four name something else. It says how sure the name is, and "
+    "nothing of how large the effect is."
 )
 _SHRINK = (
-    "The share that will go is a promise for experiments that were not used. It counts from what is left when the rig's "
-    "own numbers are refitted down to the noise, which no model takes away. Its interval is meant to hold nine times in ten."
+    "The share that will go is a promise for experiments that were not used. It counts from what is left "
+    "when the rig's own numbers are refitted down to the noise, which no model takes away. Its interval is "
+    "meant to hold nine times in ten."
 )
 
 
@@ -78,7 +80,7 @@ def _units(drawn: Drawn | None) -> Mapping[str, str]:
 
 
 def _told(lines: Sequence[str]) -> tuple[str, ...]:
-    """The sentences of the terminal without the word that leads them there, which is the part's title here."""
+    """The sentences of the terminal without the word that leads them there: here it is the part's title."""
     heads = ("Where: ", "Which: ", "How far: ", "Next: ", "also: ", "nearest: ")
     found = []
     for line in lines:
@@ -98,8 +100,8 @@ def _lead(found: Diagnosis, units: Mapping[str, str]) -> str:
 
 def _files(found: Diagnosis) -> tuple[str, ...]:
     return (
-        f"{found.refitted_rig} is the rig with its own numbers refitted, {found.augmented_rig} the same with the effects "
-        "in it. Both can be replayed, simulated and designed for.",
+        f"{found.refitted_rig} is the rig with its own numbers refitted, {found.augmented_rig} the same "
+        "with the effects in it. Both can be replayed, simulated and designed for.",
     )
 
 
@@ -171,8 +173,8 @@ def _ladder(drawn: Drawn) -> Figure:
     )
     return Figure(
         "The error of each stage on its own measured input",
-        "Root-mean-square error between two logged signals, in percent of the range of the second. A stage that is as the "
-        "model says leaves noise only.",
+        "Root-mean-square error between two logged signals, in percent of the range of the second. A stage "
+        "that is as the model says leaves noise only.",
         f"Bars: the error of {', '.join(names)}, as given, refitted, and with the effects found.",
         (
             Panel(
@@ -213,8 +215,8 @@ def _behind(rivals: Rivals) -> Figure:
     )
     return Figure(
         f"What else might be {rivals.found}",
-        "How far the evidence for every other effect is behind. What is less than two standard deviations behind cannot be "
-        "told from the best by these logs.",
+        "How far the evidence for every other effect is behind. What is less than two standard deviations "
+        "behind cannot be told from the best by these logs.",
         f"Bars: standard deviations by which {', '.join(names[::-1])} are behind {rivals.found}.",
         (panel,),
         TableOf(
@@ -259,9 +261,11 @@ def _means(drawn: Drawn, units: Mapping[str, str]) -> Figure:
     )
     return Figure(
         f"What {entry} → {exit} leaves",
-        "The mean of what the model leaves, over the input's level, its rate, and time. Where the curves for a rising and a "
-        "falling input stand apart, the error depends on the direction; with the effects, all should lie at zero.",
-        f"Curves: mean error of {exit} over the level, the rate and the time of {entry}, refitted and with the effects.",
+        "The mean of what the model leaves, over the input's level, its rate, and time. Where the curves "
+        "for a rising and a falling input stand apart, the error depends on the direction; with the "
+        "effects, all should lie at zero.",
+        f"Curves: mean error of {exit} over the level, the rate and the time of {entry}, refitted and with "
+        "the effects.",
         panels,
         TableOf(("curve", "smallest", "largest"), rows, f"Mean error of {exit}"),
         linked=False,
@@ -328,7 +332,8 @@ def _session(drawn: Drawn, units: Mapping[str, str]) -> Figure:
     return Figure(
         "The session: measured, and simulated from the first logged input",
         f"Drag over a stretch to look at it closely; the panels move together.{thin}",
-        f"Curves over the session's time: the measured output and two simulations of it, their errors, and the {entry}.",
+        "Curves over the session's time: the measured output and two simulations of it, their errors, and "
+        f"the {entry}.",
         panels,
         TableOf(
             ("experiment", "begins at (s)", "lasts (s)", "RMS error refitted", "with the effects"),
@@ -339,8 +344,8 @@ def _session(drawn: Drawn, units: Mapping[str, str]) -> Figure:
 
 
 def _begins(traces: Sequence[Trace]) -> list[float]:
-    """Where each experiment begins on the page: on the session's clock, or one behind the other where several begin
-    at once."""
+    """Where each experiment begins on the page: on the session's clock, or one behind the other where several
+    begin at once."""
     ends = [t.start + float(t.time[-1]) for t in traces]
     if all(later.start >= end for end, later in zip(ends, traces[1:])):
         return [t.start for t in traces]
@@ -387,8 +392,8 @@ def _loops(drawn: Drawn, units: Mapping[str, str]) -> Figure | None:
     names = " and ".join(t.name for t in sweeping[:2])
     return Figure(
         "Output over input",
-        "The experiments that sweep and that the effects change most. A loop that the refitted model lacks and the effects "
-        "follow is a memory of the rig.",
+        "The experiments that sweep and that the effects change most. A loop that the refitted model lacks "
+        "and the effects follow is a memory of the rig.",
         f"Curves of the output over the {drawn.entry} in {names}: measured, refitted, with the effects.",
         panels,
         TableOf(
@@ -432,9 +437,10 @@ def _waterfall(found: Diagnosis) -> Figure:
     gof = gap.gof
     return Figure(
         "What the gap is made of",
-        f"The mean square error of the output as given, taken apart. The goodness of fit goes from {gof['as given']:.3f} to "
-        f"{gof['explained']:.3f} of a possible {gof['possible']:.3f}.",
-        "Bars that add up: how much of the mean square error parameters, effects, what stays unexplained, and noise make.",
+        "The mean square error of the output as given, taken apart. The goodness of fit goes from "
+        f"{gof['as given']:.3f} to {gof['explained']:.3f} of a possible {gof['possible']:.3f}.",
+        "Bars that add up: how much of the mean square error parameters, effects, what stays unexplained, "
+        "and noise make.",
         (Panel(Axis("", places=names), Axis("mean square error (%)", from_zero=True), bars),),
         TableOf(
             ("part", f"RMS error before it is taken away{unit}", "share (%)"),
