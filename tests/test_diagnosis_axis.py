@@ -30,8 +30,8 @@ AXIS = Rig(
 
 
 def bristles(u, m=0.5, c=0.8, k=0.0, force=0.4, zero=0.1, sub=200):
-    """m y'' + c y' + k y = u + zero − F, F = s0 z + s1 z', z' = v − s0 |v| z/force (Canudas de Wit and others,
-    IEEE Trans. Autom. Control 40, 1995), by small steps, the input in straight lines."""
+    """m y'' + c y' + k y = u + zero − F, F = s0 z + s1 z', z' = v − s0 |v| z/force (Canudas de Wit and
+    others, IEEE Trans. Autom. Control 40, 1995), by small steps, the input in straight lines."""
     y, v, z, dt, found = 0.0, 0.0, 0.0, H / sub, np.zeros(len(u))
     stiff, damp = 400.0, 2.0
     for n in range(1, len(u)):

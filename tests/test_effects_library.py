@@ -18,8 +18,8 @@ NAMES = sorted(library())
 RICH = Excitation(10, 0.1, 20, 20, 100.0, 0.01, 8, 5, 5, 500.0, 100.0)
 POOR = Excitation(1, 1.0, 0, 0, 0.5, 10.0, 1, 0, 0, 2.0, 100.0)
 CONTRACT = """transport_delay slow_regulator valve_asymmetry valve_stiction flow_limit supply_saturation
-leak hysteresis friction creep unloading_asymmetry softening gain_nonlinearity dead_zone contact resonance gain_drift
-sensor_nonlinearity sensor_hysteresis sensor_relaxation sensor_lag sensor_drift sensor_quantization
+leak hysteresis friction creep unloading_asymmetry softening gain_nonlinearity dead_zone contact resonance
+gain_drift sensor_nonlinearity sensor_hysteresis sensor_relaxation sensor_lag sensor_drift sensor_quantization
 sensor_saturation""".split()
 
 

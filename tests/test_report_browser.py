@@ -1,4 +1,4 @@
-"""The page in a real Chromium without a network: it draws, zooms, hovers, hides, links, prints, and fits a phone."""
+"""The page in a real Chromium without a network: draws, zooms, hovers, hides, links, prints, fits a phone."""
 
 import shutil
 
@@ -206,7 +206,8 @@ def test_nothing_is_cut_on_a_phone(chromium, file, scheme):
     assert page.evaluate("document.documentElement.scrollWidth") == 400
     out = page.evaluate(
         """[...document.querySelectorAll("main *")].filter((one) => !one.closest(".scroll, .plot"))
-             .filter((one) => one.getBoundingClientRect().right > 400).map((one) => one.outerHTML.slice(0, 80))"""
+             .filter((one) => one.getBoundingClientRect().right > 400)
+             .map((one) => one.outerHTML.slice(0, 80))"""
     )
     widths = page.evaluate("Object.values(figures).map((v) => v.el.getBoundingClientRect().right)")
     drags = page.evaluate(

@@ -1,4 +1,4 @@
-"""Figures on a page: thinned without losing a peak, bars from zero, users' texts as they are, equal bytes, a bound size."""
+"""Figures on a page: thinned with every peak, bars from zero, texts as given, equal bytes, a bound size."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Friction and hysteretic springs in a plant's own equation, against exact solutions and scipy's integrator."""
+"""Friction and hysteretic springs in a plant's equation, against exact solutions and scipy's integrator."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The bodies that the physics engine moves do what they are called, against statics and equations of motion."""
+"""The bodies that the physics engine moves do what they are called, by statics and equations of motion."""
 
 import sys
 from dataclasses import replace

@@ -52,7 +52,7 @@ class _Parser(argparse.ArgumentParser):
     """Reports a wrong argument the way every other error is reported."""
 
     def parse_known_args(self, args=None, namespace=None):
-        """As argparse does, but an option that is mistyped is said first, not what is missing for want of it."""
+        """As argparse does, but a mistyped option is said first, not what is missing for want of it."""
         if self._subparsers is None:
             self._check_options(sys.argv[1:] if args is None else args)
         return super().parse_known_args(args, namespace)

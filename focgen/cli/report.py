@@ -12,9 +12,9 @@ EXAMPLE = """examples:
   focgen report gap --out gap.html
   focgen report identified.toml logs/steps.csv controller.toml firmware verification.json --out chain.html
 
-  A path is a rig, a controller, a log to replay with the rig, a folder of generate, study or diagnose, or what
-  `focgen verify DIR --json > verification.json` wrote. The page loads nothing from elsewhere: mail it as it is.
-  Nothing is compiled."""
+  A path is a rig, a controller, a log to replay with the rig, a folder of generate, study or diagnose, or
+  what `focgen verify DIR --json > verification.json` wrote. The page loads nothing from elsewhere: mail it
+  as it is. Nothing is compiled."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:

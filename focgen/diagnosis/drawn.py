@@ -78,8 +78,8 @@ class Rivals:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """All of it. ``entry``: the role of the traces' input; ``units`` by role; ``worst``: the segment that the means
-    are of; ``kept`` of ``samples`` are there."""
+    """All of it. ``entry``: the role of the traces' input; ``units`` by role; ``worst``: the segment that the
+    means are of; ``kept`` of ``samples`` are there."""
 
     entry: str
     units: dict[str, str]

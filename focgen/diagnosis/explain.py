@@ -265,8 +265,8 @@ def _grown(
 
 
 def _widened_beside(best: Fit, threshold: float) -> Fit:
-    """Where a number of a stage stands at its end beside the effects found, it may pass that, if evidence asks
-    for it: what no effect stands for would be mended by one that imitates it."""
+    """Where a number of a stage stands at its end beside the effects found, it may pass that, if evidence
+    asks for it: what no effect stands for would be mended by one that imitates it."""
     problem = best.problem
     if problem.own.wide or not problem.own.beyond(best.vector):
         return best

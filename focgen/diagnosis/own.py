@@ -23,8 +23,8 @@ from focgen.rig.model import Rig
 class Own:
     """Turns the own parameters of a segment's ``stages`` into a vector and back: those of ``freely``, the
     stage that is refitted freely, then a logarithm for each of the others' factors; levels are the segment's
-    largest magnitudes. ``wide``: what no effect stands for may go beyond three times its uncertainty, ``far``:
-    so may the actuator's own, ``bent``: its gain; ``held``: nothing moves."""
+    largest magnitudes. ``wide``: what no effect stands for may go beyond three times its uncertainty,
+    ``far``: so may the actuator's own, ``bent``: its gain; ``held``: nothing moves."""
 
     rig: Rig
     stages: tuple[str, ...]

@@ -175,8 +175,8 @@ class Problem:
         return found
 
     def rig(self, vector: np.ndarray) -> Rig:
-        """The rig with the vector's own parameters; the same object where they are as lately: making one takes
-        as long as running a stage."""
+        """The rig with the vector's own parameters; the same object where they are as lately: making one
+        takes as long as running a stage."""
         values, kept = vector[: len(self.own_start)], self.memory.setdefault("rigs", [])
         key = values.tobytes()
         for old, given, rig in kept:
@@ -222,7 +222,7 @@ class Problem:
         return y
 
     def residual(self, vector: np.ndarray) -> np.ndarray:
-        """Measured less simulated (n,), in the log's units; of a rig that integrates, what is recent of it."""
+        """Measured less simulated (n,), in the log's units; where the rig integrates, the recent part."""
         return self.segment.recent(self.segment.y - self.simulate(vector))
 
     def weighed(self, vector: np.ndarray) -> np.ndarray:

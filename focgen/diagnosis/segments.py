@@ -24,14 +24,14 @@ _ORDER = ("command", "pressure", "curvature", "output")
 @dataclass(frozen=True, eq=False)
 class Segment:
     """The stages between two logged signals: input ``x`` and output ``y`` (n,), experiments one after the
-    other as in ``run``. ``between``: what the input does from one sample to the next. ``names`` of the experiments.
-    ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a difference
-    beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has no part in:
-    the reference in a closed loop, else the input; ``led``: whether it is a reference; ``closed``: whether a
-    loop was closed around the rig. ``unsure`` (n, k): ways in which an input that was simulated may be off, a
-    standard deviation each. ``loose`` (n, k): what the output would be off by, were experiments to begin a
-    little otherwise than ``run`` says, in the output's unit. ``pace``: s after which an error no longer
-    counts, of a rig that integrates; 0: none is forgotten."""
+    other as in ``run``. ``between``: what the input does from one sample to the next. ``names`` of the
+    experiments. ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a
+    difference beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has
+    no part in: the reference in a closed loop, else the input; ``led``: whether it is a reference;
+    ``closed``: whether a loop was closed around the rig. ``unsure`` (n, k): ways in which an input that was
+    simulated may be off, a standard deviation each. ``loose`` (n, k): what the output would be off by, were
+    experiments to begin a little otherwise than ``run`` says, in the output's unit. ``pace``: s after which
+    an error no longer counts, of a rig that integrates; 0: none is forgotten."""
 
     entry: str
     exit: str

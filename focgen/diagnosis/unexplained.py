@@ -44,8 +44,8 @@ def is_rounded(e: Explanation) -> bool:
 
 
 def _stirred(e: Explanation, left: Disturbance) -> bool:
-    """Whether bursts, slow swings, a hum or what pushes the rig are there, and the effects found, if any, take
-    hardly any of the residual away. What a rounding leaves comes in bursts by nature."""
+    """Whether bursts, slow swings, a hum or what pushes the rig are there, and the effects found, if any,
+    take hardly any of the residual away. What a rounding leaves comes in bursts by nature."""
     loud = left.bursts or left.swings or left.hums or left.pushed
     if not e.causes:
         return loud

@@ -1,4 +1,4 @@
-"""``diagnosis.json``, the two rigs, the proposed experiment, what figures draw, and pictures where matplotlib is."""
+"""``diagnosis.json``, both rigs, the proposed experiment, what figures draw, pictures where matplotlib is."""
 
 from __future__ import annotations
 

@@ -6,8 +6,9 @@ import numpy as np
 
 
 def thinned(*signals: np.ndarray, most: int) -> np.ndarray:
-    """Indices (m,) of about ``most`` samples of ``signals``, all (n,): both ends, in every one of equally long
-    stretches the smallest and the largest of each signal, and where a signal breaks off (the first NaN of a row)."""
+    """Indices (m,) of about ``most`` samples of ``signals``, all (n,): both ends, in every one of equally
+    long stretches the smallest and the largest of each signal, and where a signal breaks off (the first NaN
+    of a row)."""
     count = len(signals[0])
     if count <= most:
         return np.arange(count)

@@ -1,11 +1,14 @@
-"""Pictures, tables, pages. Called, the room does what the command of its name does: :func:`focgen.report.paths.report`."""
+"""Pictures, tables, pages.
+
+Called, the room does what the command of its name does: :func:`focgen.report.paths.report`.
+"""
 
 import sys
 from types import ModuleType
 
 
 class _Room(ModuleType):
-    """``focgen.report(paths, out)``: a command's function has the command's name, which is this room's, too."""
+    """``focgen.report(paths, out)``: a command's function has the command's name, here the room's, too."""
 
     def __call__(self, paths, out):
         from focgen.report.paths import report

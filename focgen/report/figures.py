@@ -1,8 +1,8 @@
 """A figure as data: what is drawn where, in which colour, before any library draws it.
 
-A figure has panels below each other, which may share the x axis; a panel has axes and marks. Colours are names of
-:data:`focgen.report.style.COLOURS` or colours of :data:`focgen.report.style.CYCLE`; a label is a user's text in no
-form yet, which the page gives one.
+A figure has panels below each other, which may share the x axis; a panel has axes and marks. Colours are
+names of :data:`focgen.report.style.COLOURS` or colours of :data:`focgen.report.style.CYCLE`; a label is a
+user's text in no form yet, which the page gives one.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ MOST = 4000
 
 @dataclass(frozen=True)
 class Axis:
-    """What is along it, with the unit. ``low``, ``high``: its ends, None where the marks set them; ``places``: names
-    at 0, 1, 2 … instead of numbers; ``from_zero``: zero is on it, whatever is drawn."""
+    """What is along it, with the unit. ``low``, ``high``: its ends, None where the marks set them;
+    ``places``: names at 0, 1, 2 … instead of numbers; ``from_zero``: zero is on it, whatever is drawn."""
 
     label: str
     log: bool = False
@@ -37,9 +37,9 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A curve through ``x`` and ``y``, (n,) both; NaN breaks it. ``label`` is what hovering tells; marks of one
-    ``group`` have one entry of the legend, named so (None: the label; "": no entry). ``steps``: held from sample to
-    sample; ``dots``: a dot at every point, and no line where ``dash`` is "none"."""
+    """A curve through ``x`` and ``y``, (n,) both; NaN breaks it. ``label`` is what hovering tells; marks of
+    one ``group`` have one entry of the legend, named so (None: the label; "": no entry). ``steps``: held from
+    sample to sample; ``dots``: a dot at every point, and no line where ``dash`` is "none"."""
 
     label: str
     x: np.ndarray
@@ -54,8 +54,8 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Bars at ``places`` from ``bottoms`` (0) to ``tops``, all (n,), ``width`` wide; ``names`` (n,) for hovering;
-    ``across``: to the right, not upwards."""
+    """Bars at ``places`` from ``bottoms`` (0) to ``tops``, all (n,), ``width`` wide; ``names`` (n,) for
+    hovering; ``across``: to the right, not upwards."""
 
     label: str
     places: np.ndarray

@@ -1,7 +1,7 @@
 """Figures as what BokehJS draws: a zoomable, hoverable document each, in JSON.
 
-Text is drawn as it is: the library's own markup (TeX between dollar signs, which it would fetch a renderer for) is
-never asked for.
+Text is drawn as it is: the library's own markup (TeX between dollar signs, which it would fetch a renderer
+for) is never asked for.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def library() -> str:
 
 
 def document(figure: Figure, most: int = MOST, name: str = "figure") -> dict[str, Any]:
-    """The figure as a document of BokehJS, with about ``most`` points a curve; equal figures give equal documents.
-    ``name`` tells its models from those of the page's other figures.
+    """The figure as a document of BokehJS, with about ``most`` points a curve; equal figures give equal
+    documents. ``name`` tells its models from those of the page's other figures.
     Raises MissingExtra where Bokeh is not installed.
     """
     _bokeh()

@@ -37,8 +37,8 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """One step of the chain: what was found, as sentences and tables, shown in pictures (files beside the page) or in
-    figures (within it), and where the files are."""
+    """One step of the chain: what was found, as sentences and tables, shown in pictures (files beside the
+    page) or in figures (within it), and where the files are."""
 
     title: str
     sentences: tuple[str, ...] = ()
@@ -63,7 +63,8 @@ class Page:
     def self_contained(self) -> str:
         """The page with its figures in it, which fetches nothing; equal pages give equal bytes.
 
-        Curves are thinned until the page has at most :data:`LARGEST` bytes, if need be, but not below 500 points.
+        Curves are thinned until the page has at most :data:`LARGEST` bytes, if need be, but not below 500
+        points.
         Raises MissingExtra where Bokeh, which draws them, is not installed.
         """
         for most in _POINTS:

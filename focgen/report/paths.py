@@ -37,8 +37,8 @@ from focgen.studies.kept import FILE as CURVES
 from focgen.studies.kept import read_study
 
 _TAKEN = (
-    "name a rig or a controller (.toml), a folder of generate, study or diagnose, what `verify --json` printed (.json), "
-    "or logs beside their rig"
+    "name a rig or a controller (.toml), a folder of generate, study or diagnose, what `verify --json` "
+    "printed (.json), or logs beside their rig"
 )
 _PROOF = {"node": str, "worst": (float, None), "type": str, "margin_bits": (float, None), "how": str}
 _MANIFEST = {
@@ -77,9 +77,10 @@ class _Chain:
 def report(paths: Sequence[str | Path], out: str | Path) -> Path:
     """Write one self-contained HTML page of ``paths`` to the file ``out``, and return it.
 
-    A path is a rig or a controller, a log to be replayed with the rig, a folder that generate, study or diagnose has
-    written, or a file with what ``focgen verify --json`` printed. Rig and controller together are simulated; nothing
-    is compiled or run. Raises InputError for a path that is none of these, MissingExtra where Bokeh is not installed.
+    A path is a rig or a controller, a log to be replayed with the rig, a folder that generate, study or
+    diagnose has written, or a file with what ``focgen verify --json`` printed. Rig and controller together
+    are simulated; nothing is compiled or run. Raises InputError for a path that is none of these,
+    MissingExtra where Bokeh is not installed.
     """
     paths = [Path(path) for path in ((paths,) if isinstance(paths, (str, Path)) else paths)]
     library()  # before anything takes time

@@ -1,7 +1,7 @@
-"""A user's text on a page: names of files, columns, rigs and experiments, by one rule each for where they stand.
+"""A user's text on a page: names of files, columns, rigs, experiments, by one rule for each place.
 
-Within the page's HTML the templates escape everything that is printed. The two places that HTML's rule does not
-cover are here: data within a script, and text that the plotting library draws.
+Within the page's HTML the templates escape everything that is printed. The two places that HTML's rule does
+not cover are here: data within a script, and text that the plotting library draws.
 """
 
 from __future__ import annotations

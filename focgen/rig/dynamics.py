@@ -83,8 +83,8 @@ class Dynamics:
         return frozenset(name for name, value in vars(self).items() if value != getattr(UNCHANGED, name))
 
     def bending(self, gain: float = 1.0) -> tuple[float, ...]:
-        """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, and of
-        the drag."""
+        """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, and
+        of the drag."""
         bend = self.bend
         obstacle = self.place, self.stiffness / gain
         return bend.first / gain, bend.second / gain, bend.scale, *obstacle, *self.drag.held

@@ -42,8 +42,8 @@ void focgen_filter(int n, const double *x, double *y, const unsigned char *rest,
 int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double
     *made, const double *weight, int coarse, int order, const double *ar, double *mean);
 void focgen_products(int n, int k, const double *r, double *m);
-void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const double
-    *bend, const double *twist, int order, int base, int last, const double *numbers, const double
+void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const
+    double *bend, const double *twist, int order, int base, int last, const double *numbers, const double
     *tables);
 void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
     const double *b0, const double *b1, const double *pair, double through, int switching, const double

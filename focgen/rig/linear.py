@@ -83,7 +83,7 @@ def _bent(transfer: TransferFunction, h: float) -> tuple[np.ndarray, ...]:
 
 
 def _powers(transfer: TransferFunction, h: float, k: int, count: int) -> np.ndarray:
-    """The output (count,) at the end of a sample in which the input is t^k, and at the ends of those after."""
+    """The output (count,) at the end of a sample in which the input is t^k, and at the ends that follow."""
     from scipy.linalg import expm
     from scipy.signal import tf2ss
 

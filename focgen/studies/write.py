@@ -26,7 +26,7 @@ def write(study: Study, folder: Path, inputs: Iterable = ()) -> None:
 
 
 def _shown(study: Study) -> dict[str, str | bytes]:
-    """Pictures, and a page with figures of its own, or beside the pictures: as far as the libraries are there."""
+    """Pictures, and a page with figures of its own or beside them: as far as the libraries are there."""
     from focgen.report.pages.study import study_page
     from focgen.report.study import study_pictures
 

@@ -43,11 +43,11 @@ class Cost:
 
     ``flash_bytes``: machine code and constants of the controller and of the compiler's own functions that it
     calls (``flash`` has the parts), without ``save_bytes``, the code of NAME_save and NAME_restore, which a
-    linker leaves out where they are not called (-ffunction-sections, --gc-sections). ``ram_bytes``: one state, and what else the controller keeps.
-    ``stack_bytes``: the most that a call of its interface uses, from machine code, ``stack_path``: the
-    functions on that path, each with its bytes; ``stack_seen``: the most that the measured steps have used.
-    ``cycles_per_step`` is None for a core whose timings are not published. ``skipped``: why nothing was
-    counted; the rest is None then.
+    linker leaves out where they are not called (-ffunction-sections, --gc-sections). ``ram_bytes``: one
+    state, and what else the controller keeps. ``stack_bytes``: the most that a call of its interface uses,
+    from machine code, ``stack_path``: the functions on that path, each with its bytes; ``stack_seen``: the
+    most that the measured steps have used. ``cycles_per_step`` is None for a core whose timings are not
+    published. ``skipped``: why nothing was counted; the rest is None then.
     """
 
     compiler: str | None = None

@@ -1,8 +1,8 @@
 """What proposals are worth: the proposed experiment made by the true rig, and every other of the menu.
 
 A case that ended in a set is remade from its trial's seed, its true rig makes the experiment after the
-session, and the session with it is diagnosed as blind as before. An experiment for which a further signal is to be
-logged is diagnosed by itself: what the session lacks it cannot be compared in. Results go to
+session, and the session with it is diagnosed as blind as before. An experiment for which a further signal is
+to be logged is diagnosed by itself: what the session lacks it cannot be compared in. Results go to
 DIR/asked/NNNN/WHICH; *resolved* is a case whose every true effect is then named, and nothing else.
 """
 

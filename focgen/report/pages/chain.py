@@ -129,7 +129,8 @@ def controller_section(controller: Controller) -> Section:
     integral = ", then the integrator" if controller.integrator else ""
     gain = "the gain schedule" if controller.scheduled else f"{controller.gain:.4g}"
     told = (
-        f"{controller.name}: error → {controller.transfer} → × {gain}{integral}, every {controller.sample_time:g} s.",
+        f"{controller.name}: error → {controller.transfer} → × {gain}{integral}, every "
+        f"{controller.sample_time:g} s.",
     )
     spans = vars(controller.ranges).items()
     rows = tuple((name, f"{span[0]:g} to {span[1]:g}") for name, span in spans if span is not None)
@@ -172,9 +173,10 @@ def firmware_section(manifest: Mapping[str, Any]) -> Section:
     """What a manifest says of the generated C: its size, and what is proved of it."""
     bound, sizes = manifest["error_bound"]["quantisation"], manifest["sizes"]
     told = (
-        f"{manifest['name']} in {manifest['arithmetic']} with {manifest['memory']} memory, every {manifest['sample_time']:g} s. "
-        f"Its state takes {sizes['state_bytes']} B, its tables {sizes['table_bytes']} B. Against the same controller in "
-        f"float64 the signal ahead of the integrator is off by {bound['operator']:.3g} at most, which is proved.",
+        f"{manifest['name']} in {manifest['arithmetic']} with {manifest['memory']} memory, every "
+        f"{manifest['sample_time']:g} s. Its state takes {sizes['state_bytes']} B, its tables "
+        f"{sizes['table_bytes']} B. Against the same controller in float64 the signal ahead of the "
+        f"integrator is off by {bound['operator']:.3g} at most, which is proved.",
     )
     rows = tuple(
         (p["node"], number(p["worst"]), p["type"], number(p["margin_bits"]), p["how"])

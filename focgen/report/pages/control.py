@@ -1,4 +1,4 @@
-"""A design and a simulated loop as pages: the controller, its schedule and margins, and the steps that it makes."""
+"""A design and a simulated loop as pages: the controller, its schedule and margins, the steps it makes."""
 
 from __future__ import annotations
 
@@ -96,8 +96,8 @@ def _schedule(design: Design, rig: Rig) -> Figure:
     rows = tuple((number(p), number(g)) for p, g in zip(schedule.breakpoints, schedule.gains))
     return Figure(
         "The gain schedule is the controller",
-        "Above, the table that runs and the formula it stands for; left of the dotted line the gain is held. Below, the line "
-        "K_o(p) through the operating points.",
+        "Above, the table that runs and the formula it stands for; left of the dotted line the gain is "
+        "held. Below, the line K_o(p) through the operating points.",
         "Curves over the pressure: the scheduled gain, the formula behind it, and the line K_o(p).",
         (Panel(x, Axis("gain"), gains, height=280), Panel(x, Axis("K_o", from_zero=True), line, height=220)),
         TableOf((with_unit("pressure", unit), "gain"), rows, "The schedule"),
@@ -133,8 +133,8 @@ def bode_figure(loops: Shapes, worst: PointMargins, controller: Controller, numb
     x = Axis("frequency (rad/s)", log=True)
     return Figure(
         f"The open loop at {at}",
-        "At the operating point with the smallest phase margin. The dots stand at the crossover; how far they are above −180° "
-        "is the phase margin.",
+        "At the operating point with the smallest phase margin. The dots stand at the crossover; how far "
+        "they are above −180° is the phase margin.",
         "Bode plot: magnitude and phase of the open loop over frequency, ideal and as it will run.",
         (
             Panel(x, Axis("|L|", log=True), (*tops, Rule(1.0))),
@@ -160,8 +160,8 @@ def _lead(simulation: Simulation) -> str:
         what = "; ".join(f"{r.reference:.4g} {r.verdict}" for r in bad)
         return f"{len(bad)} of {count} set points are not held within {simulation.duration:.3g} s: {what}."
     return (
-        f"All {count} set points are reached and held: the output settles in {mean_settling(simulation):.3g} s on average, "
-        f"and overshoots by {max(r.overshoot_pct for r in results):.2g} % at most."
+        f"All {count} set points are reached and held: the output settles in {mean_settling(simulation):.3g} "
+        f"s on average, and overshoots by {max(r.overshoot_pct for r in results):.2g} % at most."
     )
 
 
@@ -185,8 +185,9 @@ def _steps(simulation: Simulation) -> Figure:
     time = Axis(_TIME.label, low=0.0, high=end)
     return Figure(
         f"Steps to {len(simulation.setpoints)} set points",
-        f"The controller bit for bit as it will run ({simulation.arithmetic}, {simulation.remembers}){effects}. Set points "
-        "are dashed in their band of ±5 %; a dot says where the output has settled.",
+        f"The controller bit for bit as it will run ({simulation.arithmetic}, "
+        f"{simulation.remembers}){effects}. Set points are dashed in their band of ±5 %; a dot says where "
+        "the output has settled.",
         "Curves over time: the output stepping to each set point, and the command that does it.",
         (
             Panel(time, Axis(with_unit("output", units.measurement)), tuple(tops), height=380),

@@ -73,7 +73,7 @@ def read_diagnosis(path: Path) -> Diagnosis:
 
 
 def _sound(value: dict[str, Any]) -> bool:
-    """What a shape cannot say: intervals have two ends, every share is a number, every parameter an estimate."""
+    """What a shape cannot say: intervals have two ends, shares are numbers, parameters estimates."""
     spans = [value["shrink_interval"]] + [cause["shrink_interval"] for cause in value["causes"]]
     candidates = [candidate for cause in value["causes"] for candidate in cause["candidates"]]
     estimates = [estimate for one in candidates for estimate in one["parameters"].values()]

@@ -37,8 +37,9 @@ def _lead(found: Identification) -> str:
         return " ".join(sentence(stage_text(fit)) for fit in found.stages.values())
     joint, gof = found.joint, found.gof
     text = (
-        f"K(p)/(T s^α + 1) with T = {joint.T:.4g} and α = {joint.alpha:.4g} fits {_count(len(found.experiments))} with a "
-        f"mean goodness of fit of {gof['rig']['mean']:.3f}; each experiment by itself reaches {gof['fom']['mean']:.3f}."
+        f"K(p)/(T s^α + 1) with T = {joint.T:.4g} and α = {joint.alpha:.4g} fits "
+        f"{_count(len(found.experiments))} with a mean goodness of fit of {gof['rig']['mean']:.3f}; each "
+        f"experiment by itself reaches {gof['fom']['mean']:.3f}."
     )
     others = [f"{model_label(m)} {v['mean']:.3f}" for m, v in gof.items() if m.startswith("iom_")]
     return text + (f" Models of integer order, each fitted alike: {', '.join(others)}." if others else "")
@@ -98,9 +99,10 @@ def _fits(found: Identification) -> Figure:
     )
     return Figure(
         "Measured and identified",
-        "Every experiment in colour; black the identified rig, one for all; dotted the model of each experiment by itself. "
-        "Below, what the rig leaves.",
-        f"Curves over time: {_count(len(found.experiments))} as measured, and as the identified rig has them.",
+        "Every experiment in colour; black the identified rig, one for all; dotted the model of each "
+        "experiment by itself. Below, what the rig leaves.",
+        f"Curves over time: {_count(len(found.experiments))} as measured, and as the identified rig has "
+        "them.",
         panels,
         TableOf(("experiment", "level", "GOF of the rig", "by itself"), rows, "How well each is fitted"),
     )
@@ -123,7 +125,8 @@ def _gof(found: Identification) -> Figure:
     panel = Panel(Axis("experiment", places=names), Axis("goodness of fit", low=0.0, high=1.0), bars)
     return Figure(
         "Fractional and integer-order models",
-        "Goodness of fit by eq. (4): 1 is exact, 0 no better than the mean. FOM: fractional, IOM: of integer order.",
+        "Goodness of fit by eq. (4): 1 is exact, 0 no better than the mean. FOM: fractional, IOM: of "
+        "integer order.",
         f"Bars: goodness of fit of {', '.join(map(model_label, found.gof))} in each experiment.",
         (panel,),
         quality_table(found),
@@ -170,7 +173,8 @@ def _parameters(found: Identification) -> tuple[Figure, ...]:
     return (
         Figure(
             "Parameters over the level",
-            "Each experiment by itself with its 95 % interval, and all together: the line K(p), one T, one α.",
+            "Each experiment by itself with its 95 % interval, and all together: the line K(p), one T, one "
+            "α.",
             "Points with intervals: K, T and alpha of each experiment over its level, and of all together.",
             tuple(panels),
             parameter_table(found),
@@ -222,9 +226,10 @@ def _loops(found: Identification) -> tuple[Figure, ...]:
     return (
         Figure(
             "Loops",
-            "The second half of every log that swings: what the rig does, and what the model says. A loop that the model "
-            "lacks is a hysteresis or a friction; `focgen diagnose` names it.",
-            f"Loops of output over input in {', '.join(name for name, *_ in shown)}, as logged and by the identified rig.",
+            "The second half of every log that swings: what the rig does, and what the model says. A loop "
+            "that the model lacks is a hysteresis or a friction; `focgen diagnose` names it.",
+            f"Loops of output over input in {', '.join(name for name, *_ in shown)}, as logged and by the "
+            "identified rig.",
             tuple(panels),
             curves_table("Output in the second half", curves),
             linked=False,

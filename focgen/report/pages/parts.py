@@ -11,7 +11,7 @@ from focgen.report.page import Section, TableOf
 
 
 def sentence(line: str) -> str:
-    """A line of text with a capital, unless it begins with a name as it is written in files, and a full stop."""
+    """A line of text with a full stop, and a capital unless it begins with a name as files write it."""
     text = line.strip()
     first = text.partition(" ")[0]
     head = text[:1].upper() if first.rstrip(",.:;").isalpha() else text[:1]

@@ -96,9 +96,10 @@ def _accuracy(study: Study, memory: str) -> Figure:
     )
     return Figure(
         f"{memory.capitalize()} memory: what it leaves",
-        "Error of the memory operator: the worst of a step, a ramp, a sine and noise, each relative to its largest exact "
-        "output; dotted, what is proved that it cannot exceed.",
-        f"Curves on logarithmic axes: error and proven bound over the size of {memory} memory, by arithmetic.",
+        "Error of the memory operator: the worst of a step, a ramp, a sine and noise, each relative to its "
+        "largest exact output; dotted, what is proved that it cannot exceed.",
+        f"Curves on logarithmic axes: error and proven bound over the size of {memory} memory, by "
+        "arithmetic.",
         (Panel(_LENGTHS[memory], _ERROR, tuple(marks)),),
         TableOf(("memory", "arithmetic", "error", "bound"), rows, f"{memory.capitalize()} memory"),
     )
@@ -116,7 +117,8 @@ def _fronts(study: Study) -> tuple[Figure, ...]:
     return (
         Figure(
             "What accuracy costs",
-            "Every variant by what it costs and what it leaves; the grey line joins those that no other beats in both.",
+            "Every variant by what it costs and what it leaves; the grey line joins those that no other "
+            "beats in both.",
             "Points on logarithmic axes: error over cost of every variant, and the line of the best.",
             panels,
             TableOf(
@@ -177,7 +179,8 @@ def _frequency(study: Study) -> Figure:
     rows = tuple((row_label(r), number(r.phase_error_deg), number(r.magnitude_error_db)) for r, _, _ in lines)
     return Figure(
         "The controller's response against infinite memory",
-        "What the memory adds to phase and magnitude. Upright dotted lines: the slowest and the fastest crossover of the loop.",
+        "What the memory adds to phase and magnitude. Upright dotted lines: the slowest and the fastest "
+        "crossover of the loop.",
         "Curves over frequency: phase error and magnitude error by memory.",
         (
             Panel(x, Axis("phase error (°)"), (within, *tops, *rules)),
@@ -234,7 +237,8 @@ def _plant(study: Study) -> Figure:
     marks.append(curve("exact", plant.time, plant.exact, "ideal", width=1.2))
     return Figure(
         "Short memory in a plant's denominator",
-        f"A step of 1 into {plant.transfer}, simulated with each memory: where it ends, and when it leaves the exact course.",
+        f"A step of 1 into {plant.transfer}, simulated with each memory: where it ends, and when it leaves "
+        "the exact course.",
         "Curves over logarithmic time: the plant's step with each memory, and the exact one.",
         (Panel(Axis("time after the step (s)", log=True), Axis("output"), tuple(marks)),),
         plant_table(study),

@@ -1,4 +1,7 @@
-"""The scores of blind trials as a page: every row beside its target, what confidences are worth, what is called what."""
+"""The scores of blind trials as a page.
+
+It shows every row beside its target, what confidences are worth, and what each effect was called.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,10 @@ def trials_page(sets: Sequence[Scores]) -> Page:
     asked = [row for scores in sets for row in scores.rows if row.reached is not None]
     missed = [row for row in asked if row.reached is False]
     cases = sum(scores.cases for scores in sets)
-    lead = f"{cases} sealed cases were diagnosed blind. {len(asked) - len(missed)} of {len(asked)} scores that have a target reach it."
+    lead = (
+        f"{cases} sealed cases were diagnosed blind. "
+        f"{len(asked) - len(missed)} of {len(asked)} scores that have a target reach it."
+    )
     return Page("How often the diagnosis is right", lead, tuple(map(_section, sets)))
 
 
@@ -64,9 +70,10 @@ def _reliability(scores: Scores) -> Figure:
     )
     return Figure(
         "What a stated confidence is worth",
-        f"How often causes stated at each confidence are so, of {whole['cases']}: calibration error {whole['error']:.3f}, "
-        f"that of perfect calibration {whole['perfect']:.3f}, p = {whole['p']:.2f}.",
-        "Curve: how often a cause is right over the confidence stated, near the diagonal of perfect calibration.",
+        f"How often causes stated at each confidence are so, of {whole['cases']}: calibration error "
+        f"{whole['error']:.3f}, that of perfect calibration {whole['perfect']:.3f}, p = {whole['p']:.2f}.",
+        "Curve: how often a cause is right over the confidence stated, near the diagonal of perfect "
+        "calibration.",
         (
             Panel(
                 Axis("stated confidence", low=0.0, high=1.03),
@@ -105,8 +112,8 @@ def _calls(scores: Scores) -> Figure:
     )
     return Figure(
         "What each effect was called",
-        "Visible single effects: how many were called by their own name, the strongest candidate counting. The table says what "
-        "the others were called.",
+        "Visible single effects: how many were called by their own name, the strongest candidate counting. "
+        "The table says what the others were called.",
         f"Bars: share of the cases of {', '.join(true[::-1])} that were called so.",
         (panel,),
         TableOf(("true effect", "cases", "called"), rows, "What each was called"),
