@@ -129,7 +129,7 @@ def test_json_is_the_manifest(tmp_path, capsys):
     header = (tmp_path / "finger.h").read_text()
     for key in ("REF_LSB", "SCHED_LSB", "U_LSB"):
         value = next(
-            line.split()[2] for line in header.splitlines() if line.startswith(f"#define finger_{key}")
+            line.split()[2] for line in header.splitlines() if line.startswith(f"#define FINGER_{key}")
         )
         assert float(value.rstrip("f")) == manifest[key]
 

@@ -112,6 +112,7 @@ def diagnosed(name, folder, **options):
     return diagnose(rig, [log], **options)
 
 
+@pytest.mark.long
 def test_friction_damper_has_hysteresis(tmp_path):
     """Dry friction: one stage, so where it sits is inferred; it explains more than four fifths of the gap."""
     found = diagnosed("damper", tmp_path)
@@ -119,6 +120,7 @@ def test_friction_damper_has_hysteresis(tmp_path):
     assert found.where.inferred
 
 
+@pytest.mark.long
 def test_coupled_drives_fold_the_speed_or_are_unknown(tmp_path):
     """The pulse counter cannot see the sign of the speed. That it is the sensor no log of one stage can
     tell."""

@@ -140,6 +140,7 @@ def test_an_effect_beside_a_converter_is_found():
     assert ["sensor_quantization"] in found and any("valve_asymmetry" in names for names in found)
 
 
+@pytest.mark.long
 def test_a_curve_that_stands_for_two_effects_is_told_apart():
     logs = session(6, zone=0.03, roles=())
     clipped = [

@@ -29,7 +29,7 @@ FAULTS = (
         r"s->numerator_means\[i\] = [^;]*;",
         "s->numerator_means[i] = 0;",
     ),
-    Fault("reset keeps the slow means", "@.c", r"s->numerator_slow_means\[i\] = [^;]*;", "(void)e;"),
+    Fault("reset keeps the slow means", "@.c", r"s->numerator_slow_means\[i\] = [^;]*;", "(void)i;"),
     Fault("reset keeps the rests", "@.c", r"s->numerator_slow_rests\[i\] = [^;]*;", "", ("f32",)),
     Fault("a mean with a bit less", "@.c", r"(numerator_means, \d+, past,\s+)(\d+), ", r"\1\2 - 1, ", FIXED),
     Fault("a drive with a bit less", "@.c", r"(means, \d+, past,\s+\d+,\s+)(\d+)", r"\1\2 + 1", FIXED),

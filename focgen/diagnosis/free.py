@@ -80,6 +80,7 @@ class Free:
             last, parts = a.dynamics.den[-1].order, (a.dynamics.num, a.dynamics.den[:-1])
             orders = [t.order for t in parts[0]], [t.order - last for t in parts[1]]
             moves = [gain + k * time for k in orders[0]] + [k * time for k in orders[1]]
+            moves += [(-np.inf, np.inf)] * a.integrates  # the zero of the drive
         ends = np.array([*moves, (-np.inf, np.inf)]).T
         return start + ends[0], start + ends[1]
 
