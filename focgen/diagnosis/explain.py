@@ -337,7 +337,8 @@ def _shows_more(ground: Fit) -> bool:
     base = ground.problem
     left, response = ground.residual(), base.references.clocks["response"]
     found = disturbance(left, base.segment.run.h, response)
-    return found.swings or found.hums or found.bursts or ground.foretold > _TELLING
+    kept = base.segment.pace > 0.0 and found.pushed  # an integral of what inputs do shows little of them
+    return found.swings or found.hums or found.bursts or kept or ground.foretold > _TELLING
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
