@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 
 from focgen.diagnosis.noise import autocovariance, whiten
+from focgen.logs.between import white_level
 
 # kurtosis of the innovations, 3 for noise, and loudest stretch of a response over the usual one
 BURSTS = (12.0, 5.0)
@@ -88,7 +89,7 @@ def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturban
 
 def _above(parts: list[np.ndarray]) -> float:
     """The root mean square over that of what is white: of second differences, in the median experiment."""
-    white = np.median([1.4826 * np.median(np.abs(np.diff(p, 2))) / np.sqrt(6.0) for p in parts if len(p) > 2])
+    white = np.median([white_level(p) for p in parts if len(p) > 2])
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)) / max(white, 1e-300))
 
 

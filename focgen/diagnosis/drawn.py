@@ -20,6 +20,7 @@ from focgen.logs.experiment import Experiment
 from focgen.logs.thinning import thinned
 from focgen.rig.model import Rig
 
+_SWEEPING = 20  # of 50 places in its range: an input that visits fewer only steps
 FILE = "signals.json"
 MOST = 8000
 """Samples of all experiments together that are kept."""
@@ -127,6 +128,12 @@ def units_of_rig(rig: Rig) -> dict[str, str]:
 def entry_of(logs: Sequence[Experiment]) -> str:
     """The first signal that every experiment has."""
     return "command" if all("command" in log for log in logs) else "pressure"
+
+
+def sweeps(x: np.ndarray) -> bool:
+    """Whether an input (n,) runs through its range instead of stepping: it visits many fiftieths of it."""
+    places = np.round((x - x.min()) / max(float(np.ptp(x)), 1e-300) * 50)
+    return len(np.unique(places)) >= _SWEEPING
 
 
 def worst_of(evidence: Evidence) -> Explanation:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from focgen.logs.between import Between
+from focgen.logs.between import Between, white_level
 from focgen.logs.experiment import Experiment
 from focgen.rig import kernels
 from focgen.rig.effects import Run
@@ -226,8 +226,7 @@ def _trust(y: np.ndarray, timing: float) -> np.ndarray:
 
 def _noise(y: np.ndarray) -> float:
     """The root mean square of what is white of a signal (n,), or a little of its span."""
-    white = 1.4826 * np.median(np.abs(np.diff(y, 2))) / np.sqrt(6.0)
-    return max(float(white), 2e-3 * float(np.ptp(y)), 1e-300)
+    return max(white_level(y), 2e-3 * float(np.ptp(y)), 1e-300)
 
 
 def is_single(rig: Rig) -> bool:

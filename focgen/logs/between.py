@@ -73,6 +73,12 @@ def noise_level(values: np.ndarray) -> float:
     return float(np.median(np.abs(np.diff(values, _ORDER)))) / _NORMAL / _OF_SIXTH
 
 
+def white_level(values: np.ndarray) -> float:
+    """The standard deviation of what is white of a signal (n,), n ≥ 3, from its second differences: what is
+    slower than a few samples counts little."""
+    return float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
+
+
 def jumps_of(values: np.ndarray) -> np.ndarray:
     """Where a signal (n,) jumps: (n,) bool, true at the first sample after a jump.
 

@@ -73,16 +73,16 @@ def sniffed(text: str) -> Dialect:
 def _delimiter(sample: str) -> str:
     """Plain CSV is recognised without ado, for it is what most logs are; the rest is put to a library."""
     lines = [line for line in sample.splitlines() if line.strip() and not _is_comment(line)]
-    tail = lines[-min(_TAIL, max(1, len(lines) - 1)) :]
-    rows = [row for row in rows_of("\n".join(tail), ",") if row]
+    tail = "\n".join(lines[-min(_TAIL, max(1, len(lines) - 1)) :])
+    rows = [row for row in rows_of(tail, ",") if row]
     if len({len(row) for row in rows}) == 1 and len(rows[0]) > 1 and _all_plain(rows):
         return ","
     import clevercsv  # G. J. J. van den Burg et al., Data Min. Knowl. Disc. 33, 2019
 
-    dialect = clevercsv.Detector().detect("\n".join(tail), delimiters=list(_DELIMITERS))
+    dialect = clevercsv.Detector().detect(tail, delimiters=list(_DELIMITERS))
     found = getattr(dialect, "delimiter", None)
     likely = [found, *_DELIMITERS] if found in _DELIMITERS else list(_DELIMITERS)
-    return max(likely, key=lambda delimiter: _readable("\n".join(tail), delimiter))  # the first of the best
+    return max(likely, key=lambda delimiter: _readable(tail, delimiter))  # the first of the best
 
 
 def _readable(text: str, delimiter: str) -> int:

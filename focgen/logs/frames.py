@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from focgen.errors import LogError
+from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LogTable
 
 
@@ -22,14 +23,11 @@ def table_of(frame, name: str) -> LogTable:
     of one length.
     """
     columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
-    index = getattr(frame, "index", None)
+    index, clock = getattr(frame, "index", None), None
     if index is not None and not callable(index) and str(index.name) not in columns:
         values = _column(index, name, "index")
-        if index.name is not None:
-            columns = {str(index.name): values, **columns}
-        clock = values if np.asarray(index).dtype.kind in "mM" else None
-    else:
-        clock = None
+        named = {} if index.name is None else {str(index.name): values}
+        columns, clock = named | columns, values if np.asarray(index).dtype.kind in "mM" else None
     if len({len(values) for values in columns.values()}) > 1:
         sizes = ", ".join(f"{key} {len(values)}" for key, values in columns.items())
         raise LogError(name, f"holds columns of different lengths ({sizes})", "give one value a sample")
@@ -50,11 +48,7 @@ def _column(values, name: str, key: str) -> np.ndarray | list:
         raise LogError(f"{name} [{key}]", "is no vector", "give one number a sample") from None
     if array.ndim != 1:
         raise LogError(f"{name} [{key}]", f"has the shape {array.shape}", "give one number a sample")
-    if array.dtype.kind in "mM":
-        return (
-            array.astype(f"{'datetime' if array.dtype.kind == 'M' else 'timedelta'}64[ns]").astype(np.int64)
-            * 1e-9
-        )
+    array = of_numpy(array)
     return array.astype(float) if array.dtype.kind in "fiub" else [_cell(cell) for cell in array.tolist()]
 
 

@@ -72,8 +72,7 @@ def _segments(lines: Sequence[str], separator: str) -> Iterator[_Segment]:
 
 def _head(cells: Sequence[Sequence[str]], begin: int) -> int:
     """Where the header of the segment whose names are in row ``begin`` starts."""
-    at = next((i for i in range(begin, -1, -1) if cells[i][0] == "Channels"), begin)
-    return at
+    return next((i for i in range(begin, -1, -1) if cells[i][0] == "Channels"), begin)
 
 
 def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) -> LogTable:
@@ -89,8 +88,7 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
             what = f"line {number + 1} has {len(row)} values for {len(first)} columns"
             raise LogError(str(path), what, "complete the line")
     columns = {name: [row[j] for _, row in rows] for j, name in enumerate(first)}
-    doubled = len(columns) != len(first)
-    if doubled:
+    if len(columns) != len(first):
         raise LogError(str(path), "has a channel's name twice", "give each channel a name of its own")
     clock = None
     if time == "No" or not any(columns[_TIME]):

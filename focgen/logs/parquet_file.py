@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from focgen.errors import LogError, MissingExtra
+from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LogTable
 
 
@@ -29,9 +30,5 @@ def read(path: Path) -> LogTable:
 
 def _column(column) -> np.ndarray | list:
     """Numbers as an array with NaN for nulls, time stamps in s, everything else as a list."""
-    values = column.to_numpy()
-    if values.dtype.kind == "M":
-        return values.astype("datetime64[ns]").astype(np.int64) * 1e-9
-    if values.dtype.kind == "m":
-        return values.astype("timedelta64[ns]").astype(np.int64) * 1e-9
+    values = of_numpy(column.to_numpy())
     return values if values.dtype.kind in "fiu" else values.tolist()

@@ -133,7 +133,13 @@ def _unit_note(table: LogTable, role: str, signals: Roles) -> str | None:
     column = signals.columns()[role]
     given, own, scale = table.unit(column), signals.units.get(role), signals.scales.get(role)
     taken = own if scale is None else scale.unit
-    if given is None or taken is None or not (known(given) and known(taken)) or same(given, taken):
+    if (
+        given is None
+        or taken is None
+        or given == taken
+        or not (known(given) and known(taken))
+        or same(given, taken)
+    ):
         return None
     return f"the log gives {column!r} in {given}, {role} is taken as {taken}: is it {{ unit = {given!r} }}?"
 

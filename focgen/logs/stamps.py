@@ -22,6 +22,13 @@ def seconds(cells: Sequence[str]) -> np.ndarray:
     return found if of is _since_1970 else _past_midnight(found)
 
 
+def of_numpy(values: np.ndarray) -> np.ndarray:
+    """Times of numpy (m,), instants or spans, in s; others as they are."""
+    kinds = {"M": "datetime64[ns]", "m": "timedelta64[ns]"}
+    kind = kinds.get(values.dtype.kind)
+    return values if kind is None else values.astype(kind).astype(np.int64) * 1e-9
+
+
 def _has_date(cell: str) -> bool:
     return "-" in cell or len(cell) > len("23:59:59.999999999")
 

@@ -175,7 +175,10 @@ def _parsed(column, decimal: str = ".") -> list[float]:
         raise ValueError  # Python reads 1_000 as a number, nobody else does
     if decimal == ",":
         cells = [cell.replace(",", ".") if isinstance(cell, str) else cell for cell in cells]
-    return [math.nan if _is_missing(cell) else float(cell) for cell in cells]
+    try:
+        return list(map(float, cells))  # most columns miss nothing
+    except (ValueError, TypeError):
+        return [math.nan if _is_missing(cell) else float(cell) for cell in cells]
 
 
 def _is_missing(cell) -> bool:

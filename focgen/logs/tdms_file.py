@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from focgen.errors import LogError, MissingExtra
+from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LogTable
 
 
@@ -57,7 +58,7 @@ def read(path: Path) -> LogTable:
 
 
 def _group(group) -> _Group:
-    found = {c.name: (c, _seconds(np.asarray(c[:]))) for c in group.channels()}
+    found = {c.name: (c, of_numpy(np.asarray(c[:]))) for c in group.channels()}
     channels = {name: values for name, (_, values) in found.items() if len(values)}
     units = {name: str(c.properties.get("unit_string", "")) for name, (c, _) in found.items()}
     clocks = [_clock(c.properties, len(values)) for c, values in found.values() if len(values)]
@@ -72,14 +73,8 @@ def _clock(properties: Mapping, count: int) -> np.ndarray | None:
     if step <= 0.0:
         return None
     start = properties.get("wf_start_time")
-    begin = _seconds(np.array([start], "datetime64[us]"))[0] if start is not None else 0.0
+    begin = of_numpy(np.array([start], "datetime64[us]"))[0] if start is not None else 0.0
     return begin + float(properties.get("wf_start_offset", 0.0)) + step * np.arange(count)
-
-
-def _seconds(values: np.ndarray) -> np.ndarray:
-    if values.dtype.kind == "M":
-        return values.astype("datetime64[ns]").astype(np.int64) * 1e-9
-    return values
 
 
 def _check_lengths(path: Path, columns: Mapping[str, np.ndarray]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from focgen.diagnosis.drawn import entry_of, means, rate_of, segment_errors, steady, way_of, worst_of
+from focgen.diagnosis.drawn import entry_of, means, rate_of, segment_errors, steady, sweeps, way_of, worst_of
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import problem_residual
 from focgen.diagnosis.model import Diagnosis, Evidence
@@ -129,7 +129,7 @@ def loops(evidence: Evidence, logs: Sequence[Experiment], units: Mapping[str, st
         for row, i in zip(axes, chosen):
             x = logs[i][entry_of(logs)]
             swept = with_unit(entry_of(logs), units[entry_of(logs)])
-            place, label = (x, swept) if places(x) >= SWEEPING else (logs[i].time, "time (s)")
+            place, label = (x, swept) if sweeps(x) else (logs[i].time, "time (s)")
             for axis, name in zip(row, ("refitted", "explained")):
                 where, y, made = _thin(place, logs[i]["output"], evidence.simulated[name][i]["output"])
                 axis.plot(where, y, color=COLOURS["measured"], lw=0.7, label="measured")
@@ -141,22 +141,14 @@ def loops(evidence: Evidence, logs: Sequence[Experiment], units: Mapping[str, st
         return png(fig)
 
 
-SWEEPING = 20  # of 50 places in its range: an input that visits fewer only steps
-
-
-def places(x: np.ndarray) -> int:
-    """How many fiftieths of its range a signal visits."""
-    return len(np.unique(np.round((x - x.min()) / max(float(np.ptp(x)), 1e-300) * 50)))
-
-
 def _telling(evidence: Evidence, logs: Sequence[Experiment]) -> list[int]:
     """Up to two experiments where the effects changed the simulated output most, those that sweep first."""
     before, after = evidence.simulated["refitted"], evidence.simulated["explained"]
 
     def telling(i: int) -> float:
         changed = np.sqrt(np.mean((before[i]["output"] - after[i]["output"]) ** 2))
-        sweeps = places(logs[i][entry_of(logs)]) >= SWEEPING
-        return float(changed) * (3.0 if sweeps else 1.0) + 1e-12 * len(logs[i])
+        weight = 3.0 if sweeps(logs[i][entry_of(logs)]) else 1.0
+        return float(changed) * weight + 1e-12 * len(logs[i])
 
     return sorted(sorted(range(len(logs)), key=telling)[-2:])
 

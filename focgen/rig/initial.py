@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.logs.begin import REST, Begin
+from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
@@ -273,5 +274,5 @@ def _effective(left: np.ndarray) -> float:
 
 
 def _white(y: np.ndarray) -> float:
-    """The standard deviation of what is white of a signal (n,)."""
-    return float(1.4826 * np.median(np.abs(np.diff(y, 2))) / np.sqrt(6.0)) if len(y) > 4 else 0.0
+    """The standard deviation of what is white of a signal (n,), 0 where it is too short to tell."""
+    return white_level(y) if len(y) > 4 else 0.0

@@ -37,8 +37,13 @@ from focgen.trials.plan import CLOSED_KINDS, ENGINE_KINDS, KINDS, Assignment, as
 from focgen.trials.recording import as_csv
 from focgen.trials.sealing import commitment, sealed
 
-DEFAULT_KINDS = {"full": KINDS, "short": KINDS, "closed": CLOSED_KINDS, "engine": ENGINE_KINDS}
-DEFAULT_KINDS |= dict.fromkeys(DISTURBED, KINDS)
+DEFAULT_KINDS = {
+    "full": KINDS,
+    "short": KINDS,
+    "closed": CLOSED_KINDS,
+    "engine": ENGINE_KINDS,
+    **dict.fromkeys(DISTURBED, KINDS),
+}
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from focgen.diagnosis.drawn import Drawn, Mean, Rivals, Trace
+from focgen.diagnosis.drawn import Drawn, Mean, Rivals, Trace, sweeps
 from focgen.diagnosis.model import Diagnosis
 from focgen.report.figures import Axis, Bars, Figure, Line, Panel, Rule
 from focgen.report.page import TableOf
 from focgen.report.pages.parts import number
 from focgen.report.style import with_unit
 
-SWEEPING = 20  # of 50 places in its range: an input that visits fewer only steps
 _GAP = 0.02  # of the session: between experiments that follow each other at once
 _MOST_RIVALS = 8
 _TIED = 2.0  # standard deviations
@@ -255,7 +254,7 @@ def _rows(drawn: Drawn, begins: Sequence[float]) -> tuple[tuple[str, ...], ...]:
 
 def _loops(drawn: Drawn, units: Mapping[str, str]) -> Figure | None:
     """Output over input of the two sweeping experiments that the effects change most."""
-    sweeping = [t for t in drawn.traces if _places(t.input) >= SWEEPING]
+    sweeping = [t for t in drawn.traces if sweeps(t.input)]
     sweeping.sort(key=lambda t: -float(np.nanmean((t.refitted - t.explained) ** 2)))
     if not sweeping:
         return None
@@ -295,11 +294,6 @@ def _loops(drawn: Drawn, units: Mapping[str, str]) -> Figure | None:
         ),
         linked=False,
     )
-
-
-def _places(x: np.ndarray) -> int:
-    """How many fiftieths of its range a signal visits."""
-    return len(np.unique(np.round((x - x.min()) / max(float(np.ptp(x)), 1e-300) * 50)))
 
 
 def _waterfall(found: Diagnosis) -> Figure:
