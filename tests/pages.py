@@ -70,11 +70,15 @@ def as_here(line: str) -> str:
 def is_elsewhere(command: list[str]) -> bool:
     """Whether a command sets up a machine: its extra or its target must exist, and it is not run."""
     if command[0] == "pip":
-        extras = {name for word in command for part in re.findall(r"\[(.*)\]", word) for name in part.split(",")}
+        extras = {
+            name for word in command for part in re.findall(r"\[(.*)\]", word) for name in part.split(",")
+        }
         project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
         assert extras <= set(project["optional-dependencies"]), extras
     elif command[0] == "make":
-        targets = re.findall(r"^([a-z-]+(?: [a-z-]+)*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+        targets = re.findall(
+            r"^([a-z-]+(?: [a-z-]+)*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE
+        )
         assert command[1] in {name for names in targets for name in names.split()}, command
     return command[0] in ("pip", "make", "apt-get")
 

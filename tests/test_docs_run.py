@@ -99,8 +99,12 @@ def test_a_frame_is_read_as_the_page_of_logs_says(folder, monkeypatch):
 
 def test_the_c_that_is_shown_is_the_c_that_is_written(tmp_path):
     made = tmp_path / "valve"
-    focgen.generate(ROOT / "examples" / "controller.toml", made, name="valve", memory="exponential", selftest=True)
-    prototypes, loop, start, _ = (block.text for block in blocks(DOCS / "c-interface.md") if block.language == "c")
+    focgen.generate(
+        ROOT / "examples" / "controller.toml", made, name="valve", memory="exponential", selftest=True
+    )
+    prototypes, loop, start, _ = (
+        block.text for block in blocks(DOCS / "c-interface.md") if block.language == "c"
+    )
     header = "".join((made / "valve.h").read_text(encoding="utf-8").split())
     for line in prototypes.replace("NAME", "valve").splitlines():
         assert "".join(line.split()) in header, line
@@ -130,7 +134,9 @@ def compiles(text, folder):
 
 @pytest.mark.long
 def test_the_site_is_built_without_a_warning(tmp_path):
-    done = subprocess.run([sys.executable, "tools/make_docs.py", tmp_path], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "tools/make_docs.py", tmp_path], cwd=ROOT, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert 'href="own-log.html"' in page and "<script src=\"http" not in page
+    assert 'href="own-log.html"' in page and '<script src="http' not in page

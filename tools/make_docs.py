@@ -29,7 +29,16 @@ ELSEWHERE = {"README.md": "index.md", "examples/README.md": "examples.md", "CHAN
 NAV = {
     "Start": ("own-log", "tutorial-board", "tutorial-diagnosis", "tutorial-memory", "examples"),
     "How to": ("recording-logs", "logs", "rig-file", "controller-file", "testing", "report"),
-    "Understand": ("identification", "closed-loop", "memory", "diagnosis", "effects", "proofs", "kernels", "records"),
+    "Understand": (
+        "identification",
+        "closed-loop",
+        "memory",
+        "diagnosis",
+        "effects",
+        "proofs",
+        "kernels",
+        "records",
+    ),
     "Look up": ("commands", "python", "reference", "c-interface", "targets", "glossary"),
     "About": ("limits", "comparison", "architecture", "changelog"),
 }
@@ -72,7 +81,9 @@ def gather(source: Path) -> None:
         (source / name).write_text(linked(text, page.parent, pages), encoding="utf-8")
     (source / "commands.md").write_text(commands_page(), encoding="utf-8")
     (source / "reference.md").write_text(reference_page(), encoding="utf-8")
-    (source / "index.md").write_text((source / "index.md").read_text(encoding="utf-8") + contents(), encoding="utf-8")
+    (source / "index.md").write_text(
+        (source / "index.md").read_text(encoding="utf-8") + contents(), encoding="utf-8"
+    )
     (source / "conf.py").write_text(CONF, encoding="utf-8")
 
 
@@ -113,7 +124,11 @@ def commands_page() -> str:
 
 def _help(command: str) -> str:
     """What the command prints for ``--help``, at a hundred columns whatever the terminal has."""
-    with mock.patch.dict(os.environ, {"COLUMNS": "100"}), redirect_stdout(StringIO()) as said, suppress(SystemExit):
+    with (
+        mock.patch.dict(os.environ, {"COLUMNS": "100"}),
+        redirect_stdout(StringIO()) as said,
+        suppress(SystemExit),
+    ):
         run([command, "--help"])
     return said.getvalue().strip()
 
