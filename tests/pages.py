@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?$")
-# The seventh digit of a fit may differ from one processor to the next; what a page shows is rounded to three or four.
+# A fit may differ in its last digits from one processor to the next; what a page shows is rounded.
 AGREES = 0.02
 
 
@@ -50,7 +50,7 @@ def run_page(page: Path, folder: Path) -> int:
 
 
 def run_shell(block: Block, folder: Path) -> tuple[str, int]:
-    """What the block's commands print, and how many were run; what needs the network is only checked to exist."""
+    """What the commands print, and how many were run; what sets up a machine is only checked to exist."""
     said, count = "", 0
     for line in block.text.replace("\\\n", " ").splitlines():
         command = shlex.split(line, comments=True)

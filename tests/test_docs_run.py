@@ -1,4 +1,4 @@
-"""The pages do what they say: every command in them runs, prints what is shown, and every file in them is read.
+"""The pages do what they say: every command runs and prints what is shown, every file is read.
 
 Red when a command's option, output or example file changes and the page does not.
 """
@@ -16,9 +16,9 @@ from tests.pages import ROOT, Block, blocks, check_shown, run_page, run_shell
 
 DOCS = ROOT / "docs"
 TUTORIALS = ("own-log", "tutorial-board", "tutorial-diagnosis", "tutorial-memory")
-# Pages whose commands go on from files that the reader has by then; the first line of the folder's set-up makes them.
-USES = ("README.md", "examples/README.md", "docs/memory.md", "docs/kernels.md", "docs/targets.md", "docs/report.md",
-        "docs/proofs.md")  # fmt: skip
+FURTHER = ("memory", "kernels", "targets", "report", "proofs")
+# Pages whose commands go on from files that the reader has by then; SETUP makes them.
+USES = ("README.md", "examples/README.md", *(f"docs/{name}.md" for name in FURTHER))
 SETUP = """
 focgen identify steps.csv --rig rig.toml --to 40 --out identified.toml
 focgen design identified.toml --out controller.toml --settling 1.5

@@ -1,8 +1,8 @@
 """The documentation as a site that needs no server: ``python tools/make_docs.py build/site``.
 
-The pages of ``docs/`` are gathered with those that stand elsewhere in the project (the README, the examples' page,
-the changelog) and with two that are made here, so that they cannot be out of date: the commands, as ``--help``
-prints them, and the public functions, from their docstrings. Sphinx makes the site; a warning of its is a fault.
+The pages of ``docs/`` are gathered with those that stand elsewhere in the project: the README, the examples'
+page, the changelog. Two are made here, so that they cannot be out of date: the commands, as ``--help`` prints
+them, and the public functions, from their docstrings. Sphinx makes the site; a warning of Sphinx is a fault.
 """
 
 from __future__ import annotations
@@ -52,8 +52,10 @@ html_theme = "furo"
 html_title = "focgen"
 html_show_sourcelink = False
 html_copy_source = False
-html_theme_options = {{"light_css_variables": {{"color-brand-primary": "#00695c", "color-brand-content": "#00695c"}},
-    "dark_css_variables": {{"color-brand-primary": "#4db6ac", "color-brand-content": "#4db6ac"}}}}
+html_theme_options = {{
+    "light_css_variables": {{"color-brand-primary": "#00695c", "color-brand-content": "#00695c"}},
+    "dark_css_variables": {{"color-brand-primary": "#4db6ac", "color-brand-content": "#4db6ac"}},
+}}
 html_last_updated_fmt = None
 autodoc_typehints = "none"
 copybutton_exclude = ".linenos, .gp, .go"

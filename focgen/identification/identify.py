@@ -33,8 +33,8 @@ from focgen.rig.model import Actuator, Rig
 from focgen.rig.plausibility import doubts
 
 _COMPROMISE = (
-    "what the model cannot follow outweighs the noise: T, alpha and K(p) are a compromise, and known no better than "
-    "[uncertainty] says, whatever their intervals"
+    "what the model cannot follow outweighs the noise: T, alpha and K(p) are a compromise, and known "
+    "no better than [uncertainty] says, whatever their intervals"
 )
 
 
