@@ -25,7 +25,7 @@ _FUNCTIONS = {
     "study": "focgen.studies.study",
     "demo": "focgen.demonstration",
     "report": "focgen.report.paths",
-    "read_logs": "focgen.logs.read",
+    "read_logs": "focgen.rig.reading",
     "read_rig": "focgen.rig.files",
     "read_controller": "focgen.control.files",
 }

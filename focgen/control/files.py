@@ -35,8 +35,11 @@ sha256 = "…"
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 
@@ -54,9 +57,25 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
 from focgen.tomlfile import Table, terms_of
 
+ControllerLike = Controller | str | Path | Mapping[str, Any]
+"""A controller, the path of its controller.toml, or a dictionary of the same shape."""
 
-def read_controller(path: str | Path) -> Controller:
-    """Read a controller. Raises ControllerError naming file, table, key and remedy."""
+
+def controller_from(given: ControllerLike) -> Controller:
+    """The controller that an argument is. Raises ControllerError where it is none, or cannot be used."""
+    if isinstance(given, Controller):
+        return given
+    if not isinstance(given, (str, os.PathLike, Mapping)):
+        remedy = "give a Controller, a controller.toml or a dictionary like it"
+        raise ControllerError("controller", f"is {type(given).__name__}", remedy)
+    return read_controller(given)
+
+
+def read_controller(path: str | Path | Mapping[str, Any]) -> Controller:
+    """Read a controller from its file, or from a dictionary of the same shape. Raises ControllerError naming
+    file, table, key and remedy."""
+    if isinstance(path, Mapping):
+        return controller_of(Table(path, "controller", ControllerError), "controller")
     return controller_of(Table.read(path, ControllerError), Path(path).stem)
 
 

@@ -25,50 +25,56 @@ from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, check_determined, with_stages
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
-from focgen.logs.read import each_of, read_logs
+from focgen.logs.read import Logs, each_of, read_logs
 from focgen.output import check_apart, write_file
+from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.engine import STAGES
-from focgen.rig.files import read_rig, rig_text
+from focgen.rig.files import rig_text
 from focgen.rig.model import Actuator, Rig
 from focgen.rig.plausibility import doubts
 
 
+@rig_then_logs
 def identify(
-    logs: Sequence[str | Path] | Sequence[Experiment],
-    rig: Rig | str | Path,
+    rig: RigLike,
+    logs: Logs,
     out: str | Path | None = None,
-    first: float | None = None,
-    last: float | None = None,
+    from_: float | None = None,
+    to: float | None = None,
     gain_degree: int = 1,
-    unseen: Sequence[str | Path] | Sequence[Experiment] = (),
+    unseen: Logs = (),
     stages: Sequence[str] = ("actuator",),
     delay: bool = False,
     integer: bool = True,
 ) -> Identification:
     """Fit K(p) p through e^(−Ls)/(T s^α + 1), eq. (3) to (5), to all experiments at once.
 
-    ``logs`` are paths or experiments of one session, ``first`` and ``last`` (s within each experiment) cut
-    them, ``gain_degree`` is the degree of K(p); where the logs show fewer levels than that needs, a lower one
-    is taken and said. The new rig is written to ``out``. The input is the measured pressure where logged,
-    else the command through the regulator; fitted is the curvature where logged, else the output through the
-    sensor. ``unseen`` are logs that the identified rig is shown against, but not fitted to. ``stages``: which
-    of regulator, actuator and sensor are identified, the first and the last from their own signals.
-    ``delay``: whether the actuator's dead time is fitted. ``integer``: whether integer-order models are
-    fitted to each experiment for comparison.
+    ``rig`` (its file, a dictionary like it, or a :class:`Rig`) names the columns, and has the regulator and
+    the sensor that the actuator is seen through. ``logs`` (files, frames, dictionaries of arrays, or
+    experiments) are one session of it; ``from_`` and ``to`` cut each experiment, s within it.
+    ``gain_degree`` is the degree of K(p); where the logs show fewer levels than that needs, a lower one is
+    taken and said. The new rig is written to ``out`` where given.
+
+    The input is the measured pressure where logged, else the command through the regulator; fitted is the
+    curvature where logged, else the output through the sensor. ``unseen`` are logs that the identified rig is
+    shown against, but not fitted to. ``stages``: which of regulator, actuator and sensor are identified, the
+    first and the last from their own signals. ``delay``: whether the actuator's dead time is fitted.
+    ``integer``: whether integer-order models are fitted to each experiment for comparison.
 
     Raises LogError, RigError or FitError; nothing is written then.
     """
-    logs, unseen = each_of(logs), each_of(unseen)
+    shown, given = each_of(unseen), each_of(logs)
+    inputs = (*given, rig, *shown)
     if out is not None:
-        check_apart([out], (*logs, rig, *unseen))
+        check_apart([out], inputs)
     check_degree(gain_degree)
     if not stages:
         raise FitError("--stages", "names no stage", f"give one or more of {', '.join(STAGES)}")
     for stage in stages:
         check_choice("--stages", stage, STAGES, FitError)
-    nominal = rig if isinstance(rig, Rig) else read_rig(rig)
-    experiments = _read(logs, nominal, first, last)
-    others = _read(unseen, nominal, None, None) if unseen else ()
+    nominal = rig_of(rig)
+    experiments = _read(given, nominal, from_, to)
+    others = _read(shown, nominal, None, None) if shown else ()
     found = {stage: identify_stage(experiments, stage) for stage in stages if stage != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
     new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
@@ -81,11 +87,11 @@ def identify(
     notes = remarks_of(experiments, nominal, result) + told + result.notes
     result = replace(result, warnings=warnings, notes=notes)
     if out is not None:
-        write_file(out, rig_text(result.rig), (*logs, rig, *unseen))
+        write_file(out, rig_text(result.rig), inputs)
     return result
 
 
-def _read(logs, rig: Rig, first, last) -> tuple[Experiment, ...]:
+def _read(logs: Logs, rig: Rig, first: float | None, last: float | None) -> tuple[Experiment, ...]:
     limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
     return read_logs(logs, rig.signals, rig.sample_time, first, last, limits)
 

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
 from focgen.errors import LogError
 from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LogTable
+
+
+class Frame(Protocol):
+    """What pandas and polars frames have in common: columns, by name."""
+
+    @property
+    def columns(self) -> Iterable[Any]: ...
+
+    def __getitem__(self, key: Any, /) -> Any: ...
 
 
 def is_frame(log: object) -> bool:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from focgen.errors import LogError
 from focgen.logs.experiment import Experiment
-from focgen.logs.frames import is_frame, table_of
+from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.scales import Scale, known, same
@@ -19,9 +19,12 @@ from focgen.logs.table import LogTable, read_table, stem
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
+_GIVE = "give a path, a frame, a dictionary of arrays, or a list of these"
 
 Limits = Mapping[str, tuple[float, float]]
-Log = str | Path | Mapping[str, Any] | Any  # a file, a dictionary of arrays, or a frame
+Log = str | Path | Mapping[str, Any] | Frame | Experiment
+"""A file, a dictionary of arrays (m,) by column, a pandas or polars frame, or what was read before."""
+Logs = Log | Iterable[Log]
 
 
 class Roles(Protocol):
@@ -37,7 +40,7 @@ class Roles(Protocol):
 
 
 def read_logs(
-    paths: Log | Sequence[Log],
+    paths: Logs,
     signals: Roles,
     sample_time: float,
     first: float | None = None,
@@ -65,9 +68,14 @@ def read_logs(
     return in_session_order(_with_own_names(found))
 
 
-def each_of(logs: Log | Sequence[Log]) -> list[Log]:
-    """One log, or several, as a list."""
-    return [logs] if isinstance(logs, str | Path | Experiment) or is_frame(logs) else list(logs)
+def each_of(logs: Logs) -> list[Log]:
+    """One log, or several, as a list. Raises LogError for what is neither."""
+    if isinstance(logs, str | Path | Experiment) or is_frame(logs):
+        return [cast(Log, logs)]
+    try:
+        return list(cast(Iterable[Log], logs))
+    except TypeError:
+        raise LogError("logs", f"is {type(logs).__name__}", _GIVE) from None
 
 
 def tables_of(logs: Sequence[Log]) -> list[LogTable]:

@@ -27,8 +27,7 @@ from focgen.loop.worst import Worst, worst_case
 from focgen.output import check_apart, write_file
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST, Plan
-from focgen.rig.files import read_rig
-from focgen.rig.model import Rig
+from focgen.rig.arguments import RigLike, file_of, rig_of
 
 SETTLING = 1.5  # s, where nothing is wished and it is feasible
 _SLACK = 1.02  # of the wish, for the controller as it will run
@@ -107,7 +106,7 @@ class Design:
 
 
 def design(
-    rig: Rig | str | Path,
+    rig: RigLike,
     out: str | Path | None = None,
     settling: float | None = None,
     overshoot: float | None = None,
@@ -139,7 +138,7 @@ def design(
     _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance)
     if out is not None:
         check_apart([out], [rig])
-    model, source = (rig, None) if isinstance(rig, Rig) else (read_rig(rig), _source(rig))
+    model, source = rig_of(rig), _source(file_of(rig))
     bench, notes = prepare(model, setpoints, lowest, delay)
     wish, tuned = _tuned(bench, settling, overshoot, notes)
     table, report = _schedule(bench, tuned, tolerance)
@@ -166,8 +165,9 @@ def _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance) -> 
         raise DesignError("tolerance", f"is {tolerance:g}", "give a relative error between 0 and 1")
 
 
-def _source(path: str | Path) -> Source:
-    return Source(Path(path).name, hashlib.sha256(Path(path).read_bytes()).hexdigest())
+def _source(path: Path | None) -> Source | None:
+    """What the controller says it was designed from; nothing where that is no file."""
+    return None if path is None else Source(path.name, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 def _tuned(bench: Bench, settling, overshoot, notes: list[str]) -> tuple[Wish, Tuned]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest, within_reach
-from focgen.control.files import read_controller
+from focgen.control.files import ControllerLike, controller_from
 from focgen.control.measures import StepMeasures, measure_step
 from focgen.control.setpoints import default_setpoints
 from focgen.errors import ControllerError, DesignError
@@ -26,7 +26,7 @@ from focgen.loop.run import LoopRun, run_loop
 from focgen.loop.stepper import FloatStepper
 from focgen.loop.worst import Worst, worst_case
 from focgen.plan.build import build_plan
-from focgen.rig.files import read_rig
+from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.model import Rig
 
 _SETTLINGS = 8.0  # time constants of the slowest frozen loop that a step is followed for
@@ -97,8 +97,8 @@ class Simulation:
 
 
 def simulate(
-    rig: Rig | str | Path,
-    controller: Controller | str | Path,
+    rig: RigLike,
+    controller: ControllerLike,
     setpoints: Sequence[float] | None = None,
     *,
     consecutive: bool = False,
@@ -118,12 +118,11 @@ def simulate(
     not fit together, PlanError where the controller cannot be realised, RigError and ControllerError for
     their files.
     """
-    model = rig if isinstance(rig, Rig) else read_rig(rig)
-    which = controller if isinstance(controller, Controller) else read_controller(controller)
+    model, which = rig_of(rig), controller_from(controller)
     _check_options(duration, delay)
     ranges, notes = derived_ranges(model)
     _check_fit(model, which)
-    notes = [*notes, *_said(model, which, None if isinstance(rig, Rig) else Path(rig))]
+    notes = [*notes, *_said(model, which, file_of(rig))]
     plan = build_plan(which, arithmetic, length)
     start = rest(model, which.ranges.output)
     targets = _targets(model, which, setpoints, start, consecutive)
