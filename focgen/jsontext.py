@@ -14,8 +14,8 @@ import numpy as np
 
 from focgen.errors import InputError
 
-UNWRITTEN: Any = {"metadata": {"json": False}, "repr": False, "compare": False}
-"""Keywords of a dataclass field that :func:`plain` leaves out."""
+UNWRITTEN = {"json": False}
+"""Metadata of a dataclass field that :func:`plain` leaves out."""
 
 
 def plain(value: Any) -> Any:

@@ -186,7 +186,7 @@ def _check_operator(
         raise InputError("--band", what, f"{remedy}, up to {highest:.6g}, half of the Nyquist frequency")
 
 
-def _refuse_what_is_missing(package) -> None:
+def _refuse_what_is_missing(package: str) -> None:
     """Options of the command that this version does not have are refused, never ignored."""
     check_choice("--for", package, PACKAGES)
     if package != "plain":

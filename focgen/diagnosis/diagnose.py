@@ -120,7 +120,8 @@ def explain_all(
     """Explain segment after segment, each on what the one before it gives freed of noise. ``draws``:
     sessions simulated for the threshold of each; where it comes out higher than ``threshold``, the segment
     is explained anew."""
-    roles, x, found, trusted = cuts(logs), None, [], True
+    found: list[Explanation] = []
+    roles, x, trusted = cuts(logs), None, True
     for entry, exit in zip(roles, roles[1:]):
         segment = loosened(rig, make(logs, entry, exit, x, carried(found[-1]) if found else None))
         step(f"{entry} to {exit}")

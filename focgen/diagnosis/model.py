@@ -13,6 +13,7 @@ from focgen.rig.model import Rig
 
 if TYPE_CHECKING:
     from focgen.diagnosis.drawn import Drawn
+    from focgen.diagnosis.explain import Explanation
 
 Interval = tuple[float, float]
 
@@ -112,9 +113,9 @@ class Diagnosis:
     notes: tuple[str, ...]
     fits: tuple[PlainFit, ...] = ()
     warnings: tuple[str, ...] = ()
-    refitted: Rig | None = field(default=None, **UNWRITTEN)
-    augmented: Rig | None = field(default=None, **UNWRITTEN)
-    drawn: Drawn | None = field(default=None, **UNWRITTEN)
+    refitted: Rig | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
+    augmented: Rig | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
+    drawn: Drawn | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,5 +124,5 @@ class Evidence:
     by segment; ``next_input``: the experiment that is proposed."""
 
     simulated: dict[str, list[dict[str, np.ndarray]]]
-    explanations: tuple
+    explanations: tuple[Explanation, ...]
     next_input: Choice | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,8 @@ from focgen.rig.engine import STAGES
 from focgen.rig.files import rig_text
 from focgen.rig.model import Actuator, Rig
 from focgen.rig.plausibility import doubts
+
+Quality = dict[str, dict[str, float]]
 
 
 @rig_then_logs
@@ -99,11 +102,18 @@ def _read(logs: Logs, rig: Rig, first: float | None, last: float | None) -> tupl
 def _with_stages(rig: Rig, found: dict[str, StageFit]) -> Rig:
     """The rig with its regulator and sensor as identified."""
     delays = replace(rig.delays, **{name: fit.delay for name, fit in found.items()})
-    transfers = {name: fit.transfer for name, fit in found.items()}
+    transfers: dict[str, Any] = {name: fit.transfer for name, fit in found.items()}
     return replace(rig, delays=delays, uncertainty=with_stages(rig.uncertainty, found), **transfers)
 
 
-def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: bool):
+def _actuator(
+    experiments: Sequence[Experiment],
+    others: Sequence[Experiment],
+    rig: Rig,
+    degree: int,
+    delay: bool,
+    integer: bool,
+) -> Identification:
     """The identification of the actuator; ``rig`` has the regulator and the sensor it is seen through."""
     if rig.delays.actuator and not delay:
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
@@ -172,39 +182,48 @@ def _fitted(excitations: list[Excitation]) -> FractionalFit:
 
 
 def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[ExperimentFit]) -> Joint:
-    T, alpha = told_value(fit.T, fit.half["T"]), told_value(fit.alpha, fit.half["alpha"])
-    gain = told_gain(fit.gain, fit.half["gain"])
-    span = lambda value, half: (float(value - half), float(value + half))  # noqa: E731
+    half: dict[str, Any] = dict(fit.half)
+    T, alpha = told_value(fit.T, half["T"]), told_value(fit.alpha, half["alpha"])
+    gain = told_gain(fit.gain, half["gain"])
     names = [x.name for x in excitations]
+    ci95: dict[str, Any] = {
+        "T": _span(fit.T, half["T"]),
+        "alpha": _span(fit.alpha, half["alpha"]),
+        "gain": tuple(map(_span, fit.gain, half["gain"])),
+    }
+    if half["delay"]:
+        ci95["delay"] = _span(fit.delay, half["delay"])
     return Joint(
         T=T,
         alpha=alpha,
-        delay=told_value(fit.delay, fit.half["delay"]),
+        delay=told_value(fit.delay, half["delay"]),
         gain=gain,
         gain_r2=r2_of_line(excitations, fits, len(gain) - 1),
-        ci95={
-            "T": span(fit.T, fit.half["T"]),
-            "alpha": span(fit.alpha, fit.half["alpha"]),
-            "gain": tuple(map(span, fit.gain, fit.half["gain"])),
-        }
-        | ({"delay": span(fit.delay, fit.half["delay"])} if fit.half["delay"] else {}),
+        ci95=ci95,
         simulated=dict(zip(names, fit.simulated)),
         pasts={name: past for name, past in zip(names, fit.pasts) if past is not None and past.steps},
         closed_loop=fit.closed_loop,
     )
 
 
+def _span(value: float, half: float) -> tuple[float, float]:
+    return float(value - half), float(value + half)
+
+
 def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
     """Logs beside what the identified rig makes of their input, each from the initial state that it asks
     for."""
-    made = [_prepared([e], rig, len(rig.actuator.gain))[0] for e in experiments]
+    actuator: Any = rig.actuator
+    made = [_prepared([e], rig, len(actuator.gain))[0] for e in experiments]
     return tuple(
         Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
-        for x, y in ((x, answer_from_its_past(x, rig.actuator, rig.delays.actuator)) for x in made)
+        for x, y in ((x, answer_from_its_past(x, actuator, rig.delays.actuator)) for x in made)
     )
 
 
-def _compared(excitations, fits: list[ExperimentFit], joint: Joint):
+def _compared(
+    excitations: Sequence[Excitation], fits: list[ExperimentFit], joint: Joint
+) -> tuple[Quality, Quality]:
     """GOF and Schwarz's criterion of every model in every experiment."""
     measured = {x.name: x.measured for x in excitations}
     models = {"fom": {f.name: f.simulated for f in fits}}

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -151,7 +152,14 @@ def design(
     return result
 
 
-def _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance) -> None:
+def _check_wishes(
+    settling: float | None,
+    overshoot: float | None,
+    arithmetic: str,
+    length: int | None,
+    delay: int,
+    tolerance: float,
+) -> None:
     if settling is not None and not (math.isfinite(settling) and settling > 0.0):
         raise DesignError("--settling", f"is {settling:g}", "give a time above 0 s")
     if overshoot is not None and not (math.isfinite(overshoot) and overshoot >= 0.0):
@@ -170,7 +178,9 @@ def _source(path: Path | None) -> Source | None:
     return None if path is None else Source(path.name, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
-def _tuned(bench: Bench, settling, overshoot, notes: list[str]) -> tuple[Wish, Tuned]:
+def _tuned(
+    bench: Bench, settling: float | None, overshoot: float | None, notes: list[str]
+) -> tuple[Wish, Tuned]:
     wish = Wish(settling, OVERSHOOT if overshoot is None else overshoot)
     if settling is not None or overshoot is not None:
         return wish, tune(bench, wish)
@@ -196,7 +206,7 @@ def _schedule(bench: Bench, tuned: Tuned, tolerance: float) -> tuple[Table | Non
         gain = line.intercept / inversion.gain[0]
         return None, ScheduleReport((), (gain,), line.intercept, 0.0, 0.0, tolerance, None, None, None)
 
-    def formula(pressure):
+    def formula(pressure: Any) -> Any:
         return line(pressure) / inversion.K(pressure)
 
     try:
@@ -291,7 +301,13 @@ def _judged(
     )
 
 
-def _worst(bench: Bench, controller: Controller, plan: Plan, points, seconds: float) -> Worst:
+def _worst(
+    bench: Bench,
+    controller: Controller,
+    plan: Plan,
+    points: Sequence[OperatingPoint],
+    seconds: float,
+) -> Worst:
     return worst_case(
         bench.rig,
         controller,

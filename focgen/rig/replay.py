@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -117,7 +118,7 @@ def placed_in(rig: Rig) -> tuple[Placed, ...]:
     return tuple(_placed(rig, table) for table in rig.effects)
 
 
-def _placed(rig: Rig, table) -> Placed:
+def _placed(rig: Rig, table: Mapping[str, Any]) -> Placed:
     effect = library().get(table["name"])
     if effect is None:
         raise RigError(
@@ -161,7 +162,7 @@ def session_end(rig: Rig) -> float:
 
 def effect_tables(
     placed: Sequence[Placed], left: Sequence[dict[str, float]], clock: float
-) -> tuple[dict, ...]:
+) -> tuple[dict[str, Any], ...]:
     """Effects as ``[[effects]]`` tables, with what outlives the session: ``left``, one for each, and its
     ``clock`` in s."""
     tables = []

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from focgen.codegen.kernels import TARGETS
 from focgen.control.controller import Controller
@@ -15,13 +16,14 @@ from focgen.control.equilibrium import derived_ranges, holding, rest
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.setpoints import default_setpoints
 from focgen.errors import ControllerError, DesignError, InputError, check_choice
+from focgen.fractional.transfer import TransferFunction
 from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.spelling import respelled
 from focgen.studies.grid import Grid, grid_of
 from focgen.studies.jobs import Job, read_ideal, read_plant, read_row
-from focgen.studies.model import Curves, Ideal, Plant, Row, Setup, Study, Variant
+from focgen.studies.model import Curves, Ideal, Plant, PlantRow, Row, Setup, Study, Variant
 from focgen.studies.operator import fractional_terms
 from focgen.studies.plant import exact_step, plant_of, plant_times
 from focgen.studies.recommend import Wish, leanest, pareto, sentence, shortest
@@ -202,11 +204,13 @@ class _Sweep:
         """The sample time that is recommended for: the controller's own where it is looked at."""
         return self.own if self.own in self.grid.sample_times else self.grid.sample_times[0]
 
-    def _done(self, asked: list[tuple[str, Variant]]) -> list[dict]:
+    def _done(self, asked: list[tuple[str, Variant]]) -> list[dict[str, Any]]:
         jobs = [Job(kind, self.setup, variant) for kind, variant in asked]
         return sweep(jobs, self.store, self.workers)
 
-    def _recommended(self, rows, ideal) -> tuple[str, list[tuple[Row, Curves]]]:
+    def _recommended(
+        self, rows: list[tuple[Row, Curves]], ideal: Ideal
+    ) -> tuple[str, list[tuple[Row, Curves]]]:
         """The sentence, and the rows with those that it took to find the shortest length."""
         h, arithmetics = self._first(), self.grid.arithmetics
         own = self.setup.controller.arithmetic
@@ -226,7 +230,7 @@ class _Sweep:
         said = sentence(as_run, wish, short, exponential, set(self.grid.memories), max(self.grid.lengths))
         return said, [*rows, *added]
 
-    def _plant(self, plant, rows) -> Plant:
+    def _plant(self, plant: TransferFunction, rows: tuple[PlantRow, ...]) -> Plant:
         times = plant_times(self.own) * self.own
         exact = exact_step(plant, self.own)
         return Plant(str(plant), self.own, tuple(map(float, times)), tuple(map(float, exact)), rows)
