@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from focgen.fractional.transfer import TransferFunction
 
@@ -22,7 +24,7 @@ class GainSchedule:
     breakpoints: tuple[float, ...]
     gains: tuple[float, ...]
 
-    def __call__(self, value):
+    def __call__(self, value: ArrayLike) -> Any:
         """The gain at ``value``, any shape."""
         points, gains = np.array(self.breakpoints), np.array(self.gains)
         place = np.clip(np.asarray(value, dtype=float), points[0], points[-1])
@@ -93,6 +95,10 @@ class Controller:
         """Whether the gain depends on a scheduling signal."""
         return isinstance(self.gain, GainSchedule)
 
-    def gain_at(self, value: float | np.ndarray | None = None):
+    def gain_at(self, value: ArrayLike | None = None) -> Any:
         """The gain at a value of the scheduling signal (ignored where nothing is scheduled)."""
-        return self.gain(value) if self.scheduled else self.gain
+        if not isinstance(self.gain, GainSchedule):
+            return self.gain
+        if value is None:
+            raise TypeError("the gain is scheduled: give a value of the scheduling signal")
+        return self.gain(value)
