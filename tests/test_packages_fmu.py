@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import zipfile
 from pathlib import Path
 
@@ -218,6 +219,14 @@ def test_verify_names_edited_c_of_the_interface(tmp_path):
     source = tmp_path / "fmu" / "filter_fmi3.c"
     source.write_text(source.read_text().replace("1e-6", "1e-5"))
     assert any("fmu/filter_fmi3.c: is not what" in line for line in read_folder(tmp_path).differences)
+
+
+def test_the_example_runs_its_loop(fmpy, tmp_path):
+    examples = Path(__file__).resolve().parents[1] / "examples"
+    focgen.generate(examples / "controller.toml", tmp_path, package="fmu")
+    lines = run(sys.executable, examples / "fmu" / "loop.py", tmp_path / "spba.fmu").splitlines()
+    reached = [float(line.split()[4]) for line in lines]
+    assert len(reached) == 5 and reached == sorted(reached) and 0.0095 < reached[-1] < 0.01
 
 
 def test_without_a_compiler_nothing_is_written(tmp_path, monkeypatch):

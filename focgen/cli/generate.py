@@ -74,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="package",
         action="append",
         choices=PACKAGES,
-        help="what to add to the plain files: a CMake package, an FMU (a block for simulators)",
+        help="what to add to the plain files: a CMake package, an Arduino or PlatformIO library, an FMU",
     )
     parser.add_argument("--fmi", type=int, choices=FMI, help="version of an FMU's interface; default: 3")
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from focgen.codegen.packages.arduino import arduino_files
 from focgen.codegen.packages.cmake import cmake_files
 from focgen.codegen.packages.context import Made
 from focgen.codegen.packages.fmu import fmu_files
+from focgen.codegen.packages.platformio import platformio_files
 from focgen.errors import InputError, check_choice
 
 _FILES: Mapping[str, Callable[[Made], dict[str, str | bytes]]] = {
     "plain": lambda made: {},
     "cmake": cmake_files,
+    "arduino": arduino_files,
+    "platformio": platformio_files,
     "fmu": fmu_files,
 }
 PACKAGES = tuple(_FILES)
