@@ -181,11 +181,13 @@ def test_the_same_input_gives_the_same_bytes(tmp_path):
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
 
 
-def changed(path: Path, name: str, content: bytes | None) -> None:
-    """Write the archive anew with another content of one file, or without it."""
+def changed(path: Path, name: str, content) -> None:
+    """Write the archive anew with another content of one file (bytes, or what makes them of the former), or
+    without it.
+    """
     with zipfile.ZipFile(path) as archive:
         inside = {entry: archive.read(entry) for entry in archive.namelist()}
-    inside[name] = content
+    inside[name] = content(inside[name]) if callable(content) else content
     with zipfile.ZipFile(path, "w") as archive:
         for entry, data in inside.items():
             if data is not None:
@@ -194,9 +196,13 @@ def changed(path: Path, name: str, content: bytes | None) -> None:
 
 DAMAGED = {
     "sources/filter.c is not what": lambda path: changed(path, "sources/filter.c", b"/* mine */"),
+    "sources/filter.h is not what": lambda path: changed(path, "sources/filter.h", bytes.swapcase),
     "lacks modelDescription.xml": lambda path: changed(path, "modelDescription.xml", None),
     "files that do not belong": lambda path: changed(path, "sources/mine.c", b""),
     "is no zip": lambda path: path.write_bytes(b"PK mine"),
+    "zip that can be read": lambda path: path.write_bytes(
+        bytes(b ^ (i == 200) for i, b in enumerate(path.read_bytes()))
+    ),
 }
 
 

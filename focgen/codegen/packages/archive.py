@@ -10,6 +10,7 @@ import io
 import platform
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,7 +94,7 @@ def compare_archive(path: Path, name: str, files: Mapping[str, str | bytes], fmi
     try:
         with zipfile.ZipFile(path) as archive:
             faults = tuple(_faults(archive, _members(name, files, fmi)))
-    except (zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError, EOFError):
+    except (zipfile.BadZipFile, zlib.error, OSError, NotImplementedError, RuntimeError, EOFError):
         return Compared((f"{path.name}: is no zip that can be read",))
     return Compared(
         tuple(f"{path.name}: {fault}" for fault in faults),
