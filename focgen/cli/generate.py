@@ -66,6 +66,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-float", action="store_true", help="leave out NAME_ref_from_f32() and the other conversions"
     )
+    parser.add_argument(
+        "--tunable",
+        action="store_true",
+        help="add NAME_tune(): gains and output limits in RAM, within the box of [tunable] in the controller",
+    )
     parser.add_argument("--for", dest="package", choices=PACKAGES, default="plain", help="build files to add")
 
 
@@ -86,6 +91,7 @@ def run(args: argparse.Namespace) -> Outcome:
         args.no_float,
         args.operator,
         args.band and tuple(args.band),
+        args.tunable,
     )
     return Outcome(made.manifest, _text(made))
 

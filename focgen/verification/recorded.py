@@ -31,6 +31,7 @@ _SHAPE = {
     "kernels?": {"target": str},
     "selftest?": dict,
     "no_float?": bool,
+    "tunable?": dict,
     "inputs": dict,
 }
 _EXPONENTIAL = {"tolerance": float, "horizon": int}
@@ -59,6 +60,7 @@ class Recorded:
     content: Mapping[str, Any]
     operator: str = "gl"
     band: tuple[float, float] | None = None
+    tunable: bool = False
 
 
 def read_recorded(folder: Path) -> Recorded:
@@ -85,7 +87,8 @@ def read_recorded(folder: Path) -> Recorded:
     options = found["arithmetic"], found["memory"], *_memory(path, found)
     bound, floats = _bound(found["error_bound"]), not found.get("no_float", False)
     recorded = Recorded(name, *options, Kernels(target), "selftest" in found, bound, floats, found)
-    return replace(recorded, operator=found["operator"], band=_band(path, found))
+    band, tunable = _band(path, found), "tunable" in found
+    return replace(recorded, operator=found["operator"], band=band, tunable=tunable)
 
 
 def _check_shape(path: Path, found: Any, shape: dict[str, Any]) -> None:

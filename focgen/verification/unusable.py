@@ -34,7 +34,7 @@ def strewn(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
     others = [values[-1] for name, values in signals.items() if name != "meas"]
     _largest(rng, signals["meas"][-1], others, kind(limit(plan)))
     resets, tracks = _resets(rng, scenario, bad), _tracks(rng, scenario, bad)
-    made = Scenario(**signals, resets=resets, tracks=tracks)
+    made = Scenario(**signals, resets=resets, tracks=tracks, tunes=scenario.tunes)
     return replace(made, damages=_damages(plan, made, rng))
 
 
