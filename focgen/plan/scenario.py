@@ -57,8 +57,8 @@ class Tune:
 @dataclass(frozen=True)
 class Damage:
     """What a run cannot do, in a floating state before sample ``sample``, whose inputs can be used: ``what``
-    is the latest "error", which becomes NaN, the "integral", which leaves its limits, or "all", every byte
-    becoming 0xff.
+    is the latest "error", which becomes NaN, the "integral", which leaves its limits, the "limits" or the
+    "gains" of a tunable plan, which leave their box, or "all", every byte becoming 0xff.
     """
 
     lane: int

@@ -21,7 +21,7 @@ DTYPES = {
     "int16_t": np.int16,
 }
 _RESET, _TRACK, _SAVE, _TUNE = 1, 2, 64, 128
-_DAMAGES = {"error": 16, "all": 32, "integral": 48}
+_DAMAGES = {"error": 16, "all": 32, "integral": 48, "limits": 48, "gains": 48}
 REFUSED = 128
 """Beside the flags of a step: a reset or a track ahead of it has raised INPUT or INVALID."""
 UNTUNED = 64
@@ -154,5 +154,5 @@ def _events(plan: Plan, scenario: Scenario, lane: int, signal: type) -> tuple[np
     for d in scenario.damages:
         if d.lane == lane:
             event[d.sample] |= _DAMAGES[d.what]
-            given[d.sample, 0] = np.nan
+            given[d.sample, 0] = {"limits": 1.0, "gains": 2.0}.get(d.what, np.nan)
     return event, given

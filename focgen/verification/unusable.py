@@ -70,6 +70,7 @@ def _damages(plan: Plan, scenario: Scenario, rng: np.random.Generator) -> tuple[
         return ()
     good, begun = ~invalid_samples(plan, scenario), {(r.lane, r.sample) for r in scenario.resets}
     kinds = ["error"] * bool(plan.error_lags) + ["all"] + ["integral"] * bool(plan.integrator)
+    kinds += ["limits", "gains"] * bool(plan.tuning)
     found = []
     for lane in range(scenario.lanes):
         places = [k for k in np.flatnonzero(good[lane]).tolist() if (lane, k) not in begun]
