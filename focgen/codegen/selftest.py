@@ -257,9 +257,7 @@ def scenario_of(plan: Plan, made: list[Row]) -> Scenario:
         if row.event == RESET
     ]
     tracks = [Track(0, int(at), _argument(row, 0)) for row, at in zip(made, starts) if row.event == TRACK]
-    tunes = [
-        Tune(0, int(at), _params(plan, row)) for row, at in zip(made, starts) if row.event == TUNE
-    ]
+    tunes = [Tune(0, int(at), _params(plan, row)) for row, at in zip(made, starts) if row.event == TUNE]
     return Scenario(ref, meas, sched if plan.schedule else None, tuple(resets), tuple(tracks),
                     tunes=tuple(tunes))  # fmt: skip
 

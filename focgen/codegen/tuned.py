@@ -32,8 +32,8 @@ class Limits:
 class TunedText:
     """How parameters are taken over. ``gain`` and ``slope``: of index i; ``slope`` is empty without a
     schedule. ``one``: the default factor. ``within``: the function that asks for a box. ``least``, ``most``
-    and ``steepest``: what a gain and a slope in a state can be. ``moved``: the output, or the integral, within
-    the new limits; empty where no output is kept. ``kept``: its member.
+    and ``steepest``: what a gain and a slope in a state can be. ``moved``: the output, or the integral,
+    within the new limits; empty where no output is kept. ``kept``: its member.
     """
 
     tables: list[TableText]

@@ -44,9 +44,7 @@ def _mended(plan: Plan, scenario: Scenario, damages: tuple[Damage, ...], execute
     places = {(d.lane, d.sample) for d in damages}
     tracks = tuple(t for t in scenario.tracks if (t.lane, t.sample) not in places)
     lost = [Tune(d.lane, d.sample, default_params(plan)) for d in damages if _untuned(plan, d)]
-    return replace(
-        without, resets=(*scenario.resets, *resets), tracks=tracks, tunes=(*scenario.tunes, *lost)
-    )
+    return replace(without, resets=(*scenario.resets, *resets), tracks=tracks, tunes=(*scenario.tunes, *lost))
 
 
 def _untuned(plan: Plan, damage: Damage) -> bool:

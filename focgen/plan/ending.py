@@ -81,7 +81,9 @@ def _taken(plan: Plan, found: Ending, now: Applied) -> Ending:
 
 def _within(plan: Plan, found: Ending, u) -> np.generic:
     """A floating output within the limits that hold; in integers no sample is ever left out."""
-    low, high = (found.applied.low, found.applied.high) if plan.tuning else (plan.output.low, plan.output.high)
+    low, high = (
+        (found.applied.low, found.applied.high) if plan.tuning else (plan.output.low, plan.output.high)
+    )
     return type(u)(min(max(u, low), high))
 
 

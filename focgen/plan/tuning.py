@@ -66,9 +66,7 @@ def applied(plan: Plan, params: Params) -> Applied:
 def _whole(box: Tuning, factors: list[int], _) -> tuple[tuple[int, ...], tuple[int, ...]]:
     gains = tuple(shift(factor * nominal, box.to_gain) for factor, nominal in zip(factors, box.nominal))
     rises = (after - before for before, after in zip(gains, gains[1:]))
-    return gains, tuple(
-        shift(rise * per, by) for rise, per, by in zip(rises, box.reciprocals, box.to_slopes)
-    )
+    return gains, tuple(shift(rise * per, by) for rise, per, by in zip(rises, box.reciprocals, box.to_slopes))
 
 
 def _floating(box: Tuning, factors: list, kind: type) -> tuple[tuple[float, ...], tuple[float, ...]]:

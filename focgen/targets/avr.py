@@ -155,7 +155,13 @@ class AvrLibrary:
     def _records(self, scenario: Scenario, number: int) -> bytes:
         """What the emulator puts in memory, sample by sample."""
         lane, kind = lane_of(self.plan, scenario, number), DTYPES[self.plan.output.ctype]
-        fields = [("ref", kind), ("meas", kind), ("sched", kind), ("event", np.uint8), ("given", kind, given_width(self.plan))]
+        fields = [
+            ("ref", kind),
+            ("meas", kind),
+            ("sched", kind),
+            ("event", np.uint8),
+            ("given", kind, given_width(self.plan)),
+        ]
         records = np.zeros(scenario.samples, np.dtype(fields))
         for name in records.dtype.names:
             records[name] = getattr(lane, name)

@@ -171,7 +171,7 @@ def _happen(one: Any, event: Reset | Track | Tune) -> None:
 
 
 def _tune(one: Any, params: Params) -> None:
-    """What is refused changes nothing: whether it is said by an error or a number is the candidate's affair."""
+    """What is refused changes nothing; whether an error or a number says so is the candidate's affair."""
     with suppress(InputError):
         one.tune(Params(tuple(map(_plain, params.gain)), _plain(params.u_min), _plain(params.u_max)))
 

@@ -71,17 +71,17 @@ def assert_equivalent(
 
     ``candidate``: a generated folder, edited or not; an object with ``reset(ref, meas, u0)``, ``step(ref,
     meas, sched)`` and ``track(u)`` in counts, such as :func:`focgen.testing.from_c` makes, which may also
-    have ``init()``, ``flags`` and, for a tunable reference, ``tune(params)``; a class or function without arguments that makes such an object; or a
-    function ``step(ref, meas, sched)`` that starts at rest, which is tried in one run, without resets and
-    tracks.
+    have ``init()``, ``flags`` and, for a tunable reference, ``tune(params)``; a class or function without
+    arguments that makes such an object; or a function ``step(ref, meas, sched)`` that starts at rest, which
+    is tried in one run, without resets and tracks.
     Nothing is passed for ``sched`` where nothing is scheduled.
 
     ``within`` "bits": outputs, and flags where the candidate has them, are the bit-true reference's, on the
     inputs that ``verify`` takes: steps, noise, limits, ends and breakpoints of the schedule, resets, tracks,
-    parameters, inputs out of range or not usable, the worst case of every node. "bound": outputs are no further from the
-    same controller in float64 than manifest.json's ``error_bound`` allows, on inputs within their ranges; for
-    fused multiply-adds, vectorised sums and other orders of summation. ``samples`` of mixed inputs from
-    ``seed``, besides the worst cases.
+    parameters, inputs out of range or not usable, the worst case of every node. "bound": outputs are no
+    further from the same controller in float64 than manifest.json's ``error_bound`` allows, on inputs within
+    their ranges; for fused multiply-adds, vectorised sums and other orders of summation. ``samples`` of mixed
+    inputs from ``seed``, besides the worst cases.
 
     Raises InputError for what cannot be compared.
     """

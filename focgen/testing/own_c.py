@@ -88,10 +88,11 @@ def from_c(
     """Compile C of your own, and return it as a candidate for :func:`assert_equivalent`.
 
     The C has PREFIX_reset(state *, ref, meas, u0), PREFIX_step(state *, ref, meas) or PREFIX_step(state *,
-    ref, meas, sched), and, where it can, PREFIX_init(state *), PREFIX_track(state *, u) and
-    PREFIX_flags(state *), PREFIX_tune(state *, const PREFIX_params *), on a state of type ``state`` (PREFIX_state), which may hold anything. ``names``
-    gives other names, such as {"step": "valve_update"}. They are declared in ``header``: by default the first
-    .h among ``sources``, else PREFIX.h beside one of them, else the first source itself is included.
+    ref, meas, sched), and, where it can, PREFIX_init(state *), PREFIX_track(state *, u), PREFIX_flags(state
+    *) and PREFIX_tune(state *, const PREFIX_params *), on a state of type ``state`` (PREFIX_state), which may
+    hold anything. ``names`` gives other names, such as {"step": "valve_update"}. They are declared in
+    ``header``: by default the first .h among ``sources``, else PREFIX.h beside one of them, else the first
+    source itself is included.
     ``include`` are further folders of headers, ``flags`` those of the compiler.
 
     Raises InputError where a file or a function is missing, BuildError where the C does not compile.

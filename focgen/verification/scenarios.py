@@ -152,7 +152,12 @@ def worst_cases(plan: Plan) -> Scenario:
 def _content(scenario: Scenario) -> tuple:
     """What tells scenarios apart."""
     signals = scenario.ref, scenario.meas, scenario.sched
-    return *(None if x is None else x.tobytes() for x in signals), scenario.resets, scenario.tracks, scenario.tunes
+    return (
+        *(None if x is None else x.tobytes() for x in signals),
+        scenario.resets,
+        scenario.tracks,
+        scenario.tunes,
+    )
 
 
 def side_by_side(scenarios: list[Scenario]) -> Scenario:
