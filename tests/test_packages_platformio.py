@@ -40,7 +40,7 @@ Default(env.BuildProgram())
 @pytest.fixture
 def pack(monkeypatch):
     """PlatformIO's packer, which validates the manifest; the licences are those that `packaging` knows."""
-    pytest.importorskip("platformio", reason="PlatformIO is not installed: pip install 'focgen[test]'")
+    pytest.importorskip("platformio", reason="PlatformIO is not installed: pip install 'focgen[dev]'")
     from packaging.licenses._spdx import LICENSES
     from platformio.package.manifest.schema import ManifestSchema
     from platformio.package.pack import PackagePacker
@@ -73,7 +73,7 @@ def test_the_arduino_library_packs_as_well(pack, tmp_path):
 @pytest.fixture
 def core(tmp_path) -> dict[str, str]:
     """The environment of a PlatformIO that has its build tool and a platform for this computer."""
-    scons = pytest.importorskip("SCons", reason="SCons is not installed: pip install 'focgen[test]'")
+    scons = pytest.importorskip("SCons", reason="SCons is not installed: pip install 'focgen[dev]'")
     from platformio.dependencies import get_core_dependencies
 
     wanted = get_core_dependencies()["tool-scons"].strip("~^=")
@@ -105,7 +105,7 @@ def core(tmp_path) -> dict[str, str]:
 
 
 def test_the_example_is_built_by_platformio(tmp_path, request):
-    pytest.importorskip("platformio", reason="PlatformIO is not installed: pip install 'focgen[test]'")
+    pytest.importorskip("platformio", reason="PlatformIO is not installed: pip install 'focgen[dev]'")
     compiler("gcc")
     environment, project = request.getfixturevalue("core"), tmp_path / "project"
     focgen.generate(EXAMPLES / "controller.toml", project / "lib" / "spba", for_="platformio")

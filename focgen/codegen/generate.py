@@ -59,6 +59,7 @@ def generate(
     no_float: bool = False,
     operator: str = "gl",
     band: tuple[float, float] | None = None,
+    tunable: bool = False,
     fmi: int | None = None,
 ) -> Generated:
     """Write C for a controller into the folder ``out``, whole or not at all; what an earlier run wrote there
@@ -72,8 +73,10 @@ def generate(
     same. ``no_float`` leaves the conversions from and to physical values out of the header. ``operator``
     "continuous" fits the exponential memory to (jω)^α itself within ``tolerance`` over ``band`` (rad/s; None:
     four decades up to a tenth of the Nyquist frequency); it has no horizon, and a tolerance of 1e-3 unless
-    another is given. "gl" fits it to the weights of eq. (11). ``for_`` adds what an ecosystem expects: one of
-    ``PACKAGES``; the interface of an "fmu" is version ``fmi``, 2 or 3 (the default).
+    another is given. "gl" fits it to the weights of eq. (11). ``tunable`` adds NAME_params, NAME_default,
+    NAME_check and NAME_tune: factors on the gains and output limits that change at run time, within the box
+    that the controller's ``tunable`` gives. ``for_`` adds what an ecosystem expects: one of ``PACKAGES``; the
+    interface of an "fmu" is version ``fmi``, 2 or 3 (the default).
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
@@ -88,7 +91,7 @@ def generate(
     _check_form(form, length, tolerance, horizon)
     _check_operator(form, operator, band, horizon, made.sample_time)
     called = check_name(made.name if name is None else name, where)
-    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band)
+    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band, tunable)
     files = folder_files(plan, text, selftest, kernels, not no_float, wanted)
     files.update(archived(plan.name, files, wanted.fmi))
     old = leftovers(Path(out), called, files)
