@@ -79,10 +79,11 @@ def means(part: np.ndarray, coarse: int) -> np.ndarray:
     return part if coarse == 1 else part[: count * coarse].reshape(count, coarse).mean(axis=1)
 
 
-def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing) -> np.ndarray:
-    """The weighed residual, as a share of the output's level."""
+def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing, probe: bool = False) -> np.ndarray:
+    """The weighed residual, as a share of the output's level; ``probe``: of a step from a vector that was
+    simulated just before, and will be again."""
     segment = problem.segment
-    made, weight, rest = problem.simulate(vector), segment.weight, segment.run.rest
+    made, weight, rest = problem.simulate(vector, probe), segment.weight, segment.run.rest
     if not segment.pace:
         return innovated(segment.y, made, weight, rest, weighing.coarse, weighing.ar)
     left = segment.recent(segment.y - made)
@@ -154,7 +155,7 @@ def jacobian(
         step = STEP if vector[i] + STEP <= high[i] else -STEP
         moved = vector.copy()
         moved[i] += step
-        rows.append((innovations(problem, moved, weighing) - now) / step)
+        rows.append((innovations(problem, moved, weighing, probe=True) - now) / step)
     return np.stack(rows)
 
 
