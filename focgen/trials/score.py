@@ -165,7 +165,7 @@ def _ask_oracle(folder: Path, labels: dict[str, dict], jobs: int) -> None:
 def _judged(folder: Path, number: str, label: dict, baseline: bool) -> Judged:
     run, told = folder / "runs" / number, folder / "oracle" / number
     outcome, diagnosis = outcome_of(run), _diagnosis_of(run)
-    single = label["kind"] == "single" and label["suite"] != "closed"
+    single = label["kind"] == "single" and label["suite"] not in ("closed", "loops")
     return judge(
         number,
         label,
