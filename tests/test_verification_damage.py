@@ -119,19 +119,27 @@ def test_every_lane_is_damaged_and_the_reference_ends_where_the_c_does():
 
 
 @pytest.mark.parametrize(
-    "name, pattern, by",
+    "name, arithmetic, pattern, by",
     (
-        ("spba", r"if \(!foc_finite_f32\(s->integral \+ .*\) \{\n", "if (0) {\n"),
-        ("spba", r"!foc_finite_f32\(s->integral [^|]*\|\| ", ""),
-        ("spba", r" \|\| !spba_within\(s->integral\)", ""),
-        ("filter", r"if \(!foc_finite_f32\(d\)\)", "if (0)"),
-        ("spba", r"(spba_recover(.|\n)*?)    spba_settle\(s, e\);\n", r"\1"),
-        ("spba", r"    s->integral = u;\n    s->flags = flags;", "    s->flags = flags;"),
-        ("filter", r"    s->output = u;\n    s->flags = flags;", "    s->flags = flags;"),
-        ("modes", r"    s->flags = flags;\n", ""),
+        ("spba", "f64", r"if \(!foc_finite_f64\(s->integral \+ .*\) \{\n", "if (0) {\n"),
+        ("spba", "f64", r"!foc_finite_f64\(s->integral [^|]*\|\| ", ""),
+        ("spba", "f64", r" \|\| !spba_within\(s\)", ""),
+        ("spba", "f32", r"if \(!spba_within\(s\)\)", "if (0)"),
+        ("spba", "f32", r"s->error_now < SPBA_ERRORS && ", ""),
+        ("spba", "f32", r"if \(!foc_held\(d\) ", "if (0 && !foc_held(d) "),
+        ("filter", "f32", r"if \(!foc_finite_f32\(d\)\)", "if (0)"),
+        ("spba", "f32", r"(spba_recover(.|\n)*?)    spba_settle\(s, e\);\n", r"\1"),
+        (
+            "spba",
+            "f32",
+            r"    s->integral = foc_counts_f32\(u, 57\);\n    s->flags = flags;",
+            "    s->flags = flags;",
+        ),
+        ("filter", "f32", r"    s->output = u;\n    s->flags = flags;", "    s->flags = flags;"),
+        ("modes", "f32", r"    s->flags = flags;\n", ""),
     ),
 )
-def test_verify_sees_a_guard_that_is_lost(sound, tmp_path, name, pattern, by):
-    folder = copied(sound, tmp_path, name, "f32")
+def test_verify_sees_a_guard_that_is_lost(sound, tmp_path, name, arithmetic, pattern, by):
+    folder = copied(sound, tmp_path, name, arithmetic)
     sow(folder, "filter" if name == "filter" else "spba", Fault("guard", "@.c", pattern, by))
     assert verify(folder, 3000, edited=True).targets["host"].mismatches

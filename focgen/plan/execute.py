@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.plan.counts import taken_in, values_of
 from focgen.plan.damage import mended
 from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest, Recursion
@@ -212,8 +213,14 @@ class Run:
 
     def _inner(self) -> np.ndarray:
         """z, aligned to p."""
-        inner, out = self.plan.inner, np.empty(self.shape, self.kind)
-        z, before = np.zeros(self.shape[0], self.kind), np.zeros(self.shape[0], self.kind)
+        inner, kind = self.plan.inner, kind_of(self.plan.inner.state)
+        self.r = taken_in(self.r, inner.state)
+        self.r_rest = {place: taken_in(r, inner.state) for place, r in self.r_rest.items()}
+        z, before, out = (
+            np.zeros(self.shape[0], kind),
+            np.zeros(self.shape[0], kind),
+            np.empty(self.shape, kind),
+        )
         for k in range(self.shape[1]):
             for lane in self.starting.get(k, ()):
                 z[lane], before[lane] = 0, self.r_rest[lane, k]
@@ -221,7 +228,9 @@ class Run:
             z = clamp(z + (now + before), inner.state)
             out[:, k], before = z, now.copy()
         self.inner = z
-        return out if self.plan.floating else shift(out, inner.to_wide)
+        if inner.state.floating:
+            return out
+        return values_of(out, inner.state) if self.plan.floating else shift(out, inner.to_wide)
 
     def _fed_back(self, p: np.ndarray) -> np.ndarray:
         """v_k from p_k and the past of v, whose columns are samples, ``lags`` of them ahead of the first."""
@@ -274,12 +283,15 @@ class Run:
         return self._integrated(d), d
 
     def increment(self, product: np.ndarray) -> np.ndarray:
-        return product if self.plan.floating else shift(product, self.plan.gain_shift)
+        """d of g·v."""
+        if self.plan.floating:
+            return taken_in(product, self.plan.increment)
+        return shift(product, self.plan.gain_shift)
 
     def _integrated(self, d: np.ndarray) -> np.ndarray:
         plan, lanes = self.plan, self.shape[0]
-        state, out = plan.integrator.state, np.empty(self.shape, self.kind)
-        total, before = np.zeros(lanes, self.kind), np.zeros(lanes, self.kind)
+        state, kind = plan.integrator.state, kind_of(plan.integrator.state)
+        total, before, out = np.zeros(lanes, kind), np.zeros(lanes, kind), np.empty(self.shape, kind)
         tracks: dict[int, list] = {}
         for t in self.scenario.tracks:
             if usable(t.u, plan.output):
@@ -293,15 +305,20 @@ class Run:
             total = clamp(total + (d[:, k] + before), state)
             out[:, k], before = total, d[:, k].copy()
         self.integral = total
-        return out if plan.floating else saturate(shift(out, plan.integrator.to_output), plan.output.bits)
+        if plan.floating:
+            return output_of(plan, out)
+        return saturate(shift(out, plan.integrator.to_output), plan.output.bits)
 
     def tracked(self, u) -> np.generic:
         """The integral that follows the output ``u``."""
         return self.wide(clamp(np.asarray(u, dtype=self.kind), self.plan.output))
 
     def wide(self, u):
-        """Output counts in counts of the integrator."""
-        return u if self.plan.floating else u << self.plan.integrator.to_output
+        """Output counts as what the integrator holds; as they are without one."""
+        integrator = self.plan.integrator
+        if integrator is None:
+            return u
+        return taken_in(u, integrator.state) if self.plan.floating else u << integrator.to_output
 
     def flags(self, u: np.ndarray) -> np.ndarray:
         """The flags after each step."""
@@ -315,6 +332,12 @@ class Run:
             found = found + FLAG_SCHEDULE * ((self.s < first) | (self.s > last))
             outside |= False if plan.floating else np.asarray(scenario.sched) != self.s
         return (found + FLAG_INPUT * outside).astype(np.uint8)
+
+
+def output_of(plan: Plan, integral: np.ndarray) -> np.ndarray:
+    """u of a floating plan's integral, any shape; an end that is no whole number of counts counts still."""
+    state = plan.integrator.state
+    return integral if state.floating else clamp(values_of(integral, state), plan.output)
 
 
 def scheduled_gain(plan: Plan, s: np.ndarray) -> np.ndarray:
