@@ -15,8 +15,8 @@ from focgen.plan.usable import EXPONENT
 class GuardText:
     """Conditions on the arguments of reset, step and track; ``within``: whether ``now``, what is ``kept`` of
     the output that stands, ``held``, can be; ``keep``: what puts u in its place; ``start``: the output before
-    any step. ``damaged``: what tells a step that the state is none that a step has left; ``unsound``: the same
-    of integrals in counts, before the step adds to them.
+    any step. ``damaged``: what tells a step that the state is none that a step has left; ``unsound``: the
+    same of integrals in counts, before the step adds to them.
     """
 
     error_usable: str
