@@ -127,7 +127,7 @@ def test_every_lane_is_damaged_and_the_reference_ends_where_the_c_does():
         ("spba", "f64", r"!foc_finite_f64\(s->integral [^|]*\|\| ", ""),
         ("spba", "f64", r" \|\| !spba_within\(s\)", ""),
         ("spba", "f32", r"if \(!spba_within\(s\)\)", "if (0)"),
-        ("plain", "f32", r"s->error_now < SIMPLE_ERRORS && ", ""),
+        ("plain", "f32", r"s->error_now < SIMPLE_ERRORS\s+&& ", ""),
         ("spba", "f32", r"if \(!foc_held\(d\) ", "if (0 && !foc_held(d) "),
         ("filter", "f32", r"if \(!foc_finite_f32\(d\)\)", "if (0)"),
         ("spba", "f32", r"(spba_recover(.|\n)*?)    spba_settle\(s, e\);\n", r"\1"),

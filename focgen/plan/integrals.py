@@ -26,6 +26,7 @@ from focgen.plan.counts import MOST, counts_of
 from focgen.plan.formats import shift
 from focgen.plan.model import Format, Plan, Sum
 from focgen.plan.truncation import largest_error
+from focgen.plan.tuning import gain_intervals
 from focgen.plan.usable import filtered_reach, l1_of
 
 STEPS = 10**8
@@ -102,8 +103,14 @@ def remarks(plan: Plan) -> list[str]:
 
 
 def _gains(plan: Plan) -> list[float]:
-    """Every gain, in counts, that is not 0."""
-    return [g for g in (plan.schedule.gains if plan.schedule else (plan.constant_gain,)) if g]
+    """Every gain, in counts, that is not 0; of a tunable one at both ends of its factor."""
+    if plan.tuning is None:
+        found = plan.schedule.gains if plan.schedule else (plan.constant_gain,)
+    elif plan.floating:
+        found = [g * plan.tuning.factor.low for g in plan.tuning.nominal]
+    else:
+        found = [end for each in gain_intervals(plan.tuning) for end in (each.low, each.high)]
+    return [g for g in found if g]
 
 
 def _at_rest(table: Sum | None) -> float:

@@ -5,7 +5,7 @@ whatever it cannot exclude: signed overflow, a read or write outside, a shift ou
 zero, a member that leaves its interval. No report is a proof. What it cannot see is what keeps small because
 one value is taken from another, as it has one interval for each: the rounding's rest
 (:func:`tests.proofs.esbmc.carry` shows that), what modes keep (:func:`tests.proofs.esbmc.means`), the
-filtered error that they keep it of, which rests on the recursion's l1 norm, and that a finite float has counts
+filtered error that they keep it of (the recursion's l1 norm), and that a finite float has counts
 (:func:`tests.proofs.esbmc.counted`).
 """
 

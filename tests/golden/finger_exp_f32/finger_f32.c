@@ -281,7 +281,9 @@ static uint8_t finger_f32_within(const finger_f32_state *s)
 {
     const int64_t now = s->integral;
 
-    return (uint8_t)(s->error_now < FINGER_F32_ERRORS && now >= 0 && now <= 1441151880758558720);
+    return (uint8_t)(s->error_now < FINGER_F32_ERRORS
+                     && now >= 0
+                     && now <= 1441151880758558720);
 }
 
 /* An input of the step cannot be used: the output stays, and so does everything else. */
