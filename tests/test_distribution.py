@@ -67,7 +67,7 @@ def test_the_citation_names_the_paper_and_this_version():
 @pytest.fixture(scope="module")
 def built(tmp_path_factory) -> Path:
     """The folder with both archives; the wheel is built from the sources' one."""
-    pytest.importorskip("build", reason="build is not installed: pip install 'focgen[test]'")
+    pytest.importorskip("build", reason="build is not installed: pip install 'focgen[dev]'")
     out = tmp_path_factory.mktemp("dist")
     run(sys.executable, "-m", "build", "--outdir", out, ROOT)
     return out

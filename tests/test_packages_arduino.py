@@ -38,7 +38,7 @@ ALMOST = {  # spellings that the linter takes for a slip
 
 @pytest.fixture
 def library(tmp_path) -> Path:
-    focgen.generate(seed_controller(40), tmp_path / "spba", "q15", package="arduino", selftest=True)
+    focgen.generate(seed_controller(40), tmp_path / "spba", "q15", for_="arduino", selftest=True)
     return tmp_path / "spba"
 
 
@@ -106,7 +106,7 @@ def test_what_the_editor_colours(library):
 
 def test_a_name_of_arduinos_is_refused(tmp_path):
     with pytest.raises(focgen.FocgenError, match="--name"):
-        focgen.generate(seed_controller(9), tmp_path / "out", name="my_Arduino", package="arduino")
+        focgen.generate(seed_controller(9), tmp_path / "out", name="my_Arduino", for_="arduino")
     assert not (tmp_path / "out").exists()
 
 
@@ -148,7 +148,7 @@ int main(void) { setup(); for (int k = 0; k < 1500; k++) { loop(); now += 1000; 
 def test_the_sketch_drives_the_pin_as_the_reference_would(arithmetic, tmp_path):
     """Compiled as C++ with a board of ours: a loop every millisecond takes a sample every tenth time."""
     controller, folder = seed_controller(40), tmp_path / "spba"
-    focgen.generate(controller, folder, arithmetic, package="arduino")
+    focgen.generate(controller, folder, arithmetic, for_="arduino")
     (tmp_path / "board.h").write_text(BOARD)
     (tmp_path / "main.cpp").write_text(HARNESS)
     shutil.copy(folder / "examples/spba/spba.ino", tmp_path / "sketch.ino")
@@ -191,7 +191,7 @@ def test_arduinos_builder_makes_a_program_for_an_uno(sketch, tmp_path):
     if not hardware.is_dir():
         pytest.skip("the core of the AVR boards (arduino-core-avr) is not on this machine")
     folder = tmp_path / "libraries" / "spba"
-    focgen.generate(EXAMPLES / "controller.toml", folder, "q15", "exponential", package="arduino")
+    focgen.generate(EXAMPLES / "controller.toml", folder, "q15", "exponential", for_="arduino")
     (tmp_path / "build").mkdir()
     own = Path("/usr/share/arduino-builder")
     said = run(

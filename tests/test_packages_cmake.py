@@ -39,7 +39,7 @@ def built(source: Path, build: Path, *options: str) -> Path:
 def test_the_example_finds_the_installed_package_from_c_and_cpp(tmp_path):
     compiler("gcc"), compiler("g++", source="int main() { return 0; }")
     folder, installed = tmp_path / "spba", tmp_path / "installed"
-    focgen.generate(EXAMPLES / "controller.toml", folder, package="cmake", selftest=True)
+    focgen.generate(EXAMPLES / "controller.toml", folder, for_="cmake", selftest=True)
     build = built(folder, tmp_path / "build")
     assert run(build / "focgen_spba_example").count("\n") == 10
     run(build_tool("cmake"), "--install", build, "--prefix", installed)
@@ -57,7 +57,7 @@ def test_the_example_finds_the_installed_package_from_c_and_cpp(tmp_path):
 def test_a_project_takes_two_folders_in(tmp_path):
     """One of them by a name that CMake keeps for a target of its own."""
     for name in ("test", "finger"):
-        focgen.generate(seed_controller(9), tmp_path / name, "f32", name=name, package="cmake")
+        focgen.generate(seed_controller(9), tmp_path / name, "f32", name=name, for_="cmake")
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.15)\nproject(two C)\n"
         "add_subdirectory(test)\nadd_subdirectory(finger)\n"
@@ -76,7 +76,7 @@ def test_a_project_takes_two_folders_in(tmp_path):
 
 def test_build_files_are_the_users_to_change(tmp_path):
     folder = tmp_path / "spba"
-    made = focgen.generate(seed_controller(9), folder, "q15", package="cmake")
+    made = focgen.generate(seed_controller(9), folder, "q15", for_="cmake")
     assert made.manifest["package"]["for"] == "cmake"
     assert read_folder(folder).differences == () and read_folder(folder).notes == ()
     for name, note in (("CMakeLists.txt", "has been edited"), ("LICENSE", "is missing")):
@@ -89,11 +89,11 @@ def test_another_package_takes_the_place_of_the_one_before(tmp_path):
     """What is still as it was written goes; what the user changed stays."""
     folder = tmp_path / "spba"
     for package in ("cmake", "fmu", "cmake", "plain"):
-        made = focgen.generate(seed_controller(9), folder, "q15", package=package)
+        made = focgen.generate(seed_controller(9), folder, "q15", for_=package)
         assert {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()} == set(made.files)
         read = read_folder(folder)
         assert read.differences == () and all("binary" in note for note in read.notes)
-    focgen.generate(seed_controller(9), folder, "q15", package="cmake")
+    focgen.generate(seed_controller(9), folder, "q15", for_="cmake")
     (folder / "CMakeLists.txt").write_text("mine")
     focgen.generate(seed_controller(9), folder, "q15")
     assert (folder / "CMakeLists.txt").read_text() == "mine" and not (folder / "LICENSE").exists()

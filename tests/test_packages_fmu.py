@@ -66,7 +66,7 @@ def reference(plan, table, resets=()):
 
 
 def made(tmp_path: Path, controller, arithmetic: str, fmi: int) -> Path:
-    focgen.generate(controller, tmp_path, arithmetic, package="fmu", fmi=fmi)
+    focgen.generate(controller, tmp_path, arithmetic, for_="fmu", fmi=fmi)
     return tmp_path / f"{controller.name}.fmu"
 
 
@@ -168,7 +168,7 @@ def test_the_functions_are_those_of_the_standards_headers(fmpy, arithmetic, fmi,
 def test_texts_of_a_user_are_those_of_the_description(fmpy, tmp_path):
     title, unit = 'a <"&> \u00b5\tb', 'V"<&>'
     controller = seed_controller(9, name=title, units=Units("1/mm", unit, "bar"))
-    focgen.generate(controller, tmp_path, "q15", name="odd", package="fmu")
+    focgen.generate(controller, tmp_path, "q15", name="odd", for_="fmu")
     description = fmpy.read_model_description(str(tmp_path / "odd.fmu"), validate=True)
     assert description.modelName == 'a <"&> \u00b5 b'
     assert {v.unit for v in description.modelVariables if v.name == "u"} == {unit}
@@ -229,7 +229,7 @@ def test_verify_names_edited_c_of_the_interface(tmp_path):
 
 def test_the_example_runs_its_loop(fmpy, tmp_path):
     examples = Path(__file__).resolve().parents[1] / "examples"
-    focgen.generate(examples / "controller.toml", tmp_path, package="fmu")
+    focgen.generate(examples / "controller.toml", tmp_path, for_="fmu")
     lines = run(sys.executable, examples / "fmu" / "loop.py", tmp_path / "spba.fmu").splitlines()
     reached = [float(line.split()[4]) for line in lines]
     assert len(reached) == 5 and reached == sorted(reached) and 0.0095 < reached[-1] < 0.01

@@ -40,7 +40,7 @@ Default(env.BuildProgram())
 @pytest.fixture
 def pack(monkeypatch):
     """PlatformIO's packer, which validates the manifest; the licences are those that `packaging` knows."""
-    pytest.importorskip("platformio", reason="PlatformIO is not installed: pip install 'focgen[test]'")
+    pytest.importorskip("platformio", reason="PlatformIO is not installed: pip install 'focgen[dev]'")
     from packaging.licenses._spdx import LICENSES
     from platformio.package.manifest.schema import ManifestSchema
     from platformio.package.pack import PackagePacker
@@ -52,7 +52,7 @@ def pack(monkeypatch):
 
 def test_it_packs(pack, tmp_path):
     folder = tmp_path / "spba"
-    made = focgen.generate(seed_controller(9), folder, "q15", package="platformio", selftest=True)
+    made = focgen.generate(seed_controller(9), folder, "q15", for_="platformio", selftest=True)
     with tarfile.open(pack(folder, tmp_path / "spba.tar.gz")) as archive:
         assert set(made.files) <= {entry.removeprefix("./") for entry in archive.getnames()}
         described = json.load(archive.extractfile("library.json"))
@@ -66,14 +66,14 @@ def test_it_packs(pack, tmp_path):
 
 def test_the_arduino_library_packs_as_well(pack, tmp_path):
     """PlatformIO reads library.properties, too."""
-    focgen.generate(seed_controller(9), tmp_path / "spba", "q15", package="arduino")
+    focgen.generate(seed_controller(9), tmp_path / "spba", "q15", for_="arduino")
     assert Path(pack(tmp_path / "spba", tmp_path / "spba.tar.gz")).is_file()
 
 
 @pytest.fixture
 def core(tmp_path) -> dict[str, str]:
     """The environment of a PlatformIO that has its build tool and a platform for this computer."""
-    scons = pytest.importorskip("SCons", reason="SCons is not installed: pip install 'focgen[test]'")
+    scons = pytest.importorskip("SCons", reason="SCons is not installed: pip install 'focgen[dev]'")
     from platformio.dependencies import get_core_dependencies
 
     wanted = get_core_dependencies()["tool-scons"].strip("~^=")
@@ -105,10 +105,10 @@ def core(tmp_path) -> dict[str, str]:
 
 
 def test_the_example_is_built_by_platformio(tmp_path, request):
-    pytest.importorskip("platformio", reason="PlatformIO is not installed: pip install 'focgen[test]'")
+    pytest.importorskip("platformio", reason="PlatformIO is not installed: pip install 'focgen[dev]'")
     compiler("gcc")
     environment, project = request.getfixturevalue("core"), tmp_path / "project"
-    focgen.generate(EXAMPLES / "controller.toml", project / "lib" / "spba", package="platformio")
+    focgen.generate(EXAMPLES / "controller.toml", project / "lib" / "spba", for_="platformio")
     (project / "src").mkdir()
     given = (EXAMPLES / "platformio" / "platformio.ini").read_text()
     assert given.count("platform = native") == 1

@@ -70,6 +70,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--no-float", action="store_true", help="leave out NAME_ref_from_f32() and the other conversions"
     )
     parser.add_argument(
+        "--tunable",
+        action="store_true",
+        help="add NAME_tune(): gains and output limits in RAM, within the box of [tunable] in the controller",
+    )
+    parser.add_argument(
         "--for",
         dest="package",
         action="append",
@@ -96,6 +101,7 @@ def run(args: argparse.Namespace) -> Outcome:
         args.no_float,
         args.operator,
         args.band and tuple(args.band),
+        args.tunable,
         args.fmi,
     )
     return Outcome(made.manifest, _text(made))

@@ -20,7 +20,7 @@ from focgen.codegen.render import render
 from focgen.codegen.selftest import selftest_files
 from focgen.codegen.source import source_context
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
-from focgen.control.files import controller_text, read_controller
+from focgen.control.files import ControllerLike, controller_from, controller_text
 from focgen.errors import InputError, check_choice
 from focgen.fractional.continuous import HIGHEST, OPERATORS, RATIOS
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
@@ -28,6 +28,7 @@ from focgen.output import check_apart, remove, write_files
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST, Plan
 from focgen.resources import shipped
+from focgen.spelling import respelled
 
 __all__ = ["PACKAGES", "Generated", "folder_files", "generate"]
 
@@ -42,43 +43,47 @@ class Generated:
     manifest: dict[str, Any]
 
 
+@respelled({"package": "for_"})
 def generate(
-    controller: Controller | str | Path,
+    controller: ControllerLike,
     out: str | Path,
     arithmetic: str | None = None,
     memory: str | None = None,
     length: int | None = None,
     name: str | None = None,
     target: str | None = None,
-    package: str = "plain",
+    for_: str = "plain",
     tolerance: float | None = None,
     horizon: int | None = None,
     selftest: bool = False,
     no_float: bool = False,
     operator: str = "gl",
     band: tuple[float, float] | None = None,
+    tunable: bool = False,
     fmi: int | None = None,
 ) -> Generated:
     """Write C for a controller into the folder ``out``, whole or not at all; what an earlier run wrote there
     for it and this one does not, goes.
 
-    ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15),
-    ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one, ``tolerance`` (1e-8 … 0.1)
-    and ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier) default to the
-    controller's own. ``selftest`` adds NAME_selftest.c and .h. ``target`` names a core whose own instructions
-    the history sums shall use; without it they take their portable form. The bits are the same.
-    ``no_float`` leaves the conversions from and to physical values out of the header. ``operator``
+    ``controller`` is a :class:`Controller`, the path of its file, or a dictionary like it. ``arithmetic``
+    (f64, f32, q31, q15), ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one,
+    ``tolerance`` (1e-8 … 0.1) and ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier)
+    default to the controller's own. ``selftest`` adds NAME_selftest.c and .h. ``target`` names a core whose
+    own instructions the history sums shall use; without it they take their portable form. The bits are the
+    same. ``no_float`` leaves the conversions from and to physical values out of the header. ``operator``
     "continuous" fits the exponential memory to (jω)^α itself within ``tolerance`` over ``band`` (rad/s; None:
     four decades up to a tenth of the Nyquist frequency); it has no horizon, and a tolerance of 1e-3 unless
-    another is given. "gl" fits it to the weights of eq. (11). ``package`` adds what an ecosystem expects:
-    one of ``PACKAGES``; the interface of an "fmu" is version ``fmi``, 2 or 3 (the default).
+    another is given. "gl" fits it to the weights of eq. (11). ``tunable`` adds NAME_params, NAME_default,
+    NAME_check and NAME_tune: factors on the gains and output limits that change at run time, within the box
+    that the controller's ``tunable`` gives. ``for_`` adds what an ecosystem expects: one of ``PACKAGES``; the
+    interface of an "fmu" is version ``fmi``, 2 or 3 (the default).
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
     written, or one where a file would replace the controller's own by other bytes; BuildError where an FMU
     finds no C compiler.
     """
-    wanted = check_package(package, fmi)
+    wanted = check_package(for_, fmi)
     kernels = _kernels(target)
     text, made, where = _source(controller)
     _check(arithmetic, memory, made.length if length is None else length)
@@ -86,7 +91,7 @@ def generate(
     _check_form(form, length, tolerance, horizon)
     _check_operator(form, operator, band, horizon, made.sample_time)
     called = check_name(made.name if name is None else name, where)
-    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band)
+    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band, tunable)
     files = folder_files(plan, text, selftest, kernels, not no_float, wanted)
     files.update(archived(plan.name, files, wanted.fmi))
     old = leftovers(Path(out), called, files)
@@ -140,12 +145,12 @@ def _json(manifest: dict[str, Any]) -> str:
     return json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _source(controller: Controller | str | Path) -> tuple[bytes, Controller, str]:
+def _source(controller: ControllerLike) -> tuple[bytes, Controller, str]:
     """The file's content, the controller, and what errors call it."""
-    if isinstance(controller, Controller):
-        return controller_text(controller).encode("utf-8"), controller, controller.name
-    made = read_controller(controller)
-    return Path(controller).read_bytes(), made, str(controller)
+    made = controller_from(controller)
+    if isinstance(controller, (str, Path)):
+        return Path(controller).read_bytes(), made, str(controller)
+    return controller_text(made).encode("utf-8"), made, made.name
 
 
 def _check(arithmetic: str | None, memory: str | None, length: int) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from focgen.fractional.transfer import TransferFunction
 
@@ -22,7 +24,7 @@ class GainSchedule:
     breakpoints: tuple[float, ...]
     gains: tuple[float, ...]
 
-    def __call__(self, value):
+    def __call__(self, value: ArrayLike) -> Any:
         """The gain at ``value``, any shape."""
         points, gains = np.array(self.breakpoints), np.array(self.gains)
         place = np.clip(np.asarray(value, dtype=float), points[0], points[-1])
@@ -55,6 +57,19 @@ class Units:
 
 
 @dataclass(frozen=True)
+class Tunable:
+    """The box of what may be changed at run time, each (low, high): the factors on the gains, and the lower
+    and the upper output limit in physical units.
+
+    A factor of 1 and the limits of ``ranges.output`` are inside; the limits never cross.
+    """
+
+    gain: tuple[float, float] = (1.0, 1.0)
+    output_low: tuple[float, float] = (0.0, 0.0)
+    output_high: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class Source:
     """What a controller was designed from: file name and SHA-256."""
 
@@ -72,6 +87,8 @@ class Controller:
 
     ``memory`` is "short" or "exponential"; the latter keeps the weights within the relative ``tolerance`` up
     to ``horizon`` samples and has no use for ``length``.
+
+    ``tunable`` is what C that is generated for it may change at run time; None: nothing.
     """
 
     name: str
@@ -87,12 +104,27 @@ class Controller:
     designed_from: Source | None = None
     tolerance: float = 1e-4
     horizon: int = 1_000_000
+    tunable: Tunable | None = None
 
     @property
     def scheduled(self) -> bool:
         """Whether the gain depends on a scheduling signal."""
         return isinstance(self.gain, GainSchedule)
 
-    def gain_at(self, value: float | np.ndarray | None = None):
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """The gain at every breakpoint, or the only one."""
+        return self.gain.gains if isinstance(self.gain, GainSchedule) else (self.gain,)
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """The smallest and the largest factor that a gain can have."""
+        return self.tunable.gain if self.tunable else (1.0, 1.0)
+
+    def gain_at(self, value: ArrayLike | None = None) -> Any:
         """The gain at a value of the scheduling signal (ignored where nothing is scheduled)."""
-        return self.gain(value) if self.scheduled else self.gain
+        if not isinstance(self.gain, GainSchedule):
+            return self.gain
+        if value is None:
+            raise TypeError("the gain is scheduled: give a value of the scheduling signal")
+        return self.gain(value)

@@ -54,7 +54,7 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     recorded = read_recorded(path)
     controller = read_controller(path / "controller.toml")
     options = recorded.length, recorded.name, recorded.memory, recorded.tolerance, recorded.horizon
-    options += recorded.operator, recorded.band
+    options += recorded.operator, recorded.band, recorded.tunable
     plan = build_plan(controller, recorded.arithmetic, *options)
     given = _bytes(path / "controller.toml")
     files = folder_files(plan, given, recorded.selftest, recorded.kernels, recorded.floats, recorded.package)

@@ -33,6 +33,7 @@ _SHAPE = {
     "selftest?": dict,
     "no_float?": bool,
     "package?": {"for": str, "fmi?": int},
+    "tunable?": dict,
     "inputs": dict,
 }
 _EXPONENTIAL = {"tolerance": float, "horizon": int}
@@ -62,6 +63,7 @@ class Recorded:
     operator: str = "gl"
     band: tuple[float, float] | None = None
     package: Package = PLAIN
+    tunable: bool = False
 
 
 def read_recorded(folder: Path) -> Recorded:
@@ -88,8 +90,9 @@ def read_recorded(folder: Path) -> Recorded:
     options = found["arithmetic"], found["memory"], *_memory(path, found)
     bound, floats = _bound(found["error_bound"]), not found.get("no_float", False)
     recorded = Recorded(name, *options, Kernels(target), "selftest" in found, bound, floats, found)
-    package = _package(path, found.get("package"))
-    return replace(recorded, operator=found["operator"], band=_band(path, found), package=package)
+    package, tunable = _package(path, found.get("package")), "tunable" in found
+    band = _band(path, found)
+    return replace(recorded, operator=found["operator"], band=band, package=package, tunable=tunable)
 
 
 def _package(path: Path, entry: dict[str, Any] | None) -> Package:
