@@ -80,13 +80,13 @@ _RC: dict[str, Any] = {
 @cache
 def _notebooks() -> type[Figure]:
     """matplotlib's figure, which a notebook shows whether or not pyplot was ever imported."""
-    from matplotlib.figure import Figure
+    from matplotlib import figure as drawing
 
-    class Still(Figure):
+    class Figure(drawing.Figure):
         def _repr_png_(self) -> bytes:
             return png(self)
 
-    return Still
+    return Figure
 
 
 def _matplotlib():
