@@ -5,7 +5,7 @@ RUN    := $(VENV)/bin/python
 JOBS   ?= 2
 FUZZ_SECONDS ?= 600
 
-.PHONY: help demo test test-long types bench trials trial-cases trial-report foreign records prove fuzz clean
+.PHONY: help demo test test-long types docs bench trials trial-cases trial-report foreign records prove fuzz clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -38,6 +38,14 @@ $(VENV)/ready-dev: $(VENV)/ready-test
 
 types: $(VENV)/ready-dev       ## what users call and get, by a strict checker of types
 	$(RUN) -m mypy
+
+$(VENV)/ready-docs: $(VENV)/ready
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+docs: $(VENV)/ready-docs       ## the documentation as a site that needs no server, into build/site/
+	$(RUN) tools/make_docs.py build/site
+	@echo "open build/site/index.html"
 
 $(VENV)/ready-bench: $(VENV)/ready-test
 	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[bench]'

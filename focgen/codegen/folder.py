@@ -12,7 +12,7 @@ from focgen.codegen.guard import unusable_text
 from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
 from focgen.codegen.literals import quantity, wrapped
 from focgen.codegen.manifest import sizes
-from focgen.codegen.texts import UserText
+from focgen.codegen.texts import UserText, markdown
 from focgen.plan.canonical import memory_bias
 from focgen.plan.model import Plan
 
@@ -65,6 +65,7 @@ class ReadmeContext:
     biases: list[str]
     selftest: bool
     files: list[str]
+    box: list[str]
 
 
 def readme_context(
@@ -105,7 +106,18 @@ def readme_context(
         biases=_biases(plan),
         selftest=selftest,
         files=[f"{plan.name}.h", f"{plan.name}.c", *runtime_files(plan, kernels)],
+        box=_box(plan),
     )
+
+
+def _box(plan: Plan) -> list[str]:
+    """What may be tuned, a part each, for Markdown; nothing where nothing may."""
+    if plan.tuning is None:
+        return []
+    box, unit = plan.controller.tunable, markdown(UserText(plan.controller.units.output))
+    spans = (("factors on the gain", box.gain, ""), ("`u_min`", box.output_low, unit),
+             ("`u_max`", box.output_high, unit))  # fmt: skip
+    return [f"{what} from {low:g} to {high:g} {of}".rstrip() for what, (low, high), of in spans if low < high]
 
 
 def _quantity(value: float, unit: str) -> UserText:

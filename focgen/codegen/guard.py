@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from focgen.codegen.literals import literal
+from focgen.codegen.literals import constant
 from focgen.plan.model import Plan
 from focgen.plan.usable import EXPONENT
 
 
 @dataclass(frozen=True)
 class GuardText:
-    """Conditions on the arguments of reset, step and track; ``held``: the output that stands; ``start``: the
-    one before any step; ``damaged``: what tells a step that the state is none that a step has left.
+    """Conditions on the arguments of reset, step and track; ``held``: the output that stands; ``damaged``:
+    what tells a step that the state is none that a step has left.
     """
 
     error_usable: str
     step_unusable: str
     track_usable: str
     held: str
-    start: str
     damaged: str
 
 
@@ -34,8 +33,7 @@ def guard_text(plan: Plan) -> GuardText | None:
         step_unusable=" || ".join(f"!{ask}({name})" for name in inputs),
         track_usable=f"{ask}(u_applied)",
         held="s->integral" if plan.integrator else "s->output",
-        damaged=_damaged(plan),
-        start=literal(min(max(0.0, plan.output.low), plan.output.high), plan.output.ctype),
+        damaged=_damaged(plan) + _untuned(plan),
     )
 
 
@@ -44,7 +42,17 @@ def _damaged(plan: Plan) -> str:
     ask = f"foc_finite_{plan.arithmetic}"
     if plan.integrator is None:
         return f"!{ask}(d)"
-    return f"!{ask}(s->integral + (d + s->increment)) || !{plan.name}_within(s->integral)"
+    within = f"{plan.name}_within({'s, ' if plan.tuning else ''}s->integral)"
+    return f"!{ask}(s->integral + (d + s->increment)) || !{within}"
+
+
+def _untuned(plan: Plan) -> str:
+    """The gain or the limits are none that parameters in their box give."""
+    if plan.tuning is None:
+        return ""
+    ends = (constant(end, plan.gain.ctype) for end in (plan.gain.low, plan.gain.high))
+    within = f"foc_within_{plan.arithmetic}(gain, {', '.join(ends)})"
+    return f"\n        || !{within} || !{plan.name}_limits_known(s)"
 
 
 def unusable_text(plan: Plan) -> str:

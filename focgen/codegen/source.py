@@ -14,6 +14,7 @@ from focgen.codegen.saved import SavedText, saved_text
 from focgen.codegen.state import carries, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
 from focgen.codegen.texts import UserText, comment
+from focgen.codegen.tuned import Limits, TunedText, integral_ends, limits, tuned_gain, tuned_text
 from focgen.plan.canonical import realise
 from focgen.plan.model import Plan, Sum
 
@@ -112,6 +113,9 @@ class SourceContext:
     guard: GuardText | None
     saved: SavedText
     output: str
+    limits: Limits
+    gain_call: str
+    tuned: TunedText | None
 
 
 def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTABLE) -> SourceContext:
@@ -142,7 +146,7 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         narrowed=_narrowed(plan, "x"),
         at_rest=_at_rest(plan),
         schedule=schedule_text(plan) if plan.schedule else None,
-        gain=None if plan.schedule else _gain(plan),
+        gain=None if plan.schedule or plan.tuning else _gain(plan),
         gain_type=plan.gain.ctype,
         increment=plan.increment.ctype,
         increment_about=_increment_about(plan),
@@ -156,6 +160,9 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         guard=guard_text(plan),
         saved=saved_text(plan, sha256, kernels),
         output=_output(plan),
+        limits=limits(plan),
+        gain_call=_gain_call(plan),
+        tuned=tuned_text(plan),
     )
 
 
@@ -252,6 +259,13 @@ def _gain(plan: Plan) -> GainText:
     return GainText(value, about if plan.floating else f"{about}, counts of {scale(plan.gain.lsb)}")
 
 
+def _gain_call(plan: Plan) -> str:
+    """What a step's gain is; empty where it is a constant."""
+    if plan.tuning:
+        return tuned_gain(plan)
+    return schedule_text(plan).call if plan.schedule else ""
+
+
 def _increment_about(plan: Plan) -> str:
     unit = plan.controller.units.output
     if plan.floating:
@@ -266,7 +280,7 @@ def quantity_unit(unit: str) -> str:
 
 def _product(plan: Plan) -> str:
     """d from ``gain`` and ``v``, by the cheapest product that is exact."""
-    gain = "gain" if plan.schedule else f"{plan.name.upper()}_GAIN"
+    gain = "gain" if plan.schedule or plan.tuning else f"{plan.name.upper()}_GAIN"
     if plan.floating:
         return f"{gain} * v"
     if plan.gain.ctype == "int16_t" and plan.filtered.ctype == "int32_t":
@@ -282,10 +296,10 @@ def _integral(plan: Plan) -> IntegralText | None:
     if plan.integrator is None:
         return None
     state, by, u = plan.integrator.state, plan.integrator.to_output, plan.output
-    ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
+    ends = ", ".join(integral_ends(plan))
     total = f"s->integral + ({converted('d', plan.increment.ctype, state.ctype)} + s->increment)"
     start = min(max(0, state.low), state.high)
-    clamped = f"{CLAMP[u.ctype]}(u_applied, {plan.name.upper()}_U_MIN, {plan.name.upper()}_U_MAX)"
+    clamped = f"{CLAMP[u.ctype]}(u_applied, {limits(plan).low}, {limits(plan).high})"
     applied = clamped if plan.floating else "u"
     return IntegralText(
         ctype=state.ctype,
@@ -305,5 +319,5 @@ def _output(plan: Plan) -> str:
     if plan.integrator:
         state = plan.integrator.state.ctype
         return saturated(shifted("s->integral", state, plan.integrator.to_output), state, u)
-    d = plan.increment.ctype
-    return converted(f"{CLAMP[d]}(d, {plan.name.upper()}_U_MIN, {plan.name.upper()}_U_MAX)", d, u)
+    d, ends = plan.increment.ctype, limits(plan)
+    return converted(f"{CLAMP[d]}(d, {ends.low}, {ends.high})", d, u)

@@ -57,6 +57,19 @@ class Units:
 
 
 @dataclass(frozen=True)
+class Tunable:
+    """The box of what may be changed at run time, each (low, high): the factors on the gains, and the lower
+    and the upper output limit in physical units.
+
+    A factor of 1 and the limits of ``ranges.output`` are inside; the limits never cross.
+    """
+
+    gain: tuple[float, float] = (1.0, 1.0)
+    output_low: tuple[float, float] = (0.0, 0.0)
+    output_high: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class Source:
     """What a controller was designed from: file name and SHA-256."""
 
@@ -74,6 +87,8 @@ class Controller:
 
     ``memory`` is "short" or "exponential"; the latter keeps the weights within the relative ``tolerance`` up
     to ``horizon`` samples and has no use for ``length``.
+
+    ``tunable`` is what C that is generated for it may change at run time; None: nothing.
     """
 
     name: str
@@ -89,11 +104,22 @@ class Controller:
     designed_from: Source | None = None
     tolerance: float = 1e-4
     horizon: int = 1_000_000
+    tunable: Tunable | None = None
 
     @property
     def scheduled(self) -> bool:
         """Whether the gain depends on a scheduling signal."""
         return isinstance(self.gain, GainSchedule)
+
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """The gain at every breakpoint, or the only one."""
+        return self.gain.gains if isinstance(self.gain, GainSchedule) else (self.gain,)
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """The smallest and the largest factor that a gain can have."""
+        return self.tunable.gain if self.tunable else (1.0, 1.0)
 
     def gain_at(self, value: ArrayLike | None = None) -> Any:
         """The gain at a value of the scheduling signal (ignored where nothing is scheduled)."""

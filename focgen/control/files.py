@@ -23,6 +23,11 @@ measurement = [0.0, 0.02]
 output = [0.0, 10.0]                     # the output limits
 schedule = [0.0, 0.25]                   # with a gain schedule only
 
+[tunable]                                # optional: the box of generate --tunable, each key optional
+gain = [0.5, 2.0]                        # factors on the gains, 1 among them
+output_low = [0.0, 1.0]                  # the lower limit, ranges.output's among them
+output_high = [5.0, 10.0]                # the upper limit, likewise
+
 [units]                                  # optional, for comments
 measurement = "1/mm"
 output = "V"
@@ -50,6 +55,7 @@ from focgen.control.controller import (
     ControllerRanges,
     GainSchedule,
     Source,
+    Tunable,
     Units,
 )
 from focgen.errors import ControllerError
@@ -59,6 +65,8 @@ from focgen.tomlfile import Table, terms_of
 
 ControllerLike = Controller | str | Path | Mapping[str, Any]
 """A controller, the path of its controller.toml, or a dictionary of the same shape."""
+_FACTORS = 1e-3, 1e3
+"""What a factor on a gain can be."""
 
 
 def controller_from(given: ControllerLike) -> Controller:
@@ -81,14 +89,15 @@ def read_controller(path: str | Path | Mapping[str, Any]) -> Controller:
 
 def controller_of(top: Table, name: str) -> Controller:
     """The controller that a table describes, ``name`` where it has none. Raises ControllerError."""
-    gain = _gain(top)
+    gain, integrator = _gain(top), top.flag("integrator", False)
+    ranges = _ranges(top, isinstance(gain, GainSchedule))
     controller = Controller(
         name=top.text("name", name),
         sample_time=top.number("sample_time", above=0.0),
         transfer=_transfer(top),
         gain=gain,
-        integrator=top.flag("integrator", False),
-        ranges=_ranges(top, isinstance(gain, GainSchedule)),
+        integrator=integrator,
+        ranges=ranges,
         length=_whole(top, "length", 1000),
         memory=_choice(top, "memory", "short", MEMORIES),
         arithmetic=_choice(top, "arithmetic", "q31", ARITHMETICS),
@@ -96,6 +105,7 @@ def controller_of(top: Table, name: str) -> Controller:
         designed_from=_source(top.table("designed_from")),
         tolerance=top.number("tolerance", 1e-4, above=0.0),
         horizon=_whole(top, "horizon", 1_000_000),
+        tunable=_tunable(top.table("tunable"), gain, ranges),
     )
     top.done()
     return controller
@@ -138,6 +148,46 @@ def _ranges(top: Table, scheduled: bool) -> ControllerRanges:
 def _spans(table: Table, keys: Sequence[str]) -> ControllerRanges:
     spans: dict[str, Any] = {key: table.span(key) for key in keys}
     return ControllerRanges(**spans)
+
+
+def _tunable(table: Table | None, gain: float | GainSchedule, ranges: ControllerRanges) -> Tunable | None:
+    """The box; what it does not name stays as it is."""
+    if table is None:
+        return None
+    low, high = ranges.output
+    box = Tunable(
+        table.span("gain") or (1.0, 1.0),
+        table.span("output_low") or (low, low),
+        table.span("output_high") or (high, high),
+    )
+    table.done()
+    if box == Tunable((1.0, 1.0), (low, low), (high, high)):
+        raise table.fail(None, "names nothing", "give gain, output_low or output_high as [low, high]")
+    _check_factors(table, box.gain)
+    for key, span, end in (("output_low", box.output_low, low), ("output_high", box.output_high, high)):
+        if end != (span[0] if key == "output_low" else span[1]):
+            remedy = f"let it {'begin' if key == 'output_low' else 'end'} at {end:g}, which ranges.output has"
+            raise table.fail(key, f"is {list(span)}", remedy)
+    if box.output_low[1] >= box.output_high[0]:
+        what = f"reaches {box.output_low[1]:g}, and output_high {box.output_high[0]:g}"
+        raise table.fail("output_low", what, "keep the two apart, so that the limits cannot cross")
+    if "gain" in table and isinstance(gain, GainSchedule) and ranges.schedule is not None:
+        _check_inside(table, gain, ranges.schedule)
+    return box
+
+
+def _check_factors(table: Table, span: tuple[float, float]) -> None:
+    if not (_FACTORS[0] <= span[0] <= 1.0 <= span[1] <= _FACTORS[1]):
+        remedy = f"give factors from {_FACTORS[0]:g} to {_FACTORS[1]:g}, with 1 among them"
+        raise table.fail("gain", f"is {list(span)}", remedy)
+
+
+def _check_inside(table: Table, gain: GainSchedule, span: tuple[float, float]) -> None:
+    """A factor belongs to a breakpoint, so every breakpoint must be one that the signal reaches."""
+    beyond = [point for point in gain.breakpoints if not span[0] <= point <= span[1]]
+    if beyond:
+        what = f"cannot be applied at the breakpoint {beyond[0]:g}, beyond ranges.schedule"
+        raise table.fail("gain", what, "move the breakpoint, or widen ranges.schedule")
 
 
 def _whole(top: Table, key: str, default: int) -> int:
@@ -195,9 +245,17 @@ def controller_table(controller: Controller) -> dict[str, Any]:
         table["gain"] = {key: list(values) for key, values in asdict(controller.gain).items()}
     spans = {key: list(span) for key, span in asdict(controller.ranges).items() if span is not None}
     table["ranges"] = spans
+    if controller.tunable:
+        table["tunable"] = _box(controller.tunable)
     units = {key: unit for key, unit in asdict(controller.units).items() if unit}
     if units:
         table["units"] = units
     if controller.designed_from:
         table["designed_from"] = asdict(controller.designed_from)
     return table
+
+
+def _box(box: Tunable) -> dict[str, list[float]]:
+    """The spans of [tunable]; one that holds a single value is left out."""
+    spans = asdict(box).items()
+    return {key: list(span) for key, span in spans if span[0] < span[1]}

@@ -23,7 +23,7 @@ from focgen.identification.reach import seen_ranges
 from focgen.identification.remarks import remarks_of
 from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
-from focgen.identification.sure import actuator_uncertainty, check_determined, with_stages
+from focgen.identification.sure import actuator_uncertainty, check_determined, is_compromise, with_stages
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
 from focgen.logs.read import Logs, each_of, read_logs
@@ -35,6 +35,10 @@ from focgen.rig.model import Actuator, Rig
 from focgen.rig.plausibility import doubts
 
 Quality = dict[str, dict[str, float]]
+_COMPROMISE = (
+    "what the model cannot follow outweighs the noise: T, alpha and K(p) are a compromise, and known "
+    "no better than [uncertainty] says, whatever their intervals"
+)
 
 
 @rig_then_logs
@@ -136,6 +140,8 @@ def _actuator(
     shown = _shown(others, new)
     warnings = warnings_of(excitations, fit, fits, failed, quality)
     told = lowered + _told(experiments, excitations)
+    if is_compromise(excitations, fit):
+        told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 

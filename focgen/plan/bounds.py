@@ -30,7 +30,7 @@ from focgen.errors import PlanError
 from focgen.fractional.elementary import exact_sum, l1
 from focgen.plan.banks import drive_error
 from focgen.plan.canonical import Table, Tables, inner_limits
-from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error
+from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error, tuned_error
 from focgen.plan.model import Bank, ErrorBound, Plan, Sum
 from focgen.plan.proofs import at_rest, reset_error
 from focgen.plan.stability import inverse_of
@@ -201,6 +201,9 @@ class _Fixed(_Account):
     def gain_error(self) -> float:
         """In physical units, the h/2 taken out again."""
         plan, lsb = self.plan, self.plan.gain.lsb / self.half_step
+        if plan.tuning:
+            moved = 0.5 * plan.schedule.signal.lsb * steepest(plan.controller) if plan.schedule else 0.0
+            return tuned_error(plan, lsb) + 0.5 * lsb + moved
         if plan.schedule is None:
             return abs(plan.constant_gain * lsb - plan.controller.gain)
         inputs = 0.5 * plan.schedule.signal.lsb * steepest(plan.controller)
@@ -333,6 +336,8 @@ class _Floating(_Account):
 
     def gain_error(self) -> float:
         plan, g = self.plan, self.largest_gain
+        if plan.tuning:
+            return tuned_error(plan, 1.0 / self.half_step) * (1.0 + _DOUBLE / self.u)
         if plan.schedule is None:
             return 2.0 * (self.u + _DOUBLE) * g
         slope, reach = steepest(plan.controller), max(map(abs, plan.controller.ranges.schedule))

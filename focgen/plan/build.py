@@ -18,6 +18,7 @@ from focgen.plan.memory import Memory, band_memories_of, checked_band, exponenti
 from focgen.plan.model import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
 from focgen.plan.stability import check_stable
+from focgen.plan.tuning import with_limits
 from focgen.plan.usable import check_room
 
 _LONGEST = 1_000_000
@@ -33,6 +34,7 @@ def build_plan(
     horizon: int | None = None,
     operator: str = "gl",
     band: tuple[float, float] | None = None,
+    tunable: bool = False,
 ) -> Plan:
     """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with ``memory`` "short", of ``length`` past
     samples, or "exponential", within ``tolerance`` up to ``horizon`` samples; all default to the
@@ -43,10 +45,12 @@ def build_plan(
     "continuous": then an exponential memory follows (jω)^α itself within ``tolerance``, relative, over
     ``band`` in rad/s, a factor of 10 to 1e6 wide and at most to half of the Nyquist frequency; by default
     four decades up to a tenth of it. It has no horizon, and its ``tolerance`` defaults to 1e-3.
+    ``tunable``: with the parameters whose box the controller's ``tunable`` gives.
 
     Raises PlanError where the transfer function cannot be realised, its truncated recursion is not stable, a
     range cannot be represented, or a node cannot be proved; the remedy says what would work.
     """
+    controller = _tunable(controller, tunable)
     if operator == "continuous" and tolerance is None:
         tolerance = DEFAULT_TOLERANCE  # the controller's own is one of weights
     given = dict(arithmetic=arithmetic, length=length, memory=memory, tolerance=tolerance, horizon=horizon)
@@ -65,8 +69,17 @@ def build_plan(
         plan = replace(plan, length=max(plan.error_lags, plan.filtered_lags))
     _check_at_rest(plan, folded)
     check_room(plan)
+    plan = with_limits(plan)
     plan = replace(plan, proofs=prove(plan))
     return replace(plan, error_bound=error_bound(plan, folded))
+
+
+def _tunable(controller: Controller, tunable: bool) -> Controller:
+    """The controller as it is to be planned: without its box where nothing is to be tuned."""
+    if tunable and controller.tunable is None:
+        remedy = "add it, with gain, output_low or output_high as [low, high]"
+        raise PlanError(controller.name, "has no [tunable], which --tunable needs", remedy)
+    return controller if tunable else replace(controller, tunable=None)
 
 
 def _tables(wanted: Controller, band: tuple[float, float] | None) -> tuple[Tables, tuple[Memory, ...]]:
@@ -180,4 +193,5 @@ def _assembled(
         output=output,
         proofs=(),
         error_bound=_NOTHING_YET,
+        tuning=out.gain.tuning,
     )

@@ -123,6 +123,20 @@ kept) is no number within the limits. Then the past is as after a reset to this 
 (:mod:`focgen.plan.damage`).
 
 In the integer arithmetics a reset or a track whose argument is beyond its range raises bit 3.
+
+Tuning
+------
+With ``tuning`` the gains and the output's limits are part of the state: ``init`` takes the parameters that
+``default`` gives, and ``tune`` takes others, in this order: ``tune``, ``reset``, ``track``, step.
+
+    g_i = shift(factor_i · nominal_i, to_gain),  slope_i = shift((g_{i+1} − g_i) · reciprocal_i, to_slope_i)
+
+in 64 bits; floating without the shifts. ``tune`` then clamps I to the new limits at once (without an
+integrator the output kept), as every clamp to the output's limits from then on; d_{k−1} stays as it is, so
+only the rate at which u moves changes. Parameters outside the box (``refused``) change nothing. After a
+reset d_{k−1} is taken with the first step's own g, with and without a schedule. ``reset`` and ``track`` keep
+the parameters. A floating step that finds parameters that no ``tune`` has taken (NaN, a gain or a limit
+outside the box) has a damaged state, and the default ones return with the mended one.
 """
 
 from __future__ import annotations
@@ -153,6 +167,7 @@ __all__ = [
     "Proof",
     "Schedule",
     "Sum",
+    "Tuning",
 ]
 
 LONGEST = 65_534
@@ -205,6 +220,25 @@ class Integrator:
 
     state: Format
     to_output: int
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What may be changed at run time, and what it takes to do so; see the module's description.
+
+    ``factor``: the format and the box of the factors, in counts. ``nominal``: the gains that they are on,
+    counts of ``nominal_lsb``, one a breakpoint or the only one. ``reciprocals`` and ``to_slopes`` have one
+    entry a segment. ``low`` and ``high``: the boxes of the limits, counts of the output.
+    """
+
+    factor: Format
+    nominal: tuple[Count, ...]
+    nominal_lsb: float
+    to_gain: int
+    reciprocals: tuple[Count, ...] = ()
+    to_slopes: tuple[int, ...] = ()
+    low: tuple[Count, Count] = (0, 0)
+    high: tuple[Count, Count] = (0, 0)
 
 
 @dataclass(frozen=True)
@@ -261,6 +295,9 @@ class Plan:
     ``tolerance`` are what was asked for, and ``length`` counts the past samples that the taps need.
     ``operator`` is "gl" where they follow the Grünwald–Letnikov weights, or "continuous" where they follow
     (jω)^α: then in the ``band``, in rad/s, and there is no horizon.
+
+    With ``tuning``, ``schedule`` and ``constant_gain`` are those of the default parameters, ``gain`` reaches
+    as far as any others take it, and so do the proofs and bounds.
     """
 
     controller: Controller
@@ -293,6 +330,7 @@ class Plan:
     horizon: int | None = None
     operator: str = "gl"
     band: tuple[float, float] | None = None
+    tuning: Tuning | None = None
 
     @property
     def exponential(self) -> bool:

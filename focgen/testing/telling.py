@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from focgen.plan.model import Format, Plan
-from focgen.plan.scenario import Reset, Track
+from focgen.plan.scenario import Reset, Track, Tune
 from focgen.testing.candidates import events_of
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def _inputs(plan: Plan, judged: Judged, lane: int, k: int) -> list[str]:
 
 
 def _events(plan: Plan, judged: Judged, lane: int, k: int) -> list[str]:
-    """The latest reset or track, which most differences have to do with."""
+    """The latest tune, reset or track, which most differences have to do with."""
     events = events_of(judged.trial.raw, lane)
     latest = max((sample for sample in events if sample <= k), default=None)
     if latest is None:
@@ -48,7 +48,11 @@ def _events(plan: Plan, judged: Judged, lane: int, k: int) -> list[str]:
     return [f"  {when}: {', '.join(_call(plan, event) for event in events[latest])}"]
 
 
-def _call(plan: Plan, event: Reset | Track) -> str:
+def _call(plan: Plan, event: Reset | Track | Tune) -> str:
+    if isinstance(event, Tune):
+        p, box = event.params, plan.tuning
+        gains = ", ".join(_value(count, box.factor) for count in p.gain) if box else ""
+        return f"tune([{gains}], {_value(p.u_min, plan.output)}, {_value(p.u_max, plan.output)})"
     if isinstance(event, Track):
         return f"track({_value(event.u, plan.output)})"
     error = plan.error
