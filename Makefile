@@ -5,7 +5,7 @@ RUN    := $(VENV)/bin/python
 JOBS   ?= 2
 FUZZ_SECONDS ?= 600
 
-.PHONY: help demo test test-long bench trials trial-cases trial-report foreign records prove fuzz clean
+.PHONY: help demo test test-long types docs bench trials trial-cases trial-report foreign records prove fuzz clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -29,8 +29,23 @@ test test-long: export OMP_NUM_THREADS = 1
 test: $(VENV)/ready-test       ## what continuous integration runs
 	$(RUN) -m pytest -n $(JOBS) -q
 
-test-long: $(VENV)/ready-test  ## the suites that take minutes
+test-long: $(VENV)/ready-dev   ## the suites that take minutes
 	$(RUN) -m pytest -n $(JOBS) -q -m long
+
+$(VENV)/ready-dev: $(VENV)/ready-test
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+types: $(VENV)/ready-dev       ## what users call and get, by a strict checker of types
+	$(RUN) -m mypy
+
+$(VENV)/ready-docs: $(VENV)/ready
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+docs: $(VENV)/ready-docs       ## the documentation as a site that needs no server, into build/site/
+	$(RUN) tools/make_docs.py build/site
+	@echo "open build/site/index.html"
 
 $(VENV)/ready-bench: $(VENV)/ready-test
 	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[bench]'

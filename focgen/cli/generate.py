@@ -7,7 +7,9 @@ import argparse
 from focgen.cli.outcome import Outcome
 from focgen.codegen.generate import PACKAGES, Generated, generate
 from focgen.codegen.kernels import TARGETS
+from focgen.codegen.packages.package import FMI
 from focgen.control.controller import ARITHMETICS, MEMORIES
+from focgen.errors import InputError
 from focgen.fractional.continuous import OPERATORS
 from focgen.plan.model import Plan
 
@@ -17,6 +19,7 @@ EXAMPLE = """example:
   focgen generate controller.toml --out firmware --arithmetic q31 --length 1000
   focgen verify firmware
   focgen generate controller.toml --out firmware --memory exponential --tolerance 1e-4 --horizon 1000000
+  focgen generate controller.toml --out block --for fmu
 """
 
 
@@ -71,7 +74,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="add NAME_tune(): gains and output limits in RAM, within the box of [tunable] in the controller",
     )
-    parser.add_argument("--for", dest="package", choices=PACKAGES, default="plain", help="build files to add")
+    parser.add_argument(
+        "--for",
+        dest="package",
+        action="append",
+        choices=PACKAGES,
+        help="what to add to the plain files: a CMake package, an Arduino or PlatformIO library, an FMU",
+    )
+    parser.add_argument("--fmi", type=int, choices=FMI, help="version of an FMU's interface; default: 3")
 
 
 def run(args: argparse.Namespace) -> Outcome:
@@ -84,7 +94,7 @@ def run(args: argparse.Namespace) -> Outcome:
         args.length,
         args.name,
         args.target,
-        args.package,
+        _one(args.package),
         args.tolerance,
         args.horizon,
         args.selftest,
@@ -92,8 +102,17 @@ def run(args: argparse.Namespace) -> Outcome:
         args.operator,
         args.band and tuple(args.band),
         args.tunable,
+        args.fmi,
     )
     return Outcome(made.manifest, _text(made))
+
+
+def _one(packages: list[str] | None) -> str:
+    """The package that is asked for; each has its own layout, so a folder has one."""
+    if packages and len(packages) > 1:
+        what = f"is given {len(packages)} times"
+        raise InputError("--for", what, "generate each package into a folder of its own")
+    return packages[0] if packages else "plain"
 
 
 def _text(made: Generated) -> str:

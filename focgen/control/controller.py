@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from focgen.fractional.transfer import TransferFunction
 
@@ -22,7 +24,7 @@ class GainSchedule:
     breakpoints: tuple[float, ...]
     gains: tuple[float, ...]
 
-    def __call__(self, value):
+    def __call__(self, value: ArrayLike) -> Any:
         """The gain at ``value``, any shape."""
         points, gains = np.array(self.breakpoints), np.array(self.gains)
         place = np.clip(np.asarray(value, dtype=float), points[0], points[-1])
@@ -112,13 +114,17 @@ class Controller:
     @property
     def gains(self) -> tuple[float, ...]:
         """The gain at every breakpoint, or the only one."""
-        return self.gain.gains if self.scheduled else (self.gain,)
+        return self.gain.gains if isinstance(self.gain, GainSchedule) else (self.gain,)
 
     @property
     def factors(self) -> tuple[float, float]:
         """The smallest and the largest factor that a gain can have."""
         return self.tunable.gain if self.tunable else (1.0, 1.0)
 
-    def gain_at(self, value: float | np.ndarray | None = None):
+    def gain_at(self, value: ArrayLike | None = None) -> Any:
         """The gain at a value of the scheduling signal (ignored where nothing is scheduled)."""
-        return self.gain(value) if self.scheduled else self.gain
+        if not isinstance(self.gain, GainSchedule):
+            return self.gain
+        if value is None:
+            raise TypeError("the gain is scheduled: give a value of the scheduling signal")
+        return self.gain(value)

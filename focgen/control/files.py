@@ -40,8 +40,11 @@ sha256 = "…"
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 
@@ -60,12 +63,27 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
 from focgen.tomlfile import Table, terms_of
 
+ControllerLike = Controller | str | Path | Mapping[str, Any]
+"""A controller, the path of its controller.toml, or a dictionary of the same shape."""
 _FACTORS = 1e-3, 1e3
 """What a factor on a gain can be."""
 
 
-def read_controller(path: str | Path) -> Controller:
-    """Read a controller. Raises ControllerError naming file, table, key and remedy."""
+def controller_from(given: ControllerLike) -> Controller:
+    """The controller that an argument is. Raises ControllerError where it is none, or cannot be used."""
+    if isinstance(given, Controller):
+        return given
+    if not isinstance(given, (str, os.PathLike, Mapping)):
+        remedy = "give a Controller, a controller.toml or a dictionary like it"
+        raise ControllerError("controller", f"is {type(given).__name__}", remedy)
+    return read_controller(given)
+
+
+def read_controller(path: str | Path | Mapping[str, Any]) -> Controller:
+    """Read a controller from its file, or from a dictionary of the same shape. Raises ControllerError naming
+    file, table, key and remedy."""
+    if isinstance(path, Mapping):
+        return controller_of(Table(path, "controller", ControllerError), "controller")
     return controller_of(Table.read(path, ControllerError), Path(path).stem)
 
 
@@ -93,15 +111,8 @@ def controller_of(top: Table, name: str) -> Controller:
     return controller
 
 
-def _section(top: Table, key: str, purpose: str) -> Table:
-    table = top.table(key)
-    if table is None:
-        raise top.fail(None, f"lacks the table [{key}]", purpose)
-    return table
-
-
 def _transfer(top: Table) -> TransferFunction:
-    table = _section(top, "transfer", "give num and den as [coefficient, order of s] terms")
+    table = top.section("transfer", "give num and den as [coefficient, order of s] terms")
     transfer = table.transfer()
     table.done()
     return transfer
@@ -110,7 +121,7 @@ def _transfer(top: Table) -> TransferFunction:
 def _gain(top: Table) -> float | GainSchedule:
     if not isinstance(top.values.get("gain"), dict):
         return top.number("gain", 1.0)
-    table = top.table("gain")
+    table = top.section("gain", "")
     points, gains = table.numbers("breakpoints"), table.numbers("gains")
     table.done()
     if len(points) != len(gains):
@@ -123,15 +134,20 @@ def _gain(top: Table) -> float | GainSchedule:
 
 
 def _ranges(top: Table, scheduled: bool) -> ControllerRanges:
-    table = _section(top, "ranges", "give reference, measurement and output as [low, high]")
+    table = top.section("ranges", "give reference, measurement and output as [low, high]")
     needed = ["reference", "measurement", "output"] + ["schedule"] * scheduled
     for key in needed:
         table.required(key)
-    ranges = ControllerRanges(**{key: table.span(key) for key in needed})
+    ranges = _spans(table, needed)
     if "schedule" in table and not scheduled:
         raise table.fail("schedule", "is given, but the gain is not scheduled", "remove it or add [gain]")
     table.done()
     return ranges
+
+
+def _spans(table: Table, keys: Sequence[str]) -> ControllerRanges:
+    spans: dict[str, Any] = {key: table.span(key) for key in keys}
+    return ControllerRanges(**spans)
 
 
 def _tunable(table: Table | None, gain: float | GainSchedule, ranges: ControllerRanges) -> Tunable | None:
@@ -200,7 +216,7 @@ def _source(table: Table | None) -> Source | None:
     if table is None:
         return None
     table.required("file"), table.required("sha256")
-    source = Source(table.text("file"), table.text("sha256"))
+    source = Source(table.text("file", ""), table.text("sha256", ""))
     table.done()
     return source
 
@@ -215,17 +231,17 @@ def controller_text(controller: Controller) -> str:
     return tomlkit.dumps(controller_table(controller))
 
 
-def controller_table(controller: Controller) -> dict:
+def controller_table(controller: Controller) -> dict[str, Any]:
     """The controller as plain numbers, texts and tables of them."""
     plain = ("name", "sample_time", "integrator", "length", "memory", "arithmetic")
-    table: dict = {key: getattr(controller, key) for key in plain}
+    table: dict[str, Any] = {key: getattr(controller, key) for key in plain}
     if controller.memory == "exponential":
         table.update(tolerance=controller.tolerance, horizon=controller.horizon)
     if not controller.scheduled:
         table["gain"] = controller.gain
     transfer = controller.transfer
     table["transfer"] = {"num": terms_of(transfer.num), "den": terms_of(transfer.den)}
-    if controller.scheduled:
+    if isinstance(controller.gain, GainSchedule):
         table["gain"] = {key: list(values) for key, values in asdict(controller.gain).items()}
     spans = {key: list(span) for key, span in asdict(controller.ranges).items() if span is not None}
     table["ranges"] = spans

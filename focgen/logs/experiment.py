@@ -35,7 +35,7 @@ class Experiment:
     continues: bool = False
     begins: Mapping[str, Begin] = field(default_factory=dict)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "begins", MappingProxyType(dict(self.begins)))
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
         if self.rows is not None:
@@ -71,7 +71,9 @@ class Experiment:
         begins = self.begins if begin == 0 else {}
         return replace(self, signals=cut, start=start, raw_time=time, rows=rows, begins=begins)
 
-    def _rows_between(self, low: float, high: float):
+    def _rows_between(
+        self, low: float, high: float
+    ) -> tuple[np.ndarray | None, Mapping[str, np.ndarray] | None]:
         """The raw time stamps and rows from ``low`` to ``high`` (s since the first)."""
         if self.raw_time is None:
             return None, None

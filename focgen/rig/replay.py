@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +12,10 @@ from focgen.errors import LogError, RigError
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
-from focgen.logs.read import read_logs
+from focgen.logs.read import Logs, read_logs
+from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
-from focgen.rig.files import read_rig
 from focgen.rig.initial import begun
 from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
@@ -48,29 +48,25 @@ class Replay:
     warnings: tuple[str, ...] = ()
 
 
-def replay(
-    rig: Rig | str | Path,
-    logs: Sequence[Experiment | str | Path],
-    first: float | None = None,
-    last: float | None = None,
-) -> Replay:
+@rig_then_logs
+def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | None = None) -> Replay:
     """Run the rig on each experiment's ``command`` where it is logged, else on its ``pressure``.
 
-    The experiments are one session and follow the one the rig's effects were found in. ``first``, ``last``:
+    The experiments are one session and follow the one the rig's effects were found in. ``from_``, ``to``:
     s within each experiment. Raises RigError for effects unknown, LogError for logs that cannot be used.
     """
-    rig = rig if isinstance(rig, Rig) else read_rig(rig)
-    logs = experiments(rig, logs, first, last)
-    rig = told_between(rig, logs)
-    logs = begun(rig, logs, placed_in(rig))
-    simulated = simulate_session(rig, logs)
-    results = {log.name: _compared(log, made) for log, made in zip(logs, simulated)}
-    made = {log.name: made for log, made in zip(logs, simulated)}
-    return Replay(results, made, notes_of(logs), doubts(rig, logs))
+    given = rig_of(rig)
+    session = experiments(given, logs, from_, to)
+    told = told_between(given, session)
+    session = begun(told, session, placed_in(told))
+    simulated = simulate_session(told, session)
+    results = {log.name: _compared(log, made) for log, made in zip(session, simulated)}
+    made = {log.name: made for log, made in zip(session, simulated)}
+    return Replay(results, made, notes_of(session), doubts(told, session))
 
 
 def experiments(
-    rig: Rig, logs: Sequence[Experiment | str | Path], first=None, last=None
+    rig: Rig, logs: Logs, first: float | None = None, last: float | None = None
 ) -> tuple[Experiment, ...]:
     """The logs read, and cut to ``first`` … ``last`` s."""
     return read_logs(logs, rig.signals, rig.sample_time, first, last)
@@ -122,7 +118,7 @@ def placed_in(rig: Rig) -> tuple[Placed, ...]:
     return tuple(_placed(rig, table) for table in rig.effects)
 
 
-def _placed(rig: Rig, table) -> Placed:
+def _placed(rig: Rig, table: Mapping[str, Any]) -> Placed:
     effect = library().get(table["name"])
     if effect is None:
         raise RigError(
@@ -166,7 +162,7 @@ def session_end(rig: Rig) -> float:
 
 def effect_tables(
     placed: Sequence[Placed], left: Sequence[dict[str, float]], clock: float
-) -> tuple[dict, ...]:
+) -> tuple[dict[str, Any], ...]:
     """Effects as ``[[effects]]`` tables, with what outlives the session: ``left``, one for each, and its
     ``clock`` in s."""
     tables = []

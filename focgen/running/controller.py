@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntFlag
 from pathlib import Path
-from typing import Any, Literal, Self, overload
+from typing import Any, Literal, NoReturn, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -148,10 +148,10 @@ class LoadedController:
 
     __copy__ = copy
 
-    def __deepcopy__(self, memo: dict) -> Self:
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         return self.copy()
 
-    def __reduce__(self):
+    def __reduce__(self) -> NoReturn:
         raise TypeError("compiled C cannot be pickled: load the folder in each process")
 
     def __repr__(self) -> str:
@@ -187,7 +187,8 @@ class LoadedController:
     def _step(self, ref: float, meas: float, *sched: int | float) -> float:
         error = self.plan.error
         given = self._one("ref", ref, error), self._one("meas", meas, error)
-        return self._signals.back(self._machine.step(self._state, *given, *sched), self.plan.output)
+        u: float = self._signals.back(self._machine.step(self._state, *given, *sched), self.plan.output)
+        return u
 
     def _run(self, inputs: tuple[tuple[str, ArrayLike], ...], with_flags: bool) -> Any:
         u, flags = self._machine.loop(self._state, self._rows(inputs))
@@ -213,7 +214,8 @@ class ScheduledController(LoadedController):
 
     def step(self, ref: float, meas: float, sched: float) -> float:  # type: ignore[override]
         """One sample; the output."""
-        return self._step(ref, meas, self._one("sched", sched, self.plan.schedule.signal))
+        schedule: Any = self.plan.schedule
+        return self._step(ref, meas, self._one("sched", sched, schedule.signal))
 
     def run(  # type: ignore[override]
         self, ref: ArrayLike, meas: ArrayLike, sched: ArrayLike, *, with_flags: bool = False

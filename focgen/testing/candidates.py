@@ -140,20 +140,22 @@ def _scenario(candidate: Candidate, plan: Plan, scenario: Scenario) -> Played:
     return Played(np.array([u for u, _ in lanes], float), flags)
 
 
-def _lane(one: Steps, plan: Plan, scenario: Scenario, lane: int) -> tuple[list, list | None]:
+def _lane(one: Steps, plan: Plan, scenario: Scenario, lane: int) -> tuple[list[float], list[int] | None]:
     events = events_of(scenario, lane)
     begin = getattr(one, "init", None) or (lambda: one.reset(*at_rest(plan)))
     begin()
     inputs = [x[lane].tolist() for x in (scenario.ref, scenario.meas, scenario.sched) if x is not None]
     flagged = hasattr(one, "flags")
-    u, flags = [], []
+    u: list[float] = []
+    flags: list[int] = []
     for k, given in enumerate(zip(*inputs)):
         try:
             for event in events.get(k, ()):
                 _happen(one, event)
             u.append(float(one.step(*given)))
             if flagged:
-                flags.append(int(one.flags() if callable(one.flags) else one.flags))
+                now = getattr(one, "flags")
+                flags.append(int(now() if callable(now) else now))
         except Exception as error:
             now = events.get(k, "no event")
             error.add_note(f"at sample {k} of run {lane}, with the inputs {given}, after {now}")
@@ -178,13 +180,15 @@ def _tune(one: Any, params: Params) -> None:
 
 def _plain(value: Any) -> int | float:
     """Python's own number, as the inputs are."""
-    return value.item() if isinstance(value, np.generic) else value
+    plain: int | float = value.item() if isinstance(value, np.generic) else value
+    return plain
 
 
 def events_of(scenario: Scenario, lane: int) -> dict[int, list[Reset | Track | Tune]]:
     """Tunes, resets and tracks of a lane by sample, in the order in which they happen."""
     found: dict[int, list[Reset | Track | Tune]] = {}
-    for event in (*scenario.tunes, *scenario.resets, *scenario.tracks):
+    every: tuple[Reset | Track | Tune, ...] = (*scenario.tunes, *scenario.resets, *scenario.tracks)
+    for event in every:
         if event.lane == lane:
             found.setdefault(event.sample, []).append(event)
     return found

@@ -15,7 +15,7 @@ from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
 from focgen.plan.model import Plan
-from focgen.plan.scenario import Scenario
+from focgen.plan.scenario import Reset, Scenario, Track
 from focgen.running.controller import LoadedController
 from focgen.testing.candidates import Candidate, Played, candidate_of, played, tunes
 from focgen.testing.inputs import Trial, bounded_trials, exact_trials
@@ -136,7 +136,8 @@ def _run(candidate: Candidate, plan: Plan, scenarios: list[Scenario]) -> list[Pl
         return played(candidate, plan, scenarios)
     limit = _PATIENCE + _SLOW * sum(s.ref.size for s in scenarios)
     try:
-        return apart(played, candidate, plan, scenarios, seconds=limit)
+        seen: list[Played] = apart(played, candidate, plan, scenarios, seconds=limit)
+        return seen
     except Crashed as how:
         raise AssertionError(f"{candidate.label} crashed ({how})") from None
     except TimedOut as how:
@@ -169,7 +170,7 @@ def _steps(plan: Plan, scenario: Scenario) -> np.ndarray:
     if not plan.integrator and not plan.error_bound.operator_per_sample:
         return count
     count = count.cumsum(axis=1)
-    begun = [*scenario.resets, *(scenario.tracks if plan.integrator else ())]
+    begun: list[Reset | Track] = [*scenario.resets, *(scenario.tracks if plan.integrator else ())]
     for event in sorted(begun, key=lambda event: event.sample):
         count[event.lane, event.sample :] = np.arange(1, scenario.samples - event.sample + 1)
     return count

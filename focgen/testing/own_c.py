@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,7 @@ class OwnC:
         self._library, self._ffi = library, ffi
         self._state = ffi.new("double[]", -(-library.focgen_bytes() // 8) or 1)  # aligned for every member
         if glue.init:
-            self.init = lambda: library.focgen_init(self._state)
+            self.init: Callable[[], None] = lambda: library.focgen_init(self._state)
             self.init()
         if glue.track:
             self.track = lambda u: library.focgen_track(self._state, u)
@@ -65,7 +65,8 @@ class OwnC:
 
     def step(self, ref: float, meas: float, sched: float = 0) -> float:
         """PREFIX_step, in counts; ``sched`` is not passed on where it takes none."""
-        return self._library.focgen_step(self._state, ref, meas, sched)
+        u: float = self._library.focgen_step(self._state, ref, meas, sched)
+        return u
 
     def _tune(self, params: Params) -> None:
         """PREFIX_tune, in counts."""

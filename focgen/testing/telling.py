@@ -33,7 +33,7 @@ def difference(plan: Plan, headline: str, judged: Judged, counted: tuple[int, in
 def _inputs(plan: Plan, judged: Judged, lane: int, k: int) -> list[str]:
     raw = judged.trial.raw
     found = [("ref", raw.ref, plan.error), ("meas", raw.meas, plan.error)]
-    if plan.schedule:
+    if plan.schedule and raw.sched is not None:
         found.append(("sched", raw.sched, plan.schedule.signal))
     return [f"  {name:<9} {_value(values[lane, k], form)}" for name, values, form in found]
 
@@ -64,7 +64,7 @@ def _outputs(plan: Plan, judged: Judged, at: tuple[int, int]) -> list[str]:
     seen, form = judged.seen, plan.output
     if judged.allowed is None:
         told = "" if judged.flags is None else f", flags {judged.flags[at]}"
-        own = "" if judged.flags is None else f", flags {seen.flags[at]}"
+        own = "" if judged.flags is None or seen.flags is None else f", flags {seen.flags[at]}"
         return [
             f"  reference u = {_value(judged.u[at], form)}{told}",
             f"  candidate u = {_value(seen.u[at], form)}{own}",

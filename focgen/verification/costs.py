@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from focgen.codegen.kernels import TARGETS
 from focgen.errors import InputError, MissingExtra, check_choice
@@ -138,10 +139,10 @@ def _remember(read: GeneratedFolder, compiler: str, found: dict[str, Cost]) -> d
     return {name: cost_of(entry) for name, entry in previous.items()}
 
 
-def _stored(path: Path) -> dict:
+def _stored(path: Path) -> dict[str, Any]:
     """What a folder remembers; nothing where that cannot be read."""
     try:
-        stored = read_json(path, "")
+        stored: dict[str, Any] = read_json(path, "")
         for part in stored.values():
             for entry in (*part["targets"].values(), *part["previous"].values()):
                 cost_of(entry)
