@@ -1,4 +1,4 @@
-"""What the calls beside the step cost on a core: init, reset, track, save, restore and tune, one at a time."""
+"""What the calls beside the step cost on a core: init, reset, track, save, restore, tune, one at a time."""
 
 from __future__ import annotations
 
