@@ -345,6 +345,13 @@ class Plan:
         return self.memory == "exponential"
 
     @property
+    def box(self) -> Tuning:
+        """``tuning`` of a plan that has it. Raises ValueError for any other."""
+        if self.tuning is None:
+            raise ValueError(f"{self.name} has no parameters")
+        return self.tuning
+
+    @property
     def sums(self) -> tuple[Sum, ...]:
         """The sums that there are: numerator, what 1/s integrates, denominator."""
         found = (self.direct, self.inner and self.inner.rest, self.feedback and self.feedback.table)
