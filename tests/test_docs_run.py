@@ -17,9 +17,10 @@ from tests.pages import ROOT, Block, blocks, check_shown, run_page, run_shell
 
 DOCS = ROOT / "docs"
 TUTORIALS = ("own-log", "tutorial-board", "tutorial-diagnosis", "tutorial-memory")
-FURTHER = ("memory", "kernels", "targets", "report", "proofs")
+FURTHER = ("memory", "packages", "kernels", "targets", "report", "proofs")
 # Pages whose commands go on from files that the reader has by then; SETUP makes them.
-USES = ("README.md", "examples/README.md", *(f"docs/{name}.md" for name in FURTHER))
+PROJECTS = ("examples/cmake/README.md", "examples/fmu/README.md")
+USES = ("README.md", "examples/README.md", *PROJECTS, *(f"docs/{name}.md" for name in FURTHER))
 SETUP = """
 focgen identify steps.csv --rig rig.toml --to 40 --out identified.toml
 focgen design identified.toml --out controller.toml --settling 1.5

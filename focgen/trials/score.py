@@ -167,7 +167,7 @@ def _ask_oracle(folder: Path, labels: dict[str, dict[str, Any]], jobs: int) -> N
 def _judged(folder: Path, number: str, label: dict[str, Any], baseline: bool) -> Judged:
     run, told = folder / "runs" / number, folder / "oracle" / number
     outcome, diagnosis = outcome_of(run), _diagnosis_of(run)
-    single = label["kind"] == "single" and label["suite"] != "closed"
+    single = label["kind"] == "single" and label["suite"] not in ("closed", "loops")
     return judge(
         number,
         label,
