@@ -222,7 +222,10 @@ def _source(table: Table | None) -> Source | None:
 
 
 def write_controller(controller: Controller, path: str | Path) -> None:
-    """Write a controller so that :func:`read_controller` gives an equal one."""
+    """Write a controller so that :func:`read_controller` gives an equal one.
+
+    Raises InputError where it cannot be written.
+    """
     write_file(path, controller_text(controller))
 
 
