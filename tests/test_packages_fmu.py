@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import sys
 import zipfile
 from pathlib import Path
@@ -18,6 +20,7 @@ from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.plan.scenario import Reset, Scenario, physical_trace, to_raw
 from focgen.verification.folder import read_folder
+from tests.build_tools import build_tool
 from tests.c_code import STRICT, compiler, run, tool
 from tests.controllers import seed_controller, simple
 
@@ -136,6 +139,22 @@ def test_it_starts_without_a_bump_and_returns_to_a_kept_state(fmpy, fmi, tmp_pat
         )
         assert rest["u"][1:].tolist() == found["u"][21:].tolist()
         (unit.setFMUState if fmi == 3 else unit.setFMUstate)(kept)
+
+
+@pytest.mark.parametrize("fmi", (2, 3))
+def test_fmpy_makes_the_same_block_of_its_sources(fmpy, fmi, tmp_path, monkeypatch):
+    """For a computer that the archive has no binary for: the description lists what is to be compiled."""
+    from fmpy.build import build_platform_binary
+
+    monkeypatch.setenv("PATH", str(Path(build_tool("cmake")).parent), prepend=os.pathsep)
+    folder, table = tmp_path / "unpacked", inputs(FILTER, 30)
+    path = made(tmp_path, FILTER, "q15", fmi)
+    expected = simulated(fmpy, path, table)
+    fmpy.extract(str(path), str(folder))
+    shutil.rmtree(folder / "binaries")
+    build_platform_binary(folder)
+    assert list((folder / "binaries").rglob("filter.*"))
+    assert simulated(fmpy, folder, table)["u"].tolist() == expected["u"].tolist()
 
 
 def test_another_token_is_refused(fmpy, tmp_path):
