@@ -180,6 +180,7 @@ def test_the_functions_are_those_of_the_standards_headers(fmpy, arithmetic, fmi,
     wanted = set(re.findall(r"\b(fmi\d\w+)TYPE\b", declared[0]))
     if fmi == 2:  # a block for co-simulation has no functions of model exchange
         wanted |= set(re.findall(r"\b(fmi\d\w+)TYPE\b", declared[2].partition("Co-Simulation")[2]))
+    assert max(map(len, source.read_text().splitlines())) <= 110
     defined = set(run(tool("nm"), "--defined-only", "-j", tmp_path / "own.o").split())
     assert len(wanted) >= (34 if fmi == 2 else 70) and wanted - defined == set()
 
