@@ -171,7 +171,7 @@ def _tunable(table: Table | None, gain: float | GainSchedule, ranges: Controller
     if box.output_low[1] >= box.output_high[0]:
         what = f"reaches {box.output_low[1]:g}, and output_high {box.output_high[0]:g}"
         raise table.fail("output_low", what, "keep the two apart, so that the limits cannot cross")
-    if "gain" in table and isinstance(gain, GainSchedule):
+    if "gain" in table and isinstance(gain, GainSchedule) and ranges.schedule:
         _check_inside(table, gain, ranges.schedule)
     return box
 
@@ -246,7 +246,7 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     spans = {key: list(span) for key, span in asdict(controller.ranges).items() if span is not None}
     table["ranges"] = spans
     if controller.tunable:
-        table["tunable"] = _box(controller)
+        table["tunable"] = _box(controller.tunable)
     units = {key: unit for key, unit in asdict(controller.units).items() if unit}
     if units:
         table["units"] = units
@@ -255,7 +255,7 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     return table
 
 
-def _box(controller: Controller) -> dict[str, list[float]]:
+def _box(tunable: Tunable) -> dict[str, list[float]]:
     """The spans of [tunable]; one that holds a single value is left out."""
-    spans = asdict(controller.tunable).items()
+    spans = asdict(tunable).items()
     return {key: list(span) for key, span in spans if span[0] < span[1]}

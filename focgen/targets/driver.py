@@ -26,6 +26,10 @@ REFUSED = 128
 """Beside the flags of a step: a reset or a track ahead of it has raised INPUT or INVALID."""
 UNTUNED = 64
 """Beside them, too: of parameters something else has been said than :func:`refused` does."""
+CALLS = ("init", "reset", "track", "save", "restore", "tune")
+"""The calls that NAME_call makes, by number."""
+PREPARE = len(CALLS)
+"""The number for which it takes parameters ready, so that ``tune`` is nothing but the call."""
 RESUME = 4
 """Event of a first sample: go on from the state that is there, without init."""
 
@@ -43,6 +47,7 @@ class DriverContext:
     conversions: tuple[str, ...]
     fixed: bool
     refusing: str
+    left: str
     tunable: bool
     width: int
 
@@ -60,8 +65,10 @@ def driver_context(plan: Plan) -> DriverContext:
     tried = tuple(expression for expression, _ in tried_conversions(plan).values())
     refusing = f"{plan.name.upper()}_FLAG_{'INVALID' if plan.floating else 'INPUT'}"
     fixed = not plan.floating
+    high, low = f"{plan.name.upper()}_U_MAX", f"{plan.name.upper()}_U_MIN"
+    left = "INT64_MAX" if plan.counted else f"{high} + ({high} - {low})"
     return DriverContext(
-        plan.name, plan.increment.ctype, scheduled, integral, held, scales, tried, fixed, refusing,
+        plan.name, plan.increment.ctype, scheduled, integral, held, scales, tried, fixed, refusing, left,
         plan.tuning is not None, given_width(plan),
     )  # fmt: skip
 
