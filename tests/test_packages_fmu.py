@@ -14,11 +14,11 @@ import pytest
 
 import focgen
 from focgen.cli.main import main
-from focgen.control.controller import Units
+from focgen.control.controller import Tunable, Units
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
-from focgen.plan.scenario import Reset, Scenario, physical_trace, to_raw
+from focgen.plan.scenario import Params, Reset, Scenario, Tune, physical_trace, to_raw
 from focgen.verification.folder import read_folder
 from tests.build_tools import build_tool
 from tests.c_code import STRICT, compiler, run, tool
@@ -60,10 +60,12 @@ def held(table: np.ndarray) -> np.ndarray:
     return table
 
 
-def reference(plan, table, resets=()):
+def reference(plan, table, resets=(), tunes=()):
     """Outputs and flags of the bit-true reference for the samples of a table but the last row."""
     rows = {name: table[name][None, :-1] for name in table.dtype.names[1:]}
-    scenario = Scenario(rows["ref"], rows["meas"], rows.get("sched"), resets=tuple(resets))
+    scenario = Scenario(
+        rows["ref"], rows["meas"], rows.get("sched"), resets=tuple(resets), tunes=tuple(tunes)
+    )
     trace = physical_trace(plan, execute(plan, to_raw(plan, scenario)))
     return np.asarray(trace.u[0], dtype=float), trace.flags[0]
 
@@ -155,6 +157,48 @@ def test_fmpy_makes_the_same_block_of_its_sources(fmpy, fmi, tmp_path, monkeypat
     build_platform_binary(folder)
     assert list((folder / "binaries").rglob("filter.*"))
     assert simulated(fmpy, folder, table)["u"].tolist() == expected["u"].tolist()
+
+
+@pytest.mark.parametrize(("arithmetic", "fmi"), [("q15", 2), ("f32", 3)])
+def test_parameters_change_between_samples(fmpy, arithmetic, fmi, tmp_path):
+    """Of a tunable controller, against the reference; what is outside the box changes nothing."""
+    from fmpy.validation import validate_fmu
+
+    controller = seed_controller(30, tunable=Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0)))
+    focgen.generate(controller, tmp_path, arithmetic, for_="fmu", fmi=fmi, tunable=True)
+    path, table = tmp_path / "spba.fmu", inputs(controller, 90)
+    assert validate_fmu(str(path)) == []
+    unit, number = instantiated(fmpy, path)
+    put, get = (unit.setFloat64, unit.getFloat64) if fmi == 3 else (unit.setReal, unit.getReal)
+    put([number["u_max"]], [6.0])
+    unit.exitInitializationMode()
+    found = []
+    for k in range(90):
+        put([number[name] for name in table.dtype.names[1:]], list(table[k])[1:])
+        if k == 30:
+            put([number["gain_2"], number["u_min"]], [1.75, 0.5])
+            with pytest.raises(Exception, match="rror"):
+                put([number["gain_3"]], [2.5])
+            assert get([number["gain_3"], number["gain_2"], number["u_max"]]) == [1.0, 1.75, 6.0]
+        unit.doStep(currentCommunicationPoint=k * STEP, communicationStepSize=STEP)
+        found += get([number["u"]])
+    first = Params((1.0,) * 9, 0.0, 6.0)
+    second = Params((1.0, 1.75, *[1.0] * 7), 0.5, 6.0)
+    plan = build_plan(controller, arithmetic, tunable=True)
+    u, _ = reference(plan, table, tunes=[Tune(0, 0, first), Tune(0, 30, second)])
+    other, _ = reference(plan, table, tunes=[Tune(0, 0, first)])
+    assert found == u.tolist() and found != other.tolist()
+
+
+def instantiated(fmpy, path):
+    """The unit in its initialisation, and the numbers of its variables."""
+    folder = fmpy.extract(str(path))
+    description = fmpy.read_model_description(folder)
+    unit = fmpy.instantiate_fmu(folder, description)
+    if description.fmiVersion == "2.0":
+        unit.setupExperiment(startTime=0.0)
+    unit.enterInitializationMode()
+    return unit, {variable.name: variable.valueReference for variable in description.modelVariables}
 
 
 def test_another_token_is_refused(fmpy, tmp_path):
