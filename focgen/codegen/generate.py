@@ -131,7 +131,7 @@ def folder_files(
         "README.md": render("README.md.jinja", readme_context(plan, title, selftest, kernels, floats)),
         "example/main.c": render("main.c.jinja", example_context(plan, title, floats)),
     }
-    made = Made(plan, compiled, package.name, package.fmi, floats)
+    made = Made(plan, compiled, package.name, package.fmi)
     files = {**compiled, "controller.toml": controller_toml, **packed(beside, made)}
     inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
     manifest = manifest_of(plan, inputs, selftest, kernels, floats)
