@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit, innovations, jacobian
+from focgen.diagnosis.jumps import by_trying
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.repeats import without_hearsay
@@ -171,6 +172,8 @@ def best_start(problem: Problem, base: np.ndarray, clue: Clue, known: np.ndarray
     extended = problem.with_clues([*problem.clues, clue])
     starts, fits = extended.starts(clue), []
     bent = problem.own.doubt(base) > _BENT
+    if clue.form.jumps:
+        return by_trying(extended, base, starts, known)
     if len(starts) > _TRIED:
         starts = _likeliest(extended, base, starts, known)
     for start in starts:
