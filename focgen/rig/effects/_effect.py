@@ -101,7 +101,8 @@ class Form:
     is not there. ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is
     linear, None where not. ``wanders``: it follows the session's time through free values, so that it
-    foretells nothing of a later one.
+    foretells nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
+    ``begun``: it says where something lay that was held when an experiment began elsewhere than at rest.
     """
 
     name: str
@@ -112,6 +113,8 @@ class Form:
     leaves: Callable[[np.ndarray, tuple[float, ...], Run], dict[str, float]] | None = None
     response: Callable[[tuple[float, ...], np.ndarray], np.ndarray] | None = None
     wanders: bool = False
+    jumps: bool = False
+    begun: bool = False
 
     @property
     def drawn(self) -> bool:
