@@ -84,7 +84,14 @@ def is_elsewhere(command: list[str]) -> bool:
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "400", "OMP_NUM_THREADS": "1"}
+    tools = Path(sys.executable).parent  # of Python packages
+    return {
+        **os.environ,
+        "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}",
+        "PYTHONPATH": str(ROOT),
+        "COLUMNS": "400",
+        "OMP_NUM_THREADS": "1",
+    }
 
 
 def check_shown(block: Block, said: str) -> None:

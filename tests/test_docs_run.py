@@ -3,6 +3,7 @@
 Red when a command's option, output or example file changes and the page does not.
 """
 
+import re
 import shutil
 import subprocess
 import sys
@@ -16,9 +17,10 @@ from tests.pages import ROOT, Block, blocks, check_shown, run_page, run_shell
 
 DOCS = ROOT / "docs"
 TUTORIALS = ("own-log", "tutorial-board", "tutorial-diagnosis", "tutorial-memory")
-FURTHER = ("memory", "kernels", "targets", "report", "proofs")
+FURTHER = ("memory", "packages", "kernels", "targets", "report", "proofs")
 # Pages whose commands go on from files that the reader has by then; SETUP makes them.
-USES = ("README.md", "examples/README.md", *(f"docs/{name}.md" for name in FURTHER))
+PROJECTS = ("examples/cmake/README.md", "examples/fmu/README.md")
+USES = ("README.md", "examples/README.md", *PROJECTS, *(f"docs/{name}.md" for name in FURTHER))
 SETUP = """
 focgen identify steps.csv --rig rig.toml --to 40 --out identified.toml
 focgen design identified.toml --out controller.toml --settling 1.5
@@ -98,30 +100,45 @@ def test_a_frame_is_read_as_the_page_of_logs_says(folder, monkeypatch):
 
 
 def test_the_c_that_is_shown_is_the_c_that_is_written(tmp_path):
-    made = tmp_path / "valve"
-    focgen.generate(
-        ROOT / "examples" / "controller.toml", made, name="valve", memory="exponential", selftest=True
+    made, controller = tmp_path / "valve", tmp_path / "controller.toml"
+    given = (ROOT / "examples" / "controller.toml").read_text(encoding="utf-8")
+    controller.write_text(
+        given + "\n[tunable]\ngain = [0.5, 2.0]\noutput_high = [5.0, 10.0]\n", encoding="utf-8"
     )
-    prototypes, loop, start, _ = (
-        block.text for block in blocks(DOCS / "c-interface.md") if block.language == "c"
-    )
+    focgen.generate(controller, made, name="valve", memory="exponential", selftest=True, tunable=True)
+    shown = [b.text.replace("NAME", "valve") for b in blocks(DOCS / "c-interface.md") if b.language == "c"]
+    prototypes, loop, declared, tuned, start, _ = shown
     header = "".join((made / "valve.h").read_text(encoding="utf-8").split())
-    for line in prototypes.replace("NAME", "valve").splitlines():
+    for line in re.findall(r"^.*\);", prototypes + declared, re.MULTILINE):
         assert "".join(line.split()) in header, line
-    compiles(f"""#include "valve.h"
+    done = {
+        "STARTED": start.replace("}", "return; }"),
+        "TUNED": tuned.replace("&controller", "&s"),
+        "LOOP": loop,
+    }
+    compiles(re.sub("|".join(done), lambda name: done[name.group()], FIRMWARE), made)
+
+
+FIRMWARE = """#include "valve.h"
+#include "valve_selftest.h"
 extern int32_t limit(int32_t u);
 void loop(int32_t ref, int32_t meas, int32_t sched, int32_t u_manual);
+void tuned(valve_state s, float supply);
+void started(void);
 void loop(int32_t ref, int32_t meas, int32_t sched, int32_t u_manual)
-{{
+{
     int32_t u, applied;
-{loop}
-}}
-int start(void);
-int start(void)
-{{
-    {start.replace("NAME", "valve").replace("}", "return 1; }")}
-    return 0;
-}}""", made)  # fmt: skip
+LOOP
+}
+void tuned(valve_state s, float supply)
+{
+TUNED
+}
+void started(void)
+{
+STARTED
+}
+"""
 
 
 def compiles(text, folder):

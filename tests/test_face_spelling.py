@@ -2,6 +2,7 @@
 
 import tomllib
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import focgen
 from focgen.diagnosis.plan import plan
-from focgen.errors import LogError, RigError
+from focgen.errors import ControllerError, LogError, RigError
 from focgen.logs.experiment import Experiment
 from focgen.resources import shipped
 from focgen.rig import Signals
@@ -105,6 +106,38 @@ def test_logs_are_read_as_the_rig_says_them():
     assert [e.name for e in old] == [e.name for e in new] and len(new) > 1
     assert all(np.array_equal(a["output"], b["output"]) for a, b in zip(old, new))
     assert len(focgen.read_logs(RIG, LOG, from_=1.0, to=2.0)[0]) == 51
+
+
+def test_rigs_and_controllers_are_files_dictionaries_or_objects(tmp_path):
+    """The same comes out, whichever is given."""
+    path = EXAMPLES / "controller.toml"
+    table, made = tomllib.loads(path.read_text(encoding="utf-8")), focgen.read_controller(path)
+    steps = [
+        focgen.simulate(rig, controller, [0.01]).setpoints
+        for rig, controller in ((RIG, path), (TABLE, table), (focgen.read_rig(RIG), made))
+    ]
+    assert steps[0] == steps[1] == steps[2]
+    designs = [focgen.design(rig, setpoints=[0.01]) for rig in (RIG, TABLE)]
+    assert designs[0].controller.designed_from.file == "rig.toml"
+    assert designs[0].controller == replace(
+        designs[1].controller, designed_from=designs[0].controller.designed_from
+    )
+    folders = [focgen.generate(given, tmp_path / str(i)) for i, given in enumerate((path, table, made))]
+    assert folders[0].manifest["proofs"] == folders[1].manifest["proofs"] == folders[2].manifest["proofs"]
+    with pytest.raises(ControllerError, match="give a Controller, a controller.toml or a dictionary"):
+        focgen.generate(3.0, tmp_path)
+    with pytest.raises(ControllerError, match=r"controller: lacks the table \[transfer\]"):
+        focgen.generate({"sample_time": 0.01}, tmp_path)
+
+
+def test_a_study_without_a_folder_leaves_nothing(tmp_path):
+    from focgen.studies import study
+
+    with study._folder(None) as place:
+        (place / "row.json").write_text("{}", encoding="utf-8")
+    with study._folder(tmp_path) as kept:
+        (kept / "row.json").write_text("{}", encoding="utf-8")
+    assert not place.exists() and (tmp_path / "row.json").exists()
 
 
 @pytest.mark.parametrize("rig", [7, None, [RIG]])

@@ -1,5 +1,6 @@
 """Closed loops: without a fault the controller is the file's; with one it departs as the fault says."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from scipy.special import binom
 
 from focgen.fractional.transfer import TransferFunction
+from focgen.rig.files import read_rig
 from focgen.rig.model import Actuator, Rig, Signals
 from focgen.trials.closed import (
     CONTROLLER_EFFECTS,
@@ -14,11 +16,13 @@ from focgen.trials.closed import (
     Loop,
     draw_controller,
     draw_fault,
+    draw_unknown,
     gl_weights,
     logged,
 )
 from focgen.trials.forms import Spans
 from focgen.trials.machine import Machine, Session
+from focgen.trials.make import make
 from focgen.trials.recording import Recorder
 
 H, TS = 0.001, 0.02
@@ -122,3 +126,26 @@ def test_every_controller_effect_has_a_fault():
     for effect in CONTROLLER_EFFECTS:
         faults = [draw_fault(effect, "mid", 1.0, np.random.default_rng(seed)) for seed in range(12)]
         assert all(f.effect == effect and f != Fault(effect, f.form) for f in faults)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_controller_of_somebody_else_keeps_the_loop_stable_and_follows(seed):
+    """Whatever was drawn: at rest it has no error, and nothing rings for long."""
+    rng = np.random.default_rng(seed)
+    session = Session(Machine(RIG), H)
+    loop = Loop(session, draw_unknown(RIG, SPANS, rng), Fault(), SPANS)
+    quiet = Recorder(dict.fromkeys(NOISE, 0.0), {name: 1e-9 for name in NOISE}, 0.0, 0.0, True, False)
+    trace, *_ = loop.run(REFERENCE, 20, 0.0, quiet, rng)
+    ends = np.arange(1, 5) * 15000 - 1
+    assert trace.output[ends] == pytest.approx(REFERENCE[ends], abs=0.12 * DRIVE)
+    assert np.ptp(trace.output[-3000:]) < 0.1 * DRIVE and trace.output.max() < 1.5 * REFERENCE.max()
+
+
+def test_cases_with_an_unknown_controller_say_nothing_of_it(tmp_path):
+    make(tmp_path / "t", cases=2, seed=5, signals="A", suite="loops", kinds=("none", "parameters"))
+    for case in sorted((tmp_path / "t" / "cases").iterdir()):
+        assert not (case / "controller.toml").exists() and "theirs" not in (case / "rig.toml").read_text()
+        rig = read_rig(case / "rig.toml")
+        assert rig.signals.reference == "ref" and rig.signals.pressure is None
+        label = json.loads((tmp_path / "t" / "sealed" / case.name / "label.json").read_text())["label"]
+        assert label["suite"] == "loops" and label["truth"] == []

@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ELSEWHERE = {"README.md": "index.md", "examples/README.md": "examples.md", "CHANGELOG.md": "changelog.md"}
 NAV = {
     "Start": ("own-log", "tutorial-board", "tutorial-diagnosis", "tutorial-memory", "examples"),
-    "How to": ("recording-logs", "logs", "rig-file", "controller-file", "testing", "report"),
+    "How to": ("recording-logs", "logs", "rig-file", "controller-file", "packages", "testing", "report"),
     "Understand": (
         "identification",
         "closed-loop",

@@ -133,10 +133,18 @@ def _text(made: Generated) -> str:
             for b in manifest["memory_bias"]
             if b["bias"]
         ),
+        *_least(made),
         f"wrote {', '.join(made.files)} to {made.folder}",
         f"next: focgen verify {made.folder}",
     ]
     return "\n".join(lines)
+
+
+def _least(made: Generated) -> list[str]:
+    """What the integral acts on, and what it cannot hold."""
+    least, unit = made.manifest.get("smallest_error"), made.plan.controller.units.measurement
+    found = [] if least is None else [f"the integral acts on a steady error of {least:.3g} {unit}".rstrip()]
+    return found + [f"note: {remark}" for remark in made.manifest.get("remarks", [])]
 
 
 def _whose(plan: Plan) -> str:

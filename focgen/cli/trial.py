@@ -11,6 +11,7 @@ from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.output import write_files
 from focgen.report.pages.trials import trials_page
 from focgen.report.trials import pictures
+from focgen.trials.excitation import SUITES
 from focgen.trials.plan import KINDS
 from focgen.trials.tables import full_text, markdown
 from focgen.trials.trial import ACTIONS, trial
@@ -40,10 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="S")
     parser.add_argument(
         "--suite",
-        choices=("full", "off", "begun", "short", "closed", "engine"),
+        choices=tuple(SUITES),
         default="full",
-        help="about 600 s, the same with regulator and sensor off or with logs cut, 270 s, closed-loop logs, "
-        "or rigs moved by a physics engine (pip install 'focgen[engine]')",
+        help="about 600 s, the same with regulator and sensor off or with logs cut (off, begun), 270 s, "
+        "loops of a known (closed) or unknown controller (loops), plants that integrate, oscillate or rub "
+        "(plants), or rigs moved by a physics engine (pip install 'focgen[engine]')",
     )
     parser.add_argument("--kinds", metavar="KIND,…", help=f"only these kinds of cases, of {', '.join(KINDS)}")
     parser.add_argument(

@@ -14,6 +14,7 @@ from focgen.codegen.literals import quantity, wrapped
 from focgen.codegen.manifest import sizes
 from focgen.codegen.texts import UserText, markdown
 from focgen.plan.canonical import memory_bias
+from focgen.plan.integrals import remarks, smallest_error
 from focgen.plan.model import Plan
 
 
@@ -61,6 +62,8 @@ class ReadmeContext:
     tightest: str
     operator: UserText
     output_per_sample: UserText
+    smallest: UserText | None
+    remarks: list[UserText]
     truncation: UserText | None
     biases: list[str]
     selftest: bool
@@ -74,6 +77,7 @@ def readme_context(
     """Prepare the folder's README; ``selftest`` and ``floats``: whether it tells of one, of conversions."""
     size, bound, unit = sizes(plan, kernels), plan.error_bound, plan.controller.units.output
     operator_unit = f"{unit}/s" if plan.integrator and unit else unit
+    least = smallest_error(plan)
     return ReadmeContext(
         name=plan.name,
         title=UserText(title),
@@ -102,6 +106,8 @@ def readme_context(
         tightest=_tightest(plan),
         operator=_quantity(bound.operator, operator_unit),
         output_per_sample=_quantity(bound.output_per_sample, unit),
+        smallest=None if least is None else _quantity(least, plan.controller.units.measurement),
+        remarks=[UserText(remark) for remark in remarks(plan)],
         truncation=None if bound.truncation is None else _quantity(bound.truncation, operator_unit),
         biases=_biases(plan),
         selftest=selftest,

@@ -28,13 +28,14 @@ from focgen.output import check_apart, remove, write_files
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST, Plan
 from focgen.resources import shipped
+from focgen.shown import Shown
 from focgen.spelling import respelled
 
 __all__ = ["PACKAGES", "Generated", "folder_files", "generate"]
 
 
-@dataclass(frozen=True)
-class Generated:
+@dataclass(frozen=True, repr=False)
+class Generated(Shown):
     """What :func:`generate` has written: the ``files`` of ``folder``, ``plan`` and ``manifest``."""
 
     folder: Path

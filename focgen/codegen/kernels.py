@@ -90,7 +90,8 @@ PORTABLE = Kernels()
 
 def runtime_files(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[str, ...]:
     """The files of the runtime that a plan's C includes."""
-    extra = [*["foc_memory.h"] * (plan.states > 0), *["foc_tune.h"] * (plan.tuning is not None)]
+    extra = [*["foc_memory.h"] * (plan.states > 0), *["foc_integral.h"] * plan.counted]
+    extra += ["foc_tune.h"] * (plan.tuning is not None)
     return ("foc_rt.h", "foc_save.h", *extra, *kernels.headers(plan))
 
 

@@ -12,6 +12,7 @@ from focgen.codegen.selftest import selftest_entry
 from focgen.codegen.state import plain_bytes, size_of, state_bytes
 from focgen.fractional.elementary import rounded_up
 from focgen.plan.canonical import memory_bias
+from focgen.plan.integrals import remarks, smallest_error
 from focgen.plan.model import (
     FLAG_HIGH,
     FLAG_INPUT,
@@ -61,6 +62,7 @@ def manifest_of(
         **({"usable_below": 2.0 ** EXPONENT[plan.output.ctype]} if plan.floating else {}),
         "proofs": [proof_entry(proof) for proof in plan.proofs],
         "error_bound": bound_entry(plan.error_bound),
+        **_least(plan),
         "memory_bias": _bias(plan),
         **({"kernels": kernel_entry(plan, kernels)} if kernels.target else {}),
         "sizes": sizes(plan, kernels),
@@ -134,6 +136,15 @@ def _exponential(plan: Plan) -> dict[str, Any]:
             for memory in plan.memories
         ],
         "compensated": any(bank.compensated for table in plan.sums for bank in table.banks),
+    }
+
+
+def _least(plan: Plan) -> dict[str, Any]:
+    """The least steady error that the integral acts on, physical, and what it cannot hold."""
+    least, said = smallest_error(plan), remarks(plan)
+    return {
+        **({} if least is None else {"smallest_error": rounded_up(least)}),
+        **({"remarks": said} if said else {}),
     }
 
 

@@ -5,13 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import focgen
-from focgen.codegen.expressions import CLAMP, LONGEST_SHIFT, bound, converted, saturated, scaled_up, shifted
+from focgen.codegen.expressions import (
+    CLAMP,
+    LONGEST_SHIFT,
+    bound,
+    converted,
+    counts,
+    saturated,
+    scaled_up,
+    shifted,
+    value,
+)
 from focgen.codegen.formulas import memory_about, step_formulas, transfer_text, weights_about
-from focgen.codegen.guard import GuardText, guard_text
+from focgen.codegen.guard import GuardText, guard_text, output_of
 from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
 from focgen.codegen.literals import constant, literal, quantity, scale
 from focgen.codegen.saved import SavedText, saved_text
-from focgen.codegen.state import carries, starts
+from focgen.codegen.state import carries, inner_input, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
 from focgen.codegen.texts import UserText, comment
 from focgen.codegen.tuned import Limits, TunedText, integral_ends, limits, tuned_gain, tuned_text
@@ -21,10 +31,14 @@ from focgen.plan.model import Plan, Sum
 
 @dataclass(frozen=True)
 class InnerText:
-    """The integral of the terms of negative order."""
+    """The integral of the terms of negative order; ``taken``: the sum as it takes it in; ``counted``: it is
+    in counts though the plan is floating."""
 
     sum: SumText
     ctype: str
+    taken: str
+    zero: str
+    counted: bool
     clamp: str
     to_wide: str
     about: str
@@ -54,6 +68,7 @@ class IntegralText:
     about: str
     start: str
     start_about: str
+    zero: str
     within: str
     from_output: str
     starting: bool
@@ -83,6 +98,7 @@ class SourceContext:
     transfer: str
     formulas: list[str]
     exponential: bool
+    counted: bool
     memory_about: list[str]
     fixed: bool
     signal: str
@@ -130,6 +146,7 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         transfer=comment(transfer_text(plan)),
         formulas=step_formulas(plan),
         exponential=plan.states > 0,
+        counted=plan.counted,
         memory_about=memory_about(plan),
         fixed=not plan.floating,
         signal=signal,
@@ -203,12 +220,19 @@ def _inner(plan: Plan, kernels: Kernels) -> InnerText | None:
     what = "What 1/s integrates: numerator terms of negative order times s"
     about = weights_about(plan, realise(plan.controller).rest, plan.inner.rest, what, half_step=True)
     ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
-    total = f"s->inner + ({converted('r', plan.inner.rest.total.ctype, state.ctype)} + s->inner_input)"
+    made = _sum(plan, plan.inner.rest, "integrand", about, kernels)
+    counted = plan.floating and not state.floating
+    ctype = inner_input(plan)
+    total = f"s->inner + ({converted('r', ctype, state.ctype)} + s->inner_input)"
+    there = shifted("s->inner", state.ctype, plan.inner.to_wide)
     return InnerText(
-        sum=_sum(plan, plan.inner.rest, "integrand", about, kernels),
-        ctype=plan.inner.rest.total.ctype,
+        sum=made,
+        ctype=ctype,
+        taken=counts(f"{made.function}(s)", state) if counted else f"{made.function}(s)",
+        zero=literal(0, state.ctype),
+        counted=counted,
         clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
-        to_wide=converted(shifted("s->inner", state.ctype, plan.inner.to_wide), state.ctype, plan.wide.ctype),
+        to_wide=value("s->inner", state) if counted else converted(there, state.ctype, plan.wide.ctype),
         about=_proved(plan, "inner sum", state.bits),
     )
 
@@ -268,8 +292,10 @@ def _gain_call(plan: Plan) -> str:
 
 def _increment_about(plan: Plan) -> str:
     unit = plan.controller.units.output
-    if plan.floating:
+    if plan.increment.floating:
         return quantity_unit(unit)
+    if plan.floating:
+        return f"counts of {scale(plan.increment.lsb, unit)}"
     return f"{bound(plan.increment, 'd')}, counts of {scale(plan.increment.lsb, unit)}"
 
 
@@ -282,7 +308,7 @@ def _product(plan: Plan) -> str:
     """d from ``gain`` and ``v``, by the cheapest product that is exact."""
     gain = "gain" if plan.schedule or plan.tuning else f"{plan.name.upper()}_GAIN"
     if plan.floating:
-        return f"{gain} * v"
+        return counts(f"{gain} * v", plan.increment)
     if plan.gain.ctype == "int16_t" and plan.filtered.ctype == "int32_t":
         wide, product = "int64_t", f"foc_mul32x16(v, {gain})"
     else:
@@ -300,15 +326,17 @@ def _integral(plan: Plan) -> IntegralText | None:
     total = f"s->integral + ({converted('d', plan.increment.ctype, state.ctype)} + s->increment)"
     start = min(max(0, state.low), state.high)
     clamped = f"{CLAMP[u.ctype]}(u_applied, {limits(plan).low}, {limits(plan).high})"
-    applied = clamped if plan.floating else "u"
     return IntegralText(
         ctype=state.ctype,
         clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
         about=_proved(plan, "integrator sum", state.bits),
         start=literal(start, state.ctype),
         start_about=quantity(start * state.lsb, plan.controller.units.output),
+        zero=literal(0, plan.increment.ctype),
         within=clamped,
-        from_output=converted(applied, u.ctype, state.ctype) + scaled_up(state.ctype, by),
+        from_output=counts(clamped, state)
+        if plan.floating
+        else converted("u", u.ctype, state.ctype) + scaled_up(state.ctype, by),
         starting=starts(plan),
     )
 
@@ -316,6 +344,8 @@ def _integral(plan: Plan) -> IntegralText | None:
 def _output(plan: Plan) -> str:
     """u from the integral, or from ``d`` without one."""
     u = plan.output.ctype
+    if plan.integrator and plan.floating:
+        return output_of(plan)
     if plan.integrator:
         state = plan.integrator.state.ctype
         return saturated(shifted("s->integral", state, plan.integrator.to_output), state, u)

@@ -88,7 +88,7 @@ def _inner(plan: Plan) -> list[Member]:
             "inner",
             f"integral of the terms of negative order{_counts(plan.inner.state)}",
         ),
-        Member(plan.inner.rest.total.ctype, "inner_input", "what was added to it last, half a trapezoid"),
+        Member(inner_input(plan), "inner_input", "what was added to it last, half a trapezoid"),
     ]
 
 
@@ -106,7 +106,7 @@ def _integral(plan: Plan) -> list[Member]:
             plan.integrator.state.ctype,
             "integral",
             f"the output before rounding{_counts(plan.integrator.state)}"
-            if not plan.floating
+            if not plan.integrator.state.floating
             else "the output",
         ),
         Member(plan.increment.ctype, "increment", "half a trapezoid, of the latest sample"),
@@ -141,6 +141,11 @@ def _bytes(plan: Plan) -> list[Member]:
     if starts(plan):
         found.append(Member("uint8_t", "starting", "1 from reset to the first step"))
     return found
+
+
+def inner_input(plan: Plan) -> str:
+    """The type of what the inner integral takes in: counts of its own where it is in counts."""
+    return plan.inner.state.ctype if plan.floating else plan.inner.rest.total.ctype
 
 
 def carries(plan: Plan) -> bool:

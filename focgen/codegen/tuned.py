@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from focgen.codegen.expressions import CLAMP, converted, scaled_up, shifted
+from focgen.codegen.expressions import CLAMP, converted, counts, scaled_up, shifted
 from focgen.codegen.literals import constant, literal, rows, scale
 from focgen.codegen.tables import Group, TableText
 from focgen.plan.model import Plan
@@ -70,6 +70,8 @@ def integral_ends(plan: Plan) -> tuple[str, str]:
         return constant(state.low, state.ctype), constant(state.high, state.ctype)
     up = scaled_up(state.ctype, plan.integrator.to_output)
     ends = limits(plan)
+    if plan.floating:
+        return counts(ends.low, state), counts(ends.high, state)
     low, high = (converted(end, plan.output.ctype, state.ctype) + up for end in (ends.low, ends.high))
     return low, high
 

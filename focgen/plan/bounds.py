@@ -289,12 +289,16 @@ class _Floating(_Account):
         return 1.01 * (exact_sum(c * (here + there)) + sums * (2.0 * m * exact_sum(c) + before))
 
     def inner_edge(self) -> float:
-        return (self.u + _DOUBLE) * self.Z
+        """Of its clamp; in counts also of what it gives."""
+        state = self.plan.inner.state
+        given = 0.0 if state.floating else self.u * self.Z * 1.01 + state.lsb
+        return (self.u + _DOUBLE) * self.Z + given
 
     def inner_rounding(self) -> float:
-        """r + r_prev, z + that, each rounded, here and in the reference."""
-        r = 2.0 * self.tables.rest.l1 * self.E
-        return (self.u + _DOUBLE) * (self.Z + 2.0 * r) * 1.01 + 2.0 * self.tiny
+        """r + r_prev, z + that, each rounded, here and in the reference; in counts r alone."""
+        r, state = 2.0 * self.tables.rest.l1 * self.E, self.plan.inner.state
+        each = _DOUBLE * (self.Z + 2.0 * r) * 1.01 + 2.0 * self.tiny
+        return each + (self.u * (self.Z + 2.0 * r) * 1.01 if state.floating else state.lsb)
 
     def filtered(self) -> FilteredError:
         plan, tables = self.plan, self.tables
@@ -349,9 +353,14 @@ class _Floating(_Account):
         return 2.0 * (self.u + _DOUBLE) * reach + self.tiny / self.half_step
 
     def output(self, static: float, growth: float, operator: float) -> float:
-        plan, u = self.plan, (self.u + _DOUBLE) * 1.01
-        edge = u * max(map(abs, plan.controller.ranges.output))
+        """An integral in counts rounds each increment to half a count, and what it gives, a limit and an
+        output that is set once."""
+        plan, here = self.plan, self.u * 1.01
+        largest = max(map(abs, plan.controller.ranges.output))
+        edge = (here + _DOUBLE * 1.01) * largest
         if not plan.integrator:
             return static + growth + edge
         d = 2.0 * self.half_step * self.largest_gain * self.reach + plan.sample_time * operator
-        return plan.sample_time * operator + u * (edge / u + 2.0 * d) + 2.0 * edge + 4.0 * self.tiny
+        state, each = plan.integrator.state, _DOUBLE * 1.01 * (largest + 2.0 * d)
+        each += here * (largest + 2.0 * d) if state.floating else here * largest + 3.0 * state.lsb
+        return plan.sample_time * operator + each + 2.0 * edge + 4.0 * self.tiny

@@ -14,6 +14,7 @@ from focgen.plan import fixed, floating
 from focgen.plan.bounds import error_bound
 from focgen.plan.canonical import Tables, realise, tables
 from focgen.plan.formats import WORDS
+from focgen.plan.integrals import counted
 from focgen.plan.memory import Memory, band_memories_of, checked_band, exponential_tables, memories_of
 from focgen.plan.model import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
@@ -69,7 +70,7 @@ def build_plan(
         plan = replace(plan, length=max(plan.error_lags, plan.filtered_lags))
     _check_at_rest(plan, folded)
     check_room(plan)
-    plan = with_limits(plan)
+    plan = with_limits(counted(plan))
     plan = replace(plan, proofs=prove(plan))
     return replace(plan, error_bound=error_bound(plan, folded))
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.plan.counts import taken_in
 from focgen.plan.damage import mended
 from focgen.plan.execute import Run, execute
 from focgen.plan.model import Plan
@@ -80,11 +81,15 @@ def _taken(plan: Plan, found: Ending, now: Applied) -> Ending:
 
 
 def _within(plan: Plan, found: Ending, u) -> np.generic:
-    """A floating output within the limits that hold; in integers no sample is ever left out."""
+    """A floating output, or integral in counts, as an integral within the limits that hold; in integers no
+    sample is ever left out."""
     low, high = (
         (found.applied.low, found.applied.high) if plan.tuning else (plan.output.low, plan.output.high)
     )
-    return type(u)(min(max(u, low), high))
+    state = plan.integrator.state
+    if not state.floating:
+        u, low, high = (taken_in(value, state) for value in (u, np.float32(low), np.float32(high)))
+    return np.asarray(min(max(u, low), high)).astype(np.asarray(u).dtype)[()]
 
 
 def _part(packed: Scenario, lane: int, samples: int, resets: list[Reset], tracks: list[Track]) -> Scenario:

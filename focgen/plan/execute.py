@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.plan.counts import taken_in, values_of
 from focgen.plan.damage import mended
 from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest, Recursion
@@ -230,8 +231,11 @@ class Run:
 
     def _inner(self) -> np.ndarray:
         """z, aligned to p."""
-        inner, out = self.plan.inner, np.empty(self.shape, self.kind)
-        z, before = np.zeros(self.shape[0], self.kind), np.zeros(self.shape[0], self.kind)
+        inner, kind = self.plan.inner, kind_of(self.plan.inner.state)
+        self.r = taken_in(self.r, inner.state)
+        self.r_rest = {place: taken_in(r, inner.state) for place, r in self.r_rest.items()}
+        z, before = np.zeros(self.shape[0], kind), np.zeros(self.shape[0], kind)
+        out = np.empty(self.shape, kind)
         for k in range(self.shape[1]):
             for lane in self.starting.get(k, ()):
                 z[lane], before[lane] = 0, self.r_rest[lane, k]
@@ -239,7 +243,9 @@ class Run:
             z = clamp(z + (now + before), inner.state)
             out[:, k], before = z, now.copy()
         self.inner = z
-        return out if self.plan.floating else shift(out, inner.to_wide)
+        if inner.state.floating:
+            return out
+        return values_of(out, inner.state) if self.plan.floating else shift(out, inner.to_wide)
 
     def _fed_back(self, p: np.ndarray) -> np.ndarray:
         """v_k from p_k and the past of v, whose columns are samples, ``lags`` of them ahead of the first."""
@@ -299,12 +305,16 @@ class Run:
         return self._integrated(d), d
 
     def increment(self, product: np.ndarray) -> np.ndarray:
-        return product if self.plan.floating else shift(product, self.plan.gain_shift)
+        """d of g·v."""
+        if self.plan.floating:
+            return taken_in(product, self.plan.increment)
+        return shift(product, self.plan.gain_shift)
 
     def _integrated(self, d: np.ndarray) -> np.ndarray:
         plan, lanes = self.plan, self.shape[0]
-        out, low, high = np.empty(self.shape, self.kind), self.wide(self.low), self.wide(self.high)
-        total, before = np.zeros(lanes, self.kind), np.zeros(lanes, self.kind)
+        kind = kind_of(plan.integrator.state)
+        total, before, out = np.zeros(lanes, kind), np.zeros(lanes, kind), np.empty(self.shape, kind)
+        low, high = self.wide(self.low), self.wide(self.high)
         tracks: dict[int, list] = {}
         for t in self.scenario.tracks:
             if usable(t.u, plan.output):
@@ -325,7 +335,9 @@ class Run:
             total = np.minimum(np.maximum(total + (d[:, k] + before), low[:, k]), high[:, k])
             out[:, k], before = total, d[:, k].copy()
         self.integral = total
-        return out if plan.floating else saturate(shift(out, plan.integrator.to_output), plan.output.bits)
+        if plan.floating:
+            return np.minimum(np.maximum(output_of(plan, out), self.low), self.high)
+        return saturate(shift(out, plan.integrator.to_output), plan.output.bits)
 
     def _tunes(self) -> dict[int, list[tuple[int, Applied]]]:
         """By sample, the lanes whose parameters change ahead of it, in their order."""
@@ -340,8 +352,11 @@ class Run:
         return self.wide(self.limited(lane, sample, u))
 
     def wide(self, u):
-        """Output counts in counts of the integrator."""
-        return u if self.plan.floating else u << self.plan.integrator.to_output
+        """Output counts as what the integrator holds; as they are without one."""
+        integrator = self.plan.integrator
+        if integrator is None:
+            return u
+        return taken_in(u, integrator.state) if self.plan.floating else u << integrator.to_output
 
     def flags(self, u: np.ndarray) -> np.ndarray:
         """The flags after each step."""
@@ -355,6 +370,12 @@ class Run:
             found = found + FLAG_SCHEDULE * ((self.s < first) | (self.s > last))
             outside |= False if plan.floating else np.asarray(scenario.sched) != self.s
         return (found + FLAG_INPUT * outside).astype(np.uint8)
+
+
+def output_of(plan: Plan, integral: np.ndarray) -> np.ndarray:
+    """u of a floating plan's integral, any shape; an end that is no whole number of counts counts still."""
+    state = plan.integrator.state
+    return integral if state.floating else clamp(values_of(integral, state), plan.output)
 
 
 def scheduled_gain(plan: Plan, s: np.ndarray) -> np.ndarray:

@@ -105,6 +105,11 @@ The same structure with one block per sum, lsb 1.0 and no shifts: acc = 0; acc =
 sample to the newest, sample k last. Each operation is rounded to the type, none is contracted; brackets are
 as written above. g = gains[i] + slopes[i]·(s − breakpoints[i]).
 
+In f32 integrals are whole counts (:mod:`focgen.plan.integrals`): d_k and r_k are rounded to counts of 2^−up,
+halves away from zero, to at most 2^61; I and z are int64, as in fixed point, and what they give is the float
+nearest to their count, halves to even, times 2^−up. u is clamped once more, since a limit need be no whole
+number of counts. u0 and ``track``'s u become counts likewise, after their clamp.
+
 An argument is usable where its magnitude is below 2^48 (float) or 2^512 (double); NaN and infinity are not
 (:mod:`focgen.plan.usable`). No other ever enters the state:
 
@@ -116,10 +121,12 @@ An argument is usable where its magnitude is below 2^48 (float) or 2^512 (double
 - A reset takes e = 0 where ref or meas is not usable, and u0 = 0 where u0 is not; the flags are bit 4 then.
 - A track of what is not usable raises bit 4 and does nothing else.
 
-A step with usable inputs whose I + (d_k + d_{k−1}) (without an integrator: d_k) is NaN or infinite, or that
-finds I beyond the output's limits, has a state that no step can have left: a flipped bit, memory that nothing
-has initialised. It is left out in the same way; the output that stands is 0, clamped, where I (or the output
-kept) is no number within the limits. Then the past is as after a reset to this sample's error and that output
+A step with usable inputs has a state that no step can have left, a flipped bit or memory that nothing has
+initialised, where I + (d_k + d_{k−1}) (without an integrator, or in counts: d_k or r_k) is NaN or infinite,
+or where it finds I or a z in counts beyond its limits, a d_{k−1} or r_{k−1} beyond 2^61 counts, or, where
+there are counts, a slot that the ring of e does not have. It is left out in the same way; the output that
+stands is 0, clamped, where I (or the output kept) is no number within the limits, or the slot is none. Then
+the past is as after a reset to this sample's error and that output
 (:mod:`focgen.plan.damage`).
 
 In the integer arithmetics a reset or a track whose argument is beyond its range raises bit 3.
@@ -369,6 +376,12 @@ class Plan:
     def floating(self) -> bool:
         """Whether the arithmetic is f64 or f32."""
         return self.output.floating
+
+    @property
+    def counted(self) -> bool:
+        """Whether it is floating and has an integral in whole counts."""
+        integrals = (self.integrator, self.inner)
+        return self.floating and any(i is not None and not i.state.floating for i in integrals)
 
     @property
     def error_lags(self) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 
 from focgen.errors import PlanError
 from focgen.plan.banks import departure, drive_error, driven_by, mean_of
+from focgen.plan.counts import MOST
 from focgen.plan.formats import Interval, limit, span, weighted
 from focgen.plan.model import Bank, Plan, Proof, Schedule, Sum, Tuning
 from focgen.plan.modes import LAGS, Modes, Response, response_of
@@ -21,13 +22,15 @@ from focgen.plan.stability import Inverse, inverse
 
 
 def prove(plan: Plan) -> tuple[Proof, ...]:
-    """One proof for each integer node, in the order of a step; none for floating arithmetic.
+    """One proof for each integer node, in the order of a step; of floating arithmetic its integrals in
+    counts.
 
     Raises PlanError naming the node that cannot be proved.
     """
-    if plan.floating:
-        return ()
     ledger = _Ledger(plan)
+    if plan.floating:
+        ledger.integrals()
+        return tuple(ledger.proofs)
     ledger.inputs()
     p = ledger.combined()
     v = ledger.filtered(p)
@@ -57,6 +60,14 @@ class _Ledger:
         plan = self.plan
         reach = span(plan.reference) - span(plan.measurement)
         self.add("error", reach, plan.error.ctype, "range")
+
+    def integrals(self) -> None:
+        """Those that a floating plan has in counts; an increment beyond ``MOST`` is cut to it."""
+        plan, each = self.plan, Interval(-MOST, MOST)
+        for node, integral in (("inner sum", plan.inner), ("integrator sum", plan.integrator)):
+            if integral and not integral.state.floating:
+                reach = span(integral.state).hull(0) + each + each
+                self.add(node, reach, integral.state.ctype, "clamp")
 
     def bank(self, name: str, bank: Bank, past: Interval) -> Interval:
         """What a mode keeps, how far u is from it, D, its product with the rate, and the sum of all."""

@@ -51,20 +51,27 @@ def check_room(plan: Plan) -> None:
 
 def reach(plan: Plan, error: float) -> float:
     """A bound on every intermediate magnitude of a floating plan for |e| ≤ ``error``, from l1 norms."""
-    p, r, z = _l1(plan.direct) * error, 0.0, 0.0
-    if plan.inner:
-        r, z = _l1(plan.inner.rest) * error, _largest(plan.inner.state)
-    v = after = p + z
-    if plan.feedback:
-        own = inverse_of_recursion(plan)
-        v = max(own.norm * (p + z), abs(plan.feedback.steady) * error) if own else np.inf
-        after = p + z + _l1(plan.feedback.table) * v
+    r = l1_of(plan.inner.rest) * error if plan.inner else 0.0
+    z = _largest(plan.inner.state) * plan.inner.state.lsb if plan.inner else 0.0
+    v = filtered_reach(plan, error)
+    after = l1_of(plan.direct) * error + z + (l1_of(plan.feedback.table) * v if plan.feedback else 0.0)
     drives = [_drive(table) * (error if table.history == "error" else v) for table in plan.sums]
     gain = max(abs(plan.gain.low), abs(plan.gain.high))
     return max(after, z + 2.0 * r, v, _largest(plan.output) + 2.0 * gain * v, *drives)
 
 
-def _l1(table: Sum | None) -> float:
+def filtered_reach(plan: Plan, error: float) -> float:
+    """A bound on |v| of a floating plan for |e| ≤ ``error``, and for what a reset makes of it."""
+    p = l1_of(plan.direct) * error
+    if plan.inner:
+        p += _largest(plan.inner.state) * plan.inner.state.lsb
+    if plan.feedback is None:
+        return p
+    own = inverse_of_recursion(plan)
+    return max(own.norm * p, abs(plan.feedback.steady) * error) if own else np.inf
+
+
+def l1_of(table: Sum | None) -> float:
     """Of taps, and of modes, whose drives reach 2 m times what drives them."""
     if table is None:
         return 0.0

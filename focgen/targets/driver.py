@@ -47,6 +47,7 @@ class DriverContext:
     conversions: tuple[str, ...]
     fixed: bool
     refusing: str
+    left: str
     tunable: bool
     width: int
 
@@ -64,8 +65,10 @@ def driver_context(plan: Plan) -> DriverContext:
     tried = tuple(expression for expression, _ in tried_conversions(plan).values())
     refusing = f"{plan.name.upper()}_FLAG_{'INVALID' if plan.floating else 'INPUT'}"
     fixed = not plan.floating
+    high, low = f"{plan.name.upper()}_U_MAX", f"{plan.name.upper()}_U_MIN"
+    left = "INT64_MAX" if plan.counted else f"{high} + ({high} - {low})"
     return DriverContext(
-        plan.name, plan.increment.ctype, scheduled, integral, held, scales, tried, fixed, refusing,
+        plan.name, plan.increment.ctype, scheduled, integral, held, scales, tried, fixed, refusing, left,
         plan.tuning is not None, given_width(plan),
     )  # fmt: skip
 

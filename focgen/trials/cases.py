@@ -75,7 +75,7 @@ def _draw_case(assignment: Assignment, signals: str, suite: str, rng: np.random.
     settings = [setting for setting, _ in truth]
     shown = visibility([facts for _, facts in truth], settings, stage, recorder)
     label = label_of(assignment, signals, suite, shown, recorder, design)
-    return _play(stage, settings, recorder, believed(assignment, stage.rig, rng), label, rng)
+    return play_case(stage, settings, recorder, believed(assignment, stage.rig, rng), label, rng)
 
 
 def label_of(
@@ -105,7 +105,7 @@ def _set_up(assignment, signals, suite, design: Design | None, rng) -> Stage:
     clocks = clocks_of([*seen, *unseen], Ts, rng)
     bare = Stage(rig, full, seen, unseen, clocks, None, None)
     coarse = Trial(bare.commands(seen, _COARSE), clocks[: len(seen)], _COARSE)
-    spans = _spans(rig, full, coarse, clocks[-1])
+    spans = spans_of(rig, full, coarse, clocks[-1])
     return replace(bare, spans=spans, coarse=coarse)
 
 
@@ -120,7 +120,8 @@ def clocks_of(
     return clocks
 
 
-def _spans(rig: Rig, full: float, trial: Trial, session: float) -> Spans:
+def spans_of(rig: Rig, full: float, trial: Trial, session: float) -> Spans:
+    """What the healthy rig's signals span in a ``trial``; ``full``: its command, ``session``: s."""
     found = {name: float(np.ptp(values)) for name, values in trial.signals(rig).items()}
     top = full * rig.regulator.dc_gain
     drive = rig.actuator.drive(top) if rig.actuator else top
@@ -223,7 +224,8 @@ class Bench:
         return sample(trace, self.stage.rig.sample_time, self.recorder, session, rng)
 
 
-def _play(stage: Stage, settings, recorder: Recorder, nominal: Rig, label: dict, rng) -> Case:
+def play_case(stage: Stage, settings, recorder: Recorder, nominal: Rig, label: dict, rng) -> Case:
+    """The session, made by the stage's rig with these ``settings`` and given with the ``nominal`` one."""
     bench = Bench(stage, tuple(settings), recorder)
     played = bench.play(rng)
     unit = float(rng.choice((0.001, 0.1, 1.0, 60.0))) if label["kind"] == "linear" else 1.0

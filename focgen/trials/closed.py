@@ -69,6 +69,26 @@ def draw_controller(rig: Rig, spans: Spans, rng: np.random.Generator) -> Control
     )
 
 
+def draw_unknown(rig: Rig, spans: Spans, rng: np.random.Generator) -> Controller:
+    """A controller of somebody else's: PI or PID, sluggish to lively, the same at every level."""
+    lag = rig.actuator.T ** (1.0 / rig.actuator.alpha) * rng.uniform(0.3, 1.0)
+    gain = float(rng.uniform(0.3, 1.5)) * spans.command / spans.output / lag
+    num = [(lag, 1.0), (1.0, 0.0)] + (
+        [(0.25 * lag * rng.uniform(0.03, 0.1), 2.0)] if rng.random() < 0.3 else []
+    )
+    reach = (0.0, 1.3 * spans.output)
+    return Controller(
+        name="theirs",
+        sample_time=rig.sample_time,
+        integrator=True,
+        length=2,
+        arithmetic="f64",
+        transfer=TransferFunction(num),
+        gain=gain,
+        ranges=ControllerRanges(reach, reach, (0.0, 1.3 * spans.command), None),
+    )
+
+
 def draw_fault(effect: str | None, severity: str, used: float, rng: np.random.Generator) -> Fault:
     """A controller fault of one of two forms; ``used`` is the largest output of the faultless loop."""
     first = bool(rng.random() < 0.5)

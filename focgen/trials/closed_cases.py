@@ -15,6 +15,7 @@ from focgen.trials.closed import (
     Loop,
     draw_controller,
     draw_fault,
+    draw_unknown,
     logged,
 )
 from focgen.trials.forms import Spans
@@ -29,13 +30,17 @@ _EVERY = round(_TS / _FINE)
 _NOTICED = 1e-3  # of the command's span: below, the controller did what the ideal one would have done
 
 
-def make_closed_case(assignment: Assignment, signals: str, rng: np.random.Generator) -> Case:
-    """Draw and simulate one closed-loop case."""
+def make_closed_case(
+    assignment: Assignment, signals: str, rng: np.random.Generator, suite: str = "closed"
+) -> Case:
+    """Draw and simulate one closed-loop case; in the suite "loops" nothing is told of the controller, which
+    was not made for the rig."""
     stage, references = _set_up(signals, rng)
     recorder = replace(
         draw_recorder(rng, {n: getattr(stage.spans, n) for n in MEASURED}, _TS), jitter=0.0, skew=0.0
     )
-    controller = draw_controller(stage.rig, stage.spans, rng)
+    draw = draw_controller if suite == "closed" else draw_unknown
+    controller = draw(stage.rig, stage.spans, rng)
     quiet = _run(Session(Machine(stage.rig), _FINE), controller, Fault(), stage, references, recorder, rng)
     commands = [trace.command for trace, *_ in quiet][: len(stage.seen)]
     every = round(_COARSE / _FINE)
@@ -63,11 +68,12 @@ def make_closed_case(assignment: Assignment, signals: str, rng: np.random.Genera
         truth.append(
             _facts(fault, assignment.severity, Loop(session, controller, fault, stage.spans), logs[:count])
         )
-    label = label_of(assignment, signals, "closed", truth, recorder) | {"floor": floor_of(logs[count:])}
+    label = label_of(assignment, signals, suite, truth, recorder) | {"floor": floor_of(logs[count:])}
     rig = believed(assignment, stage.rig, rng)
     if recorder.one_file:
         rig = replace(rig, signals=replace(rig.signals, run="run"))
-    return Case(rig, logs[:count], logs[count:], recorder, label, controller)
+    known = controller if suite == "closed" else None
+    return Case(rig, logs[:count], logs[count:], recorder, label, known)
 
 
 def _set_up(signals: str, rng) -> tuple[Stage, list[np.ndarray]]:

@@ -171,7 +171,9 @@ SUITES = {
     "engine": engine,
     "off": full,
     "begun": full,
+    "plants": engine,
+    "loops": references,
 }
-STREAMS = {"closed": 0, "full": 1, "short": 2, "engine": 3, "off": 1, "begun": 1}
+STREAMS = {"closed": 0, "full": 1, "short": 2, "engine": 3, "off": 1, "begun": 1, "plants": 4, "loops": 5}
 """Of every suite its number in the seeds of its cases. Those of one number have the same cases, disturbed or
 not (``disturbed``)."""

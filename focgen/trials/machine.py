@@ -130,6 +130,7 @@ def _fill(chain, machine: Machine, h: float, lib) -> None:
     else:
         _fill_linear(chain.plant, actuator.dynamics if actuator else TransferFunction([(1.0, 0.0)]))
     chain.offset = actuator.offset if actuator else 0.0
+    chain.bias = getattr(actuator, "bias", 0.0)
     chain.effects = len(machine.settings)
     for slot, setting in zip(chain.effect, machine.settings):
         slot.form = lib.form_of(setting.form.encode())

@@ -33,15 +33,15 @@ from focgen.trials.engine.cases import make_engine_case
 from focgen.trials.engine.machine import engine
 from focgen.trials.excitation import STREAMS, SUITES
 from focgen.trials.facts import SIGNALS
-from focgen.trials.plan import CLOSED_KINDS, ENGINE_KINDS, KINDS, Assignment, assignments
+from focgen.trials.plan import CLOSED_KINDS, KINDS, Assignment, assignments
+from focgen.trials.plants_cases import make_plants_case
 from focgen.trials.recording import as_csv
 from focgen.trials.sealing import commitment, sealed
 
 DEFAULT_KINDS = {
     "full": KINDS,
     "short": KINDS,
-    "closed": CLOSED_KINDS,
-    "engine": ENGINE_KINDS,
+    **dict.fromkeys(("closed", "engine", "plants", "loops"), CLOSED_KINDS),
     **dict.fromkeys(DISTURBED, KINDS),
 }
 
@@ -119,8 +119,10 @@ def make(
 
 
 def _made(assignment: Assignment, signals: str, suite: str, rng: np.random.Generator) -> Case:
-    if suite == "closed":
-        return make_closed_case(assignment, signals, rng)
+    if suite in ("closed", "loops"):
+        return make_closed_case(assignment, signals, rng, suite)
+    if suite == "plants":
+        return make_plants_case(assignment, signals, rng)
     if suite == "engine":
         return make_engine_case(assignment, signals, rng)
     case = make_case(assignment, signals, suite, rng)

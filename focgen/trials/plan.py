@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.errors import InputError
+from focgen.trials import plants
 from focgen.trials.closed import CONTROLLER_EFFECTS
 from focgen.trials.engine.forms import BODY, HANDS
 from focgen.trials.vocabulary import OUTSIDE, VOCABULARY
 
 KINDS = ("single", "pair", "none", "parameters", "outside", "unidentifiable", "linear")
 CLOSED_KINDS = ("single", "none", "parameters", "outside")
-ENGINE_KINDS = CLOSED_KINDS
 _SHARES = {
     "single": 0.58,
     "pair": 0.11,
@@ -104,7 +104,7 @@ def assignments(
     count: int, kinds: tuple[str, ...], signals: str, suite: str, rng: np.random.Generator
 ) -> list[Assignment]:
     """``count`` cases of the given kinds, in the usual shares, shuffled; effects equally often."""
-    allowed = {"closed": CLOSED_KINDS, "engine": ENGINE_KINDS}.get(suite, KINDS)
+    allowed = CLOSED_KINDS if suite in ("closed", "engine", "plants", "loops") else KINDS
     unknown = sorted(set(kinds) - set(allowed))
     if unknown:
         raise InputError(
@@ -148,6 +148,8 @@ def _vocabulary(suite: str) -> tuple[str, ...]:
     if suite == "engine":
         around = (effect for effect, (stage, _) in VOCABULARY.items() if stage != "actuator")
         return (*around, *BODY)
+    if suite == "plants":
+        return plants.SINGLES
     return tuple(VOCABULARY) + (3 * CONTROLLER_EFFECTS if suite == "closed" else ())
 
 
@@ -155,6 +157,8 @@ def _outside(signals: str, suite: str) -> tuple[str, ...]:
     """A baseline's swing is a sensor drift to logs without curvature, a folded curve an odd calibration."""
     if suite == "engine":
         return (*HANDS, "supply_ripple", "loose_plug")
+    if suite == "plants":
+        return plants.OUTSIDE
     return tuple(name for name in OUTSIDE if signals == "C" or name != "room_swing")
 
 

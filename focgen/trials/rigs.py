@@ -115,9 +115,11 @@ def draw_linear(rng: np.random.Generator, sample_time: float) -> tuple[Rig, floa
 def nominal_of(rig: Rig, rng: np.random.Generator, scatter: tuple[float, float]) -> Rig:
     """The rig as its owner believes it to be: own parameters off by ``scatter`` (low, high), either way.
 
-    The order of the fractional stage is off by half as much, and an offset is not known at all.
+    The order of the fractional stage is off by half as much; an offset, and the zero of a drive, are not
+    known at all.
     """
-    offset = rig.actuator.offset if scatter == (0.0, 0.0) else 0.0
+    exact = scatter == (0.0, 0.0)
+    offset, bias = (rig.actuator.offset, getattr(rig.actuator, "bias", 0.0)) if exact else (0.0, 0.0)
 
     def off(value: float, share: float = 1.0) -> float:
         return value * (1.0 + share * rng.uniform(*scatter) * rng.choice((-1.0, 1.0)))
@@ -131,7 +133,7 @@ def nominal_of(rig: Rig, rng: np.random.Generator, scatter: tuple[float, float])
         den = [
             (t.coefficient if t.order == 0 else off(t.coefficient), t.order) for t in actuator.dynamics.den
         ]
-        believed = LinearActuator(TransferFunction(num, den), offset)
+        believed = LinearActuator(TransferFunction(num, den), offset, bias)
     return replace(rig, actuator=believed)
 
 

@@ -7,9 +7,9 @@ largest.
 
 *Surviving gap*: what is left of it, in the logged signals, once the own parameters of the rig have been
 refitted: the projection off their sensitivities. Those of the actuator (T, alpha, gain or num and den,
-offset) move freely, gain and times of regulator and sensor by three times their uncertainty. Each signal is
-weighted by its noise. *Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more,
-both root mean square.
+offset, the zero of an integrating one's drive) move freely, gain and times of regulator and sensor by three
+times their uncertainty. Each signal is weighted by its noise. *Visible*: in at least one logged signal the
+surviving gap is 0.3 of the noise or more, both root mean square.
 """
 
 from __future__ import annotations
@@ -125,6 +125,8 @@ def moved_rigs(rig: Rig) -> Iterator[tuple[Rig, float]]:
     else:
         for other in _moved_linear(actuator, small):
             yield replace(rig, actuator=other), small
+        if actuator.integrates:
+            yield replace(rig, actuator=replace(actuator, bias=actuator.bias + 1.0)), 1.0
     yield replace(rig, actuator=replace(actuator, offset=actuator.offset + 1.0)), 1.0
 
 

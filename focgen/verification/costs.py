@@ -14,6 +14,7 @@ from focgen.codegen.kernels import TARGETS
 from focgen.errors import InputError, MissingExtra, check_choice
 from focgen.jsontext import read_json
 from focgen.output import write_file
+from focgen.shown import Shown
 from focgen.targets.asked import asked_for, entry_of
 from focgen.targets.cores import core
 from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr, with_runtimes
@@ -41,8 +42,8 @@ class ControllerCost:
     against: Path | None = None
 
 
-@dataclass(frozen=True)
-class Costs:
+@dataclass(frozen=True, repr=False)
+class Costs(Shown):
     """The costs of every generated folder, by folder."""
 
     controllers: tuple[ControllerCost, ...]

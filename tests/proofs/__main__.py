@@ -31,6 +31,9 @@ def by_esbmc(folder: Path) -> Iterator[tuple[str, Verdict]]:
         if arithmetic == "q15":
             yield "runtime", esbmc.ring(folder)
             yield "runtime", esbmc.usable(folder)
+        if arithmetic == "f32":
+            for verdict in esbmc.counted(folder):
+                yield "runtime", verdict
         asked = esbmc.sums(plan, folder) if plan.floating else esbmc.overflow(plan, folder)
         for verdict in asked:
             yield f"all {arithmetic}, L = {length}", verdict

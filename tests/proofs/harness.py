@@ -14,6 +14,7 @@ from focgen.codegen.banks import means
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import literal
 from focgen.codegen.state import Member, members
+from focgen.plan.counts import MOST
 from focgen.plan.formats import Interval, limit, span
 from focgen.plan.model import Plan
 
@@ -28,6 +29,7 @@ def reachable(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, Interval | N
         known |= _parameters(plan)
     known |= {f"{ring}_now": Interval(0, kernels.slots(plan, ring) - 1) for ring in ("error", "filtered")}
     if plan.floating:
+        known |= _counted(plan)
         return {name: known.get(name) for name in kept}
     half = (1 << plan.narrow) >> 1
     worst = {proof.node: proof.worst for proof in plan.proofs}
@@ -46,6 +48,18 @@ def reachable(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, Interval | N
         "inner_input": _around(worst["rest total"]) if plan.inner else None,
     }
     return {name: known[name] for name in kept}
+
+
+def _counted(plan: Plan) -> dict[str, Interval]:
+    """Of a floating plan's integrals in counts."""
+    found = {}
+    for name, last, integral in (
+        ("integral", "increment", plan.integrator),
+        ("inner", "inner_input", plan.inner),
+    ):
+        if integral and not integral.state.floating:
+            found |= {name: span(integral.state).hull(0), last: _around(MOST)}
+    return found
 
 
 def _parameters(plan: Plan) -> dict[str, Interval | None]:

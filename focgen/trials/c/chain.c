@@ -15,7 +15,7 @@ void at_rest(chain *c) {
         memset(c->effect[i].ring, 0, sizeof c->effect[i].ring);
         c->effect[i].at = 0;
     }
-    c->u = c->p = c->v = c->x = c->z = c->felt = c->y = 0.0;
+    c->u = c->p = c->v = c->x = c->z = c->felt = c->y = c->speed = 0.0;
 }
 
 /* ---- linear stages: controllable companion form, Runge-Kutta with the input held over the step ---- */
@@ -73,7 +73,7 @@ static double through(chain *c, int place, double value, double t) {
 static double drive(const chain *c, double p) {
     double K = 0.0;
     for (int i = c->gains - 1; i >= 0; i--) K = K * p + c->gain[i];
-    return K * p;
+    return K * p + c->bias;
 }
 
 /* T D^alpha x + x + force(x) = v by Newton's method; T and the force may depend on the state */
@@ -84,6 +84,7 @@ static double fractional_step(chain *c, int64_t n, int64_t first) {
         if (f->resist) T *= f->resist(&c->effect[i], c->v - old);
     }
     double pull = c->v + T * (old - recall(&c->past, n, first));
+    if (gripped(c)) pull = gripped_pull(c, pull, (1.0 + T) * old);
     double x = pull / (1.0 + T);
     for (int pass = 0; pass < 30; pass++) {
         double force = 0.0, stiffness = 0.0;
@@ -96,6 +97,7 @@ static double fractional_step(chain *c, int64_t n, int64_t first) {
         if (fabs(move) <= 1e-12 * fabs(x) + 1e-300) break;
     }
     c->past.d[n] = x - old;
+    c->speed = (x - old) / c->h;
     return x;
 }
 
@@ -106,7 +108,8 @@ static void step(chain *c, int64_t n, int64_t first, double u) {
     c->v = through(c, DRIVE, drive(c, c->p), t);
     c->creep_now = remember(&c->creep, n, first, c->v - v_old);
     double mean = 0.5 * (c->v + v_old);
-    c->x = c->fractional ? fractional_step(c, n, first) : linear_step(&c->plant, mean, c->v, c->h);
+    if (c->fractional) c->x = fractional_step(c, n, first);
+    else c->x = gripped(c) ? gripped_step(c, v_old, c->v) : linear_step(&c->plant, mean, c->v, c->h);
     double z_old = c->z;
     c->z = through(c, CURVATURE, c->x, t);
     c->electrode_now = remember(&c->electrode, n, first, c->z - z_old);

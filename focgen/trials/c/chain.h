@@ -12,8 +12,8 @@
 
 #include "interface.h"
 
-/* where in the chain a form acts */
-enum { COMMAND, PRESSURE, DRIVE, RATE, CURVATURE, READING, OUTPUT, SAMPLE };
+/* where in the chain a form acts; what holds (GRIP) is dry friction on the motion */
+enum { COMMAND, PRESSURE, DRIVE, RATE, GRIP, CURVATURE, READING, OUTPUT, SAMPLE };
 
 typedef struct {
     const char *name;
@@ -21,8 +21,15 @@ typedef struct {
     double (*act)(effect *e, const chain *c, double in, double t);   /* the signal after it */
     double (*resist)(const effect *e, double pull);                  /* RATE: factor on T */
     void (*load)(const effect *e, double x, double *force, double *stiffness);   /* RATE: what pushes back */
+    double (*hold)(const effect *e, double speed);                   /* GRIP: dry friction at a speed */
 } form;
 
 extern const form FORMS[];
+
+/* friction.c */
+double held(const chain *c, double speed);
+int gripped(const chain *c);
+double gripped_step(chain *c, double before, double now);
+double gripped_pull(chain *c, double pull, double rest);
 
 #endif

@@ -1,6 +1,6 @@
 #include "forms.h"
 
-#define AT(place, name) {#name, place, name, 0, 0}
+#define AT(place, name) {#name, place, name, 0, 0, 0}
 
 const form FORMS[] = {
     AT(COMMAND, spool_friction), AT(COMMAND, stick_band),
@@ -11,9 +11,9 @@ const form FORMS[] = {
     AT(DRIVE, preisach_share), AT(DRIVE, duhem_friction), AT(CURVATURE, log_creep),
     AT(CURVATURE, eyring_creep),
     AT(DRIVE, roxburgh), AT(DRIVE, worked_soft), AT(DRIVE, warming_gain), AT(DRIVE, wandering_gain),
-    {"recovery_viscosity", RATE, 0, recovery_viscosity, 0}, AT(CURVATURE, sticky_release),
+    {"recovery_viscosity", RATE, 0, recovery_viscosity, 0, 0}, AT(CURVATURE, sticky_release),
     AT(DRIVE, locking_chain), AT(DRIVE, balloon_curve), AT(DRIVE, slack_hinge), AT(DRIVE, preload),
-    {"hertz_load", RATE, 0, 0, hertz_load}, AT(CURVATURE, foam_pad),
+    {"hertz_load", RATE, 0, 0, hertz_load, 0}, AT(CURVATURE, foam_pad),
     AT(DRIVE, duffing_share), AT(CURVATURE, side_mode),
     AT(READING, exponential_curve), AT(READING, divider_curve), AT(READING, uneven_hang),
     AT(READING, lens_curves),
@@ -23,5 +23,6 @@ const form FORMS[] = {
     AT(PRESSURE, supply_ripple), AT(PRESSURE, opening_seam), AT(CURVATURE, room_swing),
     AT(DRIVE, loose_joint),
     AT(CURVATURE, knocking_play), AT(OUTPUT, pick_up), AT(OUTPUT, loose_plug), AT(READING, folded_reading),
-    {0, 0, 0, 0, 0},
+    {"dry_block", GRIP, 0, 0, 0, dry_block}, {"stribeck_block", GRIP, 0, 0, 0, stribeck_block},
+    {0, 0, 0, 0, 0, 0},
 };

@@ -18,4 +18,6 @@ ACTS(pick_up);
 ACTS(loose_plug); ACTS(folded_reading);
 
 double recovery_viscosity(const effect *e, double pull);
+double dry_block(const effect *e, double speed);
+double stribeck_block(const effect *e, double speed);
 void hertz_load(const effect *e, double x, double *force, double *stiffness);

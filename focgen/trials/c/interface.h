@@ -32,12 +32,13 @@ typedef struct {
     linear regulator, plant, sensor;
     int fractional, gains;
     double viscosity;       /* T h^-alpha / Gamma(2 - alpha) */
-    double gain[6], offset;
+    double gain[6], offset, bias;
     int effects;
     effect effect[EFFECTS];
     memory past, creep, electrode;
     double creep_now, electrode_now;    /* the two memories' present values, for the forms that use them */
     double u, p, v, x, z, felt, y;
+    double speed;           /* of what dry friction acts on; 0: it is held */
 } chain;
 
 typedef struct {

@@ -16,6 +16,7 @@
  */
 #include "finger_f32.h"
 
+#include "foc_integral.h"
 #include "foc_rt.h"
 #include "foc_save.h"
 #include "foc_tune.h"
@@ -25,6 +26,9 @@
 #endif
 #if FOC_SAVE_VERSION != 2
 #error "foc_save.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
+#endif
+#if FOC_INTEGRAL_VERSION != 2
+#error "foc_integral.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
 #endif
 #if FOC_TUNE_VERSION != 2
 #error "foc_tune.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
@@ -125,7 +129,7 @@ static float finger_f32_denominator_sum(const finger_f32_state *s)
 /* Take the error of one more sample; return the filtered error v. */
 static float finger_f32_filter(finger_f32_state *s, float e)
 {
-    float r;
+    int64_t r;
     float x;
     float v;
 
@@ -134,10 +138,15 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     x = finger_f32_numerator_sum(s);
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
-    r = finger_f32_integrand_sum(s);
-    s->inner = foc_clamp_f32(s->inner + (r + s->inner_input), (-1.37535f), 1.37535f);
+    r = foc_counts_f32(finger_f32_integrand_sum(s), 60);
+    if (!foc_held(r)) {
+        return foc_nothing_f32();
+    }
+    /* |sum| <= 6197356608029196288 < 2^63 */
+    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-1585670589601808384),
+                           1585670589601808384);
     s->inner_input = r;
-    x += s->inner;
+    x += foc_value_f32(s->inner, 8.6736173798840355e-19f);
 
     s->filtered_now = foc_ring_next(s->filtered_now, FINGER_F32_FILTERED);
     x -= finger_f32_denominator_sum(s);
@@ -146,10 +155,10 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     return v;
 }
 
-/* The filtered error times the gain times h/2; in V. */
-static float finger_f32_increment(float gain, float v)
+/* The filtered error times the gain times h/2; counts of 2^-56 V. */
+static int64_t finger_f32_increment(float gain, float v)
 {
-    return gain * v;
+    return foc_counts_f32(gain * v, 56);
 }
 
 /* The flags of an output at its ends. */
@@ -204,18 +213,22 @@ static void finger_f32_settle(finger_f32_state *s, float e)
         s->filtered[i] = v;
     }
     s->filtered_now = 0;
-    s->inner = 0.0f;
-    s->inner_input = finger_f32_integrand_sum(s);
-    s->increment = 0.0f;
+    s->inner = 0;
+    s->inner_input = foc_counts_f32(finger_f32_integrand_sum(s), 60);
+    s->increment = 0;
     s->resting = v;
     s->starting = 1; /* the first step completes it: only then the gain is known */
     s->flags = 0;
 }
 
 /* Whether an output is one that a step can have left: NaN is not. */
-static uint8_t finger_f32_within(const finger_f32_state *s, float u)
+static uint8_t finger_f32_within(const finger_f32_state *s)
 {
-    return (uint8_t)(foc_finite_f32(u) && u >= s->u_min && u <= s->u_max);
+    const int64_t now = s->integral;
+
+    return (uint8_t)(s->error_now < FINGER_F32_ERRORS
+                     && now >= foc_counts_f32(s->u_min, 56)
+                     && now <= foc_counts_f32(s->u_max, 56));
 }
 
 /* Whether the limits are ones that finger_f32_tune can have taken. */
@@ -249,11 +262,11 @@ static void finger_f32_mend(finger_f32_state *s)
 /* An input of the step cannot be used: the output stays, and so does everything else. */
 static finger_f32_sig finger_f32_hold(finger_f32_state *s)
 {
-    const float known = s->integral;
     float u;
 
     finger_f32_mend(s);
-    u = finger_f32_within(s, known) ? known : foc_clamp_f32(0.0f, s->u_min, s->u_max);
+    u = finger_f32_within(s) ? foc_clamp_f32(foc_value_f32(s->integral, 1.3877787807814457e-17f),
+                          s->u_min, s->u_max) : foc_clamp_f32(0.0f, s->u_min, s->u_max);
     s->flags = (uint8_t)(FINGER_F32_FLAG_INVALID | finger_f32_ends(s, u));
     return u;
 }
@@ -265,7 +278,7 @@ static finger_f32_sig finger_f32_recover(finger_f32_state *s, float e)
     const uint8_t flags = s->flags;
 
     finger_f32_settle(s, e);
-    s->integral = u;
+    s->integral = foc_counts_f32(u, 56);
     s->flags = flags;
     return u;
 }
@@ -274,7 +287,7 @@ void finger_f32_init(finger_f32_state *s)
 {
     finger_f32_untune(s);
     finger_f32_settle(s, 0.0f);
-    s->integral = 0.0f; /* 0 V */
+    s->integral = 0; /* 0 V */
 }
 
 void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas, finger_f32_sig u0)
@@ -282,7 +295,7 @@ void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig me
     const int known = foc_usable_f32(ref) && foc_usable_f32(meas);
 
     finger_f32_settle(s, known ? ref - meas : 0.0f);
-    s->integral = foc_clamp_f32(0.0f, s->u_min, s->u_max); /* where u0 cannot be used */
+    s->integral = foc_counts_f32(foc_clamp_f32(0.0f, s->u_min, s->u_max), 56); /* where u0 cannot be used */
     finger_f32_track(s, u0);
     if (!known) {
         s->flags = FINGER_F32_FLAG_INVALID;
@@ -295,10 +308,15 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
     if (!foc_usable_f32(ref) || !foc_usable_f32(meas) || !foc_usable_f32(sched)) {
         return finger_f32_hold(s);
     }
+    if (!finger_f32_within(s) ||
+        !foc_held(s->inner_input) ||
+        !(s->inner >= (-1585670589601808384) && s->inner <= 1585670589601808384)) {
+        return finger_f32_recover(s, ref - meas);
+    }
 
     const float gain = foc_tuned_f32(sched, finger_f32_points, s->gains, s->slopes, FINGER_F32_GAINS);
     const float v = finger_f32_filter(s, ref - meas);
-    const float d = finger_f32_increment(gain, v);
+    const int64_t d = finger_f32_increment(gain, v);
     unsigned flags = 0;
     float u;
 
@@ -306,13 +324,15 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
         s->increment = finger_f32_increment(gain, s->resting);
         s->starting = 0;
     }
-    if (!foc_finite_f32(s->integral + (d + s->increment)) || !finger_f32_within(s, s->integral)
+    if (!foc_held(d) || !foc_held(s->increment)
         || !foc_within_f32(gain, 0.873779297f, 5.0012207f) || !finger_f32_limits_known(s)) {
         return finger_f32_recover(s, ref - meas);
     }
-    s->integral = foc_clamp_f32(s->integral + (d + s->increment), s->u_min, s->u_max);
+    /* |sum| <= 5332261958806667264 < 2^63 */
+    s->integral = foc_clamp64(s->integral + (d + s->increment), foc_counts_f32(s->u_min, 56),
+                              foc_counts_f32(s->u_max, 56));
     s->increment = d;
-    u = s->integral;
+    u = foc_clamp_f32(foc_value_f32(s->integral, 1.3877787807814457e-17f), s->u_min, s->u_max);
 
     if (sched < finger_f32_points[0] || sched > finger_f32_points[2]) {
         flags |= FINGER_F32_FLAG_SCHEDULE;
@@ -327,7 +347,7 @@ void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied)
         s->flags = (uint8_t)(s->flags | FINGER_F32_FLAG_INVALID);
         return;
     }
-    s->integral = foc_clamp_f32(u_applied, s->u_min, s->u_max);
+    s->integral = foc_counts_f32(foc_clamp_f32(u_applied, s->u_min, s->u_max), 56);
 }
 
 void finger_f32_default(finger_f32_params *p)
@@ -366,7 +386,8 @@ uint8_t finger_f32_tune(finger_f32_state *s, const finger_f32_params *p)
 
     if (refused == 0u) {
         finger_f32_take(s, p);
-        s->integral = foc_clamp_f32(s->integral, s->u_min, s->u_max);
+        s->integral = foc_clamp64(s->integral, foc_counts_f32(s->u_min, 56), foc_counts_f32(s->u_max,
+                                  56));
     }
     return refused;
 }
@@ -384,11 +405,11 @@ void finger_f32_save(const finger_f32_state *s, uint8_t *to)
     uint32_t at = foc_put(to, 0, FINGER_F32_CONFIGURATION, 8);
     uint16_t i;
 
-    at = foc_put(to, at, foc_bits_f32(s->integral), 4);
-    at = foc_put(to, at, foc_bits_f32(s->increment), 4);
+    at = foc_put(to, at, (uint64_t)s->integral, 8);
+    at = foc_put(to, at, (uint64_t)s->increment, 8);
+    at = foc_put(to, at, (uint64_t)s->inner, 8);
+    at = foc_put(to, at, (uint64_t)s->inner_input, 8);
     at = foc_put(to, at, foc_bits_f32(s->resting), 4);
-    at = foc_put(to, at, foc_bits_f32(s->inner), 4);
-    at = foc_put(to, at, foc_bits_f32(s->inner_input), 4);
     at = foc_put(to, at, foc_bits_f32(s->u_min), 4);
     at = foc_put(to, at, foc_bits_f32(s->u_max), 4);
     at = foc_put(to, at, (uint64_t)s->error_now, 2);
@@ -423,11 +444,11 @@ uint8_t finger_f32_restore(finger_f32_state *s, const uint8_t *from)
     if (foc_get(from, &at, 8) != FINGER_F32_CONFIGURATION) {
         return 1;
     }
-    s->integral = foc_float_f32(foc_get(from, &at, 4));
-    s->increment = foc_float_f32(foc_get(from, &at, 4));
+    s->integral = (int64_t)foc_get(from, &at, 8);
+    s->increment = (int64_t)foc_get(from, &at, 8);
+    s->inner = (int64_t)foc_get(from, &at, 8);
+    s->inner_input = (int64_t)foc_get(from, &at, 8);
     s->resting = foc_float_f32(foc_get(from, &at, 4));
-    s->inner = foc_float_f32(foc_get(from, &at, 4));
-    s->inner_input = foc_float_f32(foc_get(from, &at, 4));
     s->u_min = foc_float_f32(foc_get(from, &at, 4));
     s->u_max = foc_float_f32(foc_get(from, &at, 4));
     s->error_now = (uint16_t)foc_get(from, &at, 2);
