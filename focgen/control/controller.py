@@ -88,6 +88,9 @@ class Controller:
     ``memory`` is "short" or "exponential"; the latter keeps the weights within the relative ``tolerance`` up
     to ``horizon`` samples and has no use for ``length``.
 
+    ``slew_limit`` is how fast the output may move, in its units a second; it needs the integrator. A reset, a
+    track and a limit that changes move it at once.
+
     ``tunable`` is what C that is generated for it may change at run time; None: nothing.
     """
 
@@ -105,6 +108,7 @@ class Controller:
     tolerance: float = 1e-4
     horizon: int = 1_000_000
     tunable: Tunable | None = None
+    slew_limit: float | None = None
 
     @property
     def scheduled(self) -> bool:

@@ -3,6 +3,7 @@
 name = "spba"
 sample_time = 0.01                       # s
 integrator = true                        # trapezoidal, clamped to ranges.output
+slew_limit = 5.0                         # optional, with an integrator: units of the output a second
 length = 1000                            # memory length L, samples
 memory = "short"                         # or "exponential", with
 tolerance = 1e-4                         # optional: relative error of its weights, up to
@@ -106,6 +107,7 @@ def controller_of(top: Table, name: str) -> Controller:
         tolerance=top.number("tolerance", 1e-4, above=0.0),
         horizon=_whole(top, "horizon", 1_000_000),
         tunable=_tunable(top.table("tunable"), gain, ranges),
+        slew_limit=_slew_limit(top, integrator),
     )
     top.done()
     return controller
@@ -176,6 +178,15 @@ def _tunable(table: Table | None, gain: float | GainSchedule, ranges: Controller
     return box
 
 
+def _slew_limit(top: Table, integrator: bool) -> float | None:
+    if "slew_limit" not in top:
+        return None
+    if not integrator:
+        remedy = "set integrator = true, or limit the output behind the controller and track it"
+        raise top.fail("slew_limit", "is given without an integrator, which alone can keep it", remedy)
+    return top.number("slew_limit", above=0.0)
+
+
 def _check_factors(table: Table, span: tuple[float, float]) -> None:
     if not (_FACTORS[0] <= span[0] <= 1.0 <= span[1] <= _FACTORS[1]):
         remedy = f"give factors from {_FACTORS[0]:g} to {_FACTORS[1]:g}, with 1 among them"
@@ -235,6 +246,8 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     """The controller as plain numbers, texts and tables of them."""
     plain = ("name", "sample_time", "integrator", "length", "memory", "arithmetic")
     table: dict[str, Any] = {key: getattr(controller, key) for key in plain}
+    if controller.slew_limit is not None:
+        table["slew_limit"] = controller.slew_limit
     if controller.memory == "exponential":
         table.update(tolerance=controller.tolerance, horizon=controller.horizon)
     if not controller.scheduled:
