@@ -144,7 +144,7 @@ def _text(made: Generated) -> str:
 def _least(made: Generated) -> list[str]:
     """What the integral acts on, and what it cannot hold."""
     least, unit = made.manifest.get("smallest_error"), made.plan.controller.units.measurement
-    found = [] if least is None else [f"the integral acts on steady errors down to {least:.3g} {unit}".rstrip()]
+    found = [] if least is None else [f"the integral acts on errors down to {least:.3g} {unit}".rstrip()]
     return found + [f"note: {remark}" for remark in made.manifest.get("remarks", [])]
 
 
