@@ -219,7 +219,7 @@ def _choice(top: Table, key: str, default: str, choices: tuple[str, ...]) -> str
     return value
 
 
-def _operator(top: Table) -> dict:
+def _operator(top: Table) -> dict[str, Any]:
     """What an exponential memory follows, and how closely. A band of "gl" is refused, never ignored."""
     operator = _choice(top, "operator", "gl", OPERATORS)
     found = {"operator": operator, "tolerance": top.number("tolerance", TOLERANCES[operator], above=0.0)}
@@ -265,7 +265,7 @@ def controller_text(controller: Controller) -> str:
     return tomlkit.dumps(controller_table(controller))
 
 
-def _followed(controller: Controller) -> dict:
+def _followed(controller: Controller) -> dict[str, Any]:
     """What an exponential memory follows, and where."""
     if controller.operator == "gl":
         return {"horizon": controller.horizon}
