@@ -5,7 +5,7 @@ RUN    := $(VENV)/bin/python
 JOBS   ?= 2
 FUZZ_SECONDS ?= 600
 
-.PHONY: help demo test test-long bench trials trial-cases trial-report foreign records prove fuzz clean
+.PHONY: help demo test test-long test-pythons types docs bench trials trial-cases trial-report foreign records prove fuzz clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -27,10 +27,36 @@ demo: $(VENV)/ready            ## the whole chain on the example logs, into buil
 test test-long: export OMP_NUM_THREADS = 1
 
 test: $(VENV)/ready-test       ## what continuous integration runs
-	$(RUN) -m pytest -n $(JOBS) -q
+	$(RUN) -m pytest -n $(JOBS) -q $(TESTS)
 
-test-long: $(VENV)/ready-test  ## the suites that take minutes
+# PYTHONS may name others, by path too; TESTS what to run of the suite.
+PYTHONS ?= python3.11 python3.12 python3.13 python3.14
+TESTS   ?=
+
+test-pythons:                  ## the same by every Python from 3.11 on that is installed, each in build/python/
+	@for python in $(PYTHONS); do \
+	  command -v $$python > /dev/null || { echo "$$python: not installed"; continue; }; \
+	  name=$$($$python -c 'import sys; print("%d.%d" % sys.version_info[:2])') && \
+	  $(MAKE) test PYTHON=$$python VENV=build/python/$$name || exit 1; \
+	done
+
+test-long: $(VENV)/ready-dev   ## the suites that take minutes
 	$(RUN) -m pytest -n $(JOBS) -q -m long
+
+$(VENV)/ready-dev: $(VENV)/ready-test
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+types: $(VENV)/ready-dev       ## what users call and get, by a strict checker of types
+	$(RUN) -m mypy
+
+$(VENV)/ready-docs: $(VENV)/ready
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+docs: $(VENV)/ready-docs       ## the documentation as a site that needs no server, into build/site/
+	$(RUN) tools/make_docs.py build/site
+	@echo "open build/site/index.html"
 
 $(VENV)/ready-bench: $(VENV)/ready-test
 	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[bench]'

@@ -31,11 +31,11 @@ from focgen.trials.sealing import unseal
 from focgen.verification.verify import Verification, verify
 
 _LOADED = 40.0  # s: the steps up to their release, as in the paper
-_MEMORIES = {"lengths": (50, 200, 1000), "tolerances": (0.1, 0.03, 1e-3, 1e-5), "arithmetics": ("q31",)}
+_LENGTHS, _TOLERANCES = (50, 200, 1000), (0.1, 0.03, 1e-3, 1e-5)
 _SEED = 5  # of the sealed case
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Demo:
     """Everything the demo found, and the ``folder`` and ``report`` where it stands.
 
@@ -53,6 +53,10 @@ class Demo:
     verified: dict[str, Verification]
     diagnosis: Diagnosis
     sealed: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        verdict = "everything holds" if self.holds else "NOT everything holds"
+        return f"<Demo {self.folder}: {verdict}; the page is {self.report}>"
 
     @property
     def holds(self) -> bool:
@@ -94,10 +98,10 @@ def _chain(folder: Path) -> Demo:
     rig, controller = folder / "identified.toml", folder / "controller.toml"
     step("1/7  identify: a fractional model from six steps of pressure, and six integer-order ones beside it")
     found = identify(
-        [folder / "logs/steps.csv"],
         folder / "rig.toml",
+        [folder / "logs/steps.csv"],
         rig,
-        last=_LOADED,
+        to=_LOADED,
         unseen=[folder / "logs/sines.csv"],
     )
     step("2/7  design: the model inverted, and a gain schedule as quick as the loop allows")
@@ -106,7 +110,15 @@ def _chain(folder: Path) -> Demo:
     simulated = simulate(rig, controller)
     step("4/7  study memory: a few lengths of it, and the exponential form")
     own = (designed.controller.sample_time,)
-    memory = study("memory", controller, folder / "memory", sample_times=own, **_MEMORIES)
+    memory = study(
+        "memory",
+        controller,
+        folder / "memory",
+        lengths=_LENGTHS,
+        tolerances=_TOLERANCES,
+        arithmetic=("q31",),
+        sample_times=own,
+    )
     step(f"5/7  generate: C in {', '.join(ARITHMETICS)}")
     generated = {a: generate(controller, folder / "firmware" / a, a) for a in ARITHMETICS}
     step("6/7  verify: the C against the Python reference, sample for sample")

@@ -15,6 +15,7 @@ The command line prints ``focgen: error: WHERE: WHAT; REMEDY`` and exits with st
 """
 
 from collections.abc import Iterable
+from typing import Self
 
 
 class FocgenError(Exception):
@@ -28,7 +29,9 @@ class FocgenError(Exception):
         self.where, self.what, self.remedy = str(where), what, remedy
         super().__init__(f"{where}: {what}; {remedy}")
 
-    def __reduce__(self):  # three arguments, so that errors cross process boundaries
+    def __reduce__(
+        self,
+    ) -> tuple[type[Self], tuple[str, str, str]]:  # three arguments, so that errors cross process boundaries
         return type(self), (self.where, self.what, self.remedy)
 
 
@@ -68,7 +71,7 @@ class MissingExtra(FocgenError):
     """An optional library is not installed; the remedy is the line that installs it."""
 
     @classmethod
-    def of(cls, library: str, extra: str, purpose: str) -> "MissingExtra":
+    def of(cls, library: str, extra: str, purpose: str) -> Self:
         return cls(purpose, f"needs {library}, which is not installed", f"pip install 'focgen[{extra}]'")
 
 

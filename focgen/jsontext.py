@@ -14,11 +14,15 @@ import numpy as np
 
 from focgen.errors import InputError
 
+UNWRITTEN = {"json": False}
+"""Metadata of a dataclass field that :func:`plain` leaves out."""
+
 
 def plain(value: Any) -> Any:
     """Turn dataclasses, arrays and paths into what JSON can carry; what is not finite becomes null."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        written = (f for f in dataclasses.fields(value) if f.metadata.get("json", True))
+        return {f.name: plain(getattr(value, f.name)) for f in written}
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -102,6 +102,14 @@ def write_files(target: str | Path, files: Mapping[str, str | bytes], inputs: It
             path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
 
 
+def remove(files: Iterable[Path]) -> None:
+    """Remove files, and each one's folder where that is empty then."""
+    for path in files:
+        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            path.parent.rmdir()
+
+
 def write_file(path: str | Path, text: str, inputs: Iterable[Any] = ()) -> None:
     """Write one file whole or not at all. Raises InputError where it cannot be written, or is one of
     ``inputs``.

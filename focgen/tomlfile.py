@@ -6,7 +6,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from focgen.errors import InputError
 from focgen.fractional.transfer import TransferFunction
@@ -54,6 +54,12 @@ class Table:
         if key not in self.values:
             raise self.fail(None, f"lacks {key!r}", f"add {key!r}")
         return self.raw(key)
+
+    @overload
+    def text(self, key: str, default: str) -> str: ...
+
+    @overload
+    def text(self, key: str, default: None = None) -> str | None: ...
 
     def text(self, key: str, default: str | None = None) -> str | None:
         """A string, or ``default`` where absent."""
@@ -121,6 +127,13 @@ class Table:
         if not isinstance(value, dict):
             raise self.fail(key, f"is {value!r}, not a table", f"write it as [{key}]")
         return Table(value, f"{self.where} [{key}]", self.error)
+
+    def section(self, key: str, remedy: str) -> Table:
+        """A sub-table; raises with ``remedy`` where it is absent."""
+        table = self.table(key)
+        if table is None:
+            raise self.fail(None, f"lacks the table [{key}]", remedy)
+        return table
 
     def done(self) -> None:
         """Raise for keys that nothing asked for: a misspelt key must not be a silent default."""

@@ -197,7 +197,7 @@ def test_what_is_clear_in_one_segment_stands_whatever_is_left_in_another(share, 
     """The output promises next to nothing; the pressure, logged, closes its own gap, or not even that."""
     monkeypatch.setattr(promise, "predict", lambda *given: Shrink(0.15, (0.0, 0.5)))
     monkeypatch.setattr(verdict, "own_share", lambda *given: share)
-    found = diagnose(RIG, session(11, vent=0.8, roles=("pressure",)), last=40.0)
+    found = diagnose(RIG, session(11, vent=0.8, roles=("pressure",)), to=40.0)
     assert named(found) == causes
 
 

@@ -131,6 +131,16 @@ def test_bouc_wen_loop_does_not_vanish_with_frequency():
     assert areas[0] > 2.0 and abs(areas[0] / areas[1] - 1) < 0.1
 
 
+def test_bouc_wen_is_what_its_equation_makes_in_small_steps():
+    x = 0.3 * np.cumsum(np.random.default_rng(1).normal(size=200))
+    z, now, expected = kernels.bouc_wen(x, rest(200), 0.8), 0.0, []
+    for move in np.diff(x, prepend=0.0):
+        for d in [move / 0.8 / 2000] * 2000:
+            now += d * (1.0 - abs(now) * (0.5 * np.sign(now * d) + 0.5))
+        expected.append(now)
+    np.testing.assert_allclose(z, expected, atol=1e-3)
+
+
 @pytest.mark.parametrize("power", [1.05, 2.0, 5.0])
 def test_power_creep_against_an_integrator(power):
     h, tau, scale = 0.05, 3.0, 1.7

@@ -74,3 +74,67 @@ def test_without_python_control(monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(MissingExtra, match=r"pip install 'focgen\[control\]'"):
         to_control(WHOLE)
+
+
+DELAY = 0.3
+
+
+def test_a_fractional_response_is_exact_in_python_control():
+    data = FRACTIONAL.to_frd(OMEGA, delay=DELAY)
+    truth = np.exp(-1j * OMEGA * DELAY) / (1.32 * (1j * OMEGA) ** 0.6 + 1.0)
+    assert isinstance(data, control.FrequencyResponseData) and np.array_equal(data.omega, OMEGA)
+    assert np.ravel(data.complex) == pytest.approx(truth, rel=1e-14)
+    series = data * to_control(WHOLE)
+    assert np.ravel(series.complex) == pytest.approx(truth * WHOLE.frequency_response(OMEGA), rel=1e-12)
+
+
+def test_where_no_frequencies_are_given_they_surround_the_corners():
+    data = FRACTIONAL.to_frd()
+    corner = (1.0 / 1.32) ** (1.0 / 0.6)
+    assert data.omega[[0, -1]] == pytest.approx([corner / 100.0, corner * 100.0])
+    gain = np.abs(np.ravel(data.complex))
+    assert gain[0] > 0.9 and gain[-1] < 0.1
+    assert len(TransferFunction([(3, 0)]).to_frd().omega) == len(data.omega)
+
+
+def test_bode_and_nyquist_draw_the_exact_response():
+    import matplotlib
+
+    matplotlib.use("Agg")
+    truth = FRACTIONAL.frequency_response(OMEGA) * np.exp(-1j * OMEGA * DELAY)
+    drawn = FRACTIONAL.bode(OMEGA, DELAY, dB=False, deg=True, Hz=False)
+    gain, phase = drawn.axes[0, 0].lines[0], drawn.axes[1, 0].lines[0]
+    assert np.allclose(gain.get_ydata(), np.abs(truth), rtol=1e-12)
+    assert np.allclose(np.exp(1j * np.radians(phase.get_ydata())), truth / np.abs(truth), atol=1e-9)
+    curve = FRACTIONAL.nyquist(OMEGA, DELAY)
+    points = [line.get_xydata() @ (1.0, 1.0j) for line in curve.axes[0, 0].lines]
+    assert all(min(np.abs(p - z).min() for p in points if len(p)) < 1e-9 for z in truth)
+    matplotlib.pyplot.close("all")
+
+
+@pytest.mark.parametrize(
+    "omega", [[], [1.0, np.inf], [0.0, 1.0], [2.0, 1.0], [1.0, np.nan], [[1.0, 2.0]], [-1.0, 1.0]], ids=str
+)
+def test_frequencies_that_cannot_be_used_are_refused(omega):
+    with pytest.raises(ValueError, match="rising numbers above 0 rad/s"):
+        FRACTIONAL.to_frd(omega)
+    with pytest.raises(ValueError, match="delay is -1"):
+        FRACTIONAL.to_frd(OMEGA, delay=-1)
+
+
+def test_what_has_no_coefficients_is_refused():
+    with pytest.raises(ValueError, match="FrequencyResponseData has no coefficients"):
+        from_control(FRACTIONAL.to_frd(OMEGA))
+    with pytest.raises(ValueError, match="list is no system of scipy.signal"):
+        from_scipy([1.0, 2.0])
+    for transfer in (FRACTIONAL, FRACTIONAL * WHOLE):
+        with pytest.raises(ValueError, match=r"its frequency response is to_frd"):
+            to_control(transfer)
+
+
+def test_several_channels_are_refused_either_way():
+    two_in = control.ss([[-1.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]])
+    with pytest.raises(ValueError, match="2 inputs and 1 outputs"):
+        from_control(two_in)
+    with pytest.raises(ValueError, match="2 inputs and 1 outputs"):
+        from_scipy(signal.StateSpace([[-1.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]]))

@@ -61,7 +61,7 @@ def test_a_dead_time_is_found_in_experiments_of_different_sample_times():
         t = step * np.arange(-round(1.0 / step), round(22.0 / step))
         logs.append(log_of(f"{p}", t, held(p, t, of), (0.002, 0.01), rng))
     for order in (logs, logs[::-1]):
-        found = identify(order, paper_rig(), delay=True, integer=False).joint
+        found = identify(paper_rig(), order, delay=True, integer=False).joint
         low, high = found.ci95["delay"]
         assert low < 1.3 < high and high - low < 0.02
 
@@ -70,5 +70,5 @@ def test_a_dead_time_beyond_reach_is_refused(tmp_path):
     t, of = STEP * np.arange(-50, 1100), Truth(delay=9.0)
     log = log_of("a", t, held(0.2, t, of), (0.002, 0.01), np.random.default_rng(0))
     with pytest.raises(FitError, match="longest that is looked for"):
-        identify([log], paper_rig(), tmp_path / "new.toml", delay=True, gain_degree=0, integer=False)
+        identify(paper_rig(), [log], tmp_path / "new.toml", delay=True, gain_degree=0, integer=False)
     assert list(tmp_path.iterdir()) == []

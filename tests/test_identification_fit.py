@@ -218,7 +218,7 @@ def six_levels(**changes) -> list[Experiment]:
 
 
 def test_the_rig_has_the_line():
-    found = module.identify(six_levels(), paper_rig())
+    found = module.identify(paper_rig(), six_levels())
     assert found.joint.gain == pytest.approx((0.0015, 0.345), rel=1e-5) and found.joint.gain_r2 > 1.0 - 1e-9
     assert found.joint.T == pytest.approx(T, rel=1e-6) and found.joint.alpha == pytest.approx(ALPHA, abs=1e-6)
     assert found.gof["rig"]["mean"] > 0.9999
@@ -246,7 +246,7 @@ def between(p: float, q: float) -> Experiment:
     ids=["releases", "up and down", "between levels"],
 )
 def test_steps_from_anywhere_to_anywhere_give_the_line(ends):
-    found = module.identify([between(*each) for each in ends], paper_rig())
+    found = module.identify(paper_rig(), [between(*each) for each in ends])
     assert found.joint.gain == pytest.approx((0.0015, 0.345), rel=1e-6)
     assert found.gof["rig"]["mean"] > 0.9999
     assert [fit.level for fit in found.experiments] == [max(each) for each in ends]
@@ -265,13 +265,13 @@ def test_the_gain_of_a_step_is_the_slope_of_the_drive_on_it():
 
 
 def test_releases_are_fitted_and_silence_the_warning():
-    found = module.identify(six_levels(release=25.0), paper_rig())
+    found = module.identify(paper_rig(), six_levels(release=25.0))
     assert found.joint.gain == pytest.approx((0.0015, 0.345), rel=1e-5)
     assert not any("positive steps only" in w for w in found.warnings)
 
 
 def test_a_degree_that_the_levels_cannot_show_is_lowered_and_said():
-    found = module.identify(six_levels()[:2], paper_rig(), gain_degree=3)
+    found = module.identify(paper_rig(), six_levels()[:2], gain_degree=3)
     assert len(found.joint.gain) == 2 and any("2 distinct levels" in note for note in found.notes)
 
 
@@ -279,11 +279,11 @@ def test_useless_logs_are_refused():
     flat = step_log()
     with pytest.raises(LogError, match="throughout"):
         module.identify(
-            [Experiment("flat", 0.02, {**flat.signals, "curvature": np.ones(len(flat))})], paper_rig()
+            paper_rig(), [Experiment("flat", 0.02, {**flat.signals, "curvature": np.ones(len(flat))})]
         )
     with pytest.raises(LogError, match="0 throughout"):
         module.identify(
-            [Experiment("rest", 0.02, {**flat.signals, "pressure": np.zeros(len(flat))})], paper_rig()
+            paper_rig(), [Experiment("rest", 0.02, {**flat.signals, "pressure": np.zeros(len(flat))})]
         )
 
 
@@ -294,7 +294,7 @@ def test_an_output_that_does_not_follow_the_input_is_no_model(tmp_path):
         signals = {"pressure": log["pressure"], "curvature": noise, "output": noise}
         with pytest.raises(FitError, match="determine|edge"):
             module.identify(
-                [Experiment("noise", 0.02, signals)], paper_rig(), tmp_path / "new.toml", integer=False
+                paper_rig(), [Experiment("noise", 0.02, signals)], tmp_path / "new.toml", integer=False
             )
     assert not list(tmp_path.iterdir())
 
@@ -318,7 +318,7 @@ def test_integer_models_have_no_offset_where_no_rest_is_on_record():
     """The models then differ as in the paper: 0.826, 0.823, 0.802, 0.567 by a fit of others, without any
     offset.
     """
-    found = module.identify([log_of_the_step_alone(0.02)], paper_rig())
+    found = module.identify(paper_rig(), [log_of_the_step_alone(0.02)])
     mean = {model: values["mean"] for model, values in found.gof.items()}
     reached = [mean[model] for model in ("fom", "iom_3p2z", "iom_2p1z", "iom_1p")]
     assert reached == pytest.approx([0.826, 0.823, 0.802, 0.567], abs=0.006)
@@ -327,7 +327,7 @@ def test_integer_models_have_no_offset_where_no_rest_is_on_record():
 
 
 def test_an_offset_that_is_there_is_found_without_a_rest():
-    found = module.identify([log_of_the_step_alone(0.01, offset=0.2 * K * LEVEL)], paper_rig())
+    found = module.identify(paper_rig(), [log_of_the_step_alone(0.01, offset=0.2 * K * LEVEL)])
     (fit,) = found.experiments
     assert fit.offset == pytest.approx(0.2 * K * LEVEL, rel=0.1)
     assert fit.ci95["alpha"][0] < ALPHA < fit.ci95["alpha"][1]
@@ -361,7 +361,7 @@ def test_the_interval_of_a_dead_time_is_in_seconds():
 
 def test_a_log_that_is_shown_but_not_fitted_may_begin_in_a_transient():
     log = step_log(release=21.0)
-    found = module.identify([log], paper_rig(), gain_degree=0, unseen=[later(log, 3.0)], integer=False)
+    found = module.identify(paper_rig(), [log], gain_degree=0, unseen=[later(log, 3.0)], integer=False)
     assert found.unseen[0].gof > 0.99
 
 
@@ -378,7 +378,7 @@ def test_a_misfit_is_not_blamed_on_short_holds():
     wandering = np.cumsum(np.random.default_rng(2).normal(size=len(log)))
     wanders = Experiment("w", 0.02, {**log.signals, "curvature": wandering})
     with pytest.raises(FitError) as raised:
-        module.identify([wanders], paper_rig(), integer=False)
+        module.identify(paper_rig(), [wanders], integer=False)
     assert "hold" not in raised.value.remedy and "columns" in raised.value.remedy
 
 
@@ -391,6 +391,6 @@ def test_a_log_that_only_relaxes_is_not_taken_for_driven():
     signals["pressure"] = signals["pressure"] + 3e-4 * rng.normal(size=len(signals["pressure"]))
     rests = Experiment("rests", 0.02, signals)
     with pytest.raises(LogError, match="only its own noise moves"):
-        module.identify([rests], paper_rig(), integer=False)
-    found = module.identify([log, rests], paper_rig(), integer=False)
+        module.identify(paper_rig(), [rests], integer=False)
+    found = module.identify(paper_rig(), [log, rests], integer=False)
     assert found.joint.T == pytest.approx(T, rel=1e-6) and any("rests: not used" in n for n in found.notes)

@@ -80,7 +80,7 @@ def test_the_regulator_of_the_paper_gives_the_parameters_back():
 def test_the_rig_written_is_no_worse_than_the_single_fits(tau):
     """K times p at one level cannot be K(p) p where the pressure is slow; the rig has it."""
     t = clock(0.02, 30.0)
-    found = identify([log_of(f"{p}", t, rise(p, tau, t)) for p in LEVELS[::2]], paper_rig(), integer=False)
+    found = identify(paper_rig(), [log_of(f"{p}", t, rise(p, tau, t)) for p in LEVELS[::2]], integer=False)
     assert found.gof["rig"]["mean"] >= found.gof["fom"]["mean"] - 0.005
     assert min(found.gof["rig"].values()) > 0.9999
 
@@ -183,7 +183,7 @@ def test_one_level_has_a_constant_gain_and_says_so():
     t = clock(0.02, 30.0)
     made = straight([(0.0, 0.0), (0.0, 0.15), (15.0, 0.15), (15.0, 0.0)], t)
     found = identify(
-        [log_of("a", t, made, (0.001, 0.01), np.random.default_rng(0))], paper_rig(), integer=False
+        paper_rig(), [log_of("a", t, made, (0.001, 0.01), np.random.default_rng(0))], integer=False
     )
     (low, high) = found.joint.ci95["gain"][0]
     assert len(found.joint.gain) == 1 and low < Truth().K(0.15) < high
@@ -227,7 +227,7 @@ def cut_trials(seeds: range, course, latest: float, step: float = 0.02) -> tuple
     found = []
     for seed in seeds:
         try:
-            ci95 = identify(cut_session(seed, course, latest, step), paper_rig(), integer=False).joint.ci95
+            ci95 = identify(paper_rig(), cut_session(seed, course, latest, step), integer=False).joint.ci95
         except FitError:
             continue
         spans = np.array([ci95["T"], ci95["alpha"]])
@@ -252,7 +252,7 @@ def test_logs_cut_off_anywhere_tell_the_same(course, latest):
 
 def refused(log: Experiment, folder) -> FitError:
     with pytest.raises(FitError) as caught:
-        identify([log], paper_rig(), folder / "new.toml", integer=False)
+        identify(paper_rig(), [log], folder / "new.toml", integer=False)
     assert list(folder.iterdir()) == []
     return caught.value
 

@@ -65,7 +65,7 @@ def test_the_bending_actuator_of_a_pump(open_data, tmp_path):
     """All runs by one K(p), T and α; fits that begin elsewhere end at the same."""
     (tmp_path / "rig.toml").write_text(PUMP)
     log, rig = open_data / "spba_pump_two_chamber_steps.csv", read_rig(tmp_path / "rig.toml")
-    found = identify([log], rig, first=1.0, last=57.0, integer=False)
+    found = identify(rig, [log], from_=1.0, to=57.0, integer=False)
     assert found.gof["rig"]["mean"] >= 0.940
     experiments = read_logs([log], rig.signals, rig.sample_time, 1.0, 57.0, {})
     problem = Problem([prepare(e, rig, 2) for e in experiments], (None,) * len(experiments), False)

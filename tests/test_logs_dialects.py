@@ -396,6 +396,6 @@ def test_commands_take_a_frame_and_a_rig_as_a_dictionary(tmp_path):
     assert (
         all(list(f.logs.values()) == list(found[0].logs.values()) for f in found) and len(found[0].logs) > 1
     )
-    assert focgen.identify(frame, given, last=20.0, integer=False).joint.T > 0
+    assert focgen.identify(given, frame, to=20.0, integer=False).joint.T > 0
     with pytest.raises(RigError, match="rig .*actuator"):
         read_rig({**given, "actuator": {"T": -1.0}})

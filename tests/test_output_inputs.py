@@ -61,7 +61,7 @@ def test_an_output_that_is_an_input_is_refused_under_every_name(files, how, monk
     out = spelled(files["steps.csv"], how, monkeypatch)
     refused(["identify", files["steps.csv"], "--rig", files["rig.toml"], "--out", out], files, capsys)
     with pytest.raises(InputError, match="is the input"):
-        focgen.identify([files["steps.csv"]], files["rig.toml"], out)
+        focgen.identify(files["rig.toml"], [files["steps.csv"]], out)
 
 
 def test_a_rig_is_not_written_over_either(files, capsys):
@@ -79,9 +79,9 @@ def test_nothing_is_computed_before_an_output_is_refused(files, monkeypatch):
     """A refusal after minutes of work would come too late."""
     from focgen.identification import identify as module
 
-    monkeypatch.setattr(module, "read_rig", lambda path: pytest.fail("went on"))
+    monkeypatch.setattr(module, "rig_of", lambda path: pytest.fail("went on"))
     with pytest.raises(InputError, match="is the input"):
-        focgen.identify([files["steps.csv"]], files["rig.toml"], files["rig.toml"])
+        focgen.identify(files["rig.toml"], [files["steps.csv"]], files["rig.toml"])
 
 
 @pytest.mark.parametrize("command", ("identify", "design", "simulate"))

@@ -7,6 +7,8 @@ proved.
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,22 @@ from focgen.plan.scenario import Reset, Scenario, Track, to_raw
 from tests.controllers import random_controller, random_scenario, seed_controller, simple
 
 ARITHMETICS = ("f64", "f32", "q31", "q15")
+
+
+def counts(x: np.float32, state) -> int:
+    """What an integral in counts takes in: the nearest, halves away from zero, at most 2^61."""
+    exact = abs(Fraction(float(x))) / Fraction(state.lsb)
+    whole = min(int(exact + Fraction(1, 2)), 2**61)
+    return -whole if x < 0 else whole
+
+
+def nearest_float(n: int, state) -> np.float32:
+    """What it gives: of the floats around so many counts the nearest, halves to an even mantissa."""
+    exact = Fraction(n) * Fraction(state.lsb)
+    near = np.float32(float(exact))
+    tried = [np.nextafter(near, np.float32(end)) for end in (-np.inf, np.inf)] + [near]
+    odd = lambda x: int(x.view(np.uint32)) & 1  # noqa: E731
+    return min(tried, key=lambda x: (abs(Fraction(float(x)) - exact), odd(x)))
 
 
 class Interpreter:
@@ -37,11 +55,20 @@ class Interpreter:
         return (x + 2 ** (n - 1)) // 2**n
 
     def clamp(self, x, format_):
-        return max(min(x, self.number(format_.high)), self.number(format_.low))
+        number = self.number if format_.floating else int
+        return max(min(x, number(format_.high)), number(format_.low))
+
+    def taken_in(self, x, state):
+        return counts(x, state) if self.plan.floating and not state.floating else x
+
+    def given(self, integral, state, shift):
+        if self.plan.floating and not state.floating:
+            return nearest_float(integral, state)
+        return self.shift(integral, shift)
 
     def seen(self, node, value, spare=0):
         """A proof bounds this value."""
-        if not self.plan.floating:
+        if node in self.limits or not self.plan.floating:
             assert abs(value) + spare <= self.limits[node], node
         return value
 
@@ -72,25 +99,32 @@ class Interpreter:
         """The past is a constant e."""
         plan = self.plan
         self.errors = [e] * (plan.error_lags + 1)
-        self.z, self.carry, self.fresh = self.number(0), 0, True
+        self.z, self.carry, self.fresh = 0, 0, True
         direct = self.total(plan.direct, self.errors) if plan.direct else self.number(0)
-        self.r = self.total(plan.inner.rest, self.errors) if plan.inner else None
+        if plan.inner:
+            self.z = self.taken_in(self.number(0), plan.inner.state)
+            self.r = self.taken_in(self.total(plan.inner.rest, self.errors), plan.inner.state)
         if plan.feedback:
             product = self.number(plan.feedback.steady) * e
             self.v = self.saturate(self.shift(product, plan.feedback.steady_shift), plan.filtered)
         else:
             self.v = self.saturate(self.shift(direct, plan.narrow), plan.filtered)
         self.filtered = [self.v] * plan.filtered_lags
-        self.total_i = u0 if plan.floating or not plan.integrator else u0 * 2**plan.integrator.to_output
+        self.set(u0)
+
+    def set(self, u0):
+        """The integral that gives u0."""
+        integrator = self.plan.integrator
+        if integrator:
+            wide = u0 if self.plan.floating else u0 * 2**integrator.to_output
+            self.total_i = self.taken_in(wide, integrator.state)
 
     def reset(self, ref, meas, u0):
         e = self.input(ref, self.plan.reference) - self.input(meas, self.plan.measurement)
         self.start(e, self.clamp(self.number(u0), self.plan.output))
 
     def track(self, u):
-        u = self.clamp(self.number(u), self.plan.output)
-        if self.plan.integrator:
-            self.total_i = u if self.plan.floating else u * 2**self.plan.integrator.to_output
+        self.set(self.clamp(self.number(u), self.plan.output))
 
     def step(self, ref, meas, sched):
         e = self.seen("error", self.input(ref, self.plan.reference) - self.input(meas, self.plan.measurement))
@@ -112,11 +146,10 @@ class Interpreter:
         plan = self.plan
         p = self.total(plan.direct, self.errors) if plan.direct else None
         if plan.inner:
-            r = self.total(plan.inner.rest, self.errors)
-            if not plan.floating:
-                self.seen("inner sum", self.z + (r + self.r))
+            r = self.taken_in(self.total(plan.inner.rest, self.errors), plan.inner.state)
+            self.seen("inner sum", self.z + (r + self.r))
             self.z, self.r = self.clamp(self.z + (r + self.r), plan.inner.state), r
-            aligned = self.shift(self.z, plan.inner.to_wide)
+            aligned = self.given(self.z, plan.inner.state, plan.inner.to_wide)
             p = aligned if p is None else p + aligned
         self.seen("p", p)
         if plan.feedback is None:
@@ -153,11 +186,14 @@ class Interpreter:
         d = self.seen("increment", self.shift(self.seen("gain product", g * self.v), plan.gain_shift))
         if plan.integrator is None:
             return self.clamp(d, plan.output), d
-        previous = self.shift(g * before, plan.gain_shift) if self.fresh else self.d
+        d = self.taken_in(d, plan.increment)
+        first = self.taken_in(self.shift(g * before, plan.gain_shift), plan.increment)
+        previous = first if self.fresh else self.d
         self.fresh, self.d = False, d
         total = self.seen("integrator sum", self.total_i + (d + previous))
         self.total_i = self.clamp(total, plan.integrator.state)
-        return self.shift(self.total_i, plan.integrator.to_output), d
+        u = self.given(self.total_i, plan.integrator.state, plan.integrator.to_output)
+        return self.clamp(u, plan.output), d
 
 
 def by_the_book(plan: Plan, raw: Scenario):
@@ -210,9 +246,15 @@ def test_order_one_equals_the_recursion_written_by_hand(arithmetic):
     c0, c1 = (number(w) for w in plan.direct.weights)
     g, low, high = number(plan.constant_gain), number(plan.output.low), number(plan.output.high)
     expected, total, old, before = [], number(0), number(0), number(0)
+    if arithmetic == "f32":
+        total, before = Fraction(0), Fraction(0)
     for e in (raw.ref - raw.meas)[0]:
         e = number(e)
-        if plan.floating:
+        if arithmetic == "f32":  # in counts: exact, but for the rounding of d to 2^-57
+            d = Fraction(round(Fraction(float(g * (c1 * old + c0 * e))) * 2**57), 2**57)
+            total = min(max(total + (d + before), Fraction(float(low))), Fraction(float(high)))
+            expected.append(np.float32(float(total)))
+        elif plan.floating:
             d = g * (c1 * old + c0 * e)
             total = min(max(total + (d + before), low), high)
             expected.append(total)

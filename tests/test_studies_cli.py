@@ -134,7 +134,7 @@ def test_the_result_is_dataclasses(folder, found, plainly):
         folder / "out",
         lengths=(20, 200, 2000),
         tolerances=(0.1, 0.001),
-        arithmetics=("f64", "q31"),
+        arithmetic=("f64", "q31"),
         sample_times=(0.01, 0.02),
         setpoints=(0.004, 0.01),
         jobs=1,
@@ -143,7 +143,7 @@ def test_the_result_is_dataclasses(folder, found, plainly):
     assert {cost: list(front) for cost, front in result.pareto.items()} == found["pareto"]
 
 
-FEW = dict(lengths=(20,), memories=("short",), arithmetics=("f64",), sample_times=(0.05,), jobs=1)
+FEW = dict(lengths=(20,), memory=("short",), arithmetic=("f64",), sample_times=(0.05,), jobs=1)
 
 
 def _lost(folder):
@@ -175,7 +175,7 @@ def test_a_rig_that_is_not_the_one_is_not_taken(tmp_path, fault, said):
 def test_without_its_rig_the_open_loop_still_comes(tmp_path):
     _made(tmp_path)
     _lost(tmp_path)
-    found = study.study_memory(tmp_path / "controller.toml", tmp_path / "out", **FEW)
+    found = study.study("memory", tmp_path / "controller.toml", tmp_path / "out", **FEW)
     assert found.rows[0].error > 0.0 and found.rows[0].settling_s is None and found.rig is None
     assert "--rig" in found.notes[0] and not (tmp_path / "out" / "loops.png").exists()
 

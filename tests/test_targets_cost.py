@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from focgen.cli.main import main
 from focgen.codegen.generate import generate
+from focgen.control.controller import Tunable
+from focgen.targets.calls import call_costs
 from focgen.targets.cores import CORES, core
-from focgen.targets.cost import cost_on
+from focgen.targets.cost import cost_of, cost_on
+from focgen.targets.driver import CALLS
 from focgen.targets.run import TargetLibrary
 from focgen.targets.stack import Stack
 from focgen.targets.steps import step_costs
@@ -65,6 +69,33 @@ def test_instructions_are_those_a_slow_count_gives(folders, name):
     machine.ctl_flush_tb()
     step_costs(library, read.plan, steps)
     assert counts[1:] == fast.tolist() and len(set(fast)) > 1
+
+
+@pytest.mark.parametrize("name", ("cortex-m0plus", "cortex-m4"))
+def test_a_call_costs_what_a_slow_count_gives(tmp_path, name):
+    """One by one in Python, from the entry of each call to its return; tune among them."""
+    controller = replace(paper_controller(12), tunable=Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0)))
+    generate(controller, tmp_path, "f32", name="tuned", tunable=True)
+    read = read_folder(tmp_path)
+    library = library_of(read, name)
+    step_costs(library, read.plan, 3)
+    fast = {call: cost.instructions for call, cost in call_costs(library, read.plan).items()}
+    entries = {library.program[f"tuned_{call}"].address: call for call in CALLS}
+    anew, counts, inside, back = library.program["tuned_call"].address, dict.fromkeys(CALLS, 0), "", None
+
+    def see(machine, address, size, _):
+        nonlocal inside, back
+        if not inside and address in entries:
+            inside, back = entries[address], machine.reg_read(library.machine._names["lr"]) & ~1
+        elif address in (back, anew):  # a call that is the last thing returns to where its caller would
+            inside = ""
+        if inside:
+            counts[inside] += 1
+
+    library.machine._machine.hook_add(library.machine._uc.UC_HOOK_CODE, see)
+    library.machine._machine.ctl_flush_tb()
+    call_costs(library, read.plan)
+    assert counts == fast and min(fast.values()) > 5 and fast["reset"] > fast["track"]
 
 
 def per_tap(reads, core_name, steps):
@@ -220,6 +251,22 @@ def test_the_keys_of_the_json(folders, capsys):
     assert np.isfinite(found["instructions_per_step"]["worst"])
     manifest = json.loads((folders["q15", 12].path / "manifest.json").read_text())
     assert found["ram_bytes"] == manifest["sizes"]["state_bytes"]
+    assert found["calls"].keys() == {"init", "reset", "track", "save", "restore"}
+    assert all(0 < call["instructions"] < call["cycles"] for call in found["calls"].values())
+    assert found["runtimes"] is None
+
+
+def test_a_small_core_is_counted_with_every_runtime(folders, monkeypatch):
+    """The other compiler's, or the line that installs it; remembered like the rest."""
+    path = folders["q15", 12].path
+    (found,) = cost(path, "cortex-m0plus").controllers
+    runtimes = found.targets["cortex-m0plus"].runtimes
+    own, other = runtimes.values()
+    assert own.instructions_per_step == found.targets["cortex-m0plus"].instructions_per_step.mean
+    assert (other.skipped is None) == (other.instructions_per_step is not None)
+    assert other.skipped is None or "apt-get install gcc-arm-none-eabi" in other.skipped
+    remembered = json.loads((path / REMEMBERED).read_text())["zig"]["targets"]["cortex-m0plus"]
+    assert cost_of(remembered) == found.targets["cortex-m0plus"]
 
 
 @pytest.mark.parametrize("arguments", (["nowhere"], [".", "--target", "z80"], [".", "--compiler", "tcc"]))

@@ -107,7 +107,7 @@ def test_logs_are_readable_and_carry_their_signals(tmp_path, signals, roles):
         focgen.trial("make", folder, cases=1, seed=seed, suite="short", signals=signals, kinds=("single",))
         case = folder / "cases" / "0001"
         rig = focgen.read_rig(case / "rig.toml")
-        logs = focgen.read_logs(sorted((case / "logs").iterdir()), rig.signals, rig.sample_time)
+        logs = focgen.read_logs(rig, sorted((case / "logs").iterdir()))
         assert [log.name for log in logs] and set(logs[0].signals) == roles
         seconds = sum(len(log) for log in logs) * rig.sample_time
         assert 220 < seconds < 320

@@ -5,6 +5,7 @@ import pytest
 
 import focgen
 from focgen.codegen.generate import generate
+from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.ending import endings
 from focgen.plan.execute import execute
@@ -14,7 +15,7 @@ from focgen.verification.scenarios import mixed
 from focgen.verification.unusable import strewn
 from focgen.verification.verify import verify
 from tests.conftest import paper_controller
-from tests.controllers import seed_controller
+from tests.controllers import seed_controller, simple
 from tests.test_verification_mutations import Fault, copied, filter_controller, sow
 
 FORMS = {
@@ -22,6 +23,7 @@ FORMS = {
     "filter": (filter_controller(), {}),
     "modes": (paper_controller(), {"memory": "exponential", "tolerance": 1e-3, "horizon": 10_000}),
     "ahead": (paper_controller(64), {"target": "cortex-m4"}),
+    "plain": (simple(TransferFunction([(1.0, 0.0)]), integrator=True), {}),
 }
 
 
@@ -119,19 +121,27 @@ def test_every_lane_is_damaged_and_the_reference_ends_where_the_c_does():
 
 
 @pytest.mark.parametrize(
-    "name, pattern, by",
+    "name, arithmetic, pattern, by",
     (
-        ("spba", r"if \(!foc_finite_f32\(s->integral \+ .*\) \{\n", "if (0) {\n"),
-        ("spba", r"!foc_finite_f32\(s->integral [^|]*\|\| ", ""),
-        ("spba", r" \|\| !spba_within\(s->integral\)", ""),
-        ("filter", r"if \(!foc_finite_f32\(d\)\)", "if (0)"),
-        ("spba", r"(spba_recover(.|\n)*?)    spba_settle\(s, e\);\n", r"\1"),
-        ("spba", r"    s->integral = u;\n    s->flags = flags;", "    s->flags = flags;"),
-        ("filter", r"    s->output = u;\n    s->flags = flags;", "    s->flags = flags;"),
-        ("modes", r"    s->flags = flags;\n", ""),
+        ("spba", "f64", r"if \(!foc_finite_f64\(s->integral \+ .*\) \{\n", "if (0) {\n"),
+        ("spba", "f64", r"!foc_finite_f64\(s->integral [^|]*\|\| ", ""),
+        ("spba", "f64", r" \|\| !spba_within\(s\)", ""),
+        ("spba", "f32", r"if \(!spba_within\(s\)\)", "if (0)"),
+        ("plain", "f32", r"s->error_now < SIMPLE_ERRORS\s+&& ", ""),
+        ("spba", "f32", r"if \(!foc_held\(d\) ", "if (0 && !foc_held(d) "),
+        ("filter", "f32", r"if \(!foc_finite_f32\(d\)\)", "if (0)"),
+        ("spba", "f32", r"(spba_recover(.|\n)*?)    spba_settle\(s, e\);\n", r"\1"),
+        (
+            "spba",
+            "f32",
+            r"    s->integral = foc_counts_f32\(u, 57\);\n    s->flags = flags;",
+            "    s->flags = flags;",
+        ),
+        ("filter", "f32", r"    s->output = u;\n    s->flags = flags;", "    s->flags = flags;"),
+        ("modes", "f32", r"    s->flags = flags;\n", ""),
     ),
 )
-def test_verify_sees_a_guard_that_is_lost(sound, tmp_path, name, pattern, by):
-    folder = copied(sound, tmp_path, name, "f32")
-    sow(folder, "filter" if name == "filter" else "spba", Fault("guard", "@.c", pattern, by))
+def test_verify_sees_a_guard_that_is_lost(sound, tmp_path, name, arithmetic, pattern, by):
+    folder = copied(sound, tmp_path, name, arithmetic)
+    sow(folder, {"filter": "filter", "plain": "simple"}.get(name, "spba"), Fault("guard", "@.c", pattern, by))
     assert verify(folder, 3000, edited=True).targets["host"].mismatches

@@ -11,7 +11,7 @@ from focgen.codegen.kernels import Kernels
 from tests.proofs import assembly, esbmc, eva
 from tests.proofs.faults import FAULTS, sow
 from tests.proofs.harness import reachable
-from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
+from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering, tuned
 from tests.proofs.verdict import first_objection
 
 AHEAD_FAULTS = {
@@ -62,7 +62,7 @@ def test_what_modes_keep(name, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("arithmetic", ["q15", "q31"])
-@pytest.mark.parametrize("name", (*controllers(8), *remembering()))
+@pytest.mark.parametrize("name", (*controllers(8), *tuned(8), *remembering()))
 def test_any_call_from_any_state(name, arithmetic, tmp_path):
     needs_eva()
     plan = generated(tmp_path, name, arithmetic, 24)
@@ -150,7 +150,7 @@ def test_a_fault_is_caught(fault, tmp_path):
         pytest.skip("neither ESBMC nor Frama-C is on this machine")
 
 
-@pytest.mark.parametrize("name", (*controllers(8), *remembering()))
+@pytest.mark.parametrize("name", (*controllers(8), *tuned(8), *remembering()))
 @pytest.mark.parametrize("arithmetic", ["q15", "q31"])
 def test_every_member_of_a_state_has_its_interval(name, arithmetic, tmp_path):
     """A member that the proofs do not know would be one that nothing is assumed or asked of."""

@@ -16,15 +16,15 @@ import pytest
 from focgen.plan.execute import execute
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario
-from focgen.targets.driver import DTYPES, REFUSED, driver, lane_of
+from focgen.targets.driver import DTYPES, REFUSED, driver, given_width, lane_of
 from focgen.verification.scenarios import raw_scenarios
 from tests.c_code import compiler, run, tool
-from tests.proofs.spread import ARITHMETICS, controllers, generated, remembering
+from tests.proofs.spread import ARITHMETICS, controllers, generated, remembering, tuned
 
 SANITISERS = """-std=c99 -O1 -g -ffp-contract=off
     -fsanitize=address,undefined -fno-sanitize-recover=all""".split()
 LENGTH = 24
-CASES = [(name, a) for name in (*controllers(LENGTH), *remembering()) for a in ARITHMETICS]
+CASES = [(name, a) for name in (*controllers(LENGTH), *tuned(LENGTH), *remembering()) for a in ARITHMETICS]
 
 _MAIN = """#include <stdio.h>
 #include <stdlib.h>
@@ -48,7 +48,7 @@ int main(int count, char **files)
         %(signal)s *const ref = take(in, n * sizeof *ref), *const meas = take(in, n * sizeof *ref);
         %(signal)s *const sched = take(in, n * sizeof *ref);
         uint8_t *const event = take(in, n);
-        %(signal)s *const given = take(in, 4 * n * sizeof *ref), *const u = malloc(n * sizeof *ref);
+        %(signal)s *const given = take(in, %(width)d * n * sizeof *ref), *const u = malloc(n * sizeof *ref);
         %(increment)s *const d = malloc(n * sizeof *d);
         uint8_t *const flags = malloc(n);
 
@@ -76,7 +76,8 @@ class Sanitised:
     def compiled(self, command: list[str]) -> Sanitised:
         plan = self.plan
         (self.folder / f"{plan.name}_driver.c").write_text(driver(plan))
-        names = {"name": plan.name, "signal": plan.output.ctype, "increment": plan.increment.ctype}
+        names = {"name": plan.name, "signal": plan.output.ctype, "increment": plan.increment.ctype,
+                 "width": given_width(plan)}  # fmt: skip
         (self.folder / "main.c").write_text(_MAIN % names)
         sources = [self.folder / "main.c", self.folder / f"{plan.name}.c"]
         run(*command, *SANITISERS, *sources, "-o", self.folder / "main.exe")

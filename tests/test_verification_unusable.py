@@ -77,13 +77,14 @@ def content(ffi, state) -> dict[str, bytes]:
 def test_a_step_that_is_left_out_changes_the_flags_only(c, bad, place):
     ffi, library, _ = c
     state = warm(c)
-    before, u = content(ffi, state), state.integral
-    inputs = [0.01, 0.004, 0.1]
+    u = library.spba_step(state, 0.01, 0.004, 0.1)
+    before, inputs = content(ffi, state), [0.01, 0.004, 0.1]
     inputs[place] = bad
     assert library.spba_step(state, *inputs) == u
     assert content(ffi, state) == before and library.spba_flags(state) == 16
     good = library.spba_step(state, 0.01, 0.004, 0.1)
     other = warm(c)
+    assert library.spba_step(other, 0.01, 0.004, 0.1) == u != good
     assert library.spba_step(other, 0.01, 0.004, 0.1) == good and library.spba_flags(state) == 0
 
 
@@ -199,7 +200,7 @@ def test_no_usable_input_overflows(seed):
     with np.errstate(over="raise", invalid="raise"):
         seen = execute(plan, Scenario(signs * last, -signs * last, sched))
     assert np.isfinite(seen.u).all() and np.isfinite(seen.d).all() and not (seen.flags & 16).any()
-    assert np.abs(seen.d).max() <= reach(plan, 2.0**49)
+    assert np.abs(seen.d * plan.increment.lsb).max() <= reach(plan, 2.0**49)
 
 
 @pytest.mark.parametrize("order", [0.3, 0.6, 0.9])

@@ -7,7 +7,9 @@ import argparse
 from focgen.cli.outcome import Outcome
 from focgen.codegen.generate import PACKAGES, Generated, generate
 from focgen.codegen.kernels import TARGETS
+from focgen.codegen.packages.package import FMI
 from focgen.control.controller import ARITHMETICS, MEMORIES
+from focgen.errors import InputError
 from focgen.fractional.continuous import OPERATORS
 from focgen.plan.model import Plan
 
@@ -17,6 +19,7 @@ EXAMPLE = """example:
   focgen generate controller.toml --out firmware --arithmetic q31 --length 1000
   focgen verify firmware
   focgen generate controller.toml --out firmware --memory exponential --tolerance 1e-4 --horizon 1000000
+  focgen generate controller.toml --out block --for fmu
 """
 
 
@@ -47,16 +50,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--operator",
         choices=OPERATORS,
-        default="gl",
-        help="what the exponential memory follows: the weights of Gruenwald and Letnikov (gl, the default),"
-        " or s^alpha itself over a band of frequencies, within --tolerance of it",
+        help="what the exponential memory follows: the weights of Gruenwald and Letnikov (gl),"
+        " or s^alpha itself over a band of frequencies, within --tolerance of it;"
+        " default: the controller's, else gl",
     )
     parser.add_argument(
         "--band",
         type=float,
         nargs=2,
         metavar=("LOW", "HIGH"),
-        help="of --operator continuous, in rad/s; default: four decades up to a tenth of Nyquist",
+        help="of --operator continuous, in rad/s; default: the controller's, else four decades up to a tenth"
+        " of Nyquist",
     )
     parser.add_argument("--target", metavar="CORE", help=f"sums for a core: {', '.join(TARGETS)}")
     parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
@@ -66,7 +70,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-float", action="store_true", help="leave out NAME_ref_from_f32() and the other conversions"
     )
-    parser.add_argument("--for", dest="package", choices=PACKAGES, default="plain", help="build files to add")
+    parser.add_argument(
+        "--tunable",
+        action="store_true",
+        help="add NAME_tune(): gains and output limits in RAM, within the box of [tunable] in the controller",
+    )
+    parser.add_argument(
+        "--for",
+        dest="package",
+        action="append",
+        choices=PACKAGES,
+        help="what to add to the plain files: a CMake package, an Arduino or PlatformIO library, an FMU",
+    )
+    parser.add_argument("--fmi", type=int, choices=FMI, help="version of an FMU's interface; default: 3")
 
 
 def run(args: argparse.Namespace) -> Outcome:
@@ -79,15 +95,25 @@ def run(args: argparse.Namespace) -> Outcome:
         args.length,
         args.name,
         args.target,
-        args.package,
+        _one(args.package),
         args.tolerance,
         args.horizon,
         args.selftest,
         args.no_float,
         args.operator,
         args.band and tuple(args.band),
+        args.tunable,
+        args.fmi,
     )
     return Outcome(made.manifest, _text(made))
+
+
+def _one(packages: list[str] | None) -> str:
+    """The package that is asked for; each has its own layout, so a folder has one."""
+    if packages and len(packages) > 1:
+        what = f"is given {len(packages)} times"
+        raise InputError("--for", what, "generate each package into a folder of its own")
+    return packages[0] if packages else "plain"
 
 
 def _text(made: Generated) -> str:
@@ -108,10 +134,18 @@ def _text(made: Generated) -> str:
             for b in manifest["memory_bias"]
             if b["bias"]
         ),
+        *_least(made),
         f"wrote {', '.join(made.files)} to {made.folder}",
         f"next: focgen verify {made.folder}",
     ]
     return "\n".join(lines)
+
+
+def _least(made: Generated) -> list[str]:
+    """What the integral acts on, and what it cannot hold."""
+    least, unit = made.manifest.get("smallest_error"), made.plan.controller.units.measurement
+    found = [] if least is None else [f"the integral acts on errors down to {least:.3g} {unit}".rstrip()]
+    return found + [f"note: {remark}" for remark in made.manifest.get("remarks", [])]
 
 
 def _whose(plan: Plan) -> str:

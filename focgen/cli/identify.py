@@ -76,8 +76,8 @@ def run(args: Namespace) -> Outcome:
     check_apart([args.out], given)
     check_report(args.report, given)
     found = identify(
-        args.logs,
         args.rig,
+        args.logs,
         None,
         args.first,
         args.last,

@@ -12,6 +12,7 @@ from pkgutil import iter_modules
 
 import focgen
 import focgen.cli
+from focgen.cli.completion import SHELLS, PrintCompletion
 from focgen.errors import FocgenError
 from focgen.jsontext import to_json
 
@@ -95,6 +96,8 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     style = argparse.RawDescriptionHelpFormatter
     top = _Parser(prog="focgen", description=_PROLOGUE, formatter_class=style)
     top.add_argument("--version", action="version", version=f"focgen {focgen.__version__}")
+    about = "print what a shell needs to complete focgen's commands and options, and end"
+    top.add_argument("--print-completion", choices=SHELLS, action=PrintCompletion, help=about)
     sub = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in (only,) if only in commands() else commands():
         module = import_module(f"focgen.cli.{name}")

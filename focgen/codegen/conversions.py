@@ -43,9 +43,11 @@ def counted(form: Format) -> Counted:
 
 
 def inputs_of(plan: Plan) -> dict[str, Format]:
-    """The signals that go in, with what says how large a count is."""
+    """The signals that go in, and what parameters are made of, with what says how large a count is."""
     found = {"ref": plan.error, "meas": plan.error}
-    return {**found, "sched": plan.schedule.signal} if plan.schedule else found
+    if plan.schedule:
+        found["sched"] = plan.schedule.signal
+    return {**found, "gain": plan.tuning.factor, "u": plan.output} if plan.tuning else found
 
 
 def conversions(plan: Plan) -> list[Conversion]:

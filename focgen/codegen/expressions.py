@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from focgen.codegen.literals import power_of_two
 from focgen.errors import PlanError
+from focgen.plan.counts import up_of
 from focgen.plan.model import Format
 
 CLAMP = {
@@ -42,6 +44,16 @@ def saturated(expression: str, from_: str, to: str) -> str:
         ("int64_t", "int32_t"): f"foc_sat32({expression})",
         ("int64_t", "int16_t"): f"foc_sat16(foc_sat32({expression}))",
     }[from_, to]
+
+
+def counts(expression: str, state: Format) -> str:
+    """A floating expression as an integral holds it: in counts where that is in counts."""
+    return expression if state.floating else f"foc_counts_f32({expression}, {up_of(state)})"
+
+
+def value(expression: str, state: Format) -> str:
+    """A floating plan's integral as a floating value."""
+    return expression if state.floating else f"foc_value_f32({expression}, {power_of_two(state.lsb)})"
 
 
 def scaled_up(ctype: str, by: int) -> str:

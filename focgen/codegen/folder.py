@@ -12,8 +12,9 @@ from focgen.codegen.guard import unusable_text
 from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
 from focgen.codegen.literals import quantity, wrapped
 from focgen.codegen.manifest import sizes
-from focgen.codegen.texts import UserText
+from focgen.codegen.texts import UserText, markdown
 from focgen.plan.canonical import memory_bias
+from focgen.plan.integrals import remarks, smallest_error
 from focgen.plan.model import Plan
 
 
@@ -61,10 +62,14 @@ class ReadmeContext:
     tightest: str
     operator: UserText
     output_per_sample: UserText
+    smallest: UserText | None
+    remarks: list[UserText]
     truncation: UserText | None
     biases: list[str]
     selftest: bool
     files: list[str]
+    box: list[str]
+    slew: UserText | None
 
 
 def readme_context(
@@ -73,6 +78,7 @@ def readme_context(
     """Prepare the folder's README; ``selftest`` and ``floats``: whether it tells of one, of conversions."""
     size, bound, unit = sizes(plan, kernels), plan.error_bound, plan.controller.units.output
     operator_unit = f"{unit}/s" if plan.integrator and unit else unit
+    least = smallest_error(plan)
     return ReadmeContext(
         name=plan.name,
         title=UserText(title),
@@ -101,11 +107,25 @@ def readme_context(
         tightest=_tightest(plan),
         operator=_quantity(bound.operator, operator_unit),
         output_per_sample=_quantity(bound.output_per_sample, unit),
+        smallest=None if least is None else _quantity(least, plan.controller.units.measurement),
+        remarks=[UserText(remark) for remark in remarks(plan)],
         truncation=None if bound.truncation is None else _quantity(bound.truncation, operator_unit),
         biases=_biases(plan),
         selftest=selftest,
         files=[f"{plan.name}.h", f"{plan.name}.c", *runtime_files(plan, kernels)],
+        box=_box(plan),
+        slew=None if plan.controller.slew_limit is None else _quantity(plan.controller.slew_limit, unit),
     )
+
+
+def _box(plan: Plan) -> list[str]:
+    """What may be tuned, a part each, for Markdown; nothing where nothing may."""
+    if plan.tuning is None:
+        return []
+    box, unit = plan.controller.tunable, markdown(UserText(plan.controller.units.output))
+    spans = (("factors on the gain", box.gain, ""), ("`u_min`", box.output_low, unit),
+             ("`u_max`", box.output_high, unit))  # fmt: skip
+    return [f"{what} from {low:g} to {high:g} {of}".rstrip() for what, (low, high), of in spans if low < high]
 
 
 def _quantity(value: float, unit: str) -> UserText:

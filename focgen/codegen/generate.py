@@ -13,24 +13,29 @@ from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels, runtime_files
 from focgen.codegen.leftovers import leftovers
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.codegen.names import check_name
+from focgen.codegen.packages.archive import archived
+from focgen.codegen.packages.context import Made
+from focgen.codegen.packages.package import PACKAGES, PLAIN, Package, check_package, packed
 from focgen.codegen.render import render
 from focgen.codegen.selftest import selftest_files
 from focgen.codegen.source import source_context
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
-from focgen.control.files import controller_text, read_controller
+from focgen.control.files import ControllerLike, controller_from, controller_text
 from focgen.errors import InputError, check_choice
 from focgen.fractional.continuous import HIGHEST, OPERATORS, RATIOS
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
-from focgen.output import check_apart, write_files
+from focgen.output import check_apart, remove, write_files
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST, Plan
 from focgen.resources import shipped
+from focgen.shown import Shown
+from focgen.spelling import respelled
 
-PACKAGES = ("plain", "cmake", "arduino", "platformio", "zephyr", "fmu")
+__all__ = ["PACKAGES", "Generated", "folder_files", "generate"]
 
 
-@dataclass(frozen=True)
-class Generated:
+@dataclass(frozen=True, repr=False)
+class Generated(Shown):
     """What :func:`generate` has written: the ``files`` of ``folder``, ``plan`` and ``manifest``."""
 
     folder: Path
@@ -39,54 +44,62 @@ class Generated:
     manifest: dict[str, Any]
 
 
+@respelled({"package": "for_"})
 def generate(
-    controller: Controller | str | Path,
+    controller: ControllerLike,
     out: str | Path,
     arithmetic: str | None = None,
     memory: str | None = None,
     length: int | None = None,
     name: str | None = None,
     target: str | None = None,
-    package: str = "plain",
+    for_: str = "plain",
     tolerance: float | None = None,
     horizon: int | None = None,
     selftest: bool = False,
     no_float: bool = False,
-    operator: str = "gl",
+    operator: str | None = None,
     band: tuple[float, float] | None = None,
+    tunable: bool = False,
+    fmi: int | None = None,
 ) -> Generated:
     """Write C for a controller into the folder ``out``, whole or not at all; what an earlier run wrote there
     for it and this one does not, goes.
 
-    ``controller`` is a :class:`Controller` or the path of its file. ``arithmetic`` (f64, f32, q31, q15),
-    ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one, ``tolerance`` (1e-8 … 0.1)
-    and ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier) default to the
-    controller's own. ``selftest`` adds NAME_selftest.c and .h. ``target`` names a core whose own instructions
-    the history sums shall use; without it they take their portable form. The bits are the same.
-    ``no_float`` leaves the conversions from and to physical values out of the header. ``operator``
-    "continuous" fits the exponential memory to (jω)^α itself within ``tolerance`` over ``band`` (rad/s; None:
-    four decades up to a tenth of the Nyquist frequency); it has no horizon, and a tolerance of 1e-3 unless
-    another is given. "gl" fits it to the weights of eq. (11).
+    ``controller`` is a :class:`Controller`, the path of its file, or a dictionary like it. ``arithmetic``
+    (f64, f32, q31, q15), ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one,
+    ``tolerance`` (1e-8 … 0.1) and ``horizon`` (100 … 1e8 samples) of the other, ``operator`` and ``band``,
+    and ``name`` (a C identifier) default to the controller's own. ``selftest`` adds NAME_selftest.c and .h.
+    ``target`` names a core whose own instructions the history sums shall use; without it they take their
+    portable form. The bits are the same. ``no_float`` leaves the conversions from and to physical values out
+    of the header. ``operator`` "continuous" fits the exponential memory to (jω)^α itself within ``tolerance``
+    over ``band`` (rad/s; without one four decades up to a tenth of the Nyquist frequency); it has no horizon,
+    and a tolerance of 1e-3 unless another is given. "gl" fits it to the weights of eq. (11). ``tunable`` adds
+    NAME_params, NAME_default, NAME_check and NAME_tune: factors on the gains and output limits that change at
+    run time, within the box that the controller's ``tunable`` gives. ``for_`` adds what an ecosystem expects:
+    one of ``PACKAGES``; the interface of an "fmu" is version ``fmi``, 2 or 3 (the default).
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
-    written, or one where a file would replace the controller's own by other bytes.
+    written, or one where a file would replace the controller's own by other bytes; BuildError where an FMU
+    finds no C compiler.
     """
-    _refuse_what_is_missing(package)
+    wanted = check_package(for_, fmi)
     kernels = _kernels(target)
     text, made, where = _source(controller)
     _check(arithmetic, memory, made.length if length is None else length)
     form = made.memory if memory is None else memory
     _check_form(form, length, tolerance, horizon)
-    _check_operator(form, operator, band, horizon, made.sample_time)
+    own = made.operator if form == "exponential" else "gl"
+    _check_operator(form, own if operator is None else operator, band, horizon, made.sample_time)
     called = check_name(made.name if name is None else name, where)
-    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band)
-    files = folder_files(plan, text, selftest, kernels, not no_float)
+    plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band, tunable)
+    files = folder_files(plan, text, selftest, kernels, not no_float, wanted)
+    files.update(archived(plan.name, files, wanted.fmi))
     old = leftovers(Path(out), called, files)
     check_apart(old, [controller])
     write_files(out, files, [controller])
-    for path in old:
-        path.unlink(missing_ok=True)
+    remove(old)
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
 
 
@@ -96,8 +109,10 @@ def folder_files(
     selftest: bool = False,
     kernels: Kernels = PORTABLE,
     floats: bool = True,
+    package: Package = PLAIN,
 ) -> dict[str, str | bytes]:
-    """Name and content of every file of a generated folder; the same plan gives the same bytes.
+    """Name and content of every file of a generated folder; the same plan gives the same bytes. Of a package
+    all but what a compiler makes.
 
     Raises PlanError for what C cannot express, InputError where the plan's name is no name in C.
     """
@@ -107,26 +122,37 @@ def folder_files(
         name: (shipped("c_runtime") / name).read_text(encoding="utf-8")
         for name in runtime_files(plan, kernels)
     }
-    inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
-    manifest = manifest_of(plan, inputs, selftest, kernels, floats)
-    return {
+    compiled = {
         f"{plan.name}.h": render("controller.h.jinja", header_context(plan, title, digest, kernels, floats)),
         f"{plan.name}.c": render("controller.c.jinja", source_context(plan, title, digest, kernels)),
         **runtime,
-        "controller.toml": controller_toml,
-        "manifest.json": json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
-        "README.md": render("README.md.jinja", readme_context(plan, title, selftest, kernels, floats)),
-        "example/main.c": render("main.c.jinja", example_context(plan, title, floats)),
         **(selftest_files(plan, digest) if selftest else {}),
     }
+    beside = {
+        "README.md": render("README.md.jinja", readme_context(plan, title, selftest, kernels, floats)),
+        "example/main.c": render("main.c.jinja", example_context(plan, title, floats)),
+    }
+    made = Made(plan, compiled, package.name, package.fmi)
+    files = {**compiled, "controller.toml": controller_toml, **packed(beside, made)}
+    inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
+    manifest = manifest_of(plan, inputs, selftest, kernels, floats)
+    if package != PLAIN:
+        added = {name: sha256(text) for name, text in files.items() if name not in (*compiled, *beside)}
+        added.pop("controller.toml")
+        manifest["package"] = {**package.entry, "files": added}
+    return {**files, "manifest.json": _json(manifest)}
 
 
-def _source(controller: Controller | str | Path) -> tuple[bytes, Controller, str]:
+def _json(manifest: dict[str, Any]) -> str:
+    return json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _source(controller: ControllerLike) -> tuple[bytes, Controller, str]:
     """The file's content, the controller, and what errors call it."""
-    if isinstance(controller, Controller):
-        return controller_text(controller).encode("utf-8"), controller, controller.name
-    made = read_controller(controller)
-    return Path(controller).read_bytes(), made, str(controller)
+    made = controller_from(controller)
+    if isinstance(controller, (str, Path)):
+        return Path(controller).read_bytes(), made, str(controller)
+    return controller_text(made).encode("utf-8"), made, made.name
 
 
 def _check(arithmetic: str | None, memory: str | None, length: int) -> None:
@@ -181,14 +207,3 @@ def _check_operator(
         remedy = f"give two frequencies in rad/s, a factor of {RATIOS[0]:g} to {RATIOS[1]:g} apart"
         what = f"is {low:g} to {high:g}"
         raise InputError("--band", what, f"{remedy}, up to {highest:.6g}, half of the Nyquist frequency")
-
-
-def _refuse_what_is_missing(package) -> None:
-    """Options of the command that this version does not have are refused, never ignored."""
-    check_choice("--for", package, PACKAGES)
-    if package != "plain":
-        raise InputError(
-            "--for",
-            f"{package} is not available in this version",
-            "use --for plain and add its files to your build",
-        )

@@ -51,6 +51,7 @@ class HeaderContext:
     conversions: list[Conversion]
     to_float: str
     aliases: list[str]
+    tunable: list[Define]
 
 
 def header_context(
@@ -81,6 +82,7 @@ def header_context(
         conversions=conversions(plan) if floats else [],
         to_float=to_float(plan),
         aliases=_aliases(plan, kernels),
+        tunable=_tunable(plan),
     )
 
 
@@ -145,6 +147,25 @@ def _ends(name: str, form: Format, physical: tuple[float, float], unit: str) -> 
         Define(f"{name}_{end}", constant(count, form.ctype), quantity(value, unit))
         for end, count, value in (("MIN", form.low, physical[0]), ("MAX", form.high, physical[1]))
     ]
+
+
+def _tunable(plan: Plan) -> list[Define]:
+    """The box of the parameters; empty where there are none."""
+    if plan.tuning is None:
+        return []
+    box, physical, unit = plan.tuning, plan.controller.tunable, plan.controller.units.output
+    count = len(box.nominal)
+    about = "factors: one for each gain of the schedule" if plan.schedule else "factors: one for the gain"
+    ends = _ends("GAIN", box.factor, physical.gain, "")
+    lowest, highest = (
+        Define(f"U_{name}", constant(end, plan.output.ctype), quantity(value, unit))
+        for name, end, value in (
+            ("MIN_HIGHEST", box.low[1], physical.output_low[1]),
+            ("MAX_LOWEST", box.high[0], physical.output_high[0]),
+        )
+    )
+    lsb = Define("GAIN_LSB", _lsb(box.factor), "of a factor")
+    return [Define("GAINS", f"{count}u", about), lsb, *ends, lowest, highest]
 
 
 def _sizes(plan: Plan, kernels: Kernels) -> list[Define]:

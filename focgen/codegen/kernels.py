@@ -90,7 +90,9 @@ PORTABLE = Kernels()
 
 def runtime_files(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[str, ...]:
     """The files of the runtime that a plan's C includes."""
-    return ("foc_rt.h", "foc_save.h", *["foc_memory.h"] * (plan.states > 0), *kernels.headers(plan))
+    extra = [*["foc_memory.h"] * (plan.states > 0), *["foc_integral.h"] * plan.counted]
+    extra += ["foc_tune.h"] * (plan.tuning is not None)
+    return ("foc_rt.h", "foc_save.h", *extra, *kernels.headers(plan))
 
 
 def named_sums(plan: Plan) -> dict[str, Sum]:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from focgen.codegen.manifest import sha256
+from focgen.codegen.packages.package import moved, package_file
 from focgen.errors import InputError
 from focgen.jsontext import read_json
 
 
-def leftovers(folder: Path, name: str, files: Collection[str]) -> tuple[Path, ...]:
+def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tuple[Path, ...]:
     """What the manifest in ``folder`` says was written for the controller ``name`` and is not among the new
-    ``files``: a self-test, and headers of the runtime that are still as they were written.
+    ``files``: a self-test, an FMU, and whatever of the runtime and of a package is still as it was written.
 
     Files of a controller of another name stay, and so does whatever no manifest tells of.
     """
@@ -25,8 +27,27 @@ def leftovers(folder: Path, name: str, files: Collection[str]) -> tuple[Path, ..
     written = inputs.items() if isinstance(inputs, dict) else ()
     runtime = [(file, digest) for file, digest in written if re.fullmatch(r"foc_\w+\.h", file)]
     headers = [file for file, digest in runtime if _is(folder / file, digest)]
-    old = [folder / file for file in (*test, *headers) if file not in files]
-    return tuple(path for path in old if path.is_file())
+    package = [file for file, digest in _packaged(manifest, name) if _is(folder / file, digest)]
+    archive = [f"{name}.fmu"] if _of(manifest.get("package"), "for") == "fmu" else []
+    elsewhere = [
+        other for file, text in files.items() for other in moved(file) if _is(folder / other, sha256(text))
+    ]
+    old = [folder / file for file in (*test, *headers, *package, *archive, *elsewhere) if file not in files]
+    return tuple(path for path in dict.fromkeys(old) if path.is_file())
+
+
+def _packaged(manifest: dict, name: str) -> Iterator[tuple[str, str]]:
+    """Yield file and digest of what a package added, where these are its own names: a manifest from elsewhere
+    leads to no other file."""
+    listed = _of(manifest.get("package"), "files")
+    for file, digest in listed.items() if isinstance(listed, dict) else ():
+        if package_file(file, name) and isinstance(digest, str):
+            yield file, digest
+
+
+def _of(entry: Any, key: str) -> Any:
+    """What an object has under a key; None where it is no object."""
+    return entry.get(key) if isinstance(entry, dict) else None
 
 
 def _manifest(folder: Path) -> dict:

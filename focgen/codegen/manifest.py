@@ -12,6 +12,7 @@ from focgen.codegen.selftest import selftest_entry
 from focgen.codegen.state import plain_bytes, size_of, state_bytes
 from focgen.fractional.elementary import rounded_up
 from focgen.plan.canonical import memory_bias
+from focgen.plan.integrals import remarks, smallest_error
 from focgen.plan.model import (
     FLAG_HIGH,
     FLAG_INPUT,
@@ -24,6 +25,7 @@ from focgen.plan.model import (
     Proof,
     Sum,
 )
+from focgen.plan.tuning import default_params
 from focgen.plan.usable import EXPONENT
 
 
@@ -56,9 +58,12 @@ def manifest_of(
         **lsbs(plan),
         "ranges": _ranges(plan),
         "flags": flags(plan),
+        **({"tunable": tunable_entry(plan)} if plan.tuning else {}),
         **({"usable_below": 2.0 ** EXPONENT[plan.output.ctype]} if plan.floating else {}),
         "proofs": [proof_entry(proof) for proof in plan.proofs],
         "error_bound": bound_entry(plan.error_bound),
+        **_least(plan),
+        **({} if plan.controller.slew_limit is None else {"slew_limit": plan.controller.slew_limit}),
         "memory_bias": _bias(plan),
         **({"kernels": kernel_entry(plan, kernels)} if kernels.target else {}),
         "sizes": sizes(plan, kernels),
@@ -135,6 +140,15 @@ def _exponential(plan: Plan) -> dict[str, Any]:
     }
 
 
+def _least(plan: Plan) -> dict[str, Any]:
+    """The least steady error that the integral acts on, physical, and what it cannot hold."""
+    least, said = smallest_error(plan), remarks(plan)
+    return {
+        **({} if least is None else {"smallest_error": rounded_up(least)}),
+        **({"remarks": said} if said else {}),
+    }
+
+
 def _bias(plan: Plan) -> list[dict[str, float]]:
     """What each term reads of a constant, instead of 0, since the memory ends: T s^alpha at rest."""
     if plan.exponential:
@@ -166,10 +180,33 @@ def sizes(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, int]:
 
 def _table_bytes(plan: Plan, kernels: Kernels) -> int:
     total = sum(_sum_bytes(plan, table, kernels) for table in named_sums(plan).values())
+    if plan.tuning:
+        return total + _tuning_bytes(plan)
     if plan.schedule:
         counts = len(plan.schedule.breakpoints) + len(plan.schedule.gains) + len(plan.schedule.slopes)
         total += counts * size_of(plan.error.ctype) + (0 if plan.floating else len(plan.schedule.slopes))
     return total
+
+
+def _tuning_bytes(plan: Plan) -> int:
+    """Of breakpoints, nominal gains, reciprocals and shifts."""
+    one, segments = size_of(plan.error.ctype), len(plan.tuning.reciprocals)
+    points = len(plan.schedule.breakpoints) if plan.schedule else 0
+    per = one if plan.floating else 4 + 2
+    return (points + len(plan.tuning.nominal)) * one + segments * per
+
+
+def tunable_entry(plan: Plan) -> dict[str, Any]:
+    """The box in physical units, the size of a factor's count, and the default in counts."""
+    box, default = plan.controller.tunable, default_params(plan)
+    return {
+        "gains": list(plan.controller.gains),
+        "gain": list(box.gain),
+        "output_low": list(box.output_low),
+        "output_high": list(box.output_high),
+        "GAIN_LSB": plan.tuning.factor.lsb,
+        "default": {"gain": list(default.gain), "u_min": default.u_min, "u_max": default.u_max},
+    }
 
 
 def _sum_bytes(plan: Plan, table: Sum, kernels: Kernels) -> int:

@@ -26,7 +26,7 @@ _CPP_KEYWORDS = """
 _HEADERS = """
     assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
     stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar
-    wchar wctype foc_rt foc_save foc_memory foc_long foc_tiles
+    wchar wctype foc_rt foc_save foc_memory foc_tune foc_long foc_tiles
     foc_ahead_q15 foc_ahead_q31 foc_ahead_f32
     foc_m0_q15 foc_m0_q31 foc_m3_q15 foc_m3_q31 foc_m4_q15 foc_m4_f32
 """.split()

@@ -7,7 +7,7 @@ from functools import cache
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from focgen.codegen.texts import comment, markdown, printf, string
+from focgen.codegen.texts import comment, markdown, printf, string, xml
 from focgen.resources import shipped
 
 _WIDTH = 104
@@ -36,7 +36,8 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    made.filters.update(broken=broken, comment=comment, string=string, printf=printf, markdown=markdown)
+    filters = dict(comment=comment, string=string, printf=printf, markdown=markdown, xml=xml)
+    made.filters.update(filters, broken=broken)
     return made
 
 

@@ -61,5 +61,6 @@ def _configuration(plan: Plan, sha256: str, kernels: Kernels) -> str:
     settings: list = [focgen.__version__, sha256, plan.name, plan.arithmetic, plan.memory, plan.length]
     settings += [plan.tolerance, plan.horizon, kernels.target]
     settings += [plan.operator, plan.band] if plan.band else []
+    settings += ["tunable"] if plan.tuning else []
     digest = hashlib.sha256(json.dumps(settings).encode()).digest()
     return f"0x{digest[:_NAMED].hex()}"

@@ -12,9 +12,10 @@ from focgen.codegen.render import render
 from focgen.codegen.state import size_of
 from focgen.plan.execute import execute
 from focgen.plan.model import FLAG_HIGH, FLAG_LOW, Plan
-from focgen.plan.scenario import Reset, Scenario, Track, nearest_raw
+from focgen.plan.scenario import Params, Reset, Scenario, Track, Tune, nearest_raw
+from focgen.plan.tuning import default_params
 
-RESET, TRACK = 1, 2
+RESET, TRACK, TUNE = 1, 2, 3
 _FEWEST, _MOST = 240, 900  # steps; in between, twice the memory
 _QUIET = 0.3  # of the steps that may stand at a limit, so that most show what they sum
 _HALVINGS = 20
@@ -24,7 +25,8 @@ _HALVINGS = 20
 class Row:
     """An event ahead of the first of ``steps`` steps with the same raw inputs.
 
-    ``given``: ref, meas and u0 of a reset, u of a track and nothing; ``bad``: bit i stands for argument i of
+    ``given``: ref, meas and u0 of a reset, u of a track and nothing, the factor on every gain and the limits
+    of a tune; ``bad``: bit i stands for argument i of
     (``given``, ``inputs``) being no usable number. Inputs are ref, meas and the schedule (0 without one).
     """
 
@@ -52,6 +54,7 @@ class SelftestContext:
     outputs: list[str]
     flags: list[str]
     samples: int
+    tunable: bool
 
 
 def selftest_files(plan: Plan, sha256: str) -> dict[str, str]:
@@ -88,6 +91,7 @@ def selftest_context(plan: Plan, sha256: str) -> SelftestContext:
         outputs=rows(answer.u[0].tolist(), plan.output.ctype),
         flags=rows(answer.flags[0].tolist(), "uint8_t"),
         samples=answer.u.shape[1],
+        tunable=plan.tuning is not None,
     )
 
 
@@ -181,7 +185,37 @@ class _Maker:
             made.append(replace(row, inputs=(*row.inputs[:2], self.sched(place / 12))))
         if self.plan.floating:
             made += self.unusable()
+        if self.plan.tuning:
+            made += self.tuned()
         return [*made, self.track(self.small(2), 0.6), self.reset(self.small(), 0.3), self.small(4)]
+
+    def tune(self, row: Row, factor, low, high) -> Row:
+        """The row after parameters, raw."""
+        return replace(row, event=TUNE, given=(factor, low, high))
+
+    def tuned(self) -> list[Row]:
+        """Every corner of the box; parameters that are refused; limits that the output is pushed against."""
+        box, made = self.plan.tuning, []
+        for corner in range(8):
+            given = [span[corner >> i & 1] for i, span in enumerate(self.box())]
+            made += [self.tune(self.small(), *given), self.small(), self.large(corner % 2 == 0, 3)]
+        middle = self.signal(box.factor, 0.5), box.low[1], box.high[0]
+        made += [self.tune(self.small(), *middle), self.track(self.small(), 1.0)]
+        beyond = [(self.beyond(box.factor.high), *middle[1:]), (middle[0], box.high[1], middle[2])]
+        made += [self.tune(self.small(), *given) for given in beyond]
+        if self.plan.floating:
+            made.append(replace(self.tune(self.small(), *middle), bad=1))
+        one = default_params(self.plan)
+        return [*made, self.tune(self.small(), one.gain[0], one.u_min, one.u_max)]
+
+    def box(self) -> list[tuple]:
+        """The spans of a factor and of the limits, raw."""
+        box = self.plan.tuning
+        return [(box.factor.low, box.factor.high), box.low, box.high]
+
+    def beyond(self, count):
+        """More than a count of the box, within the type."""
+        return count * 1.5 if self.plan.floating else _in_type(self.plan.output, count + 1)
 
     def unusable(self) -> list[Row]:
         """Each argument of each call in turn; good samples in between."""
@@ -223,7 +257,14 @@ def scenario_of(plan: Plan, made: list[Row]) -> Scenario:
         if row.event == RESET
     ]
     tracks = [Track(0, int(at), _argument(row, 0)) for row, at in zip(made, starts) if row.event == TRACK]
-    return Scenario(ref, meas, sched if plan.schedule else None, tuple(resets), tuple(tracks))
+    tunes = [Tune(0, int(at), _params(plan, row)) for row, at in zip(made, starts) if row.event == TUNE]
+    return Scenario(ref, meas, sched if plan.schedule else None, tuple(resets), tuple(tracks),
+                    tunes=tuple(tunes))  # fmt: skip
+
+
+def _params(plan: Plan, row: Row) -> Params:
+    factor, low, high = (_argument(row, i) for i in range(3))
+    return Params((factor,) * len(plan.tuning.nominal), low, high)
 
 
 def _argument(row: Row, place: int):

@@ -5,25 +5,40 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import focgen
-from focgen.codegen.expressions import CLAMP, LONGEST_SHIFT, bound, converted, saturated, scaled_up, shifted
+from focgen.codegen.expressions import (
+    CLAMP,
+    LONGEST_SHIFT,
+    bound,
+    converted,
+    counts,
+    saturated,
+    scaled_up,
+    shifted,
+    value,
+)
 from focgen.codegen.formulas import memory_about, step_formulas, transfer_text, weights_about
-from focgen.codegen.guard import GuardText, guard_text
+from focgen.codegen.guard import GuardText, guard_text, output_of
 from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
 from focgen.codegen.literals import constant, literal, quantity, scale
 from focgen.codegen.saved import SavedText, saved_text
-from focgen.codegen.state import carries, starts
+from focgen.codegen.state import carries, inner_input, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
 from focgen.codegen.texts import UserText, comment
+from focgen.codegen.tuned import Limits, TunedText, integral_ends, limits, tuned_gain, tuned_text
 from focgen.plan.canonical import realise
 from focgen.plan.model import Plan, Sum
 
 
 @dataclass(frozen=True)
 class InnerText:
-    """The integral of the terms of negative order."""
+    """The integral of the terms of negative order; ``taken``: the sum as it takes it in; ``counted``: it is
+    in counts though the plan is floating."""
 
     sum: SumText
     ctype: str
+    taken: str
+    zero: str
+    counted: bool
     clamp: str
     to_wide: str
     about: str
@@ -53,6 +68,7 @@ class IntegralText:
     about: str
     start: str
     start_about: str
+    zero: str
     within: str
     from_output: str
     starting: bool
@@ -82,6 +98,7 @@ class SourceContext:
     transfer: str
     formulas: list[str]
     exponential: bool
+    counted: bool
     memory_about: list[str]
     fixed: bool
     signal: str
@@ -112,6 +129,9 @@ class SourceContext:
     guard: GuardText | None
     saved: SavedText
     output: str
+    limits: Limits
+    gain_call: str
+    tuned: TunedText | None
 
 
 def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTABLE) -> SourceContext:
@@ -126,6 +146,7 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         transfer=comment(transfer_text(plan)),
         formulas=step_formulas(plan),
         exponential=plan.states > 0,
+        counted=plan.counted,
         memory_about=memory_about(plan),
         fixed=not plan.floating,
         signal=signal,
@@ -142,7 +163,7 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         narrowed=_narrowed(plan, "x"),
         at_rest=_at_rest(plan),
         schedule=schedule_text(plan) if plan.schedule else None,
-        gain=None if plan.schedule else _gain(plan),
+        gain=None if plan.schedule or plan.tuning else _gain(plan),
         gain_type=plan.gain.ctype,
         increment=plan.increment.ctype,
         increment_about=_increment_about(plan),
@@ -156,6 +177,9 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         guard=guard_text(plan),
         saved=saved_text(plan, sha256, kernels),
         output=_output(plan),
+        limits=limits(plan),
+        gain_call=_gain_call(plan),
+        tuned=tuned_text(plan),
     )
 
 
@@ -196,12 +220,19 @@ def _inner(plan: Plan, kernels: Kernels) -> InnerText | None:
     what = "What 1/s integrates: numerator terms of negative order times s"
     about = weights_about(plan, realise(plan.controller).rest, plan.inner.rest, what, half_step=True)
     ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
-    total = f"s->inner + ({converted('r', plan.inner.rest.total.ctype, state.ctype)} + s->inner_input)"
+    made = _sum(plan, plan.inner.rest, "integrand", about, kernels)
+    counted = plan.floating and not state.floating
+    ctype = inner_input(plan)
+    total = f"s->inner + ({converted('r', ctype, state.ctype)} + s->inner_input)"
+    there = shifted("s->inner", state.ctype, plan.inner.to_wide)
     return InnerText(
-        sum=_sum(plan, plan.inner.rest, "integrand", about, kernels),
-        ctype=plan.inner.rest.total.ctype,
+        sum=made,
+        ctype=ctype,
+        taken=counts(f"{made.function}(s)", state) if counted else f"{made.function}(s)",
+        zero=literal(0, state.ctype),
+        counted=counted,
         clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
-        to_wide=converted(shifted("s->inner", state.ctype, plan.inner.to_wide), state.ctype, plan.wide.ctype),
+        to_wide=value("s->inner", state) if counted else converted(there, state.ctype, plan.wide.ctype),
         about=_proved(plan, "inner sum", state.bits),
     )
 
@@ -252,10 +283,19 @@ def _gain(plan: Plan) -> GainText:
     return GainText(value, about if plan.floating else f"{about}, counts of {scale(plan.gain.lsb)}")
 
 
+def _gain_call(plan: Plan) -> str:
+    """What a step's gain is; empty where it is a constant."""
+    if plan.tuning:
+        return tuned_gain(plan)
+    return schedule_text(plan).call if plan.schedule else ""
+
+
 def _increment_about(plan: Plan) -> str:
     unit = plan.controller.units.output
-    if plan.floating:
+    if plan.increment.floating:
         return quantity_unit(unit)
+    if plan.floating:
+        return f"counts of {scale(plan.increment.lsb, unit)}"
     return f"{bound(plan.increment, 'd')}, counts of {scale(plan.increment.lsb, unit)}"
 
 
@@ -266,9 +306,9 @@ def quantity_unit(unit: str) -> str:
 
 def _product(plan: Plan) -> str:
     """d from ``gain`` and ``v``, by the cheapest product that is exact."""
-    gain = "gain" if plan.schedule else f"{plan.name.upper()}_GAIN"
+    gain = "gain" if plan.schedule or plan.tuning else f"{plan.name.upper()}_GAIN"
     if plan.floating:
-        return f"{gain} * v"
+        return counts(f"{gain} * v", plan.increment)
     if plan.gain.ctype == "int16_t" and plan.filtered.ctype == "int32_t":
         wide, product = "int64_t", f"foc_mul32x16(v, {gain})"
     else:
@@ -282,28 +322,41 @@ def _integral(plan: Plan) -> IntegralText | None:
     if plan.integrator is None:
         return None
     state, by, u = plan.integrator.state, plan.integrator.to_output, plan.output
-    ends = f"{constant(state.low, state.ctype)}, {constant(state.high, state.ctype)}"
-    total = f"s->integral + ({converted('d', plan.increment.ctype, state.ctype)} + s->increment)"
+    ends = ", ".join(integral_ends(plan))
+    total = f"s->integral + {_change(plan)}"
     start = min(max(0, state.low), state.high)
-    clamped = f"{CLAMP[u.ctype]}(u_applied, {plan.name.upper()}_U_MIN, {plan.name.upper()}_U_MAX)"
-    applied = clamped if plan.floating else "u"
+    clamped = f"{CLAMP[u.ctype]}(u_applied, {limits(plan).low}, {limits(plan).high})"
     return IntegralText(
         ctype=state.ctype,
         clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
         about=_proved(plan, "integrator sum", state.bits),
         start=literal(start, state.ctype),
         start_about=quantity(start * state.lsb, plan.controller.units.output),
+        zero=literal(0, plan.increment.ctype),
         within=clamped,
-        from_output=converted(applied, u.ctype, state.ctype) + scaled_up(state.ctype, by),
+        from_output=counts(clamped, state)
+        if plan.floating
+        else converted("u", u.ctype, state.ctype) + scaled_up(state.ctype, by),
         starting=starts(plan),
     )
+
+
+def _change(plan: Plan) -> str:
+    """By how much the integral moves ahead of its limits: two half trapezoids, within the slew limit."""
+    state, slew = plan.integrator.state, plan.integrator.slew
+    both = f"{converted('d', plan.increment.ctype, state.ctype)} + s->increment"
+    if slew is None:
+        return f"({both})"
+    return f"{CLAMP[state.ctype]}({both}, {constant(-slew, state.ctype)}, {literal(slew, state.ctype)})"
 
 
 def _output(plan: Plan) -> str:
     """u from the integral, or from ``d`` without one."""
     u = plan.output.ctype
+    if plan.integrator and plan.floating:
+        return output_of(plan)
     if plan.integrator:
         state = plan.integrator.state.ctype
         return saturated(shifted("s->integral", state, plan.integrator.to_output), state, u)
-    d = plan.increment.ctype
-    return converted(f"{CLAMP[d]}(d, {plan.name.upper()}_U_MIN, {plan.name.upper()}_U_MAX)", d, u)
+    d, ends = plan.increment.ctype, limits(plan)
+    return converted(f"{CLAMP[d]}(d, {ends.low}, {ends.high})", d, u)

@@ -35,7 +35,7 @@ def members(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[Member, ...]:
     begin at a word.
     """
     found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan, kernels), *_means(plan)]
-    found += _bytes(plan)
+    found += [*_parameters(plan), *_bytes(plan)]
     found += [_ahead(table, name) for name, table in named_sums(plan).items() if kernels.ahead(plan, table)]
     grouped = [h for h in ("error", "filtered") if kernels.grouped(plan, h)]
     by_words = [*(f"{name}_ahead" for name in named_sums(plan)), *grouped] if grouped else []
@@ -88,7 +88,7 @@ def _inner(plan: Plan) -> list[Member]:
             "inner",
             f"integral of the terms of negative order{_counts(plan.inner.state)}",
         ),
-        Member(plan.inner.rest.total.ctype, "inner_input", "what was added to it last, half a trapezoid"),
+        Member(inner_input(plan), "inner_input", "what was added to it last, half a trapezoid"),
     ]
 
 
@@ -106,15 +106,32 @@ def _integral(plan: Plan) -> list[Member]:
             plan.integrator.state.ctype,
             "integral",
             f"the output before rounding{_counts(plan.integrator.state)}"
-            if not plan.floating
+            if not plan.integrator.state.floating
             else "the output",
         ),
         Member(plan.increment.ctype, "increment", "half a trapezoid, of the latest sample"),
     ]
-    if plan.schedule:
+    if starts(plan):
         found.append(
             Member(plan.filtered.ctype, "resting", "filtered error that reset has left, until a step")
         )
+    return found
+
+
+def _parameters(plan: Plan) -> list[Member]:
+    """What NAME_tune has taken over."""
+    if plan.tuning is None:
+        return []
+    signal, gains = plan.output.ctype, f"{plan.name.upper()}_GAINS"
+    count = len(plan.tuning.nominal)
+    found = [
+        Member(plan.gain.ctype, "gains", f"with their factors{_counts(plan.gain)}", count, gains),
+        Member(signal, "u_min", "lower limit of the output"),
+        Member(signal, "u_max", "upper limit of the output"),
+    ]
+    if plan.schedule:
+        about = "from each breakpoint to the next"
+        found.append(Member(plan.gain.ctype, "slopes", about, count - 1, f"{gains} - 1"))
     return found
 
 
@@ -124,6 +141,11 @@ def _bytes(plan: Plan) -> list[Member]:
     if starts(plan):
         found.append(Member("uint8_t", "starting", "1 from reset to the first step"))
     return found
+
+
+def inner_input(plan: Plan) -> str:
+    """The type of what the inner integral takes in: counts of its own where it is in counts."""
+    return plan.inner.state.ctype if plan.floating else plan.inner.rest.total.ctype
 
 
 def carries(plan: Plan) -> bool:
@@ -138,7 +160,7 @@ def holds(plan: Plan) -> bool:
 
 def starts(plan: Plan) -> bool:
     """Whether the first step after a reset must still find the gain of the sample before it."""
-    return plan.integrator is not None and plan.schedule is not None
+    return plan.integrator is not None and (plan.schedule is not None or plan.tuning is not None)
 
 
 def _counts(form: Format) -> str:

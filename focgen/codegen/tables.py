@@ -250,7 +250,7 @@ def _schedule_about(plan: Plan) -> list[str]:
     gains = [quantity(gain * plan.gain.lsb / factor) for gain in schedule.gains]
     pairs = wrapped([f"{point}: {gain}" for point, gain in zip(at, gains)], separator=",  ")
     unit = f" ({comment(schedule.signal.unit)})" if schedule.signal.unit else ""
-    half_step = " The table holds the gains times h/2." if plan.integrator else ""
+    half_step = " The table holds the gains times h/2." if plan.integrator and not plan.tuning else ""
     head = f"Gain schedule, linear between breakpoints{unit} and held beyond them.{half_step}"
     return [head, *(line + "," * (line != pairs[-1]) for line in pairs)]
 
@@ -258,16 +258,17 @@ def _schedule_about(plan: Plan) -> list[str]:
 def _columns(plan: Plan) -> list[tuple[str, str, str, tuple]]:
     """(comment, type, name, values) of each table; the gains have one more entry than slopes and shifts."""
     schedule, ctype = plan.schedule, plan.gain.ctype
+    if plan.tuning and plan.floating:
+        return [("", ctype, "points", schedule.breakpoints)]
     if plan.floating:
         named = ("points", schedule.breakpoints), ("gains", schedule.gains), ("slopes", schedule.slopes)
         return [("", ctype, key, values) for key, values in named]
+    held = scale(schedule.signal.lsb, schedule.signal.unit)
+    points = (f"counts of {held}", ctype, "points", schedule.breakpoints)
+    if plan.tuning:
+        return [points, ("of the slopes", "uint8_t", "shifts", schedule.slope_shifts)]
     return [
-        (
-            f"counts of {scale(schedule.signal.lsb, schedule.signal.unit)}",
-            ctype,
-            "points",
-            schedule.breakpoints,
-        ),
+        points,
         (f"counts of {scale(plan.gain.lsb)}", ctype, "gains", schedule.gains),
         ("from each breakpoint to the next, before its shift", ctype, "slopes", schedule.slopes),
         ("", "uint8_t", "shifts", schedule.slope_shifts),

@@ -1,7 +1,8 @@
-"""A user's text in generated files: comment, string, format and Markdown have each their rule.
+"""A user's text in generated files: comment, string, format, Markdown and XML have each their rule.
 
 A name or a unit stands in :class:`UserText` until it is printed. That has no form of its own: a template that
-prints it says by a filter (``comment``, ``string``, ``printf``, ``markdown``) where it stands, or fails.
+prints it says by a filter (``comment``, ``string``, ``printf``, ``markdown``, ``xml``) where it stands, or
+fails.
 Names in C have no rule of escaping; :func:`focgen.codegen.names.check_name` refuses what cannot be one.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from xml.sax.saxutils import escape
 
 _REPLACED = {"µ": "u", "μ": "u", "°": "deg ", "Ω": "Ohm", "²": "^2", "³": "^3", "·": " ", "–": "-", "ü": "ue"}
 _ESCAPED = {'"': '\\"', "\\": "\\\\", "?": "\\?"}  # the last would begin a trigraph
@@ -50,6 +52,11 @@ def printf(text: str | UserText) -> str:
 def markdown(text: str | UserText) -> str:
     """Text within a line or a cell of a table in Markdown, which shows it as it is."""
     return _MARKUP.sub(r"\\\1", _shown(text))
+
+
+def xml(text: str | UserText) -> str:
+    """Text between the quotes of an attribute in XML."""
+    return escape(_shown(text), {'"': "&quot;"})
 
 
 def _of(text: str | UserText) -> str:

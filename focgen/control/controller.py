@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.fractional.continuous import DEFAULT_TOLERANCE
 from focgen.fractional.transfer import TransferFunction
 
 ARITHMETICS = ("f64", "f32", "q31", "q15")
 MEMORIES = ("short", "exponential")
+TOLERANCES = {"gl": 1e-4, "continuous": DEFAULT_TOLERANCE}
+"""By operator, an exponential memory's where none is given."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +27,7 @@ class GainSchedule:
     breakpoints: tuple[float, ...]
     gains: tuple[float, ...]
 
-    def __call__(self, value):
+    def __call__(self, value: ArrayLike) -> Any:
         """The gain at ``value``, any shape."""
         points, gains = np.array(self.breakpoints), np.array(self.gains)
         place = np.clip(np.asarray(value, dtype=float), points[0], points[-1])
@@ -55,6 +60,19 @@ class Units:
 
 
 @dataclass(frozen=True)
+class Tunable:
+    """The box of what may be changed at run time, each (low, high): the factors on the gains, and the lower
+    and the upper output limit in physical units.
+
+    A factor of 1 and the limits of ``ranges.output`` are inside; the limits never cross.
+    """
+
+    gain: tuple[float, float] = (1.0, 1.0)
+    output_low: tuple[float, float] = (0.0, 0.0)
+    output_high: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class Source:
     """What a controller was designed from: file name and SHA-256."""
 
@@ -71,7 +89,13 @@ class Controller:
     j = 1 … L take part. ``sample_time`` in s. ``arithmetic`` is the one it was designed for.
 
     ``memory`` is "short" or "exponential"; the latter keeps the weights within the relative ``tolerance`` up
-    to ``horizon`` samples and has no use for ``length``.
+    to ``horizon`` samples and has no use for ``length``. Where ``operator`` is "continuous" it follows (jω)^α
+    itself within ``tolerance`` over ``band`` (rad/s; None: the default one), and ``horizon`` has no use.
+
+    ``slew_limit`` is how fast the output may move, in its units a second; it needs the integrator. A reset, a
+    track and a limit that changes move it at once.
+
+    ``tunable`` is what C that is generated for it may change at run time; None: nothing.
     """
 
     name: str
@@ -87,12 +111,30 @@ class Controller:
     designed_from: Source | None = None
     tolerance: float = 1e-4
     horizon: int = 1_000_000
+    operator: str = "gl"
+    band: tuple[float, float] | None = None
+    tunable: Tunable | None = None
+    slew_limit: float | None = None
 
     @property
     def scheduled(self) -> bool:
         """Whether the gain depends on a scheduling signal."""
         return isinstance(self.gain, GainSchedule)
 
-    def gain_at(self, value: float | np.ndarray | None = None):
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """The gain at every breakpoint, or the only one."""
+        return self.gain.gains if isinstance(self.gain, GainSchedule) else (self.gain,)
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """The smallest and the largest factor that a gain can have."""
+        return self.tunable.gain if self.tunable else (1.0, 1.0)
+
+    def gain_at(self, value: ArrayLike | None = None) -> Any:
         """The gain at a value of the scheduling signal (ignored where nothing is scheduled)."""
-        return self.gain(value) if self.scheduled else self.gain
+        if not isinstance(self.gain, GainSchedule):
+            return self.gain
+        if value is None:
+            raise TypeError("the gain is scheduled: give a value of the scheduling signal")
+        return self.gain(value)

@@ -3,10 +3,13 @@
 name = "spba"
 sample_time = 0.01                       # s
 integrator = true                        # trapezoidal, clamped to ranges.output
+slew_limit = 5.0                         # optional, with an integrator: units of the output a second
 length = 1000                            # memory length L, samples
 memory = "short"                         # or "exponential", with
 tolerance = 1e-4                         # optional: relative error of its weights, up to
 horizon = 1000000                        # optional: so many samples
+operator = "gl"                          # optional; "continuous": s^α itself, within tolerance over
+band = [0.01, 10.0]                      # optional: these frequencies, rad/s; with it there is no horizon
 arithmetic = "q31"
 
 [transfer]                               # eq. (8): terms [coefficient, order of s]
@@ -23,6 +26,11 @@ measurement = [0.0, 0.02]
 output = [0.0, 10.0]                     # the output limits
 schedule = [0.0, 0.25]                   # with a gain schedule only
 
+[tunable]                                # optional: the box of generate --tunable, each key optional
+gain = [0.5, 2.0]                        # factors on the gains, 1 among them
+output_low = [0.0, 1.0]                  # the lower limit, ranges.output's among them
+output_high = [5.0, 10.0]                # the upper limit, likewise
+
 [units]                                  # optional, for comments
 measurement = "1/mm"
 output = "V"
@@ -35,62 +43,82 @@ sha256 = "…"
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 
 from focgen.control.controller import (
     ARITHMETICS,
     MEMORIES,
+    TOLERANCES,
     Controller,
     ControllerRanges,
     GainSchedule,
     Source,
+    Tunable,
     Units,
 )
 from focgen.errors import ControllerError
+from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
 from focgen.tomlfile import Table, terms_of
 
+ControllerLike = Controller | str | Path | Mapping[str, Any]
+"""A controller, the path of its controller.toml, or a dictionary of the same shape."""
+_FACTORS = 1e-3, 1e3
+"""What a factor on a gain can be."""
 
-def read_controller(path: str | Path) -> Controller:
-    """Read a controller. Raises ControllerError naming file, table, key and remedy."""
+
+def controller_from(given: ControllerLike) -> Controller:
+    """The controller that an argument is. Raises ControllerError where it is none, or cannot be used."""
+    if isinstance(given, Controller):
+        return given
+    if not isinstance(given, (str, os.PathLike, Mapping)):
+        remedy = "give a Controller, a controller.toml or a dictionary like it"
+        raise ControllerError("controller", f"is {type(given).__name__}", remedy)
+    return read_controller(given)
+
+
+def read_controller(path: str | Path | Mapping[str, Any]) -> Controller:
+    """Read a controller from its file, or from a dictionary of the same shape. Raises ControllerError naming
+    file, table, key and remedy."""
+    if isinstance(path, Mapping):
+        return controller_of(Table(path, "controller", ControllerError), "controller")
     return controller_of(Table.read(path, ControllerError), Path(path).stem)
 
 
 def controller_of(top: Table, name: str) -> Controller:
     """The controller that a table describes, ``name`` where it has none. Raises ControllerError."""
-    gain = _gain(top)
+    gain, integrator = _gain(top), top.flag("integrator", False)
+    ranges = _ranges(top, isinstance(gain, GainSchedule))
     controller = Controller(
         name=top.text("name", name),
         sample_time=top.number("sample_time", above=0.0),
         transfer=_transfer(top),
         gain=gain,
-        integrator=top.flag("integrator", False),
-        ranges=_ranges(top, isinstance(gain, GainSchedule)),
+        integrator=integrator,
+        ranges=ranges,
         length=_whole(top, "length", 1000),
         memory=_choice(top, "memory", "short", MEMORIES),
         arithmetic=_choice(top, "arithmetic", "q31", ARITHMETICS),
         units=_units(top.table("units")),
         designed_from=_source(top.table("designed_from")),
-        tolerance=top.number("tolerance", 1e-4, above=0.0),
         horizon=_whole(top, "horizon", 1_000_000),
+        **_operator(top),
+        tunable=_tunable(top.table("tunable"), gain, ranges),
+        slew_limit=_slew_limit(top, integrator),
     )
     top.done()
     return controller
 
 
-def _section(top: Table, key: str, purpose: str) -> Table:
-    table = top.table(key)
-    if table is None:
-        raise top.fail(None, f"lacks the table [{key}]", purpose)
-    return table
-
-
 def _transfer(top: Table) -> TransferFunction:
-    table = _section(top, "transfer", "give num and den as [coefficient, order of s] terms")
+    table = top.section("transfer", "give num and den as [coefficient, order of s] terms")
     transfer = table.transfer()
     table.done()
     return transfer
@@ -99,7 +127,7 @@ def _transfer(top: Table) -> TransferFunction:
 def _gain(top: Table) -> float | GainSchedule:
     if not isinstance(top.values.get("gain"), dict):
         return top.number("gain", 1.0)
-    table = top.table("gain")
+    table = top.section("gain", "")
     points, gains = table.numbers("breakpoints"), table.numbers("gains")
     table.done()
     if len(points) != len(gains):
@@ -112,15 +140,69 @@ def _gain(top: Table) -> float | GainSchedule:
 
 
 def _ranges(top: Table, scheduled: bool) -> ControllerRanges:
-    table = _section(top, "ranges", "give reference, measurement and output as [low, high]")
+    table = top.section("ranges", "give reference, measurement and output as [low, high]")
     needed = ["reference", "measurement", "output"] + ["schedule"] * scheduled
     for key in needed:
         table.required(key)
-    ranges = ControllerRanges(**{key: table.span(key) for key in needed})
+    ranges = _spans(table, needed)
     if "schedule" in table and not scheduled:
         raise table.fail("schedule", "is given, but the gain is not scheduled", "remove it or add [gain]")
     table.done()
     return ranges
+
+
+def _spans(table: Table, keys: Sequence[str]) -> ControllerRanges:
+    spans: dict[str, Any] = {key: table.span(key) for key in keys}
+    return ControllerRanges(**spans)
+
+
+def _tunable(table: Table | None, gain: float | GainSchedule, ranges: ControllerRanges) -> Tunable | None:
+    """The box; what it does not name stays as it is."""
+    if table is None:
+        return None
+    low, high = ranges.output
+    box = Tunable(
+        table.span("gain") or (1.0, 1.0),
+        table.span("output_low") or (low, low),
+        table.span("output_high") or (high, high),
+    )
+    table.done()
+    if box == Tunable((1.0, 1.0), (low, low), (high, high)):
+        raise table.fail(None, "names nothing", "give gain, output_low or output_high as [low, high]")
+    _check_factors(table, box.gain)
+    for key, span, end in (("output_low", box.output_low, low), ("output_high", box.output_high, high)):
+        if end != (span[0] if key == "output_low" else span[1]):
+            remedy = f"let it {'begin' if key == 'output_low' else 'end'} at {end:g}, which ranges.output has"
+            raise table.fail(key, f"is {list(span)}", remedy)
+    if box.output_low[1] >= box.output_high[0]:
+        what = f"reaches {box.output_low[1]:g}, and output_high {box.output_high[0]:g}"
+        raise table.fail("output_low", what, "keep the two apart, so that the limits cannot cross")
+    if "gain" in table and isinstance(gain, GainSchedule) and ranges.schedule:
+        _check_inside(table, gain, ranges.schedule)
+    return box
+
+
+def _slew_limit(top: Table, integrator: bool) -> float | None:
+    if "slew_limit" not in top:
+        return None
+    if not integrator:
+        remedy = "set integrator = true, or limit the output behind the controller and track it"
+        raise top.fail("slew_limit", "is given without an integrator, which alone can keep it", remedy)
+    return top.number("slew_limit", above=0.0)
+
+
+def _check_factors(table: Table, span: tuple[float, float]) -> None:
+    if not (_FACTORS[0] <= span[0] <= 1.0 <= span[1] <= _FACTORS[1]):
+        remedy = f"give factors from {_FACTORS[0]:g} to {_FACTORS[1]:g}, with 1 among them"
+        raise table.fail("gain", f"is {list(span)}", remedy)
+
+
+def _check_inside(table: Table, gain: GainSchedule, span: tuple[float, float]) -> None:
+    """A factor belongs to a breakpoint, so every breakpoint must be one that the signal reaches."""
+    beyond = [point for point in gain.breakpoints if not span[0] <= point <= span[1]]
+    if beyond:
+        what = f"cannot be applied at the breakpoint {beyond[0]:g}, beyond ranges.schedule"
+        raise table.fail("gain", what, "move the breakpoint, or widen ranges.schedule")
 
 
 def _whole(top: Table, key: str, default: int) -> int:
@@ -137,6 +219,22 @@ def _choice(top: Table, key: str, default: str, choices: tuple[str, ...]) -> str
     return value
 
 
+def _operator(top: Table) -> dict:
+    """What an exponential memory follows, and how closely. A band of "gl" is refused, never ignored."""
+    operator = _choice(top, "operator", "gl", OPERATORS)
+    found = {"operator": operator, "tolerance": top.number("tolerance", TOLERANCES[operator], above=0.0)}
+    if operator == "continuous":
+        if top.text("memory", "short") != "exponential":
+            raise top.fail("operator", "needs exponential memory", 'add memory = "exponential"')
+        if "horizon" in top:
+            raise top.fail("horizon", 'belongs to operator = "gl"', "remove it; band says where it holds")
+    if "band" not in top:
+        return found
+    if operator == "gl":
+        raise top.fail("band", 'belongs to operator = "continuous"', "add that, or remove it")
+    return {**found, "band": top.span("band")}
+
+
 def _units(table: Table | None) -> Units:
     if table is None:
         return Units()
@@ -149,7 +247,7 @@ def _source(table: Table | None) -> Source | None:
     if table is None:
         return None
     table.required("file"), table.required("sha256")
-    source = Source(table.text("file"), table.text("sha256"))
+    source = Source(table.text("file", ""), table.text("sha256", ""))
     table.done()
     return source
 
@@ -164,23 +262,41 @@ def controller_text(controller: Controller) -> str:
     return tomlkit.dumps(controller_table(controller))
 
 
-def controller_table(controller: Controller) -> dict:
+def _followed(controller: Controller) -> dict:
+    """What an exponential memory follows, and where."""
+    if controller.operator == "gl":
+        return {"horizon": controller.horizon}
+    band = {} if controller.band is None else {"band": list(controller.band)}
+    return {"operator": controller.operator, **band}
+
+
+def controller_table(controller: Controller) -> dict[str, Any]:
     """The controller as plain numbers, texts and tables of them."""
     plain = ("name", "sample_time", "integrator", "length", "memory", "arithmetic")
-    table: dict = {key: getattr(controller, key) for key in plain}
+    table: dict[str, Any] = {key: getattr(controller, key) for key in plain}
+    if controller.slew_limit is not None:
+        table["slew_limit"] = controller.slew_limit
     if controller.memory == "exponential":
-        table.update(tolerance=controller.tolerance, horizon=controller.horizon)
+        table.update(tolerance=controller.tolerance, **_followed(controller))
     if not controller.scheduled:
         table["gain"] = controller.gain
     transfer = controller.transfer
     table["transfer"] = {"num": terms_of(transfer.num), "den": terms_of(transfer.den)}
-    if controller.scheduled:
+    if isinstance(controller.gain, GainSchedule):
         table["gain"] = {key: list(values) for key, values in asdict(controller.gain).items()}
     spans = {key: list(span) for key, span in asdict(controller.ranges).items() if span is not None}
     table["ranges"] = spans
+    if controller.tunable:
+        table["tunable"] = _box(controller.tunable)
     units = {key: unit for key, unit in asdict(controller.units).items() if unit}
     if units:
         table["units"] = units
     if controller.designed_from:
         table["designed_from"] = asdict(controller.designed_from)
     return table
+
+
+def _box(tunable: Tunable) -> dict[str, list[float]]:
+    """The spans of [tunable]; one that holds a single value is left out."""
+    spans = asdict(tunable).items()
+    return {key: list(span) for key, span in spans if span[0] < span[1]}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ class Inversion:
     filter_time: float = 0.0
     notes: tuple[str, ...] = ()
 
-    def K(self, pressure):
+    def K(self, pressure: Any) -> Any:
         """K(p), any shape."""
         return np.polynomial.polynomial.polyval(pressure, self.gain)
 

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from focgen.control.files import read_controller
+from focgen.control.files import ControllerLike, controller_from
 from focgen.diagnosis import compose, verdict
 from focgen.diagnosis.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.carried import carried
 from focgen.diagnosis.decimate import decimated
+from focgen.diagnosis.drawn import drawn_of
 from focgen.diagnosis.explain import Explanation, clues_for, explain
 from focgen.diagnosis.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.model import Diagnosis
@@ -23,11 +24,11 @@ from focgen.diagnosis.smooth import freed
 from focgen.diagnosis.unexplained import is_unknown
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
-from focgen.logs.read import each_of
+from focgen.logs.read import Logs, each_of
 from focgen.output import check_apart
 from focgen.progress import step
+from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import library
-from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
 from focgen.rig.replay import experiments
@@ -39,13 +40,14 @@ WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml") 
 THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
 
+@rig_then_logs
 def diagnose(
-    rig: Rig | str | Path,
-    logs: Sequence[Experiment | str | Path],
+    rig: RigLike,
+    logs: Logs,
     out: str | Path | None = None,
-    controller: str | Path | None = None,
-    first: float | None = None,
-    last: float | None = None,
+    controller: ControllerLike | None = None,
+    from_: float | None = None,
+    to: float | None = None,
     bootstrap: int = 0,
     only: Sequence[str] | None = None,
     pictures: bool = True,
@@ -53,7 +55,7 @@ def diagnose(
     """Diagnose the gap between the nominal rig and its logs, one session of one rig.
 
     ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures;
-    ``controller``: of closed-loop logs, whose own departures are then looked for too; ``first``, ``last``: s
+    ``controller``: of closed-loop logs, whose own departures are then looked for too; ``from_``, ``to``: s
     within each experiment; ``bootstrap``: sessions simulated from the nominal rig to set the threshold of
     evidence by, at least 2 (0: the built-in one).
     ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how
@@ -62,25 +64,31 @@ def diagnose(
     one of them in the place of a result, FocgenError for an unknown effect.
     """
     _check(only)
-    logs = each_of(logs)
-    given = (rig, *logs, controller)
+    each = each_of(logs)
+    given = (rig, *each, controller)
     if out is not None:
         check_apart((Path(out) / name for name in (*WRITTEN, NEXT)), given)
-    rig = rig if isinstance(rig, Rig) else read_rig(rig)
-    logs = _usable(experiments(rig, logs, first, last))
-    ran = running(read_controller(controller), logs) if controller is not None else None
-    rig, logs = decimated(rig, logs)
-    logs = begun_session(rig, logs)
-    explanations = explain_all(rig, logs, THRESHOLD, only, bootstrap)
-    rig = explanations[0].told(rig)
-    rigs = compose.compose(rig, explanations, logs)
-    logs = begun_with(rigs, logs)
-    rigs, diagnosis, evidence = verdict.reach(rig, logs, rigs, explanations, ran, only is not None)
-    diagnosis = replace(diagnosis, warnings=doubts(rig, logs))
+    nominal = rig_of(rig)
+    session = _usable(experiments(nominal, each, from_, to))
+    ran = running(controller_from(controller), session) if controller is not None else None
+    nominal, session = decimated(nominal, session)
+    session = begun_session(nominal, session)
+    explanations = explain_all(nominal, session, THRESHOLD, only, bootstrap)
+    nominal = explanations[0].told(nominal)
+    rigs = compose.compose(nominal, explanations, session)
+    session = begun_with(rigs, session)
+    rigs, diagnosis, evidence = verdict.reach(nominal, session, rigs, explanations, ran, only is not None)
+    diagnosis = replace(
+        diagnosis,
+        warnings=doubts(nominal, session),
+        refitted=rigs.refitted,
+        augmented=rigs.augmented(session, diagnosis.shrink),
+        drawn=drawn_of(rigs.refitted, evidence, session),
+    )
     if out is not None:
         from focgen.diagnosis.write import write
 
-        write(out, diagnosis, evidence, rigs, logs, pictures, given)
+        write(out, diagnosis, evidence, rigs, session, pictures, given)
     return diagnosis
 
 
@@ -112,7 +120,8 @@ def explain_all(
     """Explain segment after segment, each on what the one before it gives freed of noise. ``draws``:
     sessions simulated for the threshold of each; where it comes out higher than ``threshold``, the segment
     is explained anew."""
-    roles, x, found, trusted = cuts(logs), None, [], True
+    found: list[Explanation] = []
+    roles, x, trusted = cuts(logs), None, True
     for entry, exit in zip(roles, roles[1:]):
         segment = loosened(rig, make(logs, entry, exit, x, carried(found[-1]) if found else None))
         step(f"{entry} to {exit}")

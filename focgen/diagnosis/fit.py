@@ -13,7 +13,9 @@ from focgen.rig.kernels import innovations as innovated
 from focgen.rig.kernels import products
 
 STEP = 1e-4
+FIXED = 1e-6  # a parameter whose bounds are as close is none
 _STALE = 2  # iterations that rows of the Jacobian are kept for
+_LAGGING = 0.01  # of what a fit is behind another: one that gains less by an iteration will not reach it
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Fit:
     def size(self) -> int:
         """How many parameters the clues have that are free."""
         low, high = self.problem.bounds()
-        return int(np.sum(high[self.problem.head :] - low[self.problem.head :] > 1e-6))
+        return int(np.sum(high[self.problem.head :] - low[self.problem.head :] > FIXED))
 
     @cached_property
     def doubt(self) -> float:
@@ -79,10 +81,11 @@ def means(part: np.ndarray, coarse: int) -> np.ndarray:
     return part if coarse == 1 else part[: count * coarse].reshape(count, coarse).mean(axis=1)
 
 
-def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing) -> np.ndarray:
-    """The weighed residual, as a share of the output's level."""
+def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing, probe: bool = False) -> np.ndarray:
+    """The weighed residual, as a share of the output's level; ``probe``: of a step from a vector that was
+    simulated just before, and will be again."""
     segment = problem.segment
-    made, weight, rest = problem.simulate(vector), segment.weight, segment.run.rest
+    made, weight, rest = problem.simulate(vector, probe), segment.weight, segment.run.rest
     if not segment.pace:
         return innovated(segment.y, made, weight, rest, weighing.coarse, weighing.ar)
     left = segment.recent(segment.y - made)
@@ -96,9 +99,11 @@ def fit(
     iterations: int = 12,
     tolerance: float = 1e-3,
     known: np.ndarray | None = None,
+    leader: Fit | None = None,
 ) -> Fit:
     """The likeliest vector within the problem's bounds, from ``start``: least squares, weighed against what
-    is known beforehand; stops when the gain is below ``tolerance`` nats.
+    is known beforehand; stops when the gain is below ``tolerance`` nats, or below a hundredth of those that
+    it is behind ``leader``, a fit of the same innovations.
 
     ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a
     little off. Otherwise the rows ahead of the clues' own are made anew only every third time, for they
@@ -126,12 +131,18 @@ def fit(
                 damping = max(damping * 0.2, 1e-9)
                 break
             damping *= 6.0
-        ended = not gained or 0.5 * len(now) * np.log(before / max(cost, 1e-300)) < tolerance
+        enough = max(tolerance, _LAGGING * _nats(len(now), cost, leader.cost)) if leader else tolerance
+        ended = not gained or _nats(len(now), before, cost) < enough
         if ended and (kept is None or known is not None):
             break
         age = 0 if ended or age >= _STALE else age + 1
         kept = known if known is not None else rows[: problem.head] if age else None
     return Fit(problem, vector, now, sse, normal)
+
+
+def _nats(count: int, cost: float, better: float) -> float:
+    """By how much likelier a fit of ``count`` innovations is at the cost ``better``."""
+    return 0.5 * count * float(np.log(cost / max(better, 1e-300)))
 
 
 def _cost(problem: Problem, vector: np.ndarray, sse: float, count: int) -> float:
@@ -148,13 +159,16 @@ def jacobian(
     high,
     known: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Rows (k, n): the innovations' derivatives, by differences."""
+    """Rows (k, n): the innovations' derivatives, by differences; 0 for what cannot move."""
     rows = [] if known is None else list(known)
     for i in range(len(rows), len(vector)):
+        if high[i] - low[i] < FIXED:
+            rows.append(np.zeros_like(now))
+            continue
         step = STEP if vector[i] + STEP <= high[i] else -STEP
         moved = vector.copy()
         moved[i] += step
-        rows.append((innovations(problem, moved, weighing) - now) / step)
+        rows.append((innovations(problem, moved, weighing, probe=True) - now) / step)
     return np.stack(rows)
 
 

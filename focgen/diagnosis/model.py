@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from focgen.diagnosis.menu import Choice
+from focgen.jsontext import UNWRITTEN
+from focgen.rig.model import Rig
+from focgen.shown import Shown
+
+if TYPE_CHECKING:
+    from focgen.diagnosis.drawn import Drawn
+    from focgen.diagnosis.explain import Explanation
 
 Interval = tuple[float, float]
 
@@ -86,10 +94,11 @@ class NextExperiment:
     inputs: dict[str, object] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Shown):
     """The answer to where, which and how far. Files are named relative to ``--out``. ``notes``: what was done
-    to the logs; ``warnings``: what in them is implausible."""
+    to the logs; ``warnings``: what in them is implausible. ``refitted`` and ``augmented``: the rigs of those
+    files, ``drawn``: what its figures draw; None where it was read from a file."""
 
     verdict: str
     where: Where
@@ -105,6 +114,9 @@ class Diagnosis:
     notes: tuple[str, ...]
     fits: tuple[PlainFit, ...] = ()
     warnings: tuple[str, ...] = ()
+    refitted: Rig | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
+    augmented: Rig | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
+    drawn: Drawn | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,5 +125,5 @@ class Evidence:
     by segment; ``next_input``: the experiment that is proposed."""
 
     simulated: dict[str, list[dict[str, np.ndarray]]]
-    explanations: tuple
+    explanations: tuple[Explanation, ...]
     next_input: Choice | None = None

@@ -6,9 +6,7 @@ the nominal parameters, and how alike the survivors are, is known without a rig.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -18,9 +16,10 @@ from focgen.diagnosis.menu import menu
 from focgen.diagnosis.reach import Reach
 from focgen.diagnosis.segments import cuts, make
 from focgen.logs.experiment import Experiment
+from focgen.logs.read import Logs, each_of
+from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import Chain
-from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
 from focgen.rig.replay import experiments
 from focgen.rig.response import integrations, response_time
@@ -62,17 +61,20 @@ class Plan:
         return "\n".join(lines)
 
 
-def plan(rig: Rig | str | Path, logs: Sequence[Experiment | str | Path] = ()) -> Plan:
+@rig_then_logs
+def plan(rig: RigLike, logs: Logs = ()) -> Plan:
     """Which effects the inputs of ``logs`` could tell apart, or without logs those of a menu of experiments.
 
     Only the inputs of the logs are used. Raises RigError and LogError for files that cannot be used.
     """
-    rig = rig if isinstance(rig, Rig) else read_rig(rig)
-    session = experiments(rig, logs) if logs else _menu(rig)
+    nominal, each = rig_of(rig), each_of(logs)
+    session = experiments(nominal, each) if each else _menu(nominal)
     roles = cuts(session)
-    response = response_time(rig, session[0].sample_time, max(len(s) * s.sample_time for s in session))
+    response = response_time(nominal, session[0].sample_time, max(len(s) * s.sample_time for s in session))
     seen = excitation([s[roles[0]] for s in session], session[0].sample_time, response)
-    found = [survival for a, b in zip(roles, roles[1:]) for survival in _segment(rig, session, a, b, seen)]
+    found = [
+        survival for a, b in zip(roles, roles[1:]) for survival in _segment(nominal, session, a, b, seen)
+    ]
     return Plan(tuple(s.name for s in session), tuple(found))
 
 

@@ -191,9 +191,10 @@ class Problem:
         """The clues as effects of a chain."""
         return tuple(Placed(c.effect, c.form, c.stage, v) for c, v in zip(self.clues, self.values(vector)))
 
-    def simulate(self, vector: np.ndarray) -> np.ndarray:
-        """The segment's output (n,), in the log's units."""
-        chain = Chain(self.rig(vector), self.placed(vector), self.memory)
+    def simulate(self, vector: np.ndarray, probe: bool = False) -> np.ndarray:
+        """The segment's output (n,), in the log's units; a ``probe`` leaves nothing to the simulations that
+        follow, which go on from another vector."""
+        chain = Chain(self.rig(vector), self.placed(vector), self.memory, probe)
         own, segment = len(self.own_start), self.segment
         ends = np.cumsum([len(self.gauges), segment.unsure.shape[1]])
         gauges, off, begun = np.split(vector[own + 1 : self.head], ends)

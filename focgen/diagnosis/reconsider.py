@@ -13,7 +13,7 @@ import numpy as np
 
 from focgen.diagnosis.fit import WHITE, Fit, fit
 from focgen.diagnosis.problem import Clue
-from focgen.diagnosis.search import Ranking, best_start, coarseness, evidence, on_all
+from focgen.diagnosis.search import Ranking, best_start, coarseness, evidence, footings, on_all, raced
 
 _CLOSE = 0.4  # of the first one's evidence: families that reach as much are tried in its place
 _MOST = 3
@@ -35,7 +35,7 @@ def reconsidered(rankings: Sequence[Ranking], second: Fit, clues: Sequence[Clue]
 def _best(of: Fit, others: Sequence[Fit]) -> Fit:
     """The likeliest, the noise taken as white: a filter that takes out the colour of what a wrong form
     leaves would hide what the right one mends."""
-    fits = [fit(t.problem, t.vector, WHITE, 8, 0.05) for t in (of, *others)]
+    fits = raced([of, *others], WHITE, 8, 0.05)
     return max(fits, key=lambda f: evidence(f, fits[0]))
 
 
@@ -43,13 +43,10 @@ def _other_forms(of: Fit, which: int, clues: Sequence[Clue]) -> list[Fit]:
     """One of two effects in its other forms, each from its best start beside the other."""
     own, other = of.problem.clues[which], of.problem.clues[1 - which]
     alone, (head, *parts) = of.problem.with_clues([other]), _split(of)
-    vector, found = np.r_[head, parts[1 - which]], []
-    for clue in clues:
-        if clue.effect == own.effect and clue.stage == own.stage and clue != own:
-            start = best_start(alone, vector, clue)
-            if start is not None:
-                found.append(_in_order(start) if which == 0 else start)
-    return found
+    forms = [c for c in clues if c.effect == own.effect and c.stage == own.stage and c != own]
+    from_ = footings(alone, np.r_[head, parts[1 - which]]) if forms else []
+    starts = [s for clue in forms if (s := best_start(alone, from_, clue)) is not None]
+    return [_in_order(s) for s in starts] if which == 0 else starts
 
 
 def _split(of: Fit) -> list[np.ndarray]:

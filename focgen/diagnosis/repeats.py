@@ -91,8 +91,9 @@ def repeats_of(segment: Segment, response: float) -> Repeats:
     past = _pasts(mean, segment, cells)
     middle = np.array([segment.run.clock[(a + b) // 2] for a, b in cells])
     apart = _LATER * float(np.ptp(segment.run.clock))
-    same = np.max(np.abs(past[:, None] - past[None]), axis=2) < _ALIKE * max(float(np.ptp(mean)), 1e-12)
-    earlier = same & (middle[:, None] - middle[None] > apart)
+    earlier = middle[:, None] - middle[None] > apart
+    for piece in past.T:
+        earlier &= np.abs(piece[:, None] - piece[None]) < _ALIKE * max(float(np.ptp(mean)), 1e-12)
     repeated = np.flatnonzero(earlier.any(axis=1))
     again = np.eye(len(cells))[repeated] - earlier[repeated] / earlier[repeated].sum(axis=1, keepdims=True)
     return Repeats(again, cells)

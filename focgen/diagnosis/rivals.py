@@ -43,6 +43,7 @@ class Cause:
 def doubted(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Fit, tuple[Cause, ...]]:
     """Every effect held against its rivals beside the others; where one of them does better, it takes the
     place."""
+    rankings = list(rankings)
     for _ in range(_SWAPS):
         causes = _causes(best, nominal, rankings, clues, weighing)
         usurper = min((r for c in causes for r in c.rivals), key=lambda r: r.separation, default=None)
@@ -52,13 +53,14 @@ def doubted(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tup
     return best, _causes(best, nominal, rankings, clues, weighing)
 
 
-def _causes(best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> tuple[Cause, ...]:
+def _causes(best: Fit, nominal: Fit, rankings: list[Ranking], clues, weighing: Weighing) -> tuple[Cause, ...]:
+    """A cause for every family of ``best``; what has to be ranked anew joins ``rankings``."""
     names = dict.fromkeys(c.effect for c in best.problem.clues)
     found = [_cause(name, best, nominal, rankings, clues, weighing) for name in names]
     return tuple(sorted(found, key=lambda c: -c.share))
 
 
-def _cause(name: str, best: Fit, nominal: Fit, rankings, clues, weighing: Weighing) -> Cause:
+def _cause(name: str, best: Fit, nominal: Fit, rankings: list[Ranking], clues, weighing: Weighing) -> Cause:
     """One effect of ``best`` and its rivals, the best first."""
     own = [c for c in best.problem.clues if c.effect == name]
     without = left_out(best, own, weighing)
@@ -68,6 +70,7 @@ def _cause(name: str, best: Fit, nominal: Fit, rankings, clues, weighing: Weighi
     if ranking is None:
         untried = [c for c in clues if c.effect != name and not c.form.seen]
         ranking = rank(without.problem, without.vector, untried)
+        rankings.append(ranking)
     others = _rivals(best, without, ranking, clues, weighing, len(own) > 1)
     rivals = [Rival(name, own[0].stage, 0.0, gain, best), *(_behind(r, name, best) for r in others)]
     return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), gain, share_of(nominal, without, best))
@@ -93,7 +96,7 @@ def _rivals(
     for other, candidate in ranking.best.items():
         if other in {c.effect for c in best.problem.clues}:
             continue
-        again = fit(candidate.problem, candidate.vector, weighing, 6)
+        again = fit(candidate.problem, candidate.vector, weighing, 6, leader=best)
         if mended and len(found) < _MENDED:
             again = _second_form(again, clues, weighing)
         apart = separation(best, again, without, other in open_)

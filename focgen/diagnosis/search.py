@@ -23,7 +23,8 @@ _ADRIFT = 1.15  # of a fit's mean square without a colour
 _NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
 _FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
 _TRIED = 3  # start values of a form that are fitted, where it has more
-_FIRST, _THEN = 2, 3  # iterations from each start value, and from the best
+_FIRST, _FROM_GIVEN, _THEN = 2, 3, 3  # iterations from each start value, beside own parameters as given, and
+# from the best
 _BENT = 4.0  # nats against own parameters that make up for what is missing: then started as given, too
 _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
 
@@ -64,15 +65,13 @@ def rank(problem: Problem, base: np.ndarray, clues: Sequence[Clue]) -> Ranking:
     factor = coarseness(problem)
     thin = problem.thinned(factor)
     ground = fit(thin, problem.stretched(base, 1.0 / factor), WHITE)
-    known = jacobian(thin, ground.vector, ground.innovations, WHITE, *thin.bounds())
-    tried = [t for clue in clues if (t := best_start(thin, ground.vector, clue, known)) is not None]
+    from_ = footings(thin, ground.vector) if clues else []
+    tried = [t for clue in clues if (t := best_start(thin, from_, clue)) is not None]
     tried = without_hearsay(ground, tried)
     errors = _errors(tried, ground)
     tried = _promising(tried, ground)
     rough, ground = _coloured(ground, min([ground, *tried], key=lambda t: t.sse), 6)
-    tried = sorted(
-        (fit(t.problem, t.vector, rough, 10, 0.05) for t in tried), key=lambda t: -evidence(t, ground)
-    )
+    tried = sorted(raced(tried, rough, 10, 0.05), key=lambda t: -evidence(t, ground))
     top = evidence(tried[0], ground) if tried else 0.0
     kept = (
         tried[:2]
@@ -147,8 +146,7 @@ def finish(ground: Fit, tried: Sequence[Fit], errors: dict[str, float]) -> Ranki
     leader = min([ground, *tried], key=lambda t: t.sse)
     for iterations in (3, 6):
         weighing, ground = _coloured(ground, leader, iterations)
-        tried = [fit(t.problem, t.vector, weighing, iterations, 0.02) for t in tried]
-        tried = sorted(tried, key=lambda t: t.sse)
+        tried = sorted(raced(tried, weighing, iterations, 0.02), key=lambda t: t.sse)
         leader = min([ground, *tried], key=lambda t: t.sse)
         tried = [t for t in tried if t.sse < leader.sse * _HOPELESS or t is leader] or tried[:1]
     return _ranking(ground, weighing.ar, tried, errors)
@@ -166,42 +164,67 @@ def family(of: Fit) -> str:
     return of.problem.clues[-1].effect
 
 
-def best_start(problem: Problem, base: np.ndarray, clue: Clue, known: np.ndarray | None = None) -> Fit | None:
-    """The best of the fits from the clue's start values, a few iterations each, and a few more for the best
-    of them; ``known``: the rows of the Jacobian at ``base``."""
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """Where quick fits set out from: a ``vector``, its innovations ``now`` (n,), and the Jacobian's ``rows``
+    (k, n) there, which a quick fit takes as they are; ``first`` iterations from there."""
+
+    vector: np.ndarray
+    now: np.ndarray
+    rows: np.ndarray
+    first: int
+
+
+def footings(problem: Problem, base: np.ndarray) -> list[Footing]:
+    """``base``, and where own parameters make up for what is missing the same with those given."""
+    found = [_footing(problem, base, _FIRST)]
+    if problem.own.doubt(base) > _BENT:
+        given = np.r_[problem.own_start, base[len(problem.own_start) :]]
+        found.append(_footing(problem, given, _FROM_GIVEN))
+    return found
+
+
+def _footing(problem: Problem, vector: np.ndarray, first: int) -> Footing:
+    now = innovations(problem, vector, WHITE)
+    return Footing(vector, now, jacobian(problem, vector, now, WHITE, *problem.bounds()), first)
+
+
+def best_start(problem: Problem, from_: Sequence[Footing], clue: Clue) -> Fit | None:
+    """The best of the fits from the clue's start values beside each of the footings ``from_``, a few
+    iterations each, and a few more for the best of them."""
     extended = problem.with_clues([*problem.clues, clue])
     starts, fits = extended.starts(clue), []
-    bent = problem.own.doubt(base) > _BENT
     if clue.form.jumps:
-        return by_trying(extended, base, starts, known)
+        return by_trying(extended, from_[0].vector, starts, from_[0].rows)
     if len(starts) > _TRIED:
-        starts = _likeliest(extended, base, starts, known)
+        starts = _likeliest(extended, from_[0], starts)
     for start in starts:
-        fits.append(fit(extended, np.r_[base, start], WHITE, _FIRST, tolerance=0.1, known=known))
-        if bent:
-            fits.append(fit(extended, np.r_[_as_given(problem, base), start], WHITE, 5, tolerance=0.1))
-    best = min((f for f in fits if np.isfinite(f.sse)), key=lambda f: f.sse, default=None)
-    if best is None:
+        for at in from_:
+            fits.append((_quick(extended, np.r_[at.vector, start], at, at.first), at))
+    best, at = min(fits, key=lambda pair: pair[0].sse)
+    if not np.isfinite(best.sse):
         return None
-    further = fit(extended, best.vector, WHITE, _THEN, tolerance=0.1, known=known)
-    return min(best, further, key=lambda f: f.sse)
+    return min(best, _quick(extended, best.vector, at, _THEN), key=lambda f: f.sse)
 
 
-def _as_given(problem: Problem, base: np.ndarray) -> np.ndarray:
-    """The vector ``base`` with the own parameters of the rig as given."""
-    return np.r_[problem.own_start, base[len(problem.own_start) :]]
+def _quick(problem: Problem, start: np.ndarray, at: Footing, iterations: int) -> Fit:
+    return fit(problem, start, WHITE, iterations, tolerance=0.1, known=at.rows)
 
 
-def _likeliest(
-    problem: Problem, base: np.ndarray, starts: Sequence[np.ndarray], known: np.ndarray | None
-) -> list[np.ndarray]:
-    """Of many start values those whose direction, the parameters of ``base`` free to give way, goes furthest
-    towards the data."""
-    bare = problem.with_clues(problem.clues[:-1])
-    now = innovations(bare, base, WHITE)
-    rows = jacobian(bare, base, now, WHITE, *bare.bounds()) if known is None else known
-    own, _ = np.linalg.qr(rows.T)
-    tried = np.stack([innovations(problem, np.r_[base, start], WHITE) for start in starts]) - now
+def raced(tried: Sequence[Fit], weighing: Weighing, iterations: int, tolerance: float) -> list[Fit]:
+    """Each fitted further, the most promising first; one that falls behind is left there."""
+    found: list[Fit] = []
+    for t in sorted(tried, key=lambda t: t.sse):
+        leader = min(found, key=lambda f: f.cost, default=None)
+        found.append(fit(t.problem, t.vector, weighing, iterations, tolerance, leader=leader))
+    return found
+
+
+def _likeliest(problem: Problem, at: Footing, starts: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Of many start values those whose direction, the parameters of the footing free to give way, goes
+    furthest towards the data."""
+    own, _ = np.linalg.qr(at.rows[np.any(at.rows, axis=1)].T)
+    tried = np.stack([innovations(problem, np.r_[at.vector, start], WHITE) for start in starts]) - at.now
     tried -= (tried @ own) @ own.T
-    reach = (tried @ now) ** 2 / np.maximum(np.sum(tried**2, axis=1), 1e-300)
+    reach = (tried @ at.now) ** 2 / np.maximum(np.sum(tried**2, axis=1), 1e-300)
     return [starts[i] for i in np.argsort(-reach)[:_TRIED]]

@@ -81,10 +81,10 @@ class Segment:
         return self.x - (before - 2 * self.x + after) / 12.0
 
     def thinned(self, factor: int) -> Segment:
-        """The same in means of ``factor`` samples at a time; what does not fill the last of an experiment is
-        left out."""
+        """The same in means of ``factor`` samples at a time, for a rough run; what does not fill the last of
+        an experiment is left out."""
         if factor == 1:
-            return self
+            return replace(self, run=replace(self.run, rough=True))
         counts = [(last - first) // factor for first, last in self.run.spans]
         kept = np.concatenate(
             [first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)]
@@ -95,7 +95,7 @@ class Segment:
         )
         rest = np.zeros(len(x), np.uint8)
         rest[np.cumsum([0, *counts[:-1]])] = 1
-        run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
+        run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock, rough=True)
         thin = replace(self, x=x, y=y, trust=trust, asked=asked, run=run, between=False)
         return replace(thin, unsure=unsure, loose=loose)
 

@@ -7,8 +7,10 @@ max|y| ≤ ‖1/A‖₁ max|v|, with ‖·‖₁ the sum of the absolute values 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import fft, signal
 
 from focgen.fractional.simulation import gl_operator
@@ -32,7 +34,9 @@ class UnprovenStability(ArithmeticError):
     """The recursion is so close to the edge of stability that it could not be proved either way."""
 
 
-def gl_frequency_response(transfer: TransferFunction, step: float, length: int | None, omega) -> np.ndarray:
+def gl_frequency_response(
+    transfer: TransferFunction, step: float, length: int | None, omega: ArrayLike
+) -> Any:
     """Return the complex gain of eq. (10) at the angular frequencies ``omega`` (rad/s), shape of ``omega``.
 
     ``length`` is the memory L, None for infinite memory; ``step`` is h in s.
@@ -49,7 +53,7 @@ def _response(terms: Polynomial, step: float, length: int | None, delay: np.ndar
     return np.polyval(gl_operator(terms, step, length)[::-1], delay)
 
 
-def poles_outside(coefficients) -> int:
+def poles_outside(coefficients: ArrayLike) -> int:
     """Return how many poles of Σ_j a_j y_{k−j} = v_k are outside the unit circle, 0 where it is stable.
 
     The argument principle on the unit circle: between neighbouring points A changes by less than its
@@ -74,7 +78,7 @@ def poles_outside(coefficients) -> int:
     raise UnprovenStability("a pole of the recursion is too close to the unit circle to tell its side")
 
 
-def _checked(coefficients) -> np.ndarray:
+def _checked(coefficients: ArrayLike) -> np.ndarray:
     a = np.asarray(coefficients, dtype=float)
     if a.ndim != 1 or not len(a) or a[0] == 0.0 or not np.all(np.isfinite(a)):
         raise ValueError("the coefficients of a recursion are finite and start with one that is not zero")
@@ -87,7 +91,7 @@ def _on_the_circle(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return 2.0 * math.pi * np.arange(size // 2 + 1) / size, fft.rfft(a, size)
 
 
-def inverse_l1_bound(coefficients) -> float:
+def inverse_l1_bound(coefficients: ArrayLike) -> float:
     """Return a proved upper bound of ‖1/A‖₁ for A = Σ a_j x^j: how much Σ_j a_j y_{k−j} = v_k amplifies.
 
     With H a finite piece of the power series 1/A and R = A H − 1, ‖R‖₁ = r < 1 proves
@@ -120,7 +124,7 @@ def power_series_inverse(a: np.ndarray, count: int) -> np.ndarray:
     rounding is that of its largest number and grows with the square of ‖1/A‖₁.
     """
     if len(a) * count <= _RUN:
-        return signal.lfilter([1.0], a, np.eye(1, count)[0])
+        return np.asarray(signal.lfilter([1.0], a, np.eye(1, count)[0]))
     inverse = np.array([1.0 / a[0]])
     while len(inverse) < count:
         size = min(2 * len(inverse), count)

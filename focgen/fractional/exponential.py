@@ -14,9 +14,12 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
 from focgen.fractional import elementary
@@ -76,20 +79,20 @@ class ExponentialMemory:
         """The bounds that hold for these poles and weights."""
         return certify(self.beta, self.differences, self.horizon, self.poles, self.weights)
 
-    def kernel(self, lags) -> np.ndarray:
+    def kernel(self, lags: ArrayLike) -> np.ndarray:
         """Return h_j at the whole numbers ``lags`` ≥ 0, shape of ``lags``."""
         lags = np.asarray(lags)
         powers = np.array(self.poles) ** np.maximum(lags[..., None] - 1.0, 0.0)
         # not a matrix product, whose last bit depends on how many lags are asked for
         return np.where(lags == 0, 1.0, np.einsum("...k,k->...", powers, np.array(self.weights)))
 
-    def frequency_response(self, omega) -> np.ndarray:
+    def frequency_response(self, omega: ArrayLike) -> Any:
         """Complex gain at ``omega`` in rad per sample, 0 … π, shape of ``omega``."""
         delay = np.exp(-1j * np.asarray(omega, dtype=float))
         modes = np.array(self.weights) / (1.0 - np.array(self.poles) * delay[..., None])
         return (1.0 - delay) ** self.differences * (1.0 + delay * modes.sum(axis=-1))
 
-    def run(self, x) -> np.ndarray:
+    def run(self, x: ArrayLike) -> np.ndarray:
         """Return the output for the samples ``x``, at rest at 0 before them; float64, both (samples,)."""
         v = np.asarray(x, dtype=float)
         for _ in range(self.differences):
@@ -157,7 +160,9 @@ def _memory(order: float, horizon: int, tolerance: float, fit: Alternation) -> E
     )
 
 
-def memory_of(order: float, horizon: int, poles, weights) -> ExponentialMemory:
+def memory_of(
+    order: float, horizon: int, poles: Iterable[float], weights: Iterable[float]
+) -> ExponentialMemory:
     """Return the memory with these ``poles`` and ``weights``, and the tolerance its certificate proves."""
     differences = math.ceil(order)
     tolerance = certify(differences - order, differences, horizon, poles, weights).kernel

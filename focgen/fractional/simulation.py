@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import fft, signal
 
 from focgen.fractional.contour import inverse_laplace
@@ -18,7 +20,7 @@ from focgen.fractional.weights import gl_weights
 class Simulator(Protocol):
     """What turns a sampled input into a sampled output, from rest."""
 
-    def run(self, u) -> np.ndarray:
+    def run(self, u: ArrayLike) -> np.ndarray:
         """Return the output at the instants of the input samples ``u``, shape (n,) -> (n,)."""
 
 
@@ -46,13 +48,13 @@ class Convolution:
         self.transfer, self.step, self.hold, self.delay = transfer, step, hold, delay
         self._kernel = self._first = np.empty(0)
 
-    def run(self, u) -> np.ndarray:
-        u = _signal(u)
-        if len(u) > len(self._kernel):
-            self._prepare(len(u))
-        y = _product(self._kernel[: len(u)], u)
-        if self.hold == "linear" and len(u):
-            y += u[0] * self._first[: len(u)]
+    def run(self, u: ArrayLike) -> np.ndarray:
+        row = _signal(u)
+        if len(row) > len(self._kernel):
+            self._prepare(len(row))
+        y = _product(self._kernel[: len(row)], row)
+        if self.hold == "linear" and len(row):
+            y += row[0] * self._first[: len(row)]
         return y
 
     def _prepare(self, count: int) -> None:
@@ -72,11 +74,11 @@ class Convolution:
         self._first = steps - means[1:]
 
 
-def _signal(u) -> np.ndarray:
-    u = np.asarray(u, dtype=float)
-    if u.ndim != 1:
-        raise ValueError(f"the input has {u.ndim} dimensions, it must be one row of samples")
-    return u
+def _signal(u: ArrayLike) -> np.ndarray:
+    row: np.ndarray = np.asarray(u, dtype=float)
+    if row.ndim != 1:
+        raise ValueError(f"the input has {row.ndim} dimensions, it must be one row of samples")
+    return row
 
 
 def _later(values: np.ndarray, whole: int) -> np.ndarray:
@@ -120,11 +122,18 @@ def _first_mean(image: StepImage, step: float, end: float) -> float:
     return polar + (0.0 if image.remainder is None else float(_integrals(image, np.array([end]))[0]) / step)
 
 
+def _remainder(image: StepImage) -> Callable[[np.ndarray], np.ndarray]:
+    """What no pole makes; asked for only where there is something."""
+    assert image.remainder is not None
+    return image.remainder
+
+
 def _integrals(image: StepImage, t: np.ndarray) -> np.ndarray:
     """Return the integral of what no pole makes, from 0 to the times ``t`` (s)."""
 
-    def integral(s):
-        return image.remainder(s) / s
+    def integral(s: np.ndarray) -> np.ndarray:
+        values: np.ndarray = _remainder(image)(s) / s
+        return values
 
     return inverse_laplace(integral, t, image.poles)
 
@@ -136,8 +145,10 @@ def _head_means(image: StepImage, step: float, count: int, begin: float) -> np.n
 
 
 def _tail_means(image: StepImage, step: float, times: np.ndarray) -> np.ndarray:
-    def mean(s):  # (1 − e^{−sh})/(sh): beyond the first samples the contour bears its growth
-        return image.remainder(s) * -np.expm1(-s * step) / (s * step)
+    def mean(
+        s: np.ndarray,
+    ) -> np.ndarray:  # (1 − e^{−sh})/(sh): beyond the first samples the contour bears its growth
+        return _remainder(image)(s) * -np.expm1(-s * step) / (s * step)
 
     return inverse_laplace(mean, times, image.poles)
 
@@ -146,7 +157,8 @@ def _product(kernel: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return the first len(u) values of their convolution."""
     n = len(u)
     size = fft.next_fast_len(2 * n, real=True)
-    return fft.irfft(fft.rfft(kernel, size) * fft.rfft(u, size), size)[:n] if n else u.copy()
+    made: np.ndarray = fft.irfft(fft.rfft(kernel, size) * fft.rfft(u, size), size)[:n] if n else u.copy()
+    return made
 
 
 class GrunwaldLetnikov:
@@ -178,16 +190,16 @@ class GrunwaldLetnikov:
             raise ValueError("the sum of the leading coefficients A_i is zero at this step")
         return num, den
 
-    def run(self, u) -> np.ndarray:
-        u = _signal(u)
-        if not len(u):
-            return u.copy()
-        num, den = self.coefficients(len(u) - 1)
+    def run(self, u: ArrayLike) -> np.ndarray:
+        row = _signal(u)
+        if not len(row):
+            return row.copy()
+        num, den = self.coefficients(len(row) - 1)
         if len(den) <= self._PLAIN:
-            return signal.lfilter(num, den, u)
-        padded = np.zeros((2, len(u)))
+            return np.asarray(signal.lfilter(num, den, row))
+        padded = np.zeros((2, len(row)))
         padded[0, : len(num)], padded[1, : len(den)] = num, den
-        return divided(_product(padded[0], u), padded[1])
+        return divided(_product(padded[0], row), padded[1])
 
 
 def gl_operator(terms: Polynomial, step: float, length: int) -> np.ndarray:
@@ -220,4 +232,5 @@ def _carried(past: np.ndarray, den: np.ndarray, remaining: int) -> np.ndarray:
     ahead = min(reach, remaining)
     size = fft.next_fast_len(2 * reach, real=True)
     kernel = den[: 2 * reach]
-    return fft.irfft(fft.rfft(past, size) * fft.rfft(kernel, size), size)[reach : reach + ahead]
+    made: np.ndarray = fft.irfft(fft.rfft(past, size) * fft.rfft(kernel, size), size)
+    return made[reach : reach + ahead]

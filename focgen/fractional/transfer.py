@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from importlib import import_module
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 class Term(NamedTuple):
@@ -37,7 +39,7 @@ def _product(left: Polynomial, right: Polynomial) -> Polynomial:
     return polynomial((a.coefficient * b.coefficient, a.order + b.order) for a in left for b in right)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class TransferFunction:
     """A fractional transfer function, eq. (8); ``num`` and ``den`` are lists of (coefficient, order).
 
@@ -47,11 +49,13 @@ class TransferFunction:
     """
 
     num: Polynomial
-    den: Polynomial = (Term(1.0, 0.0),)
+    den: Polynomial
 
-    def __post_init__(self):
-        object.__setattr__(self, "num", polynomial(self.num))
-        object.__setattr__(self, "den", polynomial(self.den))
+    def __init__(
+        self, num: Iterable[tuple[float, float]], den: Iterable[tuple[float, float]] = ((1.0, 0.0),)
+    ) -> None:
+        object.__setattr__(self, "num", polynomial(num))
+        object.__setattr__(self, "den", polynomial(den))
         if not self.den:
             raise ValueError("the denominator of a transfer function is zero")
 
@@ -76,16 +80,28 @@ class TransferFunction:
     def __sub__(self, other: TransferFunction | float) -> TransferFunction:
         return self + -_lifted(other)
 
+    def to_frd(self, omega: ArrayLike | None = None, delay: float = 0.0) -> Any:
+        """The frequency response as python-control's, :func:`focgen.fractional.to_frd`."""
+        return import_module("focgen.fractional.convert").to_frd(self, omega, delay)
+
+    def bode(self, omega: ArrayLike | None = None, delay: float = 0.0, **how: Any) -> Any:
+        """Its Bode plot, :func:`focgen.fractional.bode`."""
+        return import_module("focgen.fractional.convert").bode(self, omega, delay, **how)
+
+    def nyquist(self, omega: ArrayLike | None = None, delay: float = 0.0, **how: Any) -> Any:
+        """Its Nyquist plot, :func:`focgen.fractional.nyquist`."""
+        return import_module("focgen.fractional.convert").nyquist(self, omega, delay, **how)
+
     def inverse(self) -> TransferFunction:
         """Return the reciprocal. Raises ValueError where the numerator is zero."""
         return TransferFunction(self.den, self.num)
 
-    def __call__(self, s):
+    def __call__(self, s: ArrayLike) -> Any:
         """Evaluate at complex ``s`` (rad/s), principal branch; an array gives an array."""
-        s = np.asarray(s, dtype=complex)
-        return _evaluate(self.num, s) / _evaluate(self.den, s)
+        place = np.asarray(s, dtype=complex)
+        return _evaluate(self.num, place) / _evaluate(self.den, place)
 
-    def frequency_response(self, omega) -> np.ndarray:
+    def frequency_response(self, omega: ArrayLike) -> Any:
         """Complex gain at the angular frequencies ``omega`` > 0 (rad/s), shape of ``omega``."""
         return self(1j * np.asarray(omega, dtype=float))
 
@@ -125,7 +141,8 @@ def _lifted(value: TransferFunction | float) -> TransferFunction:
 
 
 def _evaluate(terms: Polynomial, s: np.ndarray) -> np.ndarray:
-    return sum((t.coefficient * s**t.order for t in terms), np.zeros(s.shape, complex))
+    total: np.ndarray = sum((t.coefficient * s**t.order for t in terms), np.zeros(s.shape, complex))
+    return total
 
 
 def _text(terms: Polynomial) -> str:

@@ -9,8 +9,10 @@ the symmetric variable j − α/2 (Tricomi and Erdélyi 1951), whose error does 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import rgamma
 
 from focgen.fractional import elementary
@@ -39,27 +41,28 @@ def gl_weights(order: float, count: int) -> np.ndarray:
     return gl_weights_at(order, np.arange(count + 1))
 
 
-def gl_weights_at(order: float, indices) -> np.ndarray:
+def gl_weights_at(order: float, indices: ArrayLike) -> np.ndarray:
     """Return w_j of eq. (11)–(12) at the whole numbers ``indices`` ≥ 0, shape of ``indices``.
 
     Accurate as :func:`gl_weights`, without computing the weights between.
     """
     if not abs(order) <= _LARGEST_ORDER:
         raise ValueError(f"the order {order} is not a number between -100 and 100")
-    indices = np.asarray(indices)
+    places = np.asarray(indices)
     if order >= 0 and float(order).is_integer():
-        return _binomials(int(order), indices)
+        return _binomials(int(order), places)
     last = max(_HEAD, math.ceil(_HEAD_PER_ORDER * abs(order)))
-    head = _recursion(order, min(last, int(indices.max(initial=0))))
-    weights = head[np.minimum(indices, len(head) - 1)]
-    tail = indices > last
-    weights[tail] = head[-1] * _decay(order, indices[tail], last)
+    head = _recursion(order, min(last, int(places.max(initial=0))))
+    weights: np.ndarray = head[np.minimum(places, len(head) - 1)]
+    tail = places > last
+    weights[tail] = head[-1] * _decay(order, places[tail], last)
     return weights
 
 
 def _binomials(order: int, indices: np.ndarray) -> np.ndarray:
-    exact = np.array([(-1.0) ** j * math.comb(order, j) for j in range(order + 1)] + [0.0])
-    return exact[np.minimum(indices, order + 1)]
+    exact: np.ndarray = np.array([(-1.0) ** j * math.comb(order, j) for j in range(order + 1)] + [0.0])
+    found: np.ndarray = exact[np.minimum(indices, order + 1)]
+    return found
 
 
 def _recursion(order: float, count: int) -> np.ndarray:
@@ -75,10 +78,10 @@ def _decay(order: float, indices: np.ndarray, start: int) -> np.ndarray:
     return elementary.exp(ratio + (_series(order, place) - _series(order, place0)))
 
 
-def _series(order: float, place):
+def _series(order: float, place: np.ndarray | float) -> Any:
     x = 1.0 + order / 2
     inverse_square = 1.0 / np.square(place)
-    total = 0.0
+    total: Any = 0.0
     for n in (8, 6, 4, 2):
         total = (total + 2.0 * np.polyval(_BERNOULLI[n + 1], x) / (n * (n + 1))) * inverse_square
     return total

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,53 +23,65 @@ from focgen.identification.reach import seen_ranges
 from focgen.identification.remarks import remarks_of
 from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
-from focgen.identification.sure import actuator_uncertainty, check_determined, with_stages
+from focgen.identification.sure import actuator_uncertainty, check_determined, is_compromise, with_stages
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
-from focgen.logs.read import each_of, read_logs
+from focgen.logs.read import Logs, each_of, read_logs
 from focgen.output import check_apart, write_file
+from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.engine import STAGES
-from focgen.rig.files import read_rig, rig_text
+from focgen.rig.files import rig_text
 from focgen.rig.model import Actuator, Rig
 from focgen.rig.plausibility import doubts
 
+Quality = dict[str, dict[str, float]]
+_COMPROMISE = (
+    "what the model cannot follow outweighs the noise: T, alpha and K(p) are a compromise, and known "
+    "no better than [uncertainty] says, whatever their intervals"
+)
 
+
+@rig_then_logs
 def identify(
-    logs: Sequence[str | Path] | Sequence[Experiment],
-    rig: Rig | str | Path,
+    rig: RigLike,
+    logs: Logs,
     out: str | Path | None = None,
-    first: float | None = None,
-    last: float | None = None,
+    from_: float | None = None,
+    to: float | None = None,
     gain_degree: int = 1,
-    unseen: Sequence[str | Path] | Sequence[Experiment] = (),
+    unseen: Logs = (),
     stages: Sequence[str] = ("actuator",),
     delay: bool = False,
     integer: bool = True,
 ) -> Identification:
     """Fit K(p) p through e^(−Ls)/(T s^α + 1), eq. (3) to (5), to all experiments at once.
 
-    ``logs`` are paths or experiments of one session, ``first`` and ``last`` (s within each experiment) cut
-    them, ``gain_degree`` is the degree of K(p); where the logs show fewer levels than that needs, a lower one
-    is taken and said. The new rig is written to ``out``. The input is the measured pressure where logged,
-    else the command through the regulator; fitted is the curvature where logged, else the output through the
-    sensor. ``unseen`` are logs that the identified rig is shown against, but not fitted to. ``stages``: which
-    of regulator, actuator and sensor are identified, the first and the last from their own signals.
-    ``delay``: whether the actuator's dead time is fitted. ``integer``: whether integer-order models are
-    fitted to each experiment for comparison.
+    ``rig`` (its file, a dictionary like it, or a :class:`Rig`) names the columns, and has the regulator and
+    the sensor that the actuator is seen through. ``logs`` (files, frames, dictionaries of arrays, or
+    experiments) are one session of it; ``from_`` and ``to`` cut each experiment, s within it.
+    ``gain_degree`` is the degree of K(p); where the logs show fewer levels than that needs, a lower one is
+    taken and said. The new rig is written to ``out`` where given.
+
+    The input is the measured pressure where logged, else the command through the regulator; fitted is the
+    curvature where logged, else the output through the sensor. ``unseen`` are logs that the identified rig is
+    shown against, but not fitted to. ``stages``: which of regulator, actuator and sensor are identified, the
+    first and the last from their own signals. ``delay``: whether the actuator's dead time is fitted.
+    ``integer``: whether integer-order models are fitted to each experiment for comparison.
 
     Raises LogError, RigError or FitError; nothing is written then.
     """
-    logs, unseen = each_of(logs), each_of(unseen)
+    shown, given = each_of(unseen), each_of(logs)
+    inputs = (*given, rig, *shown)
     if out is not None:
-        check_apart([out], (*logs, rig, *unseen))
+        check_apart([out], inputs)
     check_degree(gain_degree)
     if not stages:
         raise FitError("--stages", "names no stage", f"give one or more of {', '.join(STAGES)}")
     for stage in stages:
         check_choice("--stages", stage, STAGES, FitError)
-    nominal = rig if isinstance(rig, Rig) else read_rig(rig)
-    experiments = _read(logs, nominal, first, last)
-    others = _read(unseen, nominal, None, None) if unseen else ()
+    nominal = rig_of(rig)
+    experiments = _read(given, nominal, from_, to)
+    others = _read(shown, nominal, None, None) if shown else ()
     found = {stage: identify_stage(experiments, stage) for stage in stages if stage != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
     new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
@@ -81,11 +94,11 @@ def identify(
     notes = remarks_of(experiments, nominal, result) + told + result.notes
     result = replace(result, warnings=warnings, notes=notes)
     if out is not None:
-        write_file(out, rig_text(result.rig), (*logs, rig, *unseen))
+        write_file(out, rig_text(result.rig), inputs)
     return result
 
 
-def _read(logs, rig: Rig, first, last) -> tuple[Experiment, ...]:
+def _read(logs: Logs, rig: Rig, first: float | None, last: float | None) -> tuple[Experiment, ...]:
     limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
     return read_logs(logs, rig.signals, rig.sample_time, first, last, limits)
 
@@ -93,11 +106,18 @@ def _read(logs, rig: Rig, first, last) -> tuple[Experiment, ...]:
 def _with_stages(rig: Rig, found: dict[str, StageFit]) -> Rig:
     """The rig with its regulator and sensor as identified."""
     delays = replace(rig.delays, **{name: fit.delay for name, fit in found.items()})
-    transfers = {name: fit.transfer for name, fit in found.items()}
+    transfers: dict[str, Any] = {name: fit.transfer for name, fit in found.items()}
     return replace(rig, delays=delays, uncertainty=with_stages(rig.uncertainty, found), **transfers)
 
 
-def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: bool):
+def _actuator(
+    experiments: Sequence[Experiment],
+    others: Sequence[Experiment],
+    rig: Rig,
+    degree: int,
+    delay: bool,
+    integer: bool,
+) -> Identification:
     """The identification of the actuator; ``rig`` has the regulator and the sensor it is seen through."""
     if rig.delays.actuator and not delay:
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
@@ -120,6 +140,8 @@ def _actuator(experiments, others, rig: Rig, degree: int, delay: bool, integer: 
     shown = _shown(others, new)
     warnings = warnings_of(excitations, fit, fits, failed, quality)
     told = lowered + _told(experiments, excitations)
+    if is_compromise(excitations, fit):
+        told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 
@@ -166,39 +188,48 @@ def _fitted(excitations: list[Excitation]) -> FractionalFit:
 
 
 def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[ExperimentFit]) -> Joint:
-    T, alpha = told_value(fit.T, fit.half["T"]), told_value(fit.alpha, fit.half["alpha"])
-    gain = told_gain(fit.gain, fit.half["gain"])
-    span = lambda value, half: (float(value - half), float(value + half))  # noqa: E731
+    half: dict[str, Any] = dict(fit.half)
+    T, alpha = told_value(fit.T, half["T"]), told_value(fit.alpha, half["alpha"])
+    gain = told_gain(fit.gain, half["gain"])
     names = [x.name for x in excitations]
+    ci95: dict[str, Any] = {
+        "T": _span(fit.T, half["T"]),
+        "alpha": _span(fit.alpha, half["alpha"]),
+        "gain": tuple(map(_span, fit.gain, half["gain"])),
+    }
+    if half["delay"]:
+        ci95["delay"] = _span(fit.delay, half["delay"])
     return Joint(
         T=T,
         alpha=alpha,
-        delay=told_value(fit.delay, fit.half["delay"]),
+        delay=told_value(fit.delay, half["delay"]),
         gain=gain,
         gain_r2=r2_of_line(excitations, fits, len(gain) - 1),
-        ci95={
-            "T": span(fit.T, fit.half["T"]),
-            "alpha": span(fit.alpha, fit.half["alpha"]),
-            "gain": tuple(map(span, fit.gain, fit.half["gain"])),
-        }
-        | ({"delay": span(fit.delay, fit.half["delay"])} if fit.half["delay"] else {}),
+        ci95=ci95,
         simulated=dict(zip(names, fit.simulated)),
         pasts={name: past for name, past in zip(names, fit.pasts) if past is not None and past.steps},
         closed_loop=fit.closed_loop,
     )
 
 
+def _span(value: float, half: float) -> tuple[float, float]:
+    return float(value - half), float(value + half)
+
+
 def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
     """Logs beside what the identified rig makes of their input, each from the initial state that it asks
     for."""
-    made = [_prepared([e], rig, len(rig.actuator.gain))[0] for e in experiments]
+    actuator: Any = rig.actuator
+    made = [_prepared([e], rig, len(actuator.gain))[0] for e in experiments]
     return tuple(
         Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
-        for x, y in ((x, answer_from_its_past(x, rig.actuator, rig.delays.actuator)) for x in made)
+        for x, y in ((x, answer_from_its_past(x, actuator, rig.delays.actuator)) for x in made)
     )
 
 
-def _compared(excitations, fits: list[ExperimentFit], joint: Joint):
+def _compared(
+    excitations: Sequence[Excitation], fits: list[ExperimentFit], joint: Joint
+) -> tuple[Quality, Quality]:
     """GOF and Schwarz's criterion of every model in every experiment."""
     measured = {x.name: x.measured for x in excitations}
     models = {"fom": {f.name: f.simulated for f in fits}}

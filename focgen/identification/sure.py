@@ -19,6 +19,7 @@ _LEAST = 0.01  # of a parameter: no rig is known better from one session
 _DIGITS = 3
 _MISFIT = 3.0  # times the noise of the readings: what is left is more than noise
 _LEFT = 0.05  # of the spread: what is left below is of no concern
+_OUTWEIGHS = 2.0  # times the noise: three quarters of what is left are the model's own misfit
 _HARDLY = 10.0  # times a parameter: an interval wider than this has no number
 
 _RECORD = {
@@ -46,13 +47,19 @@ def check_determined(excitations: Sequence[Excitation], fit: FractionalFit) -> N
 
 def misfit_of(excitations: Sequence[Excitation], fit: FractionalFit) -> float | None:
     """How many times the noise of the readings a fit leaves; None where that is little."""
+    worst = _times_noise(excitations, fit, _LEFT)
+    return worst if worst > _MISFIT else None
+
+
+def _times_noise(excitations: Sequence[Excitation], fit: FractionalFit, concern: float = 0.0) -> float:
+    """How many times its noise the usual experiment is left with; those with less than ``concern`` of their
+    spread are not asked."""
     ratios = []
     for x, made in zip(excitations, fit.simulated):
         left, noise = float(np.std(x.measured - made)), noise_level(x.measured)
-        if left > _LEFT * x.spread and noise > 0.0:
+        if left > concern * x.spread and noise > 0.0:
             ratios.append(left / noise)
-    worst = float(np.median(ratios)) if ratios else 0.0
-    return worst if worst > _MISFIT else None
+    return float(np.median(ratios)) if ratios else 0.0
 
 
 def times_text(ratio: float) -> str:
@@ -75,9 +82,22 @@ def relative_halves(excitations: Sequence[Excitation], fit: FractionalFit) -> di
 
 
 def actuator_uncertainty(excitations: Sequence[Excitation], fit: FractionalFit) -> Relative:
-    """How well the actuator is known, for the rig's ``[uncertainty]``."""
+    """How well the actuator is known, for the rig's ``[uncertainty]``.
+
+    An interval says how well this model is determined, not how far it is from the rig. Where the model's own
+    misfit outweighs the noise, the numbers are a compromise, and known no better than a rig's usually are.
+    """
     half = relative_halves(excitations, fit)
-    return Relative(_told(half["K"]), _told(half["T"]), _told(half["alpha"]))
+    known = Relative(_told(half["K"]), _told(half["T"]), _told(half["alpha"]))
+    if not is_compromise(excitations, fit):
+        return known
+    usual = Uncertainty().actuator
+    return Relative(max(known.gain, usual.gain), max(known.time, usual.time), max(known.alpha, usual.alpha))
+
+
+def is_compromise(excitations: Sequence[Excitation], fit: FractionalFit) -> bool:
+    """Whether what the model cannot follow outweighs the noise of the readings."""
+    return _times_noise(excitations, fit) > _OUTWEIGHS
 
 
 def with_stages(known: Uncertainty, found: dict[str, StageFit]) -> Uncertainty:

@@ -13,7 +13,7 @@ from focgen.logs.begin import REST, Begin
 ROLES = ("command", "pressure", "curvature", "output", "reference")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Experiment:
     """Uniformly sampled signals of one experiment, by role.
 
@@ -35,11 +35,15 @@ class Experiment:
     continues: bool = False
     begins: Mapping[str, Begin] = field(default_factory=dict)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "begins", MappingProxyType(dict(self.begins)))
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
         if self.rows is not None:
             object.__setattr__(self, "rows", MappingProxyType(dict(self.rows)))
+
+    def __repr__(self) -> str:
+        told = f"{len(self)} samples every {self.sample_time:g} s: {', '.join(self.signals)}"
+        return f"<Experiment {self.name!r}: {told}>"
 
     def __len__(self) -> int:
         return len(next(iter(self.signals.values())))
@@ -71,7 +75,9 @@ class Experiment:
         begins = self.begins if begin == 0 else {}
         return replace(self, signals=cut, start=start, raw_time=time, rows=rows, begins=begins)
 
-    def _rows_between(self, low: float, high: float):
+    def _rows_between(
+        self, low: float, high: float
+    ) -> tuple[np.ndarray | None, Mapping[str, np.ndarray] | None]:
         """The raw time stamps and rows from ``low`` to ``high`` (s since the first)."""
         if self.raw_time is None:
             return None, None

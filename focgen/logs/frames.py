@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -11,23 +12,35 @@ from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LogTable
 
 
+class Frame(Protocol):
+    """What pandas and polars frames have in common: columns, by name."""
+
+    @property
+    def columns(self) -> Iterable[Any]: ...
+
+    def __getitem__(self, key: Any, /) -> Any: ...
+
+
 def is_frame(log: object) -> bool:
     """Whether a log is in memory: a dictionary, or what has columns."""
     return isinstance(log, Mapping) or hasattr(log, "columns")
 
 
-def table_of(frame, name: str) -> LogTable:
+def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     """A frame, or a dictionary name → values (m,), as the table of a log that is called ``name``.
 
     An index that has a name, or holds times, is a column, too. Raises LogError where columns are no vectors
     of one length.
     """
     columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
-    index, clock = getattr(frame, "index", None), None
+    index = getattr(frame, "index", None)
+    clock: np.ndarray | None = None
     if index is not None and not callable(index) and str(index.name) not in columns:
         values = _column(index, name, "index")
         named = {} if index.name is None else {str(index.name): values}
-        columns, clock = named | columns, values if np.asarray(index).dtype.kind in "mM" else None
+        columns = named | columns
+        if isinstance(values, np.ndarray) and np.asarray(index).dtype.kind in "mM":
+            clock = values
     if len({len(values) for values in columns.values()}) > 1:
         sizes = ", ".join(f"{key} {len(values)}" for key, values in columns.items())
         raise LogError(name, f"holds columns of different lengths ({sizes})", "give one value a sample")
@@ -36,11 +49,11 @@ def table_of(frame, name: str) -> LogTable:
     return LogTable(name, columns, clock=clock)
 
 
-def _keys(frame) -> list:
+def _keys(frame: Frame | Mapping[Any, Any]) -> list[Any]:
     return list(frame) if isinstance(frame, Mapping) else list(frame.columns)
 
 
-def _column(values, name: str, key: str) -> np.ndarray | list:
+def _column(values: Any, name: str, key: str) -> np.ndarray | list[Any]:
     """Numbers as float64, times in s, everything else as a list."""
     try:
         array = np.asarray(values)
@@ -52,5 +65,5 @@ def _column(values, name: str, key: str) -> np.ndarray | list:
     return array.astype(float) if array.dtype.kind in "fiub" else [_cell(cell) for cell in array.tolist()]
 
 
-def _cell(cell):
+def _cell(cell: Any) -> Any:
     return None if cell is None or cell != cell else cell if isinstance(cell, float | int) else str(cell)

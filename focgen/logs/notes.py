@@ -11,8 +11,11 @@ _NAMED = 4  # experiments named in one line; of more only the first few
 class Noted(Protocol):
     """What has a name and notes (an ``Experiment``)."""
 
-    name: str
-    notes: tuple[str, ...]
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def notes(self) -> tuple[str, ...]: ...
 
 
 class Note(str):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from focgen.errors import LogError
 from focgen.logs.experiment import Experiment
-from focgen.logs.frames import is_frame, table_of
+from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.scales import Scale, known, same
@@ -19,25 +19,35 @@ from focgen.logs.table import LogTable, read_table, stem
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
+_GIVE = "give a path, a frame, a dictionary of arrays, or a list of these"
 
 Limits = Mapping[str, tuple[float, float]]
-Log = str | Path | Mapping[str, Any] | Any  # a file, a dictionary of arrays, or a frame
+Log = str | Path | Mapping[str, Any] | Frame | Experiment
+"""A file, a dictionary of arrays (m,) by column, a pandas or polars frame, or what was read before."""
+Logs = Log | Iterable[Log]
 
 
 class Roles(Protocol):
     """Which column plays which role, and how it becomes its signal (the rig's ``Signals``)."""
 
-    time: str
-    run: str | None
-    scales: Mapping[str, Scale]
-    units: Mapping[str, str]
+    @property
+    def time(self) -> str: ...
+
+    @property
+    def run(self) -> str | None: ...
+
+    @property
+    def scales(self) -> Mapping[str, Scale]: ...
+
+    @property
+    def units(self) -> Mapping[str, str]: ...
 
     def columns(self) -> dict[str, str]:
         """Role → column, without time and run."""
 
 
 def read_logs(
-    paths: Log | Sequence[Log],
+    paths: Logs,
     signals: Roles,
     sample_time: float,
     first: float | None = None,
@@ -55,8 +65,9 @@ def read_logs(
     reveal a wrong unit. Raises LogError naming file, column, line and remedy.
     """
     logs = each_of(paths)
-    if logs and all(isinstance(log, Experiment) for log in logs):
-        return tuple(log.between(first, last) for log in logs)
+    read = [log for log in logs if isinstance(log, Experiment)]
+    if logs and len(read) == len(logs):
+        return tuple(log.between(first, last) for log in read)
     tables = tables_of(logs)
     if not tables:
         raise LogError("logs", "none is given", "name at least one log")
@@ -65,19 +76,32 @@ def read_logs(
     return in_session_order(_with_own_names(found))
 
 
-def each_of(logs: Log | Sequence[Log]) -> list[Log]:
-    """One log, or several, as a list."""
-    return [logs] if isinstance(logs, str | Path | Experiment) or is_frame(logs) else list(logs)
+def each_of(logs: Logs) -> list[Log]:
+    """One log, or several, as a list. Raises LogError for what is neither."""
+    if isinstance(logs, str | Path | Experiment) or is_frame(logs):
+        return [cast(Log, logs)]
+    try:
+        return list(cast(Iterable[Log], logs))
+    except TypeError:
+        raise LogError("logs", f"is {type(logs).__name__}", _GIVE) from None
 
 
 def tables_of(logs: Sequence[Log]) -> list[LogTable]:
-    """Logs as tables. Raises LogError where one cannot be read."""
+    """Logs as tables. Raises LogError where one cannot be read, or was read before as others were not."""
     names = ["log"] if len(logs) == 1 else [f"log {k}" for k in range(1, len(logs) + 1)]
-    return [table_of(log, name) if is_frame(log) else read_table(log) for log, name in zip(logs, names)]
+    return [_table(log, name) for log, name in zip(logs, names)]
+
+
+def _table(log: Log, name: str) -> LogTable:
+    if isinstance(log, (str, Path)):
+        return read_table(log)
+    if isinstance(log, Experiment) or not is_frame(log):
+        raise LogError(name, f"is {type(log).__name__}, among others that are not", _GIVE)
+    return table_of(log, name)
 
 
 def _experiments(
-    table: LogTable, signals: Roles, sample_time: float, window
+    table: LogTable, signals: Roles, sample_time: float, window: tuple[float | None, float | None]
 ) -> Iterator[tuple[str, Experiment]]:
     """Yield (path, experiment) for each run of a log, or part of one."""
     columns, notes = _present(table, signals)
@@ -95,7 +119,7 @@ def _time(table: LogTable, signals: Roles) -> tuple[np.ndarray, tuple[str, ...]]
     if signals.time in table:
         return _scaled(table, "time", table.seconds(signals.time), signals), ()
     if table.clock is None:
-        raise table.missing("time", signals.time, {signals.run, *signals.columns().values()})
+        raise table.missing("time", signals.time, {signals.run or "", *signals.columns().values()})
     step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
     return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
 
@@ -116,7 +140,7 @@ def _scaled(table: LogTable, role: str, values: np.ndarray, signals: Roles) -> n
 def _present(table: LogTable, signals: Roles) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     """The signals that are there, by role, and notes on those that are not, or in another unit."""
     wanted = signals.columns()
-    taken = {signals.time, signals.run, *wanted.values()}
+    taken = {signals.time, signals.run or "", *wanted.values()}
     inputs = [role for role in ("command", "pressure") if role in wanted]
     there = [role for role, name in wanted.items() if name in table]
     for role in ["output"] + inputs[: 0 if any(role in there for role in inputs) else 1]:
@@ -144,7 +168,7 @@ def _unit_note(table: LogTable, role: str, signals: Roles) -> str | None:
     return f"the log gives {column!r} in {given}, {role} is taken as {taken}: is it {{ unit = {given!r} }}?"
 
 
-def _absence(table: LogTable, role: str, name: str, taken: set) -> str:
+def _absence(table: LogTable, role: str, name: str, taken: set[str]) -> str:
     near = table.closest(name, taken)
     return f"no column {name!r}: {role} taken as not logged" + (f" (is it {near!r}?)" if near else "")
 
@@ -187,7 +211,9 @@ def _check_limits(found: list[tuple[str, Experiment]], limits: Limits, columns: 
 
 def _with_own_names(found: list[tuple[str, Experiment]]) -> list[Experiment]:
     """Put the file's name, or its path, before the experiments' where names repeat."""
-    for prefix in (lambda path: "", lambda path: f"{stem(path)}/", lambda path: f"{path}/"):
+    ways: tuple[Callable[[str], str], ...]
+    ways = (lambda path: "", lambda path: f"{stem(path)}/", lambda path: f"{path}/")
+    for prefix in ways:
         named = [replace(experiment, name=prefix(path) + experiment.name) for path, experiment in found]
         if len({experiment.name for experiment in named}) == len(named):
             return named

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from focgen.control.measures import StepMeasures
 from focgen.control.schedule import TOLERANCE, Table, gain_table
 from focgen.control.units import units_of
 from focgen.errors import DesignError, check_choice
+from focgen.jsontext import UNWRITTEN
 from focgen.loop.bench import Bench, prepare
 from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
@@ -27,8 +29,9 @@ from focgen.loop.worst import Worst, worst_case
 from focgen.output import check_apart, write_file
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST, Plan
-from focgen.rig.files import read_rig
+from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 SETTLING = 1.5  # s, where nothing is wished and it is feasible
 _SLACK = 1.02  # of the wish, for the controller as it will run
@@ -82,14 +85,14 @@ class ScheduleReport:
     K_zero: float | None
 
 
-@dataclass(frozen=True)
-class Design:
+@dataclass(frozen=True, repr=False)
+class Design(Shown):
     """A controller, the wish it was designed for, and the proof in simulation.
 
     ``settling_s`` (mean over the operating points) and ``overshoot_pct`` (largest) are of the controller
     as it will run, on the rig with its effects; ``holds`` says whether they keep the wish and every loop is
     stable. ``worst``: what becomes of margins and steps within the rig's uncertainty, which the wish is not
-    judged by.
+    judged by. ``rig``: what it was designed for.
     """
 
     controller: Controller
@@ -104,10 +107,11 @@ class Design:
     holds: bool
     worst: Worst
     notes: tuple[str, ...] = field(default=())
+    rig: Rig | None = field(default=None, metadata=UNWRITTEN, compare=False)
 
 
 def design(
-    rig: Rig | str | Path,
+    rig: RigLike,
     out: str | Path | None = None,
     settling: float | None = None,
     overshoot: float | None = None,
@@ -139,7 +143,7 @@ def design(
     _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance)
     if out is not None:
         check_apart([out], [rig])
-    model, source = (rig, None) if isinstance(rig, Rig) else (read_rig(rig), _source(rig))
+    model, source = rig_of(rig), _source(file_of(rig))
     bench, notes = prepare(model, setpoints, lowest, delay)
     wish, tuned = _tuned(bench, settling, overshoot, notes)
     table, report = _schedule(bench, tuned, tolerance)
@@ -152,7 +156,14 @@ def design(
     return result
 
 
-def _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance) -> None:
+def _check_wishes(
+    settling: float | None,
+    overshoot: float | None,
+    arithmetic: str,
+    length: int | None,
+    delay: int,
+    tolerance: float,
+) -> None:
     if settling is not None and not (math.isfinite(settling) and settling > 0.0):
         raise DesignError("--settling", f"is {settling:g}", "give a time above 0 s")
     if overshoot is not None and not (math.isfinite(overshoot) and overshoot >= 0.0):
@@ -166,11 +177,14 @@ def _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance) -> 
         raise DesignError("tolerance", f"is {tolerance:g}", "give a relative error between 0 and 1")
 
 
-def _source(path: str | Path) -> Source:
-    return Source(Path(path).name, hashlib.sha256(Path(path).read_bytes()).hexdigest())
+def _source(path: Path | None) -> Source | None:
+    """What the controller says it was designed from; nothing where that is no file."""
+    return None if path is None else Source(path.name, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
-def _tuned(bench: Bench, settling, overshoot, notes: list[str]) -> tuple[Wish, Tuned]:
+def _tuned(
+    bench: Bench, settling: float | None, overshoot: float | None, notes: list[str]
+) -> tuple[Wish, Tuned]:
     wish = Wish(settling, OVERSHOOT if overshoot is None else overshoot)
     if settling is not None or overshoot is not None:
         return wish, tune(bench, wish)
@@ -196,7 +210,7 @@ def _schedule(bench: Bench, tuned: Tuned, tolerance: float) -> tuple[Table | Non
         gain = line.intercept / inversion.gain[0]
         return None, ScheduleReport((), (gain,), line.intercept, 0.0, 0.0, tolerance, None, None, None)
 
-    def formula(pressure):
+    def formula(pressure: Any) -> Any:
         return line(pressure) / inversion.K(pressure)
 
     try:
@@ -288,10 +302,17 @@ def _judged(
         kept and all(m.running.stable for m in found),
         _worst(bench, controller, plan, points, _horizon(tuned, wish)),
         tuple(notes),
+        bench.rig,
     )
 
 
-def _worst(bench: Bench, controller: Controller, plan: Plan, points, seconds: float) -> Worst:
+def _worst(
+    bench: Bench,
+    controller: Controller,
+    plan: Plan,
+    points: Sequence[OperatingPoint],
+    seconds: float,
+) -> Worst:
     return worst_case(
         bench.rig,
         controller,

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from focgen.plan.execute import clamp, kind_of, saturate, scheduled_gain
+from focgen.plan.counts import taken_in, values_of
+from focgen.plan.execute import clamp, kind_of, output_of, saturate, scheduled_gain
 from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest
 from focgen.plan.model import Format, Plan, Sum
 from focgen.plan.scenario import nearest_raw
+from focgen.plan.slewing import slewed
 
 
 class PlanStepper:
@@ -27,10 +29,13 @@ class PlanStepper:
         self.rest = _Window(plan.inner.rest if plan.inner else None, self.kind, columns)
         self.feedback = _Window(plan.feedback.table if plan.feedback else None, self.kind, columns)
         zero = np.zeros(columns, self.kind)
-        self.z, self.r, self.carry, self.d = zero, zero, zero, zero
+        self.carry, self.d = zero, zero.astype(kind_of(plan.increment))
+        self.z = self.r = zero.astype(kind_of(plan.inner.state)) if plan.inner else zero
         u0 = np.full(columns, clamp(nearest_raw(start, plan.output), plan.output))
         self.total = u0.astype(self.kind)
-        if plan.integrator and not plan.floating:
+        if plan.integrator and plan.floating:
+            self.total = taken_in(self.total, plan.integrator.state)
+        elif plan.integrator:
             self.total = self.total << plan.integrator.to_output
 
     def step(self, reference, measurement, schedule):
@@ -57,7 +62,7 @@ class PlanStepper:
         plan = self.plan
         p = self.direct(e)
         if plan.inner:
-            inner = self._shift(self._inner(self.rest(e)), plan.inner.to_wide)
+            inner = self._inner(self.rest(e))
             p = p + inner if plan.direct else inner
         if plan.feedback is None:
             return p if plan.floating else saturate(self._shift(p, plan.narrow), plan.filtered.bits)
@@ -73,17 +78,22 @@ class PlanStepper:
         return v
 
     def _inner(self, r: np.ndarray) -> np.ndarray:
-        self.z = clamp(self.z + (r + self.r), self.plan.inner.state)
+        inner = self.plan.inner
+        r = taken_in(r, inner.state)
+        self.z = clamp(self.z + (r + self.r), inner.state)
         self.r = r
-        return self.z
+        if self.plan.floating:
+            return self.z if inner.state.floating else values_of(self.z, inner.state)
+        return shift(self.z, inner.to_wide)
 
     def _output(self, d: np.ndarray) -> np.ndarray:
         plan = self.plan
         if plan.integrator is None:
             return clamp(d, plan.output)
-        self.total = clamp(self.total + (d + self.d), plan.integrator.state)
+        d = taken_in(d, plan.increment)
+        self.total = clamp(self.total + slewed(plan, d + self.d), plan.integrator.state)
         self.d = d
-        return self._shift(self.total, plan.integrator.to_output)
+        return output_of(plan, self.total) if plan.floating else shift(self.total, plan.integrator.to_output)
 
 
 class _Window:

@@ -13,7 +13,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest, within_reach
-from focgen.control.files import read_controller
+from focgen.control.files import ControllerLike, controller_from
 from focgen.control.measures import StepMeasures, measure_step
 from focgen.control.setpoints import default_setpoints
 from focgen.errors import ControllerError, DesignError
@@ -23,16 +23,19 @@ from focgen.loop.learned import learned_notes
 from focgen.loop.plan_stepper import PlanStepper
 from focgen.loop.relaxation import Plant, run_with_effects
 from focgen.loop.run import LoopRun, run_loop
-from focgen.loop.stepper import FloatStepper
+from focgen.loop.stepper import FloatStepper, Stepper
 from focgen.loop.worst import Worst, worst_case
 from focgen.plan.build import build_plan
-from focgen.rig.files import read_rig
+from focgen.plan.model import Plan
+from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 _SETTLINGS = 8.0  # time constants of the slowest frozen loop that a step is followed for
 _FEWEST, _MOST, _UNKNOWN = 200, 60_000, 1000  # samples; the last where no loop gain reaches 1
 _UNITS = 30.0  # ratio of two ranges of the same signal from which on their units must differ
 _SWING = 0.1  # of the step: movement in the last quarter that is called oscillation
+Span = tuple[float, float]
 _KEPT = 0.7  # of the movement in the quarter before
 
 
@@ -61,8 +64,8 @@ class SetpointResult:
     nominal: StepMeasures | None
 
 
-@dataclass(frozen=True, eq=False)
-class Simulation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Shown):
     """The set points' results and the signals behind them.
 
     ``running`` and ``ideal``: one column a set point, or one column in all where they are
@@ -97,8 +100,8 @@ class Simulation:
 
 
 def simulate(
-    rig: Rig | str | Path,
-    controller: Controller | str | Path,
+    rig: RigLike,
+    controller: ControllerLike,
     setpoints: Sequence[float] | None = None,
     *,
     consecutive: bool = False,
@@ -118,12 +121,11 @@ def simulate(
     not fit together, PlanError where the controller cannot be realised, RigError and ControllerError for
     their files.
     """
-    model = rig if isinstance(rig, Rig) else read_rig(rig)
-    which = controller if isinstance(controller, Controller) else read_controller(controller)
+    model, which = rig_of(rig), controller_from(controller)
     _check_options(duration, delay)
-    ranges, notes = derived_ranges(model)
+    ranges, derived = derived_ranges(model)
     _check_fit(model, which)
-    notes = [*notes, *_said(model, which, None if isinstance(rig, Rig) else Path(rig))]
+    notes = [*derived, *_said(model, which, file_of(rig))]
     plan = build_plan(which, arithmetic, length)
     start = rest(model, which.ranges.output)
     targets = _targets(model, which, setpoints, start, consecutive)
@@ -142,7 +144,7 @@ def _check_options(duration: float | None, delay: int) -> None:
 def _check_fit(rig: Rig, controller: Controller) -> None:
     """Refuse ranges of the same signal that are orders of magnitude apart."""
     theirs, ours = rig.ranges, controller.ranges
-    pairs = [
+    pairs: list[tuple[str, Span | None, str, Span | None]] = [
         ("output", theirs.output, "measurement", ours.measurement),
         ("command", theirs.command, "output", ours.output),
     ]
@@ -183,7 +185,11 @@ def _said(rig: Rig, controller: Controller, path: Path | None) -> list[str]:
 
 
 def _targets(
-    rig: Rig, controller: Controller, setpoints, start: Equilibrium, consecutive: bool
+    rig: Rig,
+    controller: Controller,
+    setpoints: Sequence[float] | None,
+    start: Equilibrium,
+    consecutive: bool,
 ) -> tuple[float, ...]:
     low, high = controller.ranges.reference
     if setpoints is None:
@@ -210,7 +216,16 @@ def _targets(
 class _Trial:
     """One simulation: the same steps for the running, the ideal and the frozen loop."""
 
-    def __init__(self, rig, controller, plan, start, points, consecutive, delay):
+    def __init__(
+        self,
+        rig: Rig,
+        controller: Controller,
+        plan: Plan,
+        start: Equilibrium,
+        points: Sequence[Equilibrium],
+        consecutive: bool,
+        delay: int,
+    ) -> None:
         self.rig, self.controller, self.plan, self.start = rig, controller, plan, start
         self.points, self.consecutive, self.delay = points, consecutive, delay
         self.loops = [frozen_loop(rig, controller, point.pressure) for point in points]
@@ -288,7 +303,7 @@ class _Trial:
     def _planned(self, columns: int) -> PlanStepper:
         return PlanStepper(self.plan, columns, self.start.command)
 
-    def _run(self, stepper, reference: np.ndarray) -> LoopRun:
+    def _run(self, stepper: Stepper, reference: np.ndarray) -> LoopRun:
         """The loop with the rig as it is, effects included."""
         if not self.rig.effects:
             return self._without_effects(stepper, reference)
@@ -296,7 +311,7 @@ class _Trial:
         known = self.rig.signals.pressure is not None
         return run_with_effects(plant, stepper, reference, self.start, self.delay, known)
 
-    def _without_effects(self, stepper, reference: np.ndarray) -> LoopRun:
+    def _without_effects(self, stepper: Stepper, reference: np.ndarray) -> LoopRun:
         prepared = chain(self.rig, self.controller.sample_time, len(reference))
         known = self.rig.signals.pressure is not None
         return run_loop(prepared, stepper, reference, self.start, self.delay, known)
@@ -321,7 +336,13 @@ class _Trial:
         )
 
     def _judged(
-        self, index: int, count: int, running: LoopRun, ideal: LoopRun, frozen, nominal: LoopRun | None
+        self,
+        index: int,
+        count: int,
+        running: LoopRun,
+        ideal: LoopRun,
+        frozen: np.ndarray | None,
+        nominal: LoopRun | None,
     ) -> SetpointResult:
         begin, target, h = self._from(index), self.points[index].output, self.controller.sample_time
         found, part = self._measured(running, index, count), self._part(running, index, count)

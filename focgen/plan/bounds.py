@@ -30,7 +30,7 @@ from focgen.errors import PlanError
 from focgen.fractional.elementary import exact_sum, l1
 from focgen.plan.banks import drive_error
 from focgen.plan.canonical import Table, Tables, inner_limits
-from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error
+from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error, tuned_error
 from focgen.plan.model import Bank, ErrorBound, Plan, Sum
 from focgen.plan.proofs import at_rest, reset_error
 from focgen.plan.stability import inverse_of
@@ -201,6 +201,9 @@ class _Fixed(_Account):
     def gain_error(self) -> float:
         """In physical units, the h/2 taken out again."""
         plan, lsb = self.plan, self.plan.gain.lsb / self.half_step
+        if plan.tuning:
+            moved = 0.5 * plan.schedule.signal.lsb * steepest(plan.controller) if plan.schedule else 0.0
+            return tuned_error(plan, lsb) + 0.5 * lsb + moved
         if plan.schedule is None:
             return abs(plan.constant_gain * lsb - plan.controller.gain)
         inputs = 0.5 * plan.schedule.signal.lsb * steepest(plan.controller)
@@ -212,7 +215,8 @@ class _Fixed(_Account):
     def output(self, static: float, growth: float, operator: float) -> float:
         """An output's own rounding and that of a limit or a reset's u0 are half a count each."""
         if self.plan.integrator:
-            return self.plan.sample_time * operator + self.plan.output.lsb
+            slew = 0.5 * self.plan.integrator.state.lsb * (self.plan.integrator.slew is not None)
+            return self.plan.sample_time * operator + self.plan.output.lsb + slew
         return max(static + growth, 0.5 * self.plan.output.lsb)
 
 
@@ -286,12 +290,16 @@ class _Floating(_Account):
         return 1.01 * (exact_sum(c * (here + there)) + sums * (2.0 * m * exact_sum(c) + before))
 
     def inner_edge(self) -> float:
-        return (self.u + _DOUBLE) * self.Z
+        """Of its clamp; in counts also of what it gives."""
+        state = self.plan.inner.state
+        given = 0.0 if state.floating else self.u * self.Z * 1.01 + state.lsb
+        return (self.u + _DOUBLE) * self.Z + given
 
     def inner_rounding(self) -> float:
-        """r + r_prev, z + that, each rounded, here and in the reference."""
-        r = 2.0 * self.tables.rest.l1 * self.E
-        return (self.u + _DOUBLE) * (self.Z + 2.0 * r) * 1.01 + 2.0 * self.tiny
+        """r + r_prev, z + that, each rounded, here and in the reference; in counts r alone."""
+        r, state = 2.0 * self.tables.rest.l1 * self.E, self.plan.inner.state
+        each = _DOUBLE * (self.Z + 2.0 * r) * 1.01 + 2.0 * self.tiny
+        return each + (self.u * (self.Z + 2.0 * r) * 1.01 if state.floating else state.lsb)
 
     def filtered(self) -> FilteredError:
         plan, tables = self.plan, self.tables
@@ -333,6 +341,8 @@ class _Floating(_Account):
 
     def gain_error(self) -> float:
         plan, g = self.plan, self.largest_gain
+        if plan.tuning:
+            return tuned_error(plan, 1.0 / self.half_step) * (1.0 + _DOUBLE / self.u)
         if plan.schedule is None:
             return 2.0 * (self.u + _DOUBLE) * g
         slope, reach = steepest(plan.controller), max(map(abs, plan.controller.ranges.schedule))
@@ -344,9 +354,17 @@ class _Floating(_Account):
         return 2.0 * (self.u + _DOUBLE) * reach + self.tiny / self.half_step
 
     def output(self, static: float, growth: float, operator: float) -> float:
-        plan, u = self.plan, (self.u + _DOUBLE) * 1.01
-        edge = u * max(map(abs, plan.controller.ranges.output))
+        """An integral in counts rounds each increment to half a count, and what it gives, a limit and an
+        output that is set once."""
+        plan, here = self.plan, self.u * 1.01
+        largest = max(map(abs, plan.controller.ranges.output))
+        edge = (here + _DOUBLE * 1.01) * largest
         if not plan.integrator:
             return static + growth + edge
         d = 2.0 * self.half_step * self.largest_gain * self.reach + plan.sample_time * operator
-        return plan.sample_time * operator + u * (edge / u + 2.0 * d) + 2.0 * edge + 4.0 * self.tiny
+        state, each = plan.integrator.state, _DOUBLE * 1.01 * (largest + 2.0 * d)
+        each += here * (largest + 2.0 * d) if state.floating else here * largest + 3.0 * state.lsb
+        if plan.integrator.slew is not None:  # rounded, here and in the reference
+            most = plan.controller.slew_limit * plan.sample_time
+            each += (here * most if state.floating else 0.5 * state.lsb) + _DOUBLE * 1.01 * most
+        return plan.sample_time * operator + each + 2.0 * edge + 4.0 * self.tiny

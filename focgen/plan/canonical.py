@@ -235,8 +235,8 @@ def inner_limits(controller: Controller) -> tuple[float, float]:
 
     At rest the output is gain · z / (the denominator's constant); see the module's description.
     """
-    gains = controller.gain.gains if controller.scheduled else (controller.gain,)
-    smallest = min((abs(g) for g in gains if g != 0.0), default=1.0)
+    gains = controller.gains
+    smallest = min((abs(g) for g in gains if g != 0.0), default=1.0) * controller.factors[0]
     low, high = controller.ranges.output
     if controller.integrator:
         reach = (high - low) / controller.sample_time

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.plan.model import Plan
-from focgen.plan.scenario import Damage, Reset, Scenario, Trace
+from focgen.plan.scenario import Damage, Reset, Scenario, Trace, Tune
+from focgen.plan.tuning import courses, default_params
 
 
 def mended(plan: Plan, scenario: Scenario, execute: Callable[[Plan, Scenario], Trace]) -> Scenario:
@@ -35,12 +36,29 @@ def _mended(plan: Plan, scenario: Scenario, damages: tuple[Damage, ...], execute
         left_out[d.lane, d.sample] = np.nan
     without = replace(scenario, ref=left_out)
     standing = execute(plan, without).u
-    start = min(max(0.0, plan.output.low), plan.output.high)
-    stands = [standing[d.lane, d.sample] if d.what == "error" else start for d in damages]
+    stands = [
+        _start(plan, scenario, d) if d.what in ("integral", "all") else standing[d.lane, d.sample]
+        for d in damages
+    ]
     resets = [_begun(scenario, damage, u0) for damage, u0 in zip(damages, stands)]
     places = {(d.lane, d.sample) for d in damages}
     tracks = tuple(t for t in scenario.tracks if (t.lane, t.sample) not in places)
-    return replace(without, resets=(*scenario.resets, *resets), tracks=tracks)
+    lost = [Tune(d.lane, d.sample, default_params(plan)) for d in damages if _untuned(plan, d)]
+    return replace(without, resets=(*scenario.resets, *resets), tracks=tracks, tunes=(*scenario.tunes, *lost))
+
+
+def _untuned(plan: Plan, damage: Damage) -> bool:
+    """Whether a damage brings the default parameters back."""
+    return plan.tuning is not None and damage.what in ("all", "limits", "gains")
+
+
+def _start(plan: Plan, scenario: Scenario, damage: Damage) -> float:
+    """0, within the limits that hold after a damage: the default ones where nothing is left of others."""
+    low, high = plan.output.low, plan.output.high
+    if plan.tuning and not _untuned(plan, damage):
+        now = [one for sample, one in courses(plan, scenario)[damage.lane] if sample <= damage.sample][-1]
+        low, high = now.low, now.high
+    return min(max(0.0, low), high)
 
 
 def _begun(scenario: Scenario, damage: Damage, u0) -> Reset:

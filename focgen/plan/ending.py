@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.plan.counts import taken_in
 from focgen.plan.damage import mended
 from focgen.plan.execute import Run, execute
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Reset, Scenario, Trace, Track
+from focgen.plan.tuning import Applied, applied, refused
 from focgen.plan.usable import good_samples, invalid_samples, usable
 
 
@@ -20,7 +22,7 @@ class Ending:
     ``error`` and ``filtered``: the samples since init or the latest reset, oldest first; before them each was
     ``error_rest`` and ``filtered_rest`` for ever. ``r``: the inner integral's latest addend. ``starting``:
     no step has been made since. ``means`` and ``rests``: of every mode, by the name of its sum and the
-    number of its bank. What a plan does not have is 0.
+    number of its bank. ``applied``: of the parameters. What a plan does not have is 0.
     """
 
     error: np.ndarray
@@ -37,6 +39,7 @@ class Ending:
     rests: dict[tuple[str, int], np.ndarray]
     output: np.generic
     flags: int
+    applied: Applied | None = None
 
 
 def endings(plan: Plan, scenario: Scenario) -> tuple[Trace, tuple[Ending, ...]]:
@@ -53,18 +56,40 @@ def endings(plan: Plan, scenario: Scenario) -> tuple[Trace, tuple[Ending, ...]]:
 
 def _lane(plan: Plan, packed: Scenario, lane: int, count: int, trace: Trace) -> Ending:
     """A lane that ends after ``count`` good samples, and what has been called after the last of them."""
-    resets, tracks = (
+    resets, tracks, tunes = (
         [replace(event, lane=0) for event in of if event.lane == lane and event.sample <= count]
-        for of in (packed.resets, packed.tracks)
+        for of in (packed.resets, packed.tracks, packed.tunes)
     )
     reset = any(r.sample == count for r in resets)
     last = count + 1 if reset or not count else count  # a sample to begin with: only its beginning counts
-    run = Run(plan, _part(packed, lane, last, resets, [t for t in tracks if t.sample < last]))
+    part = _part(packed, lane, last, resets, [t for t in tracks if t.sample < last])
+    run = Run(plan, replace(part, tunes=tuple(t for t in tunes if t.sample < last)))
     found = _begun(run, count, trace, lane) if last > count else _ended(run, 0, trace, lane)
+    for tune in tunes if last == count else ():
+        if tune.sample == count and not refused(plan, tune.params):
+            found = _taken(plan, found, applied(plan, tune.params))
     for track in tracks:
         if track.sample == count and usable(track.u, plan.output) and plan.integrator:
-            found = replace(found, integral=run.tracked(track.u))
+            found = replace(found, integral=_within(plan, found, run.kind(track.u)))
     return found
+
+
+def _taken(plan: Plan, found: Ending, now: Applied) -> Ending:
+    """With other parameters."""
+    found = replace(found, applied=now)
+    return replace(found, integral=_within(plan, found, found.integral)) if plan.integrator else found
+
+
+def _within(plan: Plan, found: Ending, u) -> np.generic:
+    """A floating output, or integral in counts, as an integral within the limits that hold; in integers no
+    sample is ever left out."""
+    low, high = (
+        (found.applied.low, found.applied.high) if plan.tuning else (plan.output.low, plan.output.high)
+    )
+    state = plan.integrator.state
+    if not state.floating:
+        u, low, high = (taken_in(value, state) for value in (u, np.float32(low), np.float32(high)))
+    return np.asarray(min(max(u, low), high)).astype(np.asarray(u).dtype)[()]
 
 
 def _part(packed: Scenario, lane: int, samples: int, resets: list[Reset], tracks: list[Track]) -> Scenario:
@@ -92,6 +117,7 @@ def _ended(run: Run, lane: int, trace: Trace, of: int) -> Ending:
         rests={key: one.rest[lane] for key, one in banks.items()},
         output=trace.u[of, -1],
         flags=int(trace.flags[of, -1]),
+        applied=run.tuned[lane][-1][1] if run.tuned else None,
     )
 
 
@@ -102,7 +128,7 @@ def _begun(run: Run, start: int, trace: Trace, of: int) -> Ending:
     for memory, past in ((m, v if name == "feedback" else rest.constant) for name, m in run.memory.items()):
         for one in memory:
             one.settle(0, past)
-    scheduled = plan.schedule is not None
+    scheduled = plan.schedule is not None or plan.tuning is not None
     increment = zero if scheduled else run.increment(run.kind(plan.constant_gain) * v)
     return replace(
         _ended(run, 0, trace, of),

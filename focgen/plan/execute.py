@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.plan.counts import taken_in, values_of
 from focgen.plan.damage import mended
 from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest, Recursion
@@ -28,6 +29,8 @@ from focgen.plan.model import (
     Sum,
 )
 from focgen.plan.scenario import Reset, Scenario, Trace
+from focgen.plan.slewing import slewed
+from focgen.plan.tuning import Applied, courses, tuned
 from focgen.plan.usable import holding, invalid_samples, usable
 
 
@@ -68,6 +71,7 @@ class _Segment:
     stop: int
     constant: np.generic
     u0: np.generic
+    begun: bool  # by a reset, not by init
 
 
 class Run:
@@ -84,6 +88,8 @@ class Run:
         self.e = self.ref - self.meas
         self.memory: dict[str, list[BankRun]] = {}
         self.carry = self.inner = self.integral = np.zeros(self.shape[0], self.kind)
+        self.tuned = courses(plan, scenario) if plan.tuning else {}
+        self.low, self.high = self._limits()
         self.segments = self._segments()
         self.starts = {(s.lane, s.start): s for s in self.segments}
         self.starting: dict[int, list[int]] = {}  # lanes by the sample at which a segment of theirs begins
@@ -104,15 +110,29 @@ class Run:
         exclude it.
         """
         lanes, samples = self.shape
-        starts = {(lane, 0): (self.kind(0), self.kind(0)) for lane in range(lanes)}
+        starts = {(lane, 0): (self.kind(0), self.kind(0), False) for lane in range(lanes)}
         for r in self.scenario.resets:
-            starts[r.lane, r.sample] = self._start(r)
+            starts[r.lane, r.sample] = *self._start(r), True
         order, found = sorted(starts), []
         for (lane, start), after in zip(order, order[1:] + [(-1, 0)]):
-            constant, u0 = starts[lane, start]
+            constant, u0, begun = starts[lane, start]
             stop = after[1] if after[0] == lane else samples
-            found.append(_Segment(lane, start, stop, constant, clamp(u0, self.plan.output)))
+            u0 = self.limited(lane, start, u0) if begun else clamp(u0, self.plan.output)
+            found.append(_Segment(lane, start, stop, constant, u0, begun))
         return found
+
+    def _limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """The output's limits at every sample."""
+        ends = (self.plan.output.low, self.plan.output.high)
+        low, high = (np.full(self.shape, end, self.kind) for end in ends)
+        for lane, course in self.tuned.items():
+            for sample, parameters in course:
+                low[lane, max(sample, 0) :], high[lane, max(sample, 0) :] = parameters.low, parameters.high
+        return low, high
+
+    def limited(self, lane: int, sample: int, u) -> np.generic:
+        """Within the output's limits at a sample."""
+        return np.minimum(np.maximum(self.kind(u), self.low[lane, sample]), self.high[lane, sample])
 
     def _start(self, reset: Reset) -> tuple[np.generic, np.generic]:
         """The error and the output that a reset starts from; 0 for what cannot be used."""
@@ -212,8 +232,11 @@ class Run:
 
     def _inner(self) -> np.ndarray:
         """z, aligned to p."""
-        inner, out = self.plan.inner, np.empty(self.shape, self.kind)
-        z, before = np.zeros(self.shape[0], self.kind), np.zeros(self.shape[0], self.kind)
+        inner, kind = self.plan.inner, kind_of(self.plan.inner.state)
+        self.r = taken_in(self.r, inner.state)
+        self.r_rest = {place: taken_in(r, inner.state) for place, r in self.r_rest.items()}
+        z, before = np.zeros(self.shape[0], kind), np.zeros(self.shape[0], kind)
+        out = np.empty(self.shape, kind)
         for k in range(self.shape[1]):
             for lane in self.starting.get(k, ()):
                 z[lane], before[lane] = 0, self.r_rest[lane, k]
@@ -221,7 +244,9 @@ class Run:
             z = clamp(z + (now + before), inner.state)
             out[:, k], before = z, now.copy()
         self.inner = z
-        return out if self.plan.floating else shift(out, inner.to_wide)
+        if inner.state.floating:
+            return out
+        return values_of(out, inner.state) if self.plan.floating else shift(out, inner.to_wide)
 
     def _fed_back(self, p: np.ndarray) -> np.ndarray:
         """v_k from p_k and the past of v, whose columns are samples, ``lags`` of them ahead of the first."""
@@ -259,54 +284,86 @@ class Run:
     def gains(self) -> None:
         """g at every sample."""
         plan = self.plan
-        if plan.schedule is None:
+        if plan.schedule:
+            self.s = self._input(self.scenario.sched, plan.schedule.signal)
+            self.g = _scheduled(plan.schedule, self.s, self.kind)
+        else:
             self.g = np.full(self.shape, plan.constant_gain, self.kind)
-            return
-        self.s = self._input(self.scenario.sched, plan.schedule.signal)
-        self.g = _scheduled(plan.schedule, self.s, self.kind)
+        for lane, course in self.tuned.items():
+            for start, parameters in course[1:]:
+                if plan.schedule:
+                    own = tuned(plan.schedule, parameters)
+                    self.g[lane, start:] = _scheduled(own, self.s[lane, start:], self.kind)
+                else:
+                    self.g[lane, start:] = self.kind(parameters.gains[0])
 
     def output(self) -> tuple[np.ndarray, np.ndarray]:
         """u and d."""
         plan = self.plan
         d = self.increment(self.g * self.v)
         if plan.integrator is None:
-            return clamp(d, plan.output), d
+            return np.minimum(np.maximum(d, self.low), self.high), d
         return self._integrated(d), d
 
     def increment(self, product: np.ndarray) -> np.ndarray:
-        return product if self.plan.floating else shift(product, self.plan.gain_shift)
+        """d of g·v."""
+        if self.plan.floating:
+            return taken_in(product, self.plan.increment)
+        return shift(product, self.plan.gain_shift)
 
     def _integrated(self, d: np.ndarray) -> np.ndarray:
         plan, lanes = self.plan, self.shape[0]
-        state, out = plan.integrator.state, np.empty(self.shape, self.kind)
-        total, before = np.zeros(lanes, self.kind), np.zeros(lanes, self.kind)
+        kind = kind_of(plan.integrator.state)
+        total, before, out = np.zeros(lanes, kind), np.zeros(lanes, kind), np.empty(self.shape, kind)
+        low, high = self.wide(self.low), self.wide(self.high)
         tracks: dict[int, list] = {}
         for t in self.scenario.tracks:
             if usable(t.u, plan.output):
                 tracks.setdefault(t.sample, []).append(t)
+        tunes = self._tunes()
+        for lane in range(lanes):
+            total[lane] = self.wide(self.starts[lane, 0].u0)
         for k in range(self.shape[1]):
+            for lane, parameters in tunes.get(k, ()):
+                ends = self.wide(self.kind(parameters.low)), self.wide(self.kind(parameters.high))
+                total[lane] = min(max(total[lane], ends[0]), ends[1])
             for lane in self.starting.get(k, ()):
-                total[lane] = self.wide(self.starts[lane, k].u0)
+                if self.starts[lane, k].begun:
+                    total[lane] = self.wide(self.starts[lane, k].u0)
                 before[lane] = self.increment(self.g[lane, k] * self.v_rest[lane, k])
             for t in tracks.get(k, ()):
-                total[t.lane] = self.tracked(t.u)
-            total = clamp(total + (d[:, k] + before), state)
+                total[t.lane] = self.tracked(t.lane, k, t.u)
+            total = total + slewed(plan, d[:, k] + before)
+            total = np.minimum(np.maximum(total, low[:, k]), high[:, k])
             out[:, k], before = total, d[:, k].copy()
         self.integral = total
-        return out if plan.floating else saturate(shift(out, plan.integrator.to_output), plan.output.bits)
+        if plan.floating:
+            return np.minimum(np.maximum(output_of(plan, out), self.low), self.high)
+        return saturate(shift(out, plan.integrator.to_output), plan.output.bits)
 
-    def tracked(self, u) -> np.generic:
-        """The integral that follows the output ``u``."""
-        return self.wide(clamp(np.asarray(u, dtype=self.kind), self.plan.output))
+    def _tunes(self) -> dict[int, list[tuple[int, Applied]]]:
+        """By sample, the lanes whose parameters change ahead of it, in their order."""
+        found: dict[int, list[tuple[int, Applied]]] = {}
+        for lane, course in self.tuned.items():
+            for sample, parameters in course[1:]:
+                found.setdefault(sample, []).append((lane, parameters))
+        return found
+
+    def tracked(self, lane: int, sample: int, u) -> np.generic:
+        """The integral that follows the output ``u`` ahead of a sample."""
+        return self.wide(self.limited(lane, sample, u))
 
     def wide(self, u):
-        """Output counts in counts of the integrator."""
-        return u if self.plan.floating else u << self.plan.integrator.to_output
+        """Output counts as what the integrator holds; as they are without one."""
+        integrator = self.plan.integrator
+        if integrator is None:
+            return u
+        return taken_in(u, integrator.state) if self.plan.floating else u << integrator.to_output
 
     def flags(self, u: np.ndarray) -> np.ndarray:
         """The flags after each step."""
         plan, scenario = self.plan, self.scenario
-        found = FLAG_HIGH * (u >= self.kind(plan.output.high)) + FLAG_LOW * (u <= self.kind(plan.output.low))
+        found = FLAG_HIGH * (u >= self.high) + FLAG_LOW * (u <= self.low)
         outside = np.zeros(self.shape, bool)
         if not plan.floating:
             outside |= (scenario.ref != self.ref) | (scenario.meas != self.meas)
@@ -315,6 +372,12 @@ class Run:
             found = found + FLAG_SCHEDULE * ((self.s < first) | (self.s > last))
             outside |= False if plan.floating else np.asarray(scenario.sched) != self.s
         return (found + FLAG_INPUT * outside).astype(np.uint8)
+
+
+def output_of(plan: Plan, integral: np.ndarray) -> np.ndarray:
+    """u of a floating plan's integral, any shape; an end that is no whole number of counts counts still."""
+    state = plan.integrator.state
+    return integral if state.floating else clamp(values_of(integral, state), plan.output)
 
 
 def scheduled_gain(plan: Plan, s: np.ndarray) -> np.ndarray:

@@ -301,9 +301,10 @@ def actuation(controller: Controller, made: Filter, inputs: Signals, word: Word)
 
 
 def _smallest(gain: Gain) -> float:
-    """The smallest gain that is not 0, with the h/2 in it."""
+    """The smallest gain that is not 0, with the h/2 in it, and the smallest factor on it."""
     counts = gain.schedule.gains if gain.schedule else (gain.constant,)
-    return min((abs(c) for c in counts if c), default=0) * gain.format.lsb
+    factor = gain.tuning.factor.low * gain.tuning.factor.lsb if gain.tuning else 1.0
+    return min((abs(c) for c in counts if c), default=0) * gain.format.lsb * factor
 
 
 def _too_small(controller: Controller, by: int) -> PlanError:

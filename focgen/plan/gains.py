@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.plan.formats import Interval, Word, exponent_for, integer, nearest
-from focgen.plan.model import Count, Format, Plan, Schedule
+from focgen.plan.model import Count, Format, Plan, Schedule, Tuning
+from focgen.plan.tuning import fixed_tuning, floating_reach, gain_intervals, overshoot, segment
 
 _MARGIN = 3  # counts a rounded slope may overshoot the gains it connects
 _FEWEST = 16  # counts that a range must cover to be worth the name
@@ -18,11 +19,14 @@ _FEWEST = 16  # counts that a range must cover to be worth the name
 
 @dataclass(frozen=True)
 class Gain:
-    """The part of a plan that makes g: ``schedule`` or ``constant`` (counts of ``format``)."""
+    """The part of a plan that makes g: ``schedule`` or ``constant`` (counts of ``format``); ``tuning`` where
+    its factors may be changed.
+    """
 
     format: Format
     constant: Count
     schedule: Schedule | None
+    tuning: Tuning | None = None
 
 
 def span_of(low: float, high: float, exponent: int, where: str, what: str) -> Interval:
@@ -50,6 +54,8 @@ def fixed_gain(controller: Controller, factor: float, word: Word) -> Gain:
     largest = max(abs(g) for g in gains)
     if largest == 0.0:
         raise PlanError(where, "is zero: the output would never move", "give a gain")
+    if controller.tunable:
+        return _tunable_gain(controller, points, gains, word, where)
     exponent = exponent_for(largest, word.limit - _MARGIN, where, "the gain")
     counts = tuple(nearest(g * 2.0**-exponent) for g in gains)
     form = Format(integer(word.bits), 2.0**exponent, min(counts) - bool(points), max(counts) + bool(points))
@@ -71,23 +77,55 @@ def _clipped(controller: Controller) -> tuple[tuple[float, ...], tuple[float, ..
 
 
 def _schedule(controller: Controller, points, gains: tuple[int, ...], word: Word, where: str) -> Schedule:
-    low, high = controller.ranges.schedule
-    place = f"{controller.name} [ranges]"
-    exponent = exponent_for(max(abs(low), abs(high), high - low), word.limit - 1, place, "the schedule")
-    reach = span_of(low, high, exponent, place, "schedule")
-    counts = tuple(nearest(p * 2.0**-exponent) for p in points)
+    signal, counts = _points(controller, points, word)
     segments = []
     for i, run in enumerate(np.diff(counts).tolist()):
         slope = _slope(gains[i + 1] - gains[i], run, word)
         if slope is None:
-            near = f"between the breakpoints {points[i]:g} and {points[i + 1]:g}"
-            raise PlanError(
-                where, f"{near} the gain is too steep for {word.bits} bits", "move the breakpoints apart"
-            )
+            raise _too_steep(where, points[i], points[i + 1], word)
         segments.append(slope)
-    unit = controller.units.schedule
-    signal = Format(integer(word.bits), 2.0**exponent, reach.low, reach.high, unit)
     return Schedule(signal, counts, gains, tuple(s for s, _ in segments), tuple(n for _, n in segments))
+
+
+def _points(controller: Controller, points, word: Word) -> tuple[Format, tuple[int, ...]]:
+    """The scheduling signal's format, and the breakpoints in its counts."""
+    low, high = controller.ranges.schedule
+    place = f"{controller.name} [ranges]"
+    exponent = exponent_for(max(abs(low), abs(high), high - low), word.limit - 1, place, "the schedule")
+    reach = span_of(low, high, exponent, place, "schedule")
+    signal = Format(integer(word.bits), 2.0**exponent, reach.low, reach.high, controller.units.schedule)
+    return signal, tuple(nearest(p * 2.0**-exponent) for p in points)
+
+
+def _too_steep(where: str, before: float, after: float, word: Word) -> PlanError:
+    what = f"between the breakpoints {before:g} and {after:g} the gain is too steep for {word.bits} bits"
+    return PlanError(where, what, "move the breakpoints apart")
+
+
+def _tunable_gain(controller: Controller, points, gains: tuple[float, ...], word: Word, where: str) -> Gain:
+    """Gains with factors on them; as the default parameters have them."""
+    box, exponent = fixed_tuning(controller, gains, word)
+    reach = gain_intervals(box)
+    one = Interval(round(1.0 / box.factor.lsb), round(1.0 / box.factor.lsb))
+    default = tuple((one * Interval(int(n), int(n))).shifted(box.to_gain).low for n in box.nominal)
+    low, high = min(i.low for i in reach), max(i.high for i in reach)
+    if not points:
+        return Gain(Format(integer(word.bits), 2.0**exponent, low, high), default[0], None, box)
+    signal, counts = _points(controller, points, word)
+    made, spare = [], 0
+    for i, run in enumerate(np.diff(counts).tolist()):
+        rise = reach[i + 1] - reach[i]
+        one_segment = segment(rise, run, word) if run > 0 else None
+        if one_segment is None:
+            raise _too_steep(where, points[i], points[i + 1], word)
+        spare = max(spare, overshoot(rise, run, *one_segment))
+        made.append(one_segment)
+    per, to_slope, by = zip(*made)
+    rises = (after - before for before, after in zip(default, default[1:]))
+    slopes = tuple(Interval(r * p, r * p).shifted(n).low for r, p, n in zip(rises, per, to_slope))
+    form = Format(integer(word.bits), 2.0**exponent, low - spare, high + spare)
+    box = replace(box, reciprocals=per, to_slopes=to_slope)
+    return Gain(form, 0, Schedule(signal, counts, default, slopes, by), box)
 
 
 def _slope(rise: int, run: int, word: Word) -> tuple[int, int] | None:
@@ -111,7 +149,8 @@ def floating_gain(controller: Controller, factor: float, kind: type[np.floating]
     """The gain times ``factor`` in float or double."""
     if not controller.scheduled:
         constant = float(kind(controller.gain * factor))
-        return Gain(Format(ctype, 1.0, constant, constant), constant, None)
+        made = Gain(Format(ctype, 1.0, constant, constant), constant, None)
+        return _with_factors(made, (constant,), controller, kind) if controller.tunable else made
     points = tuple(float(kind(b)) for b in controller.gain.breakpoints)
     gains = tuple(float(kind(g * factor)) for g in controller.gain.gains)
     if any(b <= a for a, b in zip(points, points[1:])):
@@ -123,21 +162,40 @@ def floating_gain(controller: Controller, factor: float, kind: type[np.floating]
     low, high = (float(kind(x)) for x in controller.ranges.schedule)
     signal = Format(ctype, 1.0, low, high, controller.units.schedule)
     schedule = Schedule(signal, points, gains, slopes, (0,) * len(slopes))
-    return Gain(Format(ctype, 1.0, min(gains), max(gains)), 0.0, schedule)
+    made = Gain(Format(ctype, 1.0, min(gains), max(gains)), 0.0, schedule)
+    return _with_factors(made, gains, controller, kind) if controller.tunable else made
+
+
+def _with_factors(
+    made: Gain, gains: tuple[float, ...], controller: Controller, kind: type[np.floating]
+) -> Gain:
+    """A floating gain with factors on it; its default slopes are products with reciprocals, too."""
+    ends = tuple(float(kind(end)) for end in controller.factors)
+    ctype, schedule = made.format.ctype, made.schedule
+    points = schedule.breakpoints if schedule else ()
+    per = tuple(float(kind(1.0 / (b - a))) for a, b in zip(points, points[1:]))
+    box = Tuning(Format(ctype, 1.0, *ends), gains, 1.0, 0, per, (0,) * len(per))
+    if schedule:
+        rises = [kind(b) - kind(a) for a, b in zip(gains, gains[1:])]
+        schedule = replace(schedule, slopes=tuple(float(r * kind(p)) for r, p in zip(rises, per)))
+    reach = floating_reach([end * gain for end in ends for gain in gains], ctype)
+    return Gain(Format(ctype, 1.0, *reach), made.constant, schedule, box)
 
 
 # ------------------------------------------------------------------------------------------- how exact it is
 
 
 def largest_gain(controller: Controller) -> float:
-    """Largest |gain|."""
-    return max(map(abs, controller.gain.gains)) if controller.scheduled else abs(controller.gain)
+    """Largest |gain|, with the largest factor on it."""
+    return max(map(abs, controller.gains)) * controller.factors[1]
 
 
 def steepest(controller: Controller) -> float:
-    """Largest slope of the gain over the scheduling signal."""
-    gain = controller.gain
-    return float(np.max(np.abs(np.diff(gain.gains) / np.diff(gain.breakpoints))))
+    """Largest slope of the gain over the scheduling signal, whatever the factors."""
+    gains, runs = np.array(controller.gains), np.diff(controller.gain.breakpoints)
+    ends = np.outer(controller.factors, gains)
+    rises = [np.abs(after[1:] - before[:-1]) for before in ends for after in ends]
+    return float(np.max(np.max(rises, axis=0) / runs))
 
 
 def longest_segment(controller: Controller) -> float:
@@ -158,6 +216,28 @@ def table_error(plan: Plan, lsb: float) -> float:
     inside = (places >= min(low, points[0])) & (places <= max(high, points[-1]))
     sides = [_machine_gain(schedule, points, places, side) * lsb - ideal for side in ("left", "right")]
     return float(np.max(np.abs(sides)[:, inside]))
+
+
+def tuned_error(plan: Plan, lsb: float) -> float:
+    """Largest difference of a tunable plan's gain from the controller's with the same physical factors,
+    whatever they are, but for the step's own rounding. ``lsb`` is the physical size of a gain count.
+
+    Integers: half a count each of the factor, the nominal gain and their product, what interpolation may
+    leave the gains by, and breakpoints that are half a count off. Floating: the relative error of every
+    operation between.
+    """
+    box, controller = plan.tuning, plan.controller
+    largest, slope = largest_gain(controller), steepest(controller) if controller.scheduled else 0.0
+    reach = max(map(abs, controller.ranges.schedule)) if controller.scheduled else 0.0
+    if plan.floating:
+        unit = float(np.finfo(np.float32 if plan.arithmetic == "f32" else np.float64).eps)
+        longest = longest_segment(controller) if controller.scheduled else 0.0
+        return unit * (8.0 * (largest + slope * longest) + 2.0 * slope * reach)
+    factor = 0.5 * box.factor.lsb * largest / controller.factors[1]
+    nominal = 0.5 * controller.factors[1] * box.nominal_lsb * lsb / plan.gain.lsb
+    spare = max(int(plan.gain.high) - max(i.high for i in gain_intervals(box)), 0)
+    moved = 0.5 * plan.schedule.signal.lsb * slope if plan.schedule else 0.0
+    return factor + nominal + (0.5 + spare) * lsb + moved
 
 
 def _machine_gain(schedule: Schedule, points: np.ndarray, places: np.ndarray, side: str) -> np.ndarray:

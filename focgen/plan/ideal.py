@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import fftconvolve, lfilter
 
-from focgen.control.controller import Controller
+from focgen.control.controller import Controller, GainSchedule
 from focgen.fractional.transfer import Polynomial
 from focgen.plan.canonical import Realisation, inner_limits, realise
 from focgen.plan.memory import Memory
@@ -41,12 +41,29 @@ def ideal(
     operator = _Operator(realise(controller), controller, count, {m.order: m for m in memories})
     v, rest = operator.run(scenario, endless=length is None)
     gain = controller.gain_at(scenario.sched) if controller.scheduled else controller.gain
+    low, high = (np.full(scenario.ref.shape, end) for end in controller.ranges.output)
+    if scenario.tunes:
+        gain = np.broadcast_to(gain, scenario.ref.shape).copy()
+        _tuned(controller, scenario, gain, low, high)
     d = gain * v
-    low, high = controller.ranges.output
     if not controller.integrator:
         return Trace(np.clip(d, low, high), d)
     first = {place: _gain_there(gain, *place) * value for place, value in rest.items()}
-    return Trace(_integrated(controller, scenario, d, first), d)
+    return Trace(_integrated(controller, scenario, d, first, low, high), d)
+
+
+def _tuned(controller: Controller, scenario: Scenario, gain, low, high) -> None:
+    """Write what physical parameters, none of which is refused, make of gain and limits, shape (lanes,
+    samples), in place.
+    """
+    for tune in sorted(scenario.tunes, key=lambda tune: tune.sample):
+        at = tune.lane, slice(tune.sample, None)
+        gains = tuple(factor * g for factor, g in zip(tune.params.gain, controller.gains))
+        if controller.scheduled:
+            gain[at] = GainSchedule(controller.gain.breakpoints, gains)(scenario.sched[at])
+        else:
+            gain[at] = gains[0]
+        low[at], high[at] = tune.params.u_min, tune.params.u_max
 
 
 def _gain_there(gain, lane: int, sample: int) -> float:
@@ -180,9 +197,14 @@ def _convolved(table: np.ndarray, signal: np.ndarray) -> np.ndarray:
     return fftconvolve(table, signal)[: len(signal)]
 
 
-def _integrated(controller: Controller, scenario: Scenario, d: np.ndarray, first: dict) -> np.ndarray:
-    """The trapezoidal integral of d, clamped to the output limits."""
-    low, high = controller.ranges.output
+def _integrated(
+    controller: Controller, scenario: Scenario, d: np.ndarray, first: dict, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """The trapezoidal integral of d, clamped to the output limits of every sample; what is set ahead of one,
+    and what stands where they change, likewise.
+    """
+    within = lambda u, lane, k: min(max(u, low[lane, k]), high[lane, k])  # noqa: E731
+    most = np.inf if controller.slew_limit is None else controller.slew_limit * controller.sample_time
     starts, tracks = {}, {}
     for s in _segments(scenario):
         starts.setdefault(s.start, []).append(s)
@@ -190,10 +212,12 @@ def _integrated(controller: Controller, scenario: Scenario, d: np.ndarray, first
         tracks.setdefault(t.sample, []).append(t)
     total, before, out = np.zeros(scenario.lanes), np.zeros(scenario.lanes), np.empty(d.shape)
     for k in range(scenario.samples):
+        total = np.minimum(np.maximum(total, low[:, k]), high[:, k])
         for s in starts.get(k, ()):
-            total[s.lane], before[s.lane] = min(max(s.u0, low), high), first[s.lane, s.start]
+            total[s.lane], before[s.lane] = within(s.u0, s.lane, k), first[s.lane, s.start]
         for t in tracks.get(k, ()):
-            total[t.lane] = min(max(t.u, low), high)
-        total = np.minimum(np.maximum(total + 0.5 * controller.sample_time * (d[:, k] + before), low), high)
+            total[t.lane] = within(t.u, t.lane, k)
+        total = total + np.clip(0.5 * controller.sample_time * (d[:, k] + before), -most, most)
+        total = np.minimum(np.maximum(total, low[:, k]), high[:, k])
         out[:, k], before = total, d[:, k].copy()
     return out

@@ -17,7 +17,8 @@ One step, at sample k (steps that a plan does not need are ``None`` and leave no
 5. ``schedule``: g, linear between breakpoints, held beyond them. Without it g is ``constant_gain``.
 6. d_k = shift(g·v_k, gain_shift), in physical output units (per second, times h/2, where an integrator
    follows).
-7. ``integrator``: I = clamp(I + (d_k + d_{k−1})), u = shift(I, to_output). Floating: u = I.
+7. ``integrator``: I = clamp(I + (d_k + d_{k−1})), u = shift(I, to_output). Floating: u = I. With a ``slew``
+   d_k + d_{k−1} is clamped to ± slew first; what is cut off is forgotten, so nothing winds up.
    Without an integrator d is in counts of the output and u = clamp(d_k) to ``low`` … ``high`` of ``output``.
 
 Histories hold the past ``error_lags`` samples of e and the past ``filtered_lags`` samples of v.
@@ -105,6 +106,11 @@ The same structure with one block per sum, lsb 1.0 and no shifts: acc = 0; acc =
 sample to the newest, sample k last. Each operation is rounded to the type, none is contracted; brackets are
 as written above. g = gains[i] + slopes[i]·(s − breakpoints[i]).
 
+In f32 integrals are whole counts (:mod:`focgen.plan.integrals`): d_k and r_k are rounded to counts of 2^−up,
+halves away from zero, to at most 2^61; I and z are int64, as in fixed point, and what they give is the float
+nearest to their count, halves to even, times 2^−up. u is clamped once more, since a limit need be no whole
+number of counts. u0 and ``track``'s u become counts likewise, after their clamp.
+
 An argument is usable where its magnitude is below 2^48 (float) or 2^512 (double); NaN and infinity are not
 (:mod:`focgen.plan.usable`). No other ever enters the state:
 
@@ -116,13 +122,29 @@ An argument is usable where its magnitude is below 2^48 (float) or 2^512 (double
 - A reset takes e = 0 where ref or meas is not usable, and u0 = 0 where u0 is not; the flags are bit 4 then.
 - A track of what is not usable raises bit 4 and does nothing else.
 
-A step with usable inputs whose I + (d_k + d_{k−1}) (without an integrator: d_k) is NaN or infinite, or that
-finds I beyond the output's limits, has a state that no step can have left: a flipped bit, memory that nothing
-has initialised. It is left out in the same way; the output that stands is 0, clamped, where I (or the output
-kept) is no number within the limits. Then the past is as after a reset to this sample's error and that output
+A step with usable inputs has a state that no step can have left, a flipped bit or memory that nothing has
+initialised, where I + (d_k + d_{k−1}) (without an integrator, or in counts: d_k or r_k) is NaN or infinite,
+or where it finds I or a z in counts beyond its limits, a d_{k−1} or r_{k−1} beyond 2^61 counts, or, where
+there are counts, a slot that the ring of e does not have. It is left out in the same way; the output that
+stands is 0, clamped, where I (or the output kept) is no number within the limits, or the slot is none. Then
+the past is as after a reset to this sample's error and that output
 (:mod:`focgen.plan.damage`).
 
 In the integer arithmetics a reset or a track whose argument is beyond its range raises bit 3.
+
+Tuning
+------
+With ``tuning`` the gains and the output's limits are part of the state: ``init`` takes the parameters that
+``default`` gives, and ``tune`` takes others, in this order: ``tune``, ``reset``, ``track``, step.
+
+    g_i = shift(factor_i · nominal_i, to_gain),  slope_i = shift((g_{i+1} − g_i) · reciprocal_i, to_slope_i)
+
+in 64 bits; floating without the shifts. ``tune`` then clamps I to the new limits at once (without an
+integrator the output kept), as every clamp to the output's limits from then on; d_{k−1} stays as it is, so
+only the rate at which u moves changes. Parameters outside the box (``refused``) change nothing. After a
+reset d_{k−1} is taken with the first step's own g, with and without a schedule. ``reset`` and ``track`` keep
+the parameters. A floating step that finds parameters that no ``tune`` has taken (NaN, a gain or a limit
+outside the box) has a damaged state, and the default ones return with the mended one.
 """
 
 from __future__ import annotations
@@ -153,6 +175,7 @@ __all__ = [
     "Proof",
     "Schedule",
     "Sum",
+    "Tuning",
 ]
 
 LONGEST = 65_534
@@ -205,6 +228,26 @@ class Integrator:
 
     state: Format
     to_output: int
+    slew: Count | None = None
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What may be changed at run time, and what it takes to do so; see the module's description.
+
+    ``factor``: the format and the box of the factors, in counts. ``nominal``: the gains that they are on,
+    counts of ``nominal_lsb``, one a breakpoint or the only one. ``reciprocals`` and ``to_slopes`` have one
+    entry a segment. ``low`` and ``high``: the boxes of the limits, counts of the output.
+    """
+
+    factor: Format
+    nominal: tuple[Count, ...]
+    nominal_lsb: float
+    to_gain: int
+    reciprocals: tuple[Count, ...] = ()
+    to_slopes: tuple[int, ...] = ()
+    low: tuple[Count, Count] = (0, 0)
+    high: tuple[Count, Count] = (0, 0)
 
 
 @dataclass(frozen=True)
@@ -261,6 +304,9 @@ class Plan:
     ``tolerance`` are what was asked for, and ``length`` counts the past samples that the taps need.
     ``operator`` is "gl" where they follow the Grünwald–Letnikov weights, or "continuous" where they follow
     (jω)^α: then in the ``band``, in rad/s, and there is no horizon.
+
+    With ``tuning``, ``schedule`` and ``constant_gain`` are those of the default parameters, ``gain`` reaches
+    as far as any others take it, and so do the proofs and bounds.
     """
 
     controller: Controller
@@ -293,11 +339,19 @@ class Plan:
     horizon: int | None = None
     operator: str = "gl"
     band: tuple[float, float] | None = None
+    tuning: Tuning | None = None
 
     @property
     def exponential(self) -> bool:
         """Whether the memory is a sum of exponentials."""
         return self.memory == "exponential"
+
+    @property
+    def box(self) -> Tuning:
+        """``tuning`` of a plan that has it. Raises ValueError for any other."""
+        if self.tuning is None:
+            raise ValueError(f"{self.name} has no parameters")
+        return self.tuning
 
     @property
     def sums(self) -> tuple[Sum, ...]:
@@ -324,6 +378,12 @@ class Plan:
     def floating(self) -> bool:
         """Whether the arithmetic is f64 or f32."""
         return self.output.floating
+
+    @property
+    def counted(self) -> bool:
+        """Whether it is floating and has an integral in whole counts."""
+        integrals = (self.integrator, self.inner)
+        return self.floating and any(i is not None and not i.state.floating for i in integrals)
 
     @property
     def error_lags(self) -> int:

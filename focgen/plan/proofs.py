@@ -8,25 +8,29 @@ follows.
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 
 from focgen.errors import PlanError
 from focgen.plan.banks import departure, drive_error, driven_by, mean_of
+from focgen.plan.counts import MOST
 from focgen.plan.formats import Interval, limit, span, weighted
-from focgen.plan.model import Bank, Plan, Proof, Schedule, Sum
+from focgen.plan.model import Bank, Plan, Proof, Schedule, Sum, Tuning
 from focgen.plan.modes import LAGS, Modes, Response, response_of
 from focgen.plan.stability import Inverse, inverse
 
 
 def prove(plan: Plan) -> tuple[Proof, ...]:
-    """One proof for each integer node, in the order of a step; none for floating arithmetic.
+    """One proof for each integer node, in the order of a step; of floating arithmetic its integrals in
+    counts.
 
     Raises PlanError naming the node that cannot be proved.
     """
-    if plan.floating:
-        return ()
     ledger = _Ledger(plan)
+    if plan.floating:
+        ledger.integrals()
+        return tuple(ledger.proofs)
     ledger.inputs()
     p = ledger.combined()
     v = ledger.filtered(p)
@@ -56,6 +60,14 @@ class _Ledger:
         plan = self.plan
         reach = span(plan.reference) - span(plan.measurement)
         self.add("error", reach, plan.error.ctype, "range")
+
+    def integrals(self) -> None:
+        """Those that a floating plan has in counts; an increment beyond ``MOST`` is cut to it."""
+        plan, each = self.plan, Interval(-MOST, MOST)
+        for node, integral in (("inner sum", plan.inner), ("integrator sum", plan.integrator)):
+            if integral and not integral.state.floating:
+                reach = span(integral.state).hull(0) + each + each
+                self.add(node, reach, integral.state.ctype, "clamp")
 
     def bank(self, name: str, bank: Bank, past: Interval) -> Interval:
         """What a mode keeps, how far u is from it, D, its product with the rate, and the sum of all."""
@@ -119,11 +131,48 @@ class _Ledger:
     def gain(self) -> Interval:
         """g, over every segment of the schedule."""
         plan = self.plan
+        if plan.tuning:
+            return self.tuned_gain(plan.tuning)
         if plan.schedule is None:
             return Interval(int(plan.constant_gain), int(plan.constant_gain))
         reach, product, spare = _schedule(plan.schedule)
         self.add("slope product", product, _double(plan), "range", spare)
         return self.add("gain", reach, plan.gain.ctype, "range")
+
+    def tuned_gain(self, box: Tuning) -> Interval:
+        """g over the whole box of factors: what ``tune`` computes, then what a step makes of it.
+
+        A gain between two breakpoints lies between those at them, but for the rounding of the slope.
+        """
+        plan, how = self.plan, "box of the parameters"
+        factors = Interval(int(box.factor.low), int(box.factor.high))
+        half, products = (1 << box.to_gain) >> 1, [factors * _exactly(n) for n in box.nominal]
+        self.add("tuned gain product", _hull(products), "int64_t", how, half)
+        ends = [product.shifted(box.to_gain) for product in products]
+        self.add("tuned gain", _hull(ends), plan.gain.ctype, how)
+        reach = _hull(ends)
+        if plan.schedule:
+            reach = _hull([reach, *self.slopes(box, ends)])
+        return self.add("gain", reach, plan.gain.ctype, how)
+
+    def slopes(self, box: Tuning, ends: list[Interval]) -> list[Interval]:
+        """Of every segment: the reciprocal's product, the slope, its product in a step; what g can be."""
+        schedule, products, slopes, steps, reach = self.plan.schedule, [], [], [], []
+        spare, by_slope = 0, 0
+        segments = zip(box.reciprocals, box.to_slopes, schedule.slope_shifts, np.diff(schedule.breakpoints))
+        for i, (per, to_slope, by, run) in enumerate(segments):
+            rise = ends[i + 1] - ends[i]
+            products.append(rise * _exactly(per))
+            slopes.append(products[-1].shifted(to_slope))
+            steps.append(slopes[-1] * Interval(0, int(run) - 1))
+            spare, by_slope = max(spare, (1 << to_slope) >> 1), max(by_slope, (1 << by) >> 1)
+            beyond = _beyond(rise, per, to_slope, by, int(run))
+            reach.append(_hull([ends[i], ends[i + 1]]) + Interval(-beyond, beyond))
+        how = "box of the parameters"
+        self.add("tuned slope product", _hull(products), "int64_t", how, spare)
+        self.add("tuned slope", _hull(slopes), self.plan.gain.ctype, how)
+        self.add("slope product", _hull(steps).hull(0), _double(self.plan), how, by_slope)
+        return reach
 
     def actuation(self, v: Interval, g: Interval) -> None:
         """Product, increment, integrator and output."""
@@ -136,6 +185,22 @@ class _Ledger:
             half = (1 << plan.integrator.to_output) >> 1
             self.add("integrator sum", span(state).hull(0) + d + d, state.ctype, "clamp", half)
         self.add("output", span(plan.output), plan.output.ctype, "clamp")
+
+
+def _exactly(count) -> Interval:
+    return Interval(int(count), int(count))
+
+
+def _hull(parts: list[Interval]) -> Interval:
+    return Interval(min(part.low for part in parts), max(part.high for part in parts))
+
+
+def _beyond(rise: Interval, per: int, to_slope: int, by: int, run: int) -> int:
+    """By how many counts a segment's line can leave its ends: slope · n / 2^by is rise · n / run, but for the
+    reciprocal, which is off by less than half a count, the slope's rounding and the last one.
+    """
+    off = Fraction(rise.worst * run, 2 << (to_slope + by)) + Fraction(run, 2 << by)
+    return math.ceil(off + Fraction(1, 2))
 
 
 def _both(count) -> Interval:

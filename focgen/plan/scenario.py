@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,10 +35,30 @@ class Track:
 
 
 @dataclass(frozen=True)
+class Params:
+    """What NAME_params holds, raw or physical: a factor on each gain, and the output's limits."""
+
+    gain: tuple[float, ...]
+    u_min: float
+    u_max: float
+
+
+@dataclass(frozen=True)
+class Tune:
+    """``tune(params)`` of one lane before sample ``sample``; there it comes before a reset, and after tunes
+    that stand before it.
+    """
+
+    lane: int
+    sample: int
+    params: Params
+
+
+@dataclass(frozen=True)
 class Damage:
     """What a run cannot do, in a floating state before sample ``sample``, whose inputs can be used: ``what``
-    is the latest "error", which becomes NaN, the "integral", which leaves its limits, or "all", every byte
-    becoming 0xff.
+    is the latest "error", which becomes NaN, the "integral", which leaves its limits, the "limits" or the
+    "gains" of a tunable plan, which leave their box, or "all", every byte becoming 0xff.
     """
 
     lane: int
@@ -61,6 +81,7 @@ class Scenario:
     resets: tuple[Reset, ...] = ()
     tracks: tuple[Track, ...] = ()
     damages: tuple[Damage, ...] = ()
+    tunes: tuple[Tune, ...] = ()
 
     @property
     def lanes(self) -> int:
@@ -109,6 +130,7 @@ def to_raw(plan: Plan, physical: Scenario) -> Scenario:
         None if plan.schedule is None else nearest_raw(physical.sched, plan.schedule.signal),
         tuple(Reset(r.lane, r.sample, one(r.ref, e), one(r.meas, e), one(r.u0, u)) for r in physical.resets),
         tuple(Track(t.lane, t.sample, one(t.u, u)) for t in physical.tracks),
+        tunes=tuple(replace(t, params=raw_params(plan, t.params)) for t in physical.tunes),
     )
 
 
@@ -124,7 +146,22 @@ def to_physical(plan: Plan, raw: Scenario) -> Scenario:
             Reset(r.lane, r.sample, float(r.ref) * e, float(r.meas) * e, float(r.u0) * u) for r in raw.resets
         ),
         tuple(Track(t.lane, t.sample, float(t.u) * u) for t in raw.tracks),
+        tunes=tuple(replace(t, params=physical_params(plan, t.params)) for t in raw.tunes),
     )
+
+
+def raw_params(plan: Plan, params: Params) -> Params:
+    """The raw parameters nearest to physical ones."""
+    one = lambda value, form: nearest_raw(value, form)[()].item()  # noqa: E731
+    gain = tuple(one(factor, plan.tuning.factor) for factor in params.gain)
+    return Params(gain, one(params.u_min, plan.output), one(params.u_max, plan.output))
+
+
+def physical_params(plan: Plan, params: Params) -> Params:
+    """The physical parameters that raw ones stand for, exactly."""
+    factor, u = plan.tuning.factor.lsb, plan.output.lsb
+    gain = tuple(float(count) * factor for count in params.gain)
+    return Params(gain, float(params.u_min) * u, float(params.u_max) * u)
 
 
 def physical_trace(plan: Plan, trace: Trace) -> Trace:

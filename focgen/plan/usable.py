@@ -17,7 +17,8 @@ from focgen.errors import PlanError
 from focgen.fractional.elementary import l1
 from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
 from focgen.plan.proofs import inverse_of_recursion
-from focgen.plan.scenario import Reset, Scenario, Trace, Track
+from focgen.plan.scenario import Reset, Scenario, Trace, Track, Tune
+from focgen.plan.tuning import applied, courses, refused
 
 EXPONENT = {"float": 48, "double": 512}
 """log2 of the magnitude from which on an input is not used, by type."""
@@ -50,20 +51,27 @@ def check_room(plan: Plan) -> None:
 
 def reach(plan: Plan, error: float) -> float:
     """A bound on every intermediate magnitude of a floating plan for |e| ≤ ``error``, from l1 norms."""
-    p, r, z = _l1(plan.direct) * error, 0.0, 0.0
-    if plan.inner:
-        r, z = _l1(plan.inner.rest) * error, _largest(plan.inner.state)
-    v = after = p + z
-    if plan.feedback:
-        own = inverse_of_recursion(plan)
-        v = max(own.norm * (p + z), abs(plan.feedback.steady) * error) if own else np.inf
-        after = p + z + _l1(plan.feedback.table) * v
+    r = l1_of(plan.inner.rest) * error if plan.inner else 0.0
+    z = _largest(plan.inner.state) * plan.inner.state.lsb if plan.inner else 0.0
+    v = filtered_reach(plan, error)
+    after = l1_of(plan.direct) * error + z + (l1_of(plan.feedback.table) * v if plan.feedback else 0.0)
     drives = [_drive(table) * (error if table.history == "error" else v) for table in plan.sums]
     gain = max(abs(plan.gain.low), abs(plan.gain.high))
     return max(after, z + 2.0 * r, v, _largest(plan.output) + 2.0 * gain * v, *drives)
 
 
-def _l1(table: Sum | None) -> float:
+def filtered_reach(plan: Plan, error: float) -> float:
+    """A bound on |v| of a floating plan for |e| ≤ ``error``, and for what a reset makes of it."""
+    p = l1_of(plan.direct) * error
+    if plan.inner:
+        p += _largest(plan.inner.state) * plan.inner.state.lsb
+    if plan.feedback is None:
+        return p
+    own = inverse_of_recursion(plan)
+    return max(own.norm * p, abs(plan.feedback.steady) * error) if own else np.inf
+
+
+def l1_of(table: Sum | None) -> float:
     """Of taps, and of modes, whose drives reach 2 m times what drives them."""
     if table is None:
         return 0.0
@@ -106,14 +114,28 @@ def holding(
     """
     order = _good_first(invalid)
     ran = execute(plan, good_samples(plan, scenario, invalid))
+    low, high = _limits(plan, scenario)
     u, d, flags = (np.zeros_like(part) for part in (ran.u, ran.d, ran.flags))
     for whole, part in ((u, ran.u), (d, ran.d), (flags, ran.flags)):
         np.put_along_axis(whole, order, part, axis=1)
     for lane in np.flatnonzero(invalid.any(axis=1)):
         _hold(plan, scenario, int(lane), invalid[lane], u[lane])
-    ends = FLAG_HIGH * (u >= u.dtype.type(plan.output.high)) + FLAG_LOW * (u <= u.dtype.type(plan.output.low))
+    ends = FLAG_HIGH * (u >= high) + FLAG_LOW * (u <= low)
     flags = np.where(invalid, ends + FLAG_INVALID, flags).astype(np.uint8)
     return Trace(u, np.where(invalid, d.dtype.type(0), d), flags)
+
+
+def _limits(plan: Plan, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """The output's limits at every sample, shape (lanes, samples)."""
+    low, high = (np.full(scenario.ref.shape, end, scenario.ref.dtype.type) for end in _ends(plan))
+    for lane, course in (courses(plan, scenario) if plan.tuning else {}).items():
+        for sample, now in course[1:]:
+            low[lane, sample:], high[lane, sample:] = now.low, now.high
+    return low, high
+
+
+def _ends(plan: Plan) -> tuple[float, float]:
+    return plan.output.low, plan.output.high
 
 
 def _good_first(invalid: np.ndarray) -> np.ndarray:
@@ -122,7 +144,11 @@ def _good_first(invalid: np.ndarray) -> np.ndarray:
 
 
 def good_samples(plan: Plan, scenario: Scenario, invalid: np.ndarray) -> Scenario:
-    """The good samples of each lane, then zeros; an event comes before the next good sample."""
+    """The good samples of each lane, then zeros; an event comes before the next good sample.
+
+    Parameters are taken ahead of a reset and a track there, so where these came first the values that they
+    set are limited as the parameters would have.
+    """
     order = _good_first(invalid)
     signals = {
         name: np.take_along_axis(np.where(invalid, values.dtype.type(0), values), order, axis=1)
@@ -132,38 +158,74 @@ def good_samples(plan: Plan, scenario: Scenario, invalid: np.ndarray) -> Scenari
     place = np.cumsum(~invalid, axis=1) - ~invalid
     resets: dict[tuple[int, int], Reset] = {}
     tracks: dict[tuple[int, int], Track] = {}
+    tunes: list[Tune] = []
+    ends = dict.fromkeys(range(scenario.lanes), _ends(plan))
     for event in events(scenario):
         at = event.lane, int(place[event.lane, event.sample])
         if isinstance(event, Track) and not usable(event.u, plan.output):
             continue  # and must not displace one that is usable
         if isinstance(event, Reset):
             tracks.pop(at, None)  # what was tracked before is forgotten
-        (resets if isinstance(event, Reset) else tracks)[at] = replace(event, sample=at[1])
-    return Scenario(**signals, resets=tuple(resets.values()), tracks=tuple(tracks.values()))
+        moved = replace(event, sample=at[1])
+        if isinstance(event, Tune):
+            tunes.append(moved)
+            ends[event.lane] = _taken(plan, event, ends[event.lane])
+            if at in resets:
+                resets[at] = _limited(plan, resets[at], "u0", ends[event.lane])
+            if at in tracks:
+                tracks[at] = _limited(plan, tracks[at], "u", ends[event.lane])
+        elif isinstance(event, Reset):
+            resets[at] = _limited(plan, moved, "u0", ends[event.lane])
+        else:
+            tracks[at] = _limited(plan, moved, "u", ends[event.lane])
+    return Scenario(
+        **signals, resets=tuple(resets.values()), tracks=tuple(tracks.values()), tunes=tuple(tunes)
+    )
 
 
-def events(scenario: Scenario) -> list[Reset | Track]:
-    """Resets and tracks in the order in which they happen."""
-    found = [*scenario.resets, *scenario.tracks]  # the sort keeps a reset ahead of a track of its sample
+def _taken(plan: Plan, event: Tune, ends: tuple[float, float]) -> tuple[float, float]:
+    """The limits after an event that may change them."""
+    if refused(plan, event.params):
+        return ends
+    now = applied(plan, event.params)
+    return now.low, now.high
+
+
+def _limited(plan: Plan, event: Reset | Track, name: str, ends: tuple[float, float]) -> Reset | Track:
+    """An event whose output is within limits; one that cannot be used stands for 0."""
+    value = getattr(event, name)
+    if plan.tuning is None:
+        return event
+    value = value if usable(value, plan.output) else type(value)(0)
+    return replace(event, **{name: type(value)(min(max(value, ends[0]), ends[1]))})
+
+
+def events(scenario: Scenario) -> list[Reset | Track | Tune]:
+    """Tunes, resets and tracks in the order in which they happen."""
+    found = [*scenario.tunes, *scenario.resets, *scenario.tracks]  # the sort keeps it within a sample
     return sorted(found, key=lambda event: event.sample)
 
 
 def _hold(plan: Plan, scenario: Scenario, lane: int, invalid: np.ndarray, u: np.ndarray) -> None:
     """Fill in the outputs of steps that were left out, in place."""
-    kind, low, high = u.dtype.type, plan.output.low, plan.output.high
-    start = min(max(kind(0), kind(low)), kind(high))
+    kind, ends = u.dtype.type, _ends(plan)
+    limited = lambda value: min(max(kind(value), kind(ends[0])), kind(ends[1]))  # noqa: E731
     happening: dict[int, list] = {}
     for event in events(scenario):
         if event.lane == lane:
             happening.setdefault(event.sample, []).append(event)
-    now = start
+    now = limited(0)
     for k in range(len(u)):
         for event in happening.get(k, ()):
+            if isinstance(event, Tune):
+                ends = _taken(plan, event, ends)
+                now = limited(now)
+                continue
             if isinstance(event, Reset):
-                now = start
+                now = limited(0)
             given, keeps = (event.u0, event.keeps) if isinstance(event, Reset) else (event.u, False)
             if (plan.integrator or keeps) and usable(given, plan.output):
-                now = min(max(kind(given), kind(low)), kind(high))
+                now = limited(given)
         now = u[k] = now if invalid[k] else u[k]
 
 
@@ -174,8 +236,13 @@ def refused_events(plan: Plan, scenario: Scenario, flags: np.ndarray) -> np.ndar
     A track leaves what the step before has raised, a reset does not.
     """
     raised, found = FLAG_INVALID | FLAG_INPUT, np.zeros(flags.shape, bool)
+    ends = dict.fromkeys(range(scenario.lanes), _ends(plan))
     for event in events(scenario):
         at = event.lane, event.sample
+        if isinstance(event, Tune):
+            ends[event.lane] = _taken(plan, event, ends[event.lane])
+            continue
+        output = replace(plan.output, low=ends[event.lane][0], high=ends[event.lane][1])
         if isinstance(event, Reset):
             found[at] = _refused(plan, (event.ref, plan.reference), (event.meas, plan.measurement))
             given = event.u0
@@ -183,7 +250,7 @@ def refused_events(plan: Plan, scenario: Scenario, flags: np.ndarray) -> np.ndar
             reset = any((r.lane, r.sample) == at for r in scenario.resets)
             found[at] |= not reset and event.sample > 0 and bool(flags[event.lane, event.sample - 1] & raised)
             given = event.u
-        found[at] |= plan.integrator is not None and _refused(plan, (given, plan.output))
+        found[at] |= plan.integrator is not None and _refused(plan, (given, output))
     return found
 
 

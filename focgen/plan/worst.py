@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -10,7 +12,8 @@ from focgen.plan.execute import scheduled_gain
 from focgen.plan.model import Plan, Sum
 from focgen.plan.modes import Modes
 from focgen.plan.proofs import sum_response
-from focgen.plan.scenario import Reset, Scenario
+from focgen.plan.scenario import Reset, Scenario, Tune
+from focgen.plan.tuning import default_params
 
 _LONGEST = 400  # samples of an exponential memory's response
 _SETTLED = 8  # memory lengths after which a recursion's response is taken to have died away
@@ -32,7 +35,15 @@ def worst_case_input(plan: Plan, node: str) -> Scenario:
     signs = np.stack([errors, others]) > 0
     ref = np.where(signs, plan.reference.high, plan.reference.low)
     meas = np.where(signs, plan.measurement.low, plan.measurement.high)
-    return Scenario(ref, meas, _schedule(plan, node, ref.shape), _resets(plan, node))
+    return Scenario(ref, meas, _schedule(plan, node, ref.shape), _resets(plan, node), tunes=_largest(plan))
+
+
+def _largest(plan: Plan) -> tuple[Tune, ...]:
+    """The largest factors there are, in both lanes."""
+    if plan.tuning is None:
+        return ()
+    most = (plan.tuning.factor.high,) * len(plan.tuning.nominal)
+    return tuple(Tune(lane, 0, replace(default_params(plan), gain=most)) for lane in range(2))
 
 
 def _response(plan: Plan, node: str) -> np.ndarray:

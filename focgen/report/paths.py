@@ -74,7 +74,7 @@ class _Chain:
     found: list[Page] = field(default_factory=list)  # studies and diagnoses: pages by themselves
 
 
-def report(paths: Sequence[str | Path], out: str | Path) -> Path:
+def report(paths: str | Path | Sequence[str | Path], out: str | Path) -> Path:
     """Write one self-contained HTML page of ``paths`` to the file ``out``, and return it.
 
     A path is a rig or a controller, a log to be replayed with the rig, a folder that generate, study or
@@ -82,10 +82,10 @@ def report(paths: Sequence[str | Path], out: str | Path) -> Path:
     are simulated; nothing is compiled or run. Raises InputError for a path that is none of these,
     MissingExtra where Bokeh is not installed.
     """
-    paths = [Path(path) for path in ((paths,) if isinstance(paths, (str, Path)) else paths)]
+    places = [Path(path) for path in ((paths,) if isinstance(paths, (str, Path)) else paths)]
     library()  # before anything takes time
-    check_apart([out], [path for given in paths for path in _files(given)])
-    write_file(out, page_of(paths).self_contained(), [path for path in paths if path.is_file()])
+    check_apart([out], [path for given in places for path in _files(given)])
+    write_file(out, page_of(places).self_contained(), [path for path in places if path.is_file()])
     return Path(out)
 
 
@@ -167,7 +167,7 @@ def _diagnosis(folder: Path) -> Page:
 
 def _manifest(path: Path) -> dict[str, Any]:
     remedy = "name a folder that `focgen generate` has written"
-    value = read_json(path, remedy)
+    value: dict[str, Any] = read_json(path, remedy)
     if not fits(value, _MANIFEST):
         raise InputError(str(path), "is no manifest", remedy)
     return value
@@ -175,7 +175,7 @@ def _manifest(path: Path) -> dict[str, Any]:
 
 def _verified(path: Path) -> dict[str, Any]:
     remedy = "name what `focgen verify DIR --json` printed"
-    value = read_json(path, remedy)
+    value: dict[str, Any] = read_json(path, remedy)
     if not fits(value, _VERIFIED) or not all(
         fits(one, ({"skipped": str}, _RAN)) for one in value["targets"].values()
     ):
@@ -188,7 +188,7 @@ def _sections(chain: _Chain) -> list[Section]:
     rig, sections = chain.rig, []
     if rig is not None:
         sections.append(rig_section(rig))
-    if chain.logs:
+    if chain.logs and rig is not None:
         logs: tuple[Experiment, ...] = experiments(rig, chain.logs)
         sections.append(replay_section(rig, logs, replay(rig, logs)))
     if chain.controller is not None:

@@ -8,7 +8,7 @@
 #include "bent.h"
 
 enum { BALANCED = 2, TURNS = 40 };
-static const double FLAT = 0.05, CLOSE = 1e-13;
+static const double FLAT = 0.05, CLOSE = 1e-7; /* Newton's step squares what is missing */
 
 static double pull(const double *spring, double y, double *slope)
 {

@@ -68,13 +68,14 @@ Step = tuple[tuple, Callable[[np.ndarray, Run], np.ndarray], Placed | None]
 class Chain:
     """A rig with effects, made to be run again and again with few things changed.
 
-    What a step did last is remembered by its input and parameters, so that only what comes after a changed
-    one is run.
+    What a step did lately is remembered by its input and parameters, so that only what comes after a changed
+    one is run: twice at most, by its place. A ``probe`` runs on what others remember and leaves nothing.
     """
 
     rig: Rig
     placed: tuple[Placed, ...] = ()
     remember: dict | None = None
+    probe: bool = False
 
     def run(
         self,
@@ -129,8 +130,9 @@ class Chain:
             if old_x is x and old_key == key:
                 return y
         y = act(x, run)
-        kept.insert(0, (key, x, y))
-        del kept[2:]
+        if not self.probe:
+            kept.insert(0, (key, x, y))
+            del kept[2:]
         return y
 
     def steps(self, stage: str, between: Between | bool) -> list[Step]:
@@ -207,7 +209,7 @@ def _linear(actuator: LinearActuator, dynamics: Dynamics, between, delay: float)
 
 def _plant(plant: plants.Plant, dynamics: Dynamics, between, delay: float) -> Step:
     def act(x: np.ndarray, run: Run) -> np.ndarray:
-        made = plants.respond(plant, x, run.rest, run.h, dynamics, between)
+        made = plants.respond(plant, x, run.rest, run.h, dynamics, between, run.rough)
         return delayed(made, run.rest, run.h, delay) if delay else made
 
     return (plant, dynamics, between, delay), act, None

@@ -30,18 +30,21 @@ from focgen.tomlfile import Table, terms_of
 _STAGES = ("regulator", "actuator", "sensor")
 _ROLES = ("time", "output", "command", "pressure", "curvature", "reference")
 _LONGEST = 1e6  # samples that a nominal delay may have
+_WHICH = "say which log column plays which role"
 
 
 def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
     """Read a rig from its file, or from a dictionary of the same shape. Raises RigError naming file, table,
     key and remedy."""
-    given = isinstance(path, Mapping)
-    top = Table(path, "rig", RigError) if given else Table.read(path, RigError)
+    if isinstance(path, Mapping):
+        top, usual = Table(path, "rig", RigError), "rig"
+    else:
+        top, usual = Table.read(path, RigError), Path(path).stem
     sample_time = top.number("sample_time", above=0.0)
     stages = {stage: top.table(stage) for stage in _STAGES}
     delays = Delays(**{stage: _delay(table, sample_time) for stage, table in stages.items()})
     rig = Rig(
-        name=top.text("name", "rig" if given else Path(path).stem),
+        name=top.text("name", usual),
         sample_time=sample_time,
         signals=_signals(top),
         actuator=_actuator(stages["actuator"]),
@@ -51,16 +54,14 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         effects=_effects(top),
         delays=delays,
         uncertainty=_uncertainty(top.table("uncertainty")),
-        between=_between(top.table("signals")),
+        between=_between(top.section("signals", _WHICH)),
     )
     top.done()
     return rig
 
 
 def _signals(top: Table) -> Signals:
-    table = top.table("signals")
-    if table is None:
-        raise top.fail(None, "lacks the table [signals]", "say which log column plays which role")
+    table = top.section("signals", _WHICH)
     for role in ("time", "output"):
         table.required(role)
     named = {role: _column(table, role) for role in _ROLES}
@@ -71,7 +72,8 @@ def _signals(top: Table) -> Signals:
         raise table.fail(None, "has neither 'command' nor 'pressure'", "name the column of the input")
     _check_columns(table, found)
     scales = {role: scale for role, (_, scale) in named.items() if scale is not None}
-    signals = Signals(**found, scales=scales, units=_units(top.table("units")))
+    columns: dict[str, Any] = dict(found)
+    signals = Signals(**columns, scales=scales, units=_units(top.table("units")))
     for role, scale in scales.items():
         try:
             scale.applied(np.zeros(1), "s" if role == "time" else signals.units.get(role))
@@ -96,7 +98,7 @@ def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:
     """A role's column, by its name or as a table that says how it is scaled too."""
     if not isinstance(table.raw(role), dict):
         return table.text(role), None
-    given = table.table(role)
+    given = table.section(role, "")
     name = given.required("column") and given.text("column")
     scale = Scale(given.number("scale", 1.0), given.number("offset", 0.0), given.text("unit"))
     given.done()
@@ -110,7 +112,7 @@ def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:
 def _units(table: Table | None) -> dict[str, str]:
     if table is None:
         return {}
-    found = {role: table.text(role) for role in _ROLES if role in table}
+    found = {role: table.text(role, "") for role in _ROLES if role in table}
     table.done()
     if found.pop("time", "s") != "s":
         raise table.fail(
@@ -123,7 +125,9 @@ def _check_columns(table: Table, columns: dict[str, str | None]) -> None:
     """Refuse a column with two roles: the stage between them would be taken for 1 without a word."""
     roles: dict[str, str] = {}
     for role, column in columns.items():
-        if column is not None and column in roles:
+        if column is None:
+            continue
+        if column in roles:
             remedy = "give each role its own column, and leave out what is not logged"
             raise table.fail(role, f"is the column {column!r}, as {roles[column]!r} is", remedy)
         roles[column] = role
@@ -131,7 +135,9 @@ def _check_columns(table: Table, columns: dict[str, str | None]) -> None:
 
 def _delay(table: Table | None, sample_time: float) -> float:
     """The stage's dead time, s; 0 where it has none."""
-    delay = 0.0 if table is None else table.number("delay", 0.0)
+    if table is None:
+        return 0.0
+    delay = table.number("delay", 0.0)
     if delay < 0.0:
         raise table.fail("delay", f"is {delay:g}", "give a time of 0 s or more")
     if delay > _LONGEST * sample_time:
@@ -158,9 +164,10 @@ def _actuator(table: Table | None) -> Actuator | LinearActuator | None:
     offset = table.number("offset", 0.0)
     if "num" in table or _delays_only(table):
         transfer = UNITY if _delays_only(table) else _proper(table)
-        actuator = LinearActuator(transfer, offset, table.number("bias", 0.0))
-    else:
-        actuator = Actuator(table.number("T", above=0.0), _alpha(table), table.numbers("gain"), offset)
+        linear = LinearActuator(transfer, offset, table.number("bias", 0.0))
+        table.done()
+        return linear
+    actuator = Actuator(table.number("T", above=0.0), _alpha(table), table.numbers("gain"), offset)
     table.done()
     return actuator
 
@@ -211,7 +218,7 @@ def _relative(table: Table | None, usual: Relative) -> Relative:
     return found
 
 
-def _effects(top: Table) -> tuple:
+def _effects(top: Table) -> tuple[Mapping[str, Any], ...]:
     effects = top.raw("effects", [])
     if not isinstance(effects, list) or not all(isinstance(e, dict) and "name" in e for e in effects):
         raise top.fail("effects", "is not a list of tables with a 'name'", "write each effect as [[effects]]")
@@ -228,9 +235,9 @@ def rig_text(rig: Rig) -> str:
     return tomlkit.dumps(rig_table(rig))
 
 
-def rig_table(rig: Rig) -> dict:
+def rig_table(rig: Rig) -> dict[str, Any]:
     """The rig as nested dictionaries, in the order of the file."""
-    table: dict = {"name": rig.name, "sample_time": rig.sample_time}
+    table: dict[str, Any] = {"name": rig.name, "sample_time": rig.sample_time}
     table["signals"] = _signals_table(rig.signals)
     if rig.between is not None:
         table["signals"]["between"] = rig.between.name.lower()
@@ -257,7 +264,7 @@ def rig_table(rig: Rig) -> dict:
     return table
 
 
-def _signals_table(signals: Signals) -> dict:
+def _signals_table(signals: Signals) -> dict[str, Any]:
     named = {role: getattr(signals, role) for role in (*_ROLES, "run")}
     return {
         role: _column_table(name, signals.scales.get(role))
@@ -266,18 +273,19 @@ def _signals_table(signals: Signals) -> dict:
     }
 
 
-def _column_table(name: str, scale: Scale | None) -> str | dict:
+def _column_table(name: str, scale: Scale | None) -> str | dict[str, Any]:
     if scale is None:
         return name
     given = {"unit": scale.unit} if scale.unit is not None else {"scale": scale.scale, "offset": scale.offset}
     return {"column": name, **given}
 
 
-def _relative_table(part: Relative, usual: Relative) -> dict:
+def _relative_table(part: Relative, usual: Relative) -> dict[str, Any]:
     return {key: value for key, value in vars(part).items() if vars(usual)[key]}
 
 
-def _actuator_table(actuator: Actuator | LinearActuator) -> dict:
+def _actuator_table(actuator: Actuator | LinearActuator) -> dict[str, Any]:
+    table: dict[str, Any]
     if isinstance(actuator, Actuator):
         table = {"T": actuator.T, "alpha": actuator.alpha, "gain": list(actuator.gain)}
     else:

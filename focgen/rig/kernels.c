@@ -89,12 +89,20 @@ void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest
             double to = past + (x[k] - past) * (j + 1.0) / sub, gap = to - now;
             double root = sqrt(fabs(gap) * scale), share;
             double time = (gap > 0.0 ? tau : vent) * (root / scale + 0.02);
-            share = time > 0.0 ? -expm1(-step / time) : 1.0;
+            share = time > 0.0 ? 1.0 - exp(-step / time) : 1.0;
             now += share * gap;
         }
         past = x[k];
         y[k] = now;
     }
+}
+
+/* tanh, by its series where it is close to a line. */
+static double bounded(double x)
+{
+    double square = x * x;
+    if (square < 1e-3) return x * (1.0 - square / 3.0 * (1.0 - 0.4 * square * (1.0 - 17.0 / 42.0 * square)));
+    return 1.0 - 2.0 / (exp(2.0 * x) + 1.0);
 }
 
 /* Rate limit: y follows x through a lag `tau` with |y'| <= rate; soft > 0.5 takes rate tanh(.). */
@@ -106,7 +114,7 @@ void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, d
         if (rest[k]) now = past = rest[k] == BALANCED ? x[k] : 0.0;
         for (int j = 0; j < sub; j++) {
             double to = past + (x[k] - past) * (j + 1.0) / sub, move = keep * (to - now);
-            if (soft) move = most * tanh(move / most);
+            if (soft) move = most * bounded(move / most);
             now += move > most ? most : move < -most ? -most : move;
         }
         past = x[k];
@@ -142,21 +150,19 @@ void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, 
     }
 }
 
-/* Bouc-Wen hysteretic variable, |z| <= 1: dz = dx/width (1 - |z|^power (beta sign(z dx) + 1 - beta)). */
-void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width, double power, double beta)
+/* Bouc-Wen hysteretic variable, |z| <= 1, exactly: dz = dx/width on the way to 0, dx/width (1 - |z|) away from it. */
+void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width)
 {
     double z = 0.0, past = 0.0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) z = past = 0.0;
-        double d = (x[k] - past) / width;
-        int sub = 1 + (int)(fabs(d) * 10.0);
-        if (sub > 400) sub = 400;
-        d /= sub;
-        for (int j = 0; j < sub; j++) {
-            z += d * (1.0 - pow(fabs(z), power) * ((z * d > 0.0 ? beta : -beta) + 1.0 - beta));
-            if (z > 1.0) z = 1.0;
-            if (z < -1.0) z = -1.0;
+        double way = fabs(x[k] - past) / width, side = x[k] < past ? -1.0 : 1.0, toward = side * z;
+        if (toward < 0.0) { /* in the direction of motion it is below 0: up to there in a line */
+            double inside = way < -toward ? way : -toward;
+            toward += inside, way -= inside;
         }
+        if (way > 0.0) toward = 1.0 - (1.0 - toward) * exp(-way);
+        z = side * toward;
         past = x[k];
         y[k] = z;
     }

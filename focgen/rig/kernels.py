@@ -33,8 +33,7 @@ void focgen_play(int n, const double *x, double *y, const unsigned char *rest, d
     start);
 void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double
     left, int anew, double place);
-void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width, double
-    power, double beta);
+void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width);
 void focgen_power_creep(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
     double scale, double power);
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
@@ -156,10 +155,10 @@ def stick(x, rest, band: float, left: float, anew: bool = False, place: float = 
     return _call("focgen_stick", x, rest, float(band), float(left), int(anew), float(place))
 
 
-def bouc_wen(x, rest, width: float, power: float = 1.0, beta: float = 0.5) -> np.ndarray:
-    """Bouc–Wen's hysteretic variable in [−1, 1]; ``width`` is the input's travel to reverse it, units of
-    x."""
-    return _call("focgen_bouc_wen", x, rest, float(width), float(power), float(beta))
+def bouc_wen(x, rest, width: float) -> np.ndarray:
+    """Bouc–Wen's hysteretic variable in [−1, 1], of power 1 and as stiff wherever it unloads; ``width`` is
+    the input's travel to reverse it, units of x."""
+    return _call("focgen_bouc_wen", x, rest, float(width))
 
 
 def power_creep(x, rest, h: float, tau: float, scale: float, power: float) -> np.ndarray:

@@ -55,11 +55,11 @@ class Actuator:
     gain: tuple[float, ...]
     offset: float = 0.0
 
-    def K(self, pressure):
+    def K(self, pressure: Any) -> Any:
         """The static gain K(p) at ``pressure``, any shape."""
         return np.polynomial.polynomial.polyval(pressure, self.gain)
 
-    def drive(self, pressure):
+    def drive(self, pressure: Any) -> Any:
         """K(p) p: what the dynamics settle at, any shape."""
         return self.K(pressure) * pressure
 
@@ -86,7 +86,7 @@ class LinearActuator:
         """Whether it keeps moving under a constant drive."""
         return not math.isfinite(self.dynamics.dc_gain)
 
-    def drive(self, pressure):
+    def drive(self, pressure: Any) -> Any:
         """The input of the dynamics: the pressure with the bias on it."""
         return pressure + self.bias if self.bias else pressure
 

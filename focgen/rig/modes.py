@@ -134,7 +134,8 @@ def between(x: np.ndarray, rest: np.ndarray, h: float, modes: Modes, share: floa
 def tables(T: float, alpha: float, h: float, duration: float, unloading: float):
     """What the compiled loop needs, rows loading and unloading."""
     modes = fractional_lag(T, alpha, h, duration)
-    rows = [_tables(modes, h, speed) for speed in (1.0, unloading)]
+    loading = _tables(modes, h, 1.0)
+    rows = [loading, loading if unloading == 1.0 else _tables(modes, h, unloading)]
     return *(np.stack(part) for part in zip(*rows)), modes.through
 
 

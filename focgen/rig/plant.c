@@ -42,7 +42,7 @@ static double grown(const Plant *p, double q, double old, double then)
 {
     double n = p->power, e = (q - old) / old;
     if (n == 1.0) return fabs(q);
-    if (!(fabs(e) < BESIDE)) return p->scale * pow(fabs(q) / p->scale, n);
+    if (!(fabs(e) < BESIDE)) return p->scale * exp(n * log(fabs(q) / p->scale));
     double last = 1.0 + (n - 3.0) / 4.0 * e * (1.0 + (n - 4.0) / 5.0 * e);
     return then * (1.0 + n * e * (1.0 + (n - 1.0) / 2.0 * e * (1.0 + (n - 2.0) / 3.0 * e * last)));
 }

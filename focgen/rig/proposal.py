@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tomlkit
@@ -13,11 +14,12 @@ import tomlkit
 from focgen.errors import LogError
 from focgen.logs import clock
 from focgen.logs.columns import SIGNALS, Column, Guess, columns_of, guessed, run_of, time_of
-from focgen.logs.read import Log, each_of, tables_of
+from focgen.logs.read import Logs, each_of, tables_of
 from focgen.logs.table import LogTable, stem
 from focgen.output import check_apart, write_file
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 _MEANING = {
     "time": "s",
@@ -36,8 +38,8 @@ _COLUMN = 40  # where comments begin
 Ask = Callable[[str, str, Sequence[str]], str]
 
 
-@dataclass(frozen=True)
-class Proposal:
+@dataclass(frozen=True, repr=False)
+class Proposal(Shown):
     """``rig`` without models; ``text``: its file, with comments; ``doubts``: what to check; ``next``: the
     command that identifies the models."""
 
@@ -45,6 +47,9 @@ class Proposal:
     text: str
     doubts: tuple[str, ...]
     next: str
+
+    def __str__(self) -> str:
+        return self.text
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ class _Time:
 
 
 def init(
-    logs: Log | Sequence[Log], out: str | Path | None = None, ask: Ask | None = None, name: str | None = None
+    logs: Logs, out: str | Path | None = None, ask: Ask | None = None, name: str | None = None
 ) -> Proposal:
     """Propose a rig for logs of one rig; written to ``out`` where given.
 
@@ -66,10 +71,10 @@ def init(
     columns)`` returns the column of a role that is unsure, "" for none. Raises LogError where the logs hold
     no time, input or output, InputError where ``out`` is one of them.
     """
-    logs = each_of(logs)
+    given = each_of(logs)
     if out is not None:
-        check_apart([out], logs)
-    tables = tables_of(logs)
+        check_apart([out], given)
+    tables = tables_of(given)
     run = run_of(tables[0])
     time = _time(tables[0], run)
     columns = [c for c in columns_of(tables) if c.name not in (time.column, run)]
@@ -78,13 +83,13 @@ def init(
     by_name = {c.name: c for c in columns}
     roles = {role: by_name[guess.column] for role, guess in guesses.items()}
     doubts = (*time.doubts, *_doubts(guesses, roles, [c.name for c in columns]))
-    label = name or (stem(tables[0].path) if isinstance(logs[0], str | Path) else "rig")
-    files = [str(log) for log in logs if isinstance(log, str | Path)] or ["LOG"]
+    label = name or (stem(tables[0].path) if isinstance(given[0], str | Path) else "rig")
+    files = [str(log) for log in given if isinstance(log, str | Path)] or ["LOG"]
     told = _next(files, roles, out)
     text = _text(label, run, time, roles, guesses, doubts, told)
     rig = read_rig(tomllib.loads(text))
     if out is not None:
-        write_file(out, text, logs)
+        write_file(out, text, given)
     return Proposal(rig, text, doubts, told)
 
 
@@ -99,7 +104,7 @@ def _time(table: LogTable, run: str | None) -> _Time:
     name = time_of(table)
     if name is None and table.clock is None:
         raise LogError(table.path, "has no column that increases with time", "log the time of each sample")
-    stamps = table.clock if name is None else table.seconds(name)
+    stamps: Any = table.clock if name is None else table.seconds(name)
     step, drift = _step(stamps), 0.5 / len(stamps)
     if name is None:
         return _Time("time", "s", _rounded(step, drift))
@@ -136,7 +141,8 @@ def _asked(guesses: dict[str, Guess], columns: Sequence[Column], ask: Ask | None
     """The guesses, the unsure ones as the user says."""
     if ask is None:
         return guesses
-    names, found = [c.name for c in columns], {}
+    found: dict[str, Guess] = {}
+    names = [c.name for c in columns]
     for role in SIGNALS:
         guess = guesses.get(role)
         free = [n for n in names if n not in {g.column for g in found.values()}]
@@ -173,14 +179,22 @@ def _doubts(
     return tuple(said)
 
 
-def _next(files: Sequence[str], roles: Mapping[str, Column], out) -> str:
+def _next(files: Sequence[str], roles: Mapping[str, Column], out: str | Path | None) -> str:
     stages = ["regulator"] * ({"command", "pressure"} <= set(roles)) + ["actuator"]
     stages += ["sensor"] * ("curvature" in roles)
     asked = f" --stages {','.join(stages)}" if len(stages) > 1 else ""
     return f"focgen identify {' '.join(files)} --rig {out or 'rig.toml'}{asked} --out identified.toml"
 
 
-def _text(label, run, time: _Time, roles, guesses, doubts, told: str) -> str:
+def _text(
+    label: str,
+    run: str | None,
+    time: _Time,
+    roles: Mapping[str, Column],
+    guesses: Mapping[str, Guess],
+    doubts: Sequence[str],
+    told: str,
+) -> str:
     """The file, with what each line is and how sure."""
     lines = [f"name = {_quoted(label)}", _line(f"sample_time = {time.step!r}", "s, as logged"), ""]
     lines += ["[signals]"] + ([_line(f"run = {_quoted(run)}", _MEANING["run"])] if run else [])

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from focgen.errors import LogError, RigError
+from focgen.jsontext import UNWRITTEN
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
-from focgen.logs.read import read_logs
+from focgen.logs.read import Logs, read_logs
+from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
-from focgen.rig.files import read_rig
 from focgen.rig.initial import begun
 from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
+from focgen.shown import Shown
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 _CLOSER = (
@@ -37,40 +39,39 @@ class Replayed:
     rmse_by_signal: dict[str, float]
 
 
-@dataclass(frozen=True)
-class Replay:
+@dataclass(frozen=True, repr=False)
+class Replay(Shown):
     """``logs``: every experiment by its name. ``simulated``: its signals, shape (n,), by role. ``notes``:
-    what was done to the logs. ``warnings``: what in them is implausible."""
+    what was done to the logs. ``warnings``: what in them is implausible. ``rig`` and ``experiments``: what
+    was run, on what."""
 
     logs: dict[str, Replayed]
     simulated: dict[str, dict[str, np.ndarray]]
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    rig: Rig | None = field(default=None, metadata=UNWRITTEN, compare=False)
+    experiments: tuple[Experiment, ...] = field(default=(), metadata=UNWRITTEN, compare=False)
 
 
-def replay(
-    rig: Rig | str | Path,
-    logs: Sequence[Experiment | str | Path],
-    first: float | None = None,
-    last: float | None = None,
-) -> Replay:
+@rig_then_logs
+def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | None = None) -> Replay:
     """Run the rig on each experiment's ``command`` where it is logged, else on its ``pressure``.
 
-    The experiments are one session and follow the one the rig's effects were found in. ``first``, ``last``:
+    The experiments are one session and follow the one the rig's effects were found in. ``from_``, ``to``:
     s within each experiment. Raises RigError for effects unknown, LogError for logs that cannot be used.
     """
-    rig = rig if isinstance(rig, Rig) else read_rig(rig)
-    logs = experiments(rig, logs, first, last)
-    rig = told_between(rig, logs)
-    logs = begun(rig, logs, placed_in(rig))
-    simulated = simulate_session(rig, logs)
-    results = {log.name: _compared(log, made) for log, made in zip(logs, simulated)}
-    made = {log.name: made for log, made in zip(logs, simulated)}
-    return Replay(results, made, notes_of(logs), doubts(rig, logs))
+    given = rig_of(rig)
+    session = experiments(given, logs, from_, to)
+    told = told_between(given, session)
+    session = begun(told, session, placed_in(told))
+    simulated = simulate_session(told, session)
+    results = {log.name: _compared(log, made) for log, made in zip(session, simulated)}
+    made = {log.name: made for log, made in zip(session, simulated)}
+    return Replay(results, made, notes_of(session), doubts(told, session), told, tuple(session))
 
 
 def experiments(
-    rig: Rig, logs: Sequence[Experiment | str | Path], first=None, last=None
+    rig: Rig, logs: Logs, first: float | None = None, last: float | None = None
 ) -> tuple[Experiment, ...]:
     """The logs read, and cut to ``first`` … ``last`` s."""
     return read_logs(logs, rig.signals, rig.sample_time, first, last)
@@ -122,7 +123,7 @@ def placed_in(rig: Rig) -> tuple[Placed, ...]:
     return tuple(_placed(rig, table) for table in rig.effects)
 
 
-def _placed(rig: Rig, table) -> Placed:
+def _placed(rig: Rig, table: Mapping[str, Any]) -> Placed:
     effect = library().get(table["name"])
     if effect is None:
         raise RigError(
@@ -166,7 +167,7 @@ def session_end(rig: Rig) -> float:
 
 def effect_tables(
     placed: Sequence[Placed], left: Sequence[dict[str, float]], clock: float
-) -> tuple[dict, ...]:
+) -> tuple[dict[str, Any], ...]:
     """Effects as ``[[effects]]`` tables, with what outlives the session: ``left``, one for each, and its
     ``clock`` in s."""
     tables = []

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from enum import IntFlag
 from pathlib import Path
-from typing import Any, Literal, Self, overload
+from typing import Any, Literal, NoReturn, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from focgen.errors import InputError
 from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, FLAG_SCHEDULE, Format, Plan
+from focgen.plan.scenario import Params
+from focgen.plan.tuning import REFUSED_GAIN, REFUSED_HIGH, REFUSED_LOW
 from focgen.running.machine import Machine
 from focgen.running.signals import Counts, Physical
+
+
+_REFUSED = {REFUSED_GAIN: "gain", REFUSED_LOW: "u_min", REFUSED_HIGH: "u_max"}
 
 
 class Flags(IntFlag):
@@ -94,6 +99,39 @@ class LoadedController:
         """
         return self._run((("ref", ref), ("meas", meas)), with_flags)
 
+    @property
+    def tunable(self) -> bool:
+        """Whether it has ``default``, ``check`` and ``tune``: it was generated with --tunable."""
+        return self.plan.tuning is not None
+
+    def default(self) -> Params:
+        """The parameters that controller.toml describes: factors of 1, the widest limits."""
+        self._check_tunable("default")
+        made, plan = self._machine.params(), self.plan
+        gain = tuple(self._signals.back(count, plan.box.factor) for count in made.gain)
+        ends = (self._signals.back(end, plan.output) for end in (made.u_min, made.u_max))
+        return Params(gain, *ends)
+
+    def check(self, params: Params) -> int:
+        """What NAME_check says: 0 inside the box that everything is proved for; else the sum of 1 for a gain,
+        2 for ``u_min``, 4 for ``u_max``.
+        """
+        given = self._params("check", params)
+        return self._machine.check(given)
+
+    def tune(self, params: Params) -> None:
+        """Go on with other parameters from the next step: a factor on each gain of the schedule, and the
+        limits of the output; ``dataclasses.replace(controller.default(), u_max=6.0)`` changes one.
+
+        Raises InputError, and changes nothing, where ``check`` refuses them.
+        """
+        given = self._params("tune", params)
+        refused = self._machine.tune(self._state, given)
+        if refused:
+            names = [name for bit, name in _REFUSED.items() if refused & bit]
+            what = f"{' and '.join(names)} of {params} outside the box of [tunable]"
+            raise InputError(f"{self.name}: tune", what, "give what check(params) says 0 to")
+
     def new(self) -> Self:
         """Another controller of the same C, after init."""
         return type(self)(self.plan, self._machine, self.path, self.raw, self.differences)
@@ -110,10 +148,10 @@ class LoadedController:
 
     __copy__ = copy
 
-    def __deepcopy__(self, memo: dict) -> Self:
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         return self.copy()
 
-    def __reduce__(self):
+    def __reduce__(self) -> NoReturn:
         raise TypeError("compiled C cannot be pickled: load the folder in each process")
 
     def __repr__(self) -> str:
@@ -126,13 +164,31 @@ class LoadedController:
 
     # ----------------------------------------------------------------------------------------- the calls
 
+    def _check_tunable(self, call: str) -> None:
+        if not self.tunable:
+            raise InputError(f"{self.name}: {call}", "has no parameters", "generate it with --tunable")
+
+    def _params(self, call: str, given: Params) -> Any:
+        """NAME_params of what was given."""
+        self._check_tunable(call)
+        if not isinstance(given, Params):
+            raise InputError(f"{self.name}: params", f"is {given!r}", "change what default() gives")
+        box, count = self.plan.box, len(self.plan.box.nominal)
+        factors = tuple(self._one("gain", factor, box.factor) for factor in given.gain)
+        if len(factors) != count:
+            what, remedy = f"has {len(factors)} factors for {count} gains", "give one for each gain"
+            raise InputError(f"{self.name}: gain", what, remedy)
+        ends = (self._one(name, getattr(given, name), self.plan.output) for name in ("u_min", "u_max"))
+        return self._machine.params(Params(factors, *ends))
+
     def _one(self, name: str, value: Any, form: Format) -> int | float:
         return self._signals.one(f"{self.plan.name}: {name}", value, form)
 
     def _step(self, ref: float, meas: float, *sched: int | float) -> float:
         error = self.plan.error
         given = self._one("ref", ref, error), self._one("meas", meas, error)
-        return self._signals.back(self._machine.step(self._state, *given, *sched), self.plan.output)
+        u: float = self._signals.back(self._machine.step(self._state, *given, *sched), self.plan.output)
+        return u
 
     def _run(self, inputs: tuple[tuple[str, ArrayLike], ...], with_flags: bool) -> Any:
         u, flags = self._machine.loop(self._state, self._rows(inputs))
@@ -158,7 +214,8 @@ class ScheduledController(LoadedController):
 
     def step(self, ref: float, meas: float, sched: float) -> float:  # type: ignore[override]
         """One sample; the output."""
-        return self._step(ref, meas, self._one("sched", sched, self.plan.schedule.signal))
+        schedule: Any = self.plan.schedule
+        return self._step(ref, meas, self._one("sched", sched, schedule.signal))
 
     def run(  # type: ignore[override]
         self, ref: ArrayLike, meas: ArrayLike, sched: ArrayLike, *, with_flags: bool = False

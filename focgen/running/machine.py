@@ -15,6 +15,7 @@ from focgen.codegen.render import render
 from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 from focgen.plan.model import Plan
+from focgen.plan.scenario import Params
 from focgen.targets.driver import DTYPES
 from focgen.verification.host import FLAGS
 
@@ -31,6 +32,7 @@ class Machine:
     """A controller's C. It keeps no state of its own: :meth:`state` makes any number of them.
 
     ``init``, ``reset``, ``step``, ``track`` and ``flags`` are the C's functions; each takes a state first.
+    So does ``tune`` of a tunable controller, and both it and ``check`` take what :meth:`params` makes.
     """
 
     init: Callable[..., None]
@@ -38,6 +40,9 @@ class Machine:
     step: Callable[..., Any]
     track: Callable[..., None]
     flags: Callable[..., int]
+    default: Callable[..., None]
+    check: Callable[..., int]
+    tune: Callable[..., int]
 
     def __init__(self, plan: Plan, folder: Path):
         """Compile the C in ``folder``. Raises BuildError where that fails."""
@@ -45,7 +50,8 @@ class Machine:
         self._ctype, self._ffi = plan.output.ctype, FFI()
         self._ffi.cdef(_declarations(plan))
         self._library = _loaded(self._ffi, plan, folder)
-        for function in ("init", "reset", "step", "track", "flags"):
+        tunable = ("default", "check", "tune") if plan.tuning else ()
+        for function in ("init", "reset", "step", "track", "flags", *tunable):
             setattr(self, function, getattr(self._library, f"{plan.name}_{function}"))
         self._loop = getattr(self._library, f"focgen_{plan.name}_loop")
         self.bytes = int(getattr(self._library, f"focgen_{plan.name}_bytes")())
@@ -62,6 +68,15 @@ class Machine:
     def content(self, state: Any) -> bytes:
         """The bytes of a state."""
         return bytes(self._ffi.buffer(state)[: self.bytes])
+
+    def params(self, given: Params | None = None) -> Any:
+        """NAME_params with raw values, those of NAME_default where none are given."""
+        made = self._ffi.new(f"{self.name}_params *")
+        if given is None:
+            self.default(made)
+        else:
+            made.gain, made.u_min, made.u_max = list(given.gain), given.u_min, given.u_max
+        return made
 
     def loop(self, state: Any, inputs: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """One step for each sample of raw ``inputs``, arrays of one length in the C's own type; outputs and
@@ -87,10 +102,20 @@ def _loaded(ffi: FFI, plan: Plan, folder: Path) -> Any:
             raise BuildError(str(folder / f"{plan.name}.c"), what, "generate the folder again") from None
 
 
+def _tunable(plan: Plan) -> str:
+    name, signal = plan.name, plan.output.ctype
+    members = f"{signal} gain[{len(plan.box.nominal)}]; {signal} u_min; {signal} u_max;"
+    return (
+        f"typedef struct {{ {members} }} {name}_params; void {name}_default({name}_params *); "
+        f"uint8_t {name}_check(const {name}_params *); uint8_t {name}_tune(void *, const {name}_params *); "
+    )
+
+
 def _declarations(plan: Plan) -> str:
     name, signal = plan.name, plan.output.ctype
+    tunable = _tunable(plan) if plan.tuning else ""
     sched, array = (f", {signal}", f"const {signal} *") if plan.schedule else ("", "")
-    return (
+    return tunable + (
         f"void {name}_init(void *); void {name}_reset(void *, {signal}, {signal}, {signal}); "
         f"{signal} {name}_step(void *, {signal}, {signal}{sched}); void {name}_track(void *, {signal}); "
         f"uint8_t {name}_flags(const void *); uint32_t focgen_{name}_bytes(void); "

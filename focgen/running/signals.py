@@ -42,7 +42,7 @@ class Counts:
         if form.floating:
             return _number(name, value)
         try:
-            count = value.__index__()
+            count: int = value.__index__()
         except AttributeError:
             raise _not_whole(name, value, form) from None
         top = 1 << (form.bits - 1)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from focgen.control.controller import Controller
 from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 INPUTS = ("step", "ramp", "sine", "noise")
 
@@ -204,8 +205,8 @@ class Plant:
     rows: tuple[PlantRow, ...]
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, repr=False)
+class Study(Shown):
     """All that was found. ``recommendation``: one sentence; ``notes``: what has to be said about it.
 
     ``rig``: the name of the rig that closed the loop, None where there was none. ``pareto``: for each cost

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from focgen.codegen.kernels import TARGETS
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding, rest
-from focgen.control.files import read_controller
+from focgen.control.files import ControllerLike, controller_from
 from focgen.control.setpoints import default_setpoints
 from focgen.errors import ControllerError, DesignError, InputError, check_choice
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
+from focgen.spelling import respelled
 from focgen.studies.grid import Grid, grid_of
 from focgen.studies.jobs import Job, read_ideal, read_plant, read_row
-from focgen.studies.model import Curves, Ideal, Plant, Row, Setup, Study, Variant
+from focgen.studies.model import Curves, Ideal, Plant, PlantRow, Row, Setup, Study, Variant
 from focgen.studies.operator import fractional_terms
 from focgen.studies.plant import exact_step, plant_of, plant_times
 from focgen.studies.recommend import Wish, leanest, pareto, sentence, shortest
@@ -30,73 +36,84 @@ SUBJECTS = ("memory",)
 SAMPLES = 10_000  # of the open-loop inputs
 
 
-def study(subject: str, controller: Controller | str | Path, out: str | Path, **options) -> Study:
-    """Study a controller's ``subject``; "memory" is the one there is. ``options``: those of
-    :func:`study_memory`. Raises InputError for another subject, and as that does.
-    """
-    if subject not in SUBJECTS:
-        raise InputError("study", f"has no subject {subject!r}", f"choose {' or '.join(SUBJECTS)}")
-    return study_memory(controller, out, **options)
-
-
-def study_memory(
-    controller: Controller | str | Path,
-    out: str | Path,
+@respelled({"memories": "memory", "arithmetics": "arithmetic"})
+def study(
+    subject: str,
+    controller: ControllerLike,
+    out: str | Path | None = None,
     *,
-    rig: Rig | str | Path | None = None,
-    memories: Sequence[str] | None = None,
+    rig: RigLike | None = None,
+    memory: Sequence[str] | None = None,
     lengths: Sequence[int] | None = None,
     tolerances: Sequence[float] | None = None,
     horizon: int | None = None,
-    arithmetics: Sequence[str] | None = None,
+    arithmetic: Sequence[str] | None = None,
     sample_times: Sequence[float] | None = None,
     setpoints: Sequence[float] | None = None,
     target: str | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
 ) -> Study:
-    """Sweep memory form, length or tolerance, arithmetic and sample time, and write the study into ``out``.
+    """Study a controller's ``subject``; "memory" is the one there is: sweep memory form, length or tolerance,
+    arithmetic and sample time, and write the study into the folder ``out`` where given.
 
-    ``controller``: a :class:`Controller` or its file. ``rig``: what closes the loop; by default the rig that
-    the controller's file says it was designed from, where it is found beside it, unchanged. ``lengths`` in
-    past samples; ``tolerances`` and ``horizon`` (samples at the controller's own sample time) of the
-    exponential form; ``sample_times`` in s; ``setpoints``: outputs stepped to from rest. ``target``: the core
-    that cycles are counted on. ``jobs``: processes at a time (default: the cores); ``scheduler``: address of
-    a Dask scheduler that does the work instead.
+    ``controller``: a :class:`Controller`, its file, or a dictionary like it. ``rig``: what closes the loop;
+    by default the rig that the controller's file says it was designed from, where it is found beside it,
+    unchanged. ``memory``: forms, of "short" and "exponential"; ``lengths`` in past samples; ``tolerances``
+    and ``horizon`` (samples at the controller's own sample time) of the exponential form; ``sample_times`` in
+    s; ``setpoints``: outputs stepped to from rest. ``target``: the core that cycles are counted on.
+    ``jobs``: processes at a time (default: the cores); ``scheduler``: address of a Dask scheduler that does
+    the work instead.
 
     What has been measured stays in ``out``/rows and is not measured again for the same inputs, so that an
-    interrupted study goes on. Raises InputError for options that cannot be used, ControllerError and RigError
-    for the files, DesignError where a set point cannot be reached, MissingExtra where Dask is not installed.
+    interrupted study goes on. Raises InputError for another subject and for options that cannot be used,
+    ControllerError and RigError for the files, DesignError where a set point cannot be reached, MissingExtra
+    where Dask is not installed.
     """
+    if subject not in SUBJECTS:
+        raise InputError("study", f"has no subject {subject!r}", f"choose {' or '.join(SUBJECTS)}")
     which = _fractional(controller)
     if target is not None:
         check_choice("--target", target, TARGETS)
-    grid = grid_of(which, memories, lengths, tolerances, horizon, arithmetics, sample_times)
+    grid = grid_of(which, memory, lengths, tolerances, horizon, arithmetic, sample_times)
     model, notes = _rig(rig, which, controller)
     points = _setpoints(which, model, setpoints)
     if model is not None and model.effects:
         notes.append("the rig's effects are left aside: memory is studied in the loop with the nominal chain")
     setup = Setup(which, model, band_of(which, model, points), SAMPLES, points, target)
-    with Workers(jobs, scheduler) as workers:
-        found = _Sweep(setup, grid, Store(Path(out)), workers).result(notes)
-    write(found, Path(out), (controller, rig, *_designed_from(which, controller)))
+    with Workers(jobs, scheduler) as workers, _folder(out) as folder:
+        found = _Sweep(setup, grid, Store(folder), workers).result(notes)
+    if out is not None:
+        write(found, Path(out), (controller, rig, *_designed_from(which, controller)))
     return found
 
 
-def _fractional(given: Controller | str | Path) -> Controller:
+@contextmanager
+def _folder(out: str | Path | None) -> Iterator[Path]:
+    """Where answers are kept: in ``out``, or until the study ends."""
+    if out is not None:
+        yield Path(out)
+        return
+    with tempfile.TemporaryDirectory(prefix="focgen-study-") as scratch:
+        yield Path(scratch)
+
+
+def _fractional(given: ControllerLike) -> Controller:
     """The controller. Raises ControllerError where it has no memory to study."""
-    controller = given if isinstance(given, Controller) else read_controller(given)
+    controller = controller_from(given)
     if not fractional_terms(controller):
-        where = controller.name if controller is given else str(given)
+        where = str(file_of(given) or controller.name)
         what = "has no fractional power of s, so no memory"
         raise ControllerError(where, what, "study a controller of fractional order")
     return controller
 
 
-def _rig(given, controller: Controller, source) -> tuple[Rig | None, list[str]]:
+def _rig(
+    given: RigLike | None, controller: Controller, source: ControllerLike
+) -> tuple[Rig | None, list[str]]:
     """The rig, and what has to be said about it."""
     if given is not None:
-        return (given if isinstance(given, Rig) else read_rig(given)), []
+        return rig_of(given), []
     made_from = controller.designed_from
     if made_from is None:
         return None, ["no rig is named in the controller: give --rig for the closed-loop columns"]
@@ -113,11 +130,12 @@ def _rig(given, controller: Controller, source) -> tuple[Rig | None, list[str]]:
     ]
 
 
-def _designed_from(controller: Controller, source) -> list[Path]:
+def _designed_from(controller: Controller, source: ControllerLike) -> list[Path]:
     """Where the rig that a controller was designed from may be: beside its file, and here."""
     if controller.designed_from is None:
         return []
-    folders = [Path.cwd()] if isinstance(source, Controller) else [Path(source).parent, Path.cwd()]
+    file = file_of(source)
+    folders = [Path.cwd()] if file is None else [file.parent, Path.cwd()]
     places = (folder / controller.designed_from.file for folder in folders)
     return [place for place in places if place.is_file()]
 
@@ -186,11 +204,13 @@ class _Sweep:
         """The sample time that is recommended for: the controller's own where it is looked at."""
         return self.own if self.own in self.grid.sample_times else self.grid.sample_times[0]
 
-    def _done(self, asked: list[tuple[str, Variant]]) -> list[dict]:
+    def _done(self, asked: list[tuple[str, Variant]]) -> list[dict[str, Any]]:
         jobs = [Job(kind, self.setup, variant) for kind, variant in asked]
         return sweep(jobs, self.store, self.workers)
 
-    def _recommended(self, rows, ideal) -> tuple[str, list[tuple[Row, Curves]]]:
+    def _recommended(
+        self, rows: list[tuple[Row, Curves]], ideal: Ideal
+    ) -> tuple[str, list[tuple[Row, Curves]]]:
         """The sentence, and the rows with those that it took to find the shortest length."""
         h, arithmetics = self._first(), self.grid.arithmetics
         own = self.setup.controller.arithmetic
@@ -210,7 +230,7 @@ class _Sweep:
         said = sentence(as_run, wish, short, exponential, set(self.grid.memories), max(self.grid.lengths))
         return said, [*rows, *added]
 
-    def _plant(self, plant, rows) -> Plant:
+    def _plant(self, plant: TransferFunction, rows: tuple[PlantRow, ...]) -> Plant:
         times = plant_times(self.own) * self.own
         exact = exact_step(plant, self.own)
         return Plant(str(plant), self.own, tuple(map(float, times)), tuple(map(float, exact)), rows)

@@ -26,7 +26,7 @@ from focgen.compiler import find_compiler
 from focgen.errors import BuildError
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
-from focgen.targets.driver import DTYPES, RESUME, Answers, driver_context, lane_of
+from focgen.targets.driver import DTYPES, RESUME, Answers, driver_context, lane_of, given_width
 from focgen.targets.emulator import TargetFault
 
 MCU = "atmega2560"
@@ -113,7 +113,7 @@ class AvrLibrary:
                 self.test = _compiled([feeder, own, folder / f"{plan.name}_selftest.c"], folder)
         self._symbols = _symbols(self.elf)
         signal, increment = (DTYPES[f.ctype]().itemsize for f in (plan.output, plan.increment))
-        self._in, self._out = 7 * signal + 1, signal + increment + 1
+        self._in, self._out = (3 + given_width(plan)) * signal + 1, signal + increment + 1
 
     def answers(self, plan: Plan, scenario: Scenario) -> Answers:
         """Run raw inputs, as the host's library does."""
@@ -155,7 +155,13 @@ class AvrLibrary:
     def _records(self, scenario: Scenario, number: int) -> bytes:
         """What the emulator puts in memory, sample by sample."""
         lane, kind = lane_of(self.plan, scenario, number), DTYPES[self.plan.output.ctype]
-        fields = [("ref", kind), ("meas", kind), ("sched", kind), ("event", np.uint8), ("given", kind, 4)]
+        fields = [
+            ("ref", kind),
+            ("meas", kind),
+            ("sched", kind),
+            ("event", np.uint8),
+            ("given", kind, given_width(self.plan)),
+        ]
         records = np.zeros(scenario.samples, np.dtype(fields))
         for name in records.dtype.names:
             records[name] = getattr(lane, name)

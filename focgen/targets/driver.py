@@ -11,6 +11,7 @@ from focgen.codegen.manifest import lsbs
 from focgen.codegen.render import render
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
+from focgen.plan.tuning import default_params, refused
 
 DTYPES = {
     "double": np.float64,
@@ -19,10 +20,16 @@ DTYPES = {
     "int32_t": np.int32,
     "int16_t": np.int16,
 }
-_RESET, _TRACK, _SAVE = 1, 2, 64
-_DAMAGES = {"error": 16, "all": 32, "integral": 48}
+_RESET, _TRACK, _SAVE, _TUNE = 1, 2, 64, 128
+_DAMAGES = {"error": 16, "all": 32, "integral": 48, "limits": 48, "gains": 48}
 REFUSED = 128
 """Beside the flags of a step: a reset or a track ahead of it has raised INPUT or INVALID."""
+UNTUNED = 64
+"""Beside them, too: of parameters something else has been said than :func:`refused` does."""
+CALLS = ("init", "reset", "track", "save", "restore", "tune")
+"""The calls that NAME_call makes, by number."""
+PREPARE = len(CALLS)
+"""The number for which it takes parameters ready, so that ``tune`` is nothing but the call."""
 RESUME = 4
 """Event of a first sample: go on from the state that is there, without init."""
 
@@ -40,6 +47,9 @@ class DriverContext:
     conversions: tuple[str, ...]
     fixed: bool
     refusing: str
+    left: str
+    tunable: bool
+    width: int
 
 
 def driver(plan: Plan) -> str:
@@ -51,20 +61,42 @@ def driver_context(plan: Plan) -> DriverContext:
     """What a driver asks for of a plan."""
     scheduled, integral = plan.schedule is not None, plan.integrator is not None
     held = f"({plan.name}_flags(state) & {plan.name.upper()}_FLAG_INVALID) ? 0 : " if plan.floating else ""
-    scales = tuple(f"{plan.name.upper()}_{macro}" for macro in _scales(plan))
+    scales = tuple(call or f"{plan.name.upper()}_{macro}" for macro, (call, _) in _calls(plan).items())
     tried = tuple(expression for expression, _ in tried_conversions(plan).values())
     refusing = f"{plan.name.upper()}_FLAG_{'INVALID' if plan.floating else 'INPUT'}"
     fixed = not plan.floating
+    high, low = f"{plan.name.upper()}_U_MAX", f"{plan.name.upper()}_U_MIN"
+    left = "INT64_MAX" if plan.counted else f"{high} + ({high} - {low})"
     return DriverContext(
-        plan.name, plan.increment.ctype, scheduled, integral, held, scales, tried, fixed, refusing
-    )
+        plan.name, plan.increment.ctype, scheduled, integral, held, scales, tried, fixed, refusing, left,
+        plan.tuning is not None, given_width(plan),
+    )  # fmt: skip
+
+
+def given_width(plan: Plan) -> int:
+    """How many values go with the events of a sample: ref, meas, u0, u; then parameters, and what is said of
+    them.
+    """
+    return 4 + (len(plan.tuning.nominal) + 3 if plan.tuning else 0)
 
 
 def header_scales(plan: Plan) -> dict[str, float]:
     """The values that the header's macros for LSBs, sample time and period must have, by name; and what its
     conversions must give, which are NaN in a header that has none.
     """
-    return {**_scales(plan), **{call: value for call, (_, value) in tried_conversions(plan).items()}}
+    scales = {name: value for name, (_, value) in _calls(plan).items()}
+    return {**scales, **{call: value for call, (_, value) in tried_conversions(plan).items()}}
+
+
+def _calls(plan: Plan) -> dict[str, tuple[str, float]]:
+    """By name, the C that gives a number of the header, where it is no macro of that name, and its value."""
+    found = {name: ("", value) for name, value in _scales(plan).items()}
+    if plan.tuning:
+        found["GAIN_LSB"] = "", plan.tuning.factor.lsb
+        default = default_params(plan)
+        numbers = (*default.gain, default.u_min, default.u_max)
+        found |= {f"default {i}": (f"by_default({i})", float(x)) for i, x in enumerate(numbers)}
+    return found
 
 
 def _scales(plan: Plan) -> dict[str, float]:
@@ -85,7 +117,7 @@ class Answers:
 
 def steps_alone(trace: Trace) -> Trace:
     """A trace from C with the flags of its steps, without what resets and tracks have raised."""
-    return replace(trace, flags=trace.flags & np.uint8(REFUSED - 1))
+    return replace(trace, flags=trace.flags & np.uint8(UNTUNED - 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +136,13 @@ def lane_of(plan: Plan, scenario: Scenario, lane: int) -> Lane:
     signal = DTYPES[plan.output.ctype]
     sched = scenario.ref if scenario.sched is None else scenario.sched
     inputs = [np.ascontiguousarray(x[lane], dtype=signal) for x in (scenario.ref, scenario.meas, sched)]
-    return Lane(*inputs, *_events(scenario, lane, signal))
+    return Lane(*inputs, *_events(plan, scenario, lane, signal))
 
 
-def _events(scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np.ndarray]:
-    """What happens ahead of each sample, and its values (ref, meas, u0, u applied)."""
-    event, given = np.zeros(scenario.samples, np.uint8), np.zeros((scenario.samples, 4), signal)
+def _events(plan: Plan, scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np.ndarray]:
+    """What happens ahead of each sample, and its values (ref, meas, u0, u applied; parameters)."""
+    event = np.zeros(scenario.samples, np.uint8)
+    given = np.zeros((scenario.samples, given_width(plan)), signal)
     for at in (scenario.samples // 3, 2 * scenario.samples // 3):
         event[at] |= _SAVE if at else 0
     for r in scenario.resets:
@@ -120,8 +153,13 @@ def _events(scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np
         if t.lane == lane:
             event[t.sample] |= _TRACK
             given[t.sample, 3] = t.u
+    for t in scenario.tunes:
+        if t.lane == lane:
+            event[t.sample] |= _TUNE
+            p = t.params
+            given[t.sample, 4:] = (*p.gain, p.u_min, p.u_max, refused(plan, p))
     for d in scenario.damages:
         if d.lane == lane:
             event[d.sample] |= _DAMAGES[d.what]
-            given[d.sample, 0] = np.nan
+            given[d.sample, 0] = {"limits": 1.0, "gains": 2.0}.get(d.what, np.nan)
     return event, given

@@ -7,6 +7,11 @@ def test_my_port():
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from focgen.testing.equivalence import Equivalence, assert_equivalent
+    from focgen.testing.own_c import from_c
 
 _HOME = {
     "assert_equivalent": "focgen.testing.equivalence",
@@ -14,10 +19,16 @@ _HOME = {
     "from_c": "focgen.testing.own_c",
 }
 
-__all__ = sorted(_HOME)
+__all__ = ["Equivalence", "assert_equivalent", "from_c"]
 
 
-def __getattr__(name: str):
-    if name not in _HOME:
-        raise AttributeError(f"module 'focgen.testing' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+if not TYPE_CHECKING:  # a checker reads the imports above
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOME:
+            raise AttributeError(f"module 'focgen.testing' has no attribute {name!r}")
+        return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,7 +13,7 @@ import numpy as np
 
 from focgen.errors import InputError
 from focgen.plan.model import Plan
-from focgen.plan.scenario import Reset, Scenario, Track
+from focgen.plan.scenario import Params, Reset, Scenario, Track, Tune
 from focgen.running.controller import LoadedController
 from focgen.running.load import load
 
@@ -20,11 +21,19 @@ _WANTED = "give a folder, an object with reset, step and track in counts, or a f
 
 
 class Steps(Protocol):
-    """A candidate, in counts; it may have ``init()``, ``track(u)`` and ``flags``, a value or a method."""
+    """A candidate, in counts; it may have ``init()``, ``track(u)`` and ``flags``, a value or a method; and
+    ``tune(params)``, which takes ``gain``, ``u_min`` and ``u_max`` of :class:`focgen.plan.scenario.Params`.
+    """
 
     def reset(self, ref: Any, meas: Any, u0: Any) -> None: ...
 
     def step(self, ref: Any, meas: Any, *sched: Any) -> Any: ...
+
+
+def tunes(candidate: Candidate) -> bool:
+    """Whether a candidate takes parameters."""
+    one = candidate.make()
+    return bool(one.tunable if isinstance(one, LoadedController) else hasattr(one, "tune"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +109,8 @@ def _checked(given: LoadedController, plan: Plan, label: str) -> LoadedControlle
     if wanted != found:
         what = f"is {found[0]} with other counts than the reference, which is {wanted[0]}"
         raise InputError(label, what, "compare folders of the same arithmetic and ranges")
+    if plan.tuning and not given.tunable:
+        raise InputError(label, "takes no parameters, and the reference does", "generate it with --tunable")
     return given
 
 
@@ -129,20 +140,22 @@ def _scenario(candidate: Candidate, plan: Plan, scenario: Scenario) -> Played:
     return Played(np.array([u for u, _ in lanes], float), flags)
 
 
-def _lane(one: Steps, plan: Plan, scenario: Scenario, lane: int) -> tuple[list, list | None]:
+def _lane(one: Steps, plan: Plan, scenario: Scenario, lane: int) -> tuple[list[float], list[int] | None]:
     events = events_of(scenario, lane)
     begin = getattr(one, "init", None) or (lambda: one.reset(*at_rest(plan)))
     begin()
     inputs = [x[lane].tolist() for x in (scenario.ref, scenario.meas, scenario.sched) if x is not None]
     flagged = hasattr(one, "flags")
-    u, flags = [], []
+    u: list[float] = []
+    flags: list[int] = []
     for k, given in enumerate(zip(*inputs)):
         try:
             for event in events.get(k, ()):
                 _happen(one, event)
             u.append(float(one.step(*given)))
             if flagged:
-                flags.append(int(one.flags() if callable(one.flags) else one.flags))
+                now = getattr(one, "flags")
+                flags.append(int(now() if callable(now) else now))
         except Exception as error:
             now = events.get(k, "no event")
             error.add_note(f"at sample {k} of run {lane}, with the inputs {given}, after {now}")
@@ -150,22 +163,32 @@ def _lane(one: Steps, plan: Plan, scenario: Scenario, lane: int) -> tuple[list, 
     return u, flags if flagged else None
 
 
-def _happen(one: Any, event: Reset | Track) -> None:
-    if isinstance(event, Reset):
+def _happen(one: Any, event: Reset | Track | Tune) -> None:
+    if isinstance(event, Tune):
+        _tune(one, event.params)
+    elif isinstance(event, Reset):
         one.reset(_plain(event.ref), _plain(event.meas), _plain(event.u0))
     elif hasattr(one, "track"):
         one.track(_plain(event.u))
 
 
+def _tune(one: Any, params: Params) -> None:
+    """What is refused changes nothing; whether an error or a number says so is the candidate's affair."""
+    with suppress(InputError):
+        one.tune(Params(tuple(map(_plain, params.gain)), _plain(params.u_min), _plain(params.u_max)))
+
+
 def _plain(value: Any) -> int | float:
     """Python's own number, as the inputs are."""
-    return value.item() if isinstance(value, np.generic) else value
+    plain: int | float = value.item() if isinstance(value, np.generic) else value
+    return plain
 
 
-def events_of(scenario: Scenario, lane: int) -> dict[int, list[Reset | Track]]:
-    """Resets and tracks of a lane by sample, in the order in which they happen."""
-    found: dict[int, list[Reset | Track]] = {}
-    for event in (*scenario.resets, *scenario.tracks):
+def events_of(scenario: Scenario, lane: int) -> dict[int, list[Reset | Track | Tune]]:
+    """Tunes, resets and tracks of a lane by sample, in the order in which they happen."""
+    found: dict[int, list[Reset | Track | Tune]] = {}
+    every: tuple[Reset | Track | Tune, ...] = (*scenario.tunes, *scenario.resets, *scenario.tracks)
+    for event in every:
         if event.lane == lane:
             found.setdefault(event.sample, []).append(event)
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,9 +15,9 @@ from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
 from focgen.plan.model import Plan
-from focgen.plan.scenario import Scenario
+from focgen.plan.scenario import Reset, Scenario, Track
 from focgen.running.controller import LoadedController
-from focgen.testing.candidates import Candidate, Played, candidate_of, played
+from focgen.testing.candidates import Candidate, Played, candidate_of, played, tunes
 from focgen.testing.inputs import Trial, bounded_trials, exact_trials
 from focgen.testing.telling import difference
 from focgen.verification.apart import Crashed, TimedOut, apart
@@ -71,17 +71,17 @@ def assert_equivalent(
 
     ``candidate``: a generated folder, edited or not; an object with ``reset(ref, meas, u0)``, ``step(ref,
     meas, sched)`` and ``track(u)`` in counts, such as :func:`focgen.testing.from_c` makes, which may also
-    have ``init()`` and ``flags``; a class or function without arguments that makes such an object; or a
-    function ``step(ref, meas, sched)`` that starts at rest, which is tried in one run, without resets and
-    tracks.
+    have ``init()``, ``flags`` and, for a tunable reference, ``tune(params)``; a class or function without
+    arguments that makes such an object; or a function ``step(ref, meas, sched)`` that starts at rest, which
+    is tried in one run, without resets and tracks.
     Nothing is passed for ``sched`` where nothing is scheduled.
 
     ``within`` "bits": outputs, and flags where the candidate has them, are the bit-true reference's, on the
     inputs that ``verify`` takes: steps, noise, limits, ends and breakpoints of the schedule, resets, tracks,
-    inputs out of range or not usable, the worst case of every node. "bound": outputs are no further from the
-    same controller in float64 than manifest.json's ``error_bound`` allows, on inputs within their ranges; for
-    fused multiply-adds, vectorised sums and other orders of summation. ``samples`` of mixed inputs from
-    ``seed``, besides the worst cases.
+    parameters, inputs out of range or not usable, the worst case of every node. "bound": outputs are no
+    further from the same controller in float64 than manifest.json's ``error_bound`` allows, on inputs within
+    their ranges; for fused multiply-adds, vectorised sums and other orders of summation. ``samples`` of mixed
+    inputs from ``seed``, besides the worst cases.
 
     Raises InputError for what cannot be compared.
     """
@@ -90,6 +90,9 @@ def assert_equivalent(
     plan, name = _plan(reference)
     tried = candidate_of(candidate, plan)
     trials = (exact_trials if within == "bits" else bounded_trials)(plan, samples, seed, tried.plain)
+    if plan.tuning and not tried.plain and not tunes(tried):
+        trials = [replace(t, raw=replace(t.raw, tunes=()), physical=replace(t.physical, tunes=()))
+                  for t in trials]  # fmt: skip
     seen = _run(tried, plan, [trial.raw for trial in trials])
     judge = _in_bits if within == "bits" else _in_bound
     judged = [judge(plan, trial, one) for trial, one in zip(trials, seen)]
@@ -133,7 +136,8 @@ def _run(candidate: Candidate, plan: Plan, scenarios: list[Scenario]) -> list[Pl
         return played(candidate, plan, scenarios)
     limit = _PATIENCE + _SLOW * sum(s.ref.size for s in scenarios)
     try:
-        return apart(played, candidate, plan, scenarios, seconds=limit)
+        seen: list[Played] = apart(played, candidate, plan, scenarios, seconds=limit)
+        return seen
     except Crashed as how:
         raise AssertionError(f"{candidate.label} crashed ({how})") from None
     except TimedOut as how:
@@ -166,7 +170,7 @@ def _steps(plan: Plan, scenario: Scenario) -> np.ndarray:
     if not plan.integrator and not plan.error_bound.operator_per_sample:
         return count
     count = count.cumsum(axis=1)
-    begun = [*scenario.resets, *(scenario.tracks if plan.integrator else ())]
+    begun: list[Reset | Track] = [*scenario.resets, *(scenario.tracks if plan.integrator else ())]
     for event in sorted(begun, key=lambda event: event.sample):
         count[event.lane, event.sample :] = np.arange(1, scenario.samples - event.sample + 1)
     return count

@@ -59,5 +59,5 @@ def _one_run(plan: Plan, trials: list[Trial]) -> Trial:
 
 def _joined(scenarios: list[Scenario]) -> Scenario:
     names = ("ref", "meas", "sched") if scenarios[0].sched is not None else ("ref", "meas")
-    rows = (np.concatenate([getattr(s, name).ravel() for s in scenarios])[None, :] for name in names)
-    return Scenario(*rows)
+    rows = {name: np.concatenate([getattr(s, name).ravel() for s in scenarios])[None, :] for name in names}
+    return Scenario(rows["ref"], rows["meas"], rows.get("sched"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,10 @@ from cffi import FFI
 from focgen.codegen.render import render
 from focgen.compiler import compile_shared
 from focgen.errors import BuildError, InputError
+from focgen.plan.scenario import Params
 from focgen.verification.host import FLAGS
 
-_CALLS = ("init", "reset", "step", "track", "flags")
+_CALLS = ("init", "reset", "step", "track", "flags", "tune")
 _STRICT = "-Werror=implicit-function-declaration"
 
 
@@ -32,12 +33,14 @@ class _Glue:
     step: str
     track: str
     flags: str
+    tune: str
+    params: str
 
 
 class OwnC:
     """Somebody's own C, with one state. ``scheduled``: whether its step takes a scheduling signal.
 
-    ``init``, ``track`` and ``flags`` are there where the C has them.
+    ``init``, ``track``, ``flags`` and ``tune`` are there where the C has them.
     """
 
     isolated = True
@@ -47,12 +50,14 @@ class OwnC:
         self._library, self._ffi = library, ffi
         self._state = ffi.new("double[]", -(-library.focgen_bytes() // 8) or 1)  # aligned for every member
         if glue.init:
-            self.init = lambda: library.focgen_init(self._state)
+            self.init: Callable[[], None] = lambda: library.focgen_init(self._state)
             self.init()
         if glue.track:
             self.track = lambda u: library.focgen_track(self._state, u)
         if glue.flags:
             self.flags = lambda: library.focgen_flags(self._state)
+        if glue.tune:
+            self.tune = self._tune
 
     def reset(self, ref: float, meas: float, u0: float) -> None:
         """PREFIX_reset, in counts."""
@@ -60,7 +65,12 @@ class OwnC:
 
     def step(self, ref: float, meas: float, sched: float = 0) -> float:
         """PREFIX_step, in counts; ``sched`` is not passed on where it takes none."""
-        return self._library.focgen_step(self._state, ref, meas, sched)
+        u: float = self._library.focgen_step(self._state, ref, meas, sched)
+        return u
+
+    def _tune(self, params: Params) -> None:
+        """PREFIX_tune, in counts."""
+        self._library.focgen_tune(self._state, list(map(float, params.gain)), params.u_min, params.u_max)
 
     def __repr__(self) -> str:
         return f"<C of {self.name}>"
@@ -79,10 +89,11 @@ def from_c(
     """Compile C of your own, and return it as a candidate for :func:`assert_equivalent`.
 
     The C has PREFIX_reset(state *, ref, meas, u0), PREFIX_step(state *, ref, meas) or PREFIX_step(state *,
-    ref, meas, sched), and, where it can, PREFIX_init(state *), PREFIX_track(state *, u) and
-    PREFIX_flags(state *), on a state of type ``state`` (PREFIX_state), which may hold anything. ``names``
-    gives other names, such as {"step": "valve_update"}. They are declared in ``header``: by default the first
-    .h among ``sources``, else PREFIX.h beside one of them, else the first source itself is included.
+    ref, meas, sched), and, where it can, PREFIX_init(state *), PREFIX_track(state *, u), PREFIX_flags(state
+    *) and PREFIX_tune(state *, const PREFIX_params *), on a state of type ``state`` (PREFIX_state), which may
+    hold anything. ``names`` gives other names, such as {"step": "valve_update"}. They are declared in
+    ``header``: by default the first .h among ``sources``, else PREFIX.h beside one of them, else the first
+    source itself is included.
     ``include`` are further folders of headers, ``flags`` those of the compiler.
 
     Raises InputError where a file or a function is missing, BuildError where the C does not compile.
@@ -123,7 +134,8 @@ def _glue(prefix: str, state: str, header: Path, names: Mapping[str, str], text:
         if not found[call]:
             remedy = f"give its name as names={{{call!r}: ...}}, or the file that has it among the sources"
             raise InputError(str(header), f"has no function {called[call]}", remedy)
-    return _Glue(header.as_posix(), state, _takes_schedule(called["step"], header, text), **found)
+    return _Glue(header.as_posix(), state, _takes_schedule(called["step"], header, text), **found,
+                 params=f"{prefix}_params")  # fmt: skip
 
 
 def _mentions(text: str, name: str) -> bool:
@@ -163,6 +175,7 @@ def _declarations(glue: _Glue) -> str:
         "void focgen_init(void *);": glue.init,
         "void focgen_track(void *, double);": glue.track,
         "uint32_t focgen_flags(void *);": glue.flags,
+        "void focgen_tune(void *, const double *, double, double);": glue.tune,
     }
     return (
         "uint32_t focgen_bytes(void); void focgen_reset(void *, double, double, double); "

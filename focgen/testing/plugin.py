@@ -7,11 +7,12 @@
 """
 
 import functools
+from typing import Any
 
 import pytest
 
 
-def pytest_addoption(parser):
+def pytest_addoption(parser: pytest.Parser) -> None:
     """The two options."""
     group = parser.getgroup("focgen", "equivalence with a generated controller")
     group.addoption("--focgen-samples", type=int, metavar="N", help="mixed inputs of assert_equivalent")
@@ -19,7 +20,7 @@ def pytest_addoption(parser):
 
 
 @pytest.fixture
-def assert_equivalent(request):
+def assert_equivalent(request: pytest.FixtureRequest) -> Any:
     """:func:`focgen.testing.assert_equivalent`, with what the command line says."""
     from focgen.testing.equivalence import assert_equivalent as function
 

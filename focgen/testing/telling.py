@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from focgen.plan.model import Format, Plan
-from focgen.plan.scenario import Reset, Track
+from focgen.plan.scenario import Reset, Track, Tune
 from focgen.testing.candidates import events_of
 
 if TYPE_CHECKING:
@@ -33,13 +33,13 @@ def difference(plan: Plan, headline: str, judged: Judged, counted: tuple[int, in
 def _inputs(plan: Plan, judged: Judged, lane: int, k: int) -> list[str]:
     raw = judged.trial.raw
     found = [("ref", raw.ref, plan.error), ("meas", raw.meas, plan.error)]
-    if plan.schedule:
+    if plan.schedule and raw.sched is not None:
         found.append(("sched", raw.sched, plan.schedule.signal))
     return [f"  {name:<9} {_value(values[lane, k], form)}" for name, values, form in found]
 
 
 def _events(plan: Plan, judged: Judged, lane: int, k: int) -> list[str]:
-    """The latest reset or track, which most differences have to do with."""
+    """The latest tune, reset or track, which most differences have to do with."""
     events = events_of(judged.trial.raw, lane)
     latest = max((sample for sample in events if sample <= k), default=None)
     if latest is None:
@@ -48,7 +48,11 @@ def _events(plan: Plan, judged: Judged, lane: int, k: int) -> list[str]:
     return [f"  {when}: {', '.join(_call(plan, event) for event in events[latest])}"]
 
 
-def _call(plan: Plan, event: Reset | Track) -> str:
+def _call(plan: Plan, event: Reset | Track | Tune) -> str:
+    if isinstance(event, Tune):
+        p, factor = event.params, plan.box.factor
+        gains = ", ".join(_value(count, factor) for count in p.gain)
+        return f"tune([{gains}], {_value(p.u_min, plan.output)}, {_value(p.u_max, plan.output)})"
     if isinstance(event, Track):
         return f"track({_value(event.u, plan.output)})"
     error = plan.error
@@ -60,7 +64,7 @@ def _outputs(plan: Plan, judged: Judged, at: tuple[int, int]) -> list[str]:
     seen, form = judged.seen, plan.output
     if judged.allowed is None:
         told = "" if judged.flags is None else f", flags {judged.flags[at]}"
-        own = "" if judged.flags is None else f", flags {seen.flags[at]}"
+        own = "" if judged.flags is None or seen.flags is None else f", flags {seen.flags[at]}"
         return [
             f"  reference u = {_value(judged.u[at], form)}{told}",
             f"  candidate u = {_value(seen.u[at], form)}{own}",

@@ -57,7 +57,7 @@ def guess(case: Path) -> str | None:
     rig = focgen.read_rig(case / "rig.toml")
     if rig.sample_time < _STEP or rig.sample_time > 0.2:
         return None
-    logs = focgen.read_logs(sorted((case / "logs").iterdir()), rig.signals, rig.sample_time)
+    logs = focgen.read_logs(rig, sorted((case / "logs").iterdir()))
     best, found = -1.0, None
     inputs, waiting = "command", []
     for name, effects in _STAGES.items():

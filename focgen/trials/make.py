@@ -29,10 +29,10 @@ from focgen.rig.files import rig_table
 from focgen.trials.cases import Case, make_case
 from focgen.trials.closed_cases import make_closed_case
 from focgen.trials.disturbed import DISTURBED, disturbed
-from focgen.trials.excitation import STREAMS, SUITES
-from focgen.trials.facts import SIGNALS
 from focgen.trials.engine.cases import make_engine_case
 from focgen.trials.engine.machine import engine
+from focgen.trials.excitation import STREAMS, SUITES
+from focgen.trials.facts import SIGNALS
 from focgen.trials.plan import CLOSED_KINDS, KINDS, Assignment, assignments
 from focgen.trials.plants_cases import make_plants_case
 from focgen.trials.recording import as_csv
@@ -166,7 +166,7 @@ def _write(folder: Path, number: str, case: Case, salt: str) -> str:
     return committed
 
 
-def _files(case: Case, experiments: list[tuple[str, dict]]) -> dict[str, str]:
+def _files(case: Case, experiments: list[tuple[str, dict[str, np.ndarray]]]) -> dict[str, str]:
     """File name → CSV; the names keep the order of the session."""
     signals, unit = case.rig.signals, case.recorder.time_unit
     if case.recorder.one_file:

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from focgen.errors import InputError
 from focgen.output import replace_folder
@@ -82,7 +83,7 @@ def run(
     return Ran(tuple(map(str, places)), now, len(cases) - len(waiting), len(failed), len(waiting) - now)
 
 
-def _in_turn(rows: Sequence[Sequence]) -> list:
+def _in_turn(rows: Sequence[Sequence[Any]]) -> list[Any]:
     """The first of each row, then the second of each …"""
     return [row[i] for i in range(max(map(len, rows), default=0)) for row in rows if i < len(row)]
 
@@ -93,10 +94,10 @@ def ran(folder: Path) -> bool:
 
 
 def _done(folder: Path) -> bool:
-    return outcome_of(folder)["status"] == "done"
+    return bool(outcome_of(folder)["status"] == "done")
 
 
-def outcome_of(folder: Path) -> dict:
+def outcome_of(folder: Path) -> dict[str, Any]:
     """What happened in a run; a run that left no word has failed."""
     return outcome_in(folder) or {"status": "failed", "seconds": None, "fault": "not run"}
 

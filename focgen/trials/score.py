@@ -11,10 +11,12 @@ import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from focgen.errors import FocgenError, InputError
 from focgen.output import write_file
 from focgen.progress import say, track
+from focgen.shown import Shown
 from focgen.trials import achieved, baselines
 from focgen.trials.asked import ask, resolved
 from focgen.trials.facts import achieved_in, diagnosis_in, facts_of
@@ -51,8 +53,8 @@ class Scores:
         return all(row.reached is not False for row in self.rows)
 
 
-@dataclass(frozen=True)
-class Summary:
+@dataclass(frozen=True, repr=False)
+class Summary(Shown):
     """The scores of several trials, in the order they were given."""
 
     sets: tuple[Scores, ...]
@@ -118,7 +120,7 @@ def _scored(folder: Path, asked: tuple[bool, bool], baseline: bool, partial: boo
     return scores
 
 
-def _unsealed(folder: Path, number: str, committed: str) -> dict:
+def _unsealed(folder: Path, number: str, committed: str) -> dict[str, Any]:
     if _carried(folder / "cases" / number / "commitment.txt") != committed:
         raise InputError(
             str(folder / "cases" / number), "carries another commitment than the trial", "make the cases anew"
@@ -135,7 +137,7 @@ def _carried(path: Path) -> str:
         raise InputError(str(path), "cannot be read", "make the cases anew") from None
 
 
-def _ask_oracle(folder: Path, labels: dict[str, dict], jobs: int) -> None:
+def _ask_oracle(folder: Path, labels: dict[str, dict[str, Any]], jobs: int) -> None:
     if not oracle_possible():
         say("trial score: the diagnosis cannot be told the effect; no oracle")
         return
@@ -162,7 +164,7 @@ def _ask_oracle(folder: Path, labels: dict[str, dict], jobs: int) -> None:
             one.result()
 
 
-def _judged(folder: Path, number: str, label: dict, baseline: bool) -> Judged:
+def _judged(folder: Path, number: str, label: dict[str, Any], baseline: bool) -> Judged:
     run, told = folder / "runs" / number, folder / "oracle" / number
     outcome, diagnosis = outcome_of(run), _diagnosis_of(run)
     single = label["kind"] == "single" and label["suite"] not in ("closed", "loops")
@@ -182,11 +184,11 @@ def _judged(folder: Path, number: str, label: dict, baseline: bool) -> Judged:
     )
 
 
-def _diagnosis_of(run: Path) -> dict | None:
+def _diagnosis_of(run: Path) -> dict[str, Any] | None:
     return diagnosis_in(run) if outcome_of(run)["status"] == "done" else None
 
 
-def _kept(folder: Path, run: Path, number: str, label: dict) -> float | None:
+def _kept(folder: Path, run: Path, number: str, label: dict[str, Any]) -> float | None:
     """The achieved shrink of a run, replayed once and kept beside it; None where there is none to measure."""
     kept = achieved_in(run)
     if kept is not None:
@@ -203,12 +205,12 @@ def _kept(folder: Path, run: Path, number: str, label: dict) -> float | None:
     return value
 
 
-def _best_fit(diagnosis: dict | None) -> str | None:
+def _best_fit(diagnosis: dict[str, Any] | None) -> str | None:
     """The effect of the lowest error on the given logs, where the diagnosis tells: ``fits`` [{effect,
     error}].
     """
     fits = (diagnosis or {}).get("fits") or ()
-    return min(fits, key=lambda fit: fit["error"])["effect"] if fits else None
+    return str(min(fits, key=lambda fit: fit["error"])["effect"]) if fits else None
 
 
 def confusions(judged: list[Judged]) -> dict[str, dict[str, int]]:

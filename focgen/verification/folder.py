@@ -13,6 +13,7 @@ from typing import Any
 from focgen.codegen.generate import folder_files
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.manifest import sha256
+from focgen.codegen.packages.archive import compare_archive
 from focgen.control.files import read_controller
 from focgen.errors import InputError
 from focgen.output import write_files
@@ -20,8 +21,7 @@ from focgen.plan.build import build_plan
 from focgen.plan.model import ErrorBound, Plan
 from focgen.verification.recorded import AGAIN, Recorded, read_recorded
 
-BESIDE = ("README.md", "example/main.c")
-"""Files that nothing is compiled from: theirs to change."""
+_EXAMPLES = ("example/", "examples/", "extras/")
 REMEMBERED = "cost.json"
 """The file beside a controller's C that remembers what it cost; no part of what was generated."""
 _MOST = 8  # strangers that are named
@@ -54,17 +54,26 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     recorded = read_recorded(path)
     controller = read_controller(path / "controller.toml")
     options = recorded.length, recorded.name, recorded.memory, recorded.tolerance, recorded.horizon
-    options += recorded.operator, recorded.band
+    options += recorded.operator, recorded.band, recorded.tunable
     plan = build_plan(controller, recorded.arithmetic, *options)
     given = _bytes(path / "controller.toml")
-    files = folder_files(plan, given, recorded.selftest, recorded.kernels, recorded.floats)
+    files = folder_files(plan, given, recorded.selftest, recorded.kernels, recorded.floats, recorded.package)
     for name in files:
-        if name not in BESIDE and not (path / name).is_file():
+        if not beside(name) and not (path / name).is_file():
             raise InputError(str(path), f"lacks {name}", AGAIN)
-    differences = tuple(_edited(path, files, recorded))
-    notes = tuple(_notes(path, files))
+    built = compare_archive(path / f"{plan.name}.fmu", plan.name, files, recorded.package.fmi)
+    differences = (*_edited(path, files, recorded), *built.differences)
+    notes = (*_notes(path, files, plan.name), *built.notes)
     kernels = recorded.kernels
     return GeneratedFolder(path, plan, recorded.bound, differences, recorded.selftest, kernels, files, notes)
+
+
+def beside(name: str) -> bool:
+    """Whether nothing of the controller is compiled from this file: a text, a build file, an example. These
+    are the user's to change."""
+    if name in ("manifest.json", "controller.toml"):
+        return False
+    return name.startswith(_EXAMPLES) or not name.endswith((".c", ".h"))
 
 
 @contextmanager
@@ -97,7 +106,7 @@ def _edited(path: Path, files: Mapping[str, str | bytes], recorded: Recorded) ->
     if digest != sha256(files["controller.toml"]):
         yield "controller.toml: is not the one that the folder was made from"
     for name, content in files.items():
-        if name in (*BESIDE, "manifest.json", "controller.toml") or _same_bytes(path / name, content):
+        if beside(name) or name in ("manifest.json", "controller.toml") or _same_bytes(path / name, content):
             continue
         yield f"{name}: is not what focgen writes for this controller.toml"
     if not _same_bytes(path / "manifest.json", files["manifest.json"]):
@@ -105,19 +114,26 @@ def _edited(path: Path, files: Mapping[str, str | bytes], recorded: Recorded) ->
         yield from found or ("manifest.json: has other bytes than were written",)
 
 
-def _notes(path: Path, files: Mapping[str, str | bytes]) -> Iterator[str]:
+def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Iterator[str]:
     """Yield what nothing is compiled from, where it is not as it was written, and what does not belong."""
-    for name in BESIDE:
+    for name in filter(beside, files):
         if not (path / name).is_file():
             yield f"{name}: is missing"
         elif not _same_bytes(path / name, files[name]):
             yield f"{name}: has been edited"
-    known = {*files, REMEMBERED, *(str(Path(name).parent) for name in files)}
-    found = [*path.iterdir(), *((path / "example").iterdir() if (path / "example").is_dir() else ())]
+    folders = {parent.as_posix() for name in files for parent in Path(name).parents}
+    known = {*files, *folders, REMEMBERED, *([f"{controller}.fmu"] * any(map(_of_fmu, files)))}
+    found = [
+        one for folder in sorted(folders) if (path / folder).is_dir() for one in (path / folder).iterdir()
+    ]
     strangers = sorted(name for one in found if (name := one.relative_to(path).as_posix()) not in known)
     yield from (f"{_shown(name)}: does not belong to the folder" for name in strangers[:_MOST])
     if len(strangers) > _MOST:
         yield f"{len(strangers) - _MOST} more files do not belong to the folder"
+
+
+def _of_fmu(name: str) -> bool:
+    return name.startswith("fmu/")
 
 
 def _differences(expected: Any, found: Any, place: str) -> Iterator[str]:

@@ -11,6 +11,7 @@ from typing import Any
 import focgen
 from focgen.codegen.kernels import TARGETS, Kernels
 from focgen.codegen.names import check_name
+from focgen.codegen.packages.package import PLAIN, Package, check_package
 from focgen.control.controller import ARITHMETICS, MEMORIES
 from focgen.errors import InputError, check_choice
 from focgen.fractional.continuous import OPERATORS
@@ -31,6 +32,8 @@ _SHAPE = {
     "kernels?": {"target": str},
     "selftest?": dict,
     "no_float?": bool,
+    "package?": {"for": str, "fmi?": int},
+    "tunable?": dict,
     "inputs": dict,
 }
 _EXPONENTIAL = {"tolerance": float, "horizon": int}
@@ -59,6 +62,8 @@ class Recorded:
     content: Mapping[str, Any]
     operator: str = "gl"
     band: tuple[float, float] | None = None
+    package: Package = PLAIN
+    tunable: bool = False
 
 
 def read_recorded(folder: Path) -> Recorded:
@@ -85,7 +90,18 @@ def read_recorded(folder: Path) -> Recorded:
     options = found["arithmetic"], found["memory"], *_memory(path, found)
     bound, floats = _bound(found["error_bound"]), not found.get("no_float", False)
     recorded = Recorded(name, *options, Kernels(target), "selftest" in found, bound, floats, found)
-    return replace(recorded, operator=found["operator"], band=_band(path, found))
+    package, tunable = _package(path, found.get("package")), "tunable" in found
+    band = _band(path, found)
+    return replace(recorded, operator=found["operator"], band=band, package=package, tunable=tunable)
+
+
+def _package(path: Path, entry: dict[str, Any] | None) -> Package:
+    if entry is None:
+        return PLAIN
+    try:
+        return check_package(entry["for"], entry.get("fmi"))
+    except InputError as fault:
+        raise InputError(f"{path} [package]", fault.what, AGAIN) from None
 
 
 def _check_shape(path: Path, found: Any, shape: dict[str, Any]) -> None:

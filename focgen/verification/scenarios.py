@@ -8,11 +8,12 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.plan.model import Plan
-from focgen.plan.scenario import Reset, Scenario, Track, to_raw
+from focgen.plan.scenario import Params, Reset, Scenario, Track, Tune, to_raw
 from focgen.plan.worst import worst_case_input
 from focgen.verification.unusable import strewn
 
 LANES = 8
+_TUNED = 5  # changes of the parameters in a lane
 _BEYOND = 0.15  # of a range: how far lanes that leave their ranges go beyond them
 
 
@@ -26,7 +27,9 @@ def mixed(controller: Controller, samples: int, seed: int, beyond: bool = False)
     ranges = controller.ranges
     ref, meas = (_signals(rng, span, each, beyond) for span in (ranges.reference, ranges.measurement))
     sched = _signals(rng, ranges.schedule, each, beyond) if controller.scheduled else None
-    return Scenario(ref, meas, sched, _resets(rng, controller, each, beyond), _tracks(rng, controller, each))
+    events = _resets(rng, controller, each, beyond), _tracks(rng, controller, each)
+    tunes = tunes_of(rng, controller, each) if controller.tunable else ()
+    return Scenario(ref, meas, sched, *events, tunes=tunes)
 
 
 def _signals(rng: np.random.Generator, span: tuple[float, float], count: int, beyond: bool) -> np.ndarray:
@@ -89,6 +92,52 @@ def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:
     )
 
 
+def tunes_of(rng: np.random.Generator, controller: Controller, count: int) -> tuple[Tune, ...]:
+    """Physical parameters from all over the box, its corners among them, at random moments of every lane but
+    the first.
+    """
+    box, found = controller.tunable, []
+    for lane in range(1, LANES):
+        for at in sorted(rng.choice(count, min(_TUNED, count), replace=False).tolist()):
+            corners = lane % 2 == 0
+            gain = tuple(_inside(rng, box.gain, corners) for _ in controller.gains)
+            ends = (_inside(rng, span, corners) for span in (box.output_low, box.output_high))
+            found.append(Tune(lane, at, Params(gain, *ends)))
+    return tuple(found)
+
+
+def _inside(rng: np.random.Generator, span: tuple[float, float], corner: bool) -> float:
+    return float(rng.choice(span) if corner else rng.uniform(*span))
+
+
+def mistuned(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
+    """A raw scenario of a tunable plan in which every third set of parameters is refused: one number is just
+    outside its box, far outside, or, floating, no number.
+    """
+    if plan.tuning is None:
+        return scenario
+    rng, made = np.random.default_rng([seed, 17]), []
+    for i, tune in enumerate(scenario.tunes):
+        made.append(replace(tune, params=_outside(plan, tune.params, rng)) if i % 3 == 2 else tune)
+    return replace(scenario, tunes=tuple(made))
+
+
+def _outside(plan: Plan, params: Params, rng: np.random.Generator) -> Params:
+    box, which = plan.tuning, int(rng.integers(len(params.gain) + 2))
+    ends = [(box.factor.low, box.factor.high)] * len(params.gain) + [box.low, box.high]
+    low, high = ends[which]
+    top = (1 << (plan.output.bits - 1)) - 1
+    if plan.floating:
+        kind = np.float32 if plan.arithmetic == "f32" else np.float64
+        beside = [float(np.nextafter(kind(end), kind(to))) for end, to in ((low, -np.inf), (high, np.inf))]
+        choices = [*beside, low - 1e3, high + 1e3, np.nan, np.inf, -np.inf]
+    else:
+        choices = [x for x in (low - 1, high + 1, -top - 1, top) if not low <= x <= high and abs(x) <= top]
+    values = [*params.gain, params.u_min, params.u_max]
+    values[which] = choices[int(rng.integers(len(choices)))]
+    return Params(tuple(values[:-2]), *values[-2:])
+
+
 def worst_cases(plan: Plan) -> Scenario:
     """Raw inputs that take each node to its proved worst case, two lanes a node, up and down.
 
@@ -103,7 +152,12 @@ def worst_cases(plan: Plan) -> Scenario:
 def _content(scenario: Scenario) -> tuple:
     """What tells scenarios apart."""
     signals = scenario.ref, scenario.meas, scenario.sched
-    return *(None if x is None else x.tobytes() for x in signals), scenario.resets, scenario.tracks
+    return (
+        *(None if x is None else x.tobytes() for x in signals),
+        scenario.resets,
+        scenario.tracks,
+        scenario.tunes,
+    )
 
 
 def side_by_side(scenarios: list[Scenario]) -> Scenario:
@@ -117,6 +171,7 @@ def side_by_side(scenarios: list[Scenario]) -> Scenario:
         None if scenarios[0].sched is None else stacked([s.sched for s in scenarios]),
         tuple(replace(r, lane=r.lane + int(b)) for s, b in zip(scenarios, begins) for r in s.resets),
         tuple(replace(t, lane=t.lane + int(b)) for s, b in zip(scenarios, begins) for t in s.tracks),
+        tunes=tuple(replace(t, lane=t.lane + int(b)) for s, b in zip(scenarios, begins) for t in s.tunes),
     )
 
 
@@ -137,6 +192,7 @@ def thinned(scenario: Scenario, samples: int) -> Scenario | None:
         None if scenario.sched is None else scenario.sched[chosen],
         tuple(replace(r, lane=place[r.lane]) for r in scenario.resets if r.lane in place),
         tuple(replace(t, lane=place[t.lane]) for t in scenario.tracks if t.lane in place),
+        tunes=tuple(replace(t, lane=place[t.lane]) for t in scenario.tunes if t.lane in place),
     )
 
 
@@ -147,8 +203,8 @@ def raw_scenarios(plan: Plan, samples: int, seed: int) -> dict[str, Scenario]:
         mixed(plan.controller, max(samples // 8, 1), seed, True),
     )
     found = {
-        "mixed": to_raw(plan, inside),
-        "beyond the ranges": to_raw(plan, outside),
+        "mixed": mistuned(plan, to_raw(plan, inside), seed),
+        "beyond the ranges": mistuned(plan, to_raw(plan, outside), seed),
         "worst cases": worst_cases(plan),
     }
     if plan.floating:

@@ -61,6 +61,9 @@ def remembered(plan: Plan, ending: Ending, kernels: Kernels = PORTABLE) -> dict[
         "output": ending.output,
         "flags": ending.flags,
     }
+    if ending.applied:
+        now = ending.applied
+        found |= {"gains": now.gains, "slopes": now.slopes, "u_min": now.low, "u_max": now.high}
     for history, past, rest in (("error", ending.error, ending.error_rest),
                                 ("filtered", ending.filtered, ending.filtered_rest)):  # fmt: skip
         size = kernels.slots(plan, history)

@@ -34,7 +34,7 @@ def strewn(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
     others = [values[-1] for name, values in signals.items() if name != "meas"]
     _largest(rng, signals["meas"][-1], others, kind(limit(plan)))
     resets, tracks = _resets(rng, scenario, bad), _tracks(rng, scenario, bad)
-    made = Scenario(**signals, resets=resets, tracks=tracks)
+    made = Scenario(**signals, resets=resets, tracks=tracks, tunes=scenario.tunes)
     return replace(made, damages=_damages(plan, made, rng))
 
 
@@ -70,6 +70,7 @@ def _damages(plan: Plan, scenario: Scenario, rng: np.random.Generator) -> tuple[
         return ()
     good, begun = ~invalid_samples(plan, scenario), {(r.lane, r.sample) for r in scenario.resets}
     kinds = ["error"] * bool(plan.error_lags) + ["all"] + ["integral"] * bool(plan.integrator)
+    kinds += ["limits", "gains"] * bool(plan.tuning)
     found = []
     for lane in range(scenario.lanes):
         places = [k for k in np.flatnonzero(good[lane]).tolist() if (lane, k) not in begun]

@@ -13,7 +13,7 @@ from pathlib import Path
 from focgen.codegen.kernels import Kernels
 from tests.proofs import assembly, esbmc, eva
 from tests.proofs.faults import FAULTS, sow
-from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
+from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering, tuned
 from tests.proofs.verdict import Verdict, first_objection
 
 LENGTH, SLOTS, FLOATS = 256, 64, 32
@@ -31,6 +31,9 @@ def by_esbmc(folder: Path) -> Iterator[tuple[str, Verdict]]:
         if arithmetic == "q15":
             yield "runtime", esbmc.ring(folder)
             yield "runtime", esbmc.usable(folder)
+        if arithmetic == "f32":
+            for verdict in esbmc.counted(folder):
+                yield "runtime", verdict
         asked = esbmc.sums(plan, folder) if plan.floating else esbmc.overflow(plan, folder)
         for verdict in asked:
             yield f"all {arithmetic}, L = {length}", verdict
@@ -46,7 +49,7 @@ def by_esbmc(folder: Path) -> Iterator[tuple[str, Verdict]]:
 
 def by_eva(folder: Path) -> Iterator[tuple[str, Verdict]]:
     """Whole controllers; the floating forms' accesses and shifts at a shorter memory."""
-    for name in (*controllers(LENGTH), *remembering()):
+    for name in (*controllers(LENGTH), *tuned(LENGTH), *remembering()):
         for arithmetic in ARITHMETICS:
             plan = generated(folder, name, arithmetic, LENGTH if arithmetic in FIXED else FLOATS)
             yield f"{name} {arithmetic}", eva.check(plan, folder)

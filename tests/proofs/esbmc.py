@@ -94,6 +94,54 @@ int main(void)
     return check(folder, "usable inputs, every float", code, 2)
 
 
+def counted(folder: Path) -> Iterator[Verdict]:
+    """Counts of every float are the nearest, none that cannot be held, and an integral takes two of them."""
+    nearest = f"""#include "foc_integral.h"
+{_HEAD}
+int main(void)
+{{
+    const float x = nondet_float();
+    const int16_t up = nondet_int16_t();
+    __ESBMC_assume(up >= -67 && up <= 126);
+    const int64_t n = foc_counts_f32(x, up);
+    SAYS((n == INT64_MIN) == !(x - x == 0.0f));
+    SAYS(n == INT64_MIN || foc_held(n));
+    SAYS(n == INT64_MIN || n == 0 || (n < 0) == (x < 0.0f));
+    SAYS(foc_counts_f32(-x, up) == (n == INT64_MIN ? n : -n));
+    return 0;
+}}
+"""
+    yield check(folder, "counts, every float and scale", nearest, 2, "--overflow-check", seconds=300.0)
+    exact = f"""#include "foc_integral.h"
+{_HEAD}
+int main(void)
+{{
+    const float x = nondet_float();
+    const double wide = (double)x * 0x1p57; /* exact */
+    __ESBMC_assume(wide > -0x1p52 && wide < 0x1p52);
+    const double n = (double)foc_counts_f32(x, 57);
+    SAYS(n - wide <= 0.5 && wide - n <= 0.5);
+    return 0;
+}}
+"""
+    yield check(folder, "counts are the nearest, every float", exact, 2, seconds=300.0)
+    added = f"""#include "foc_rt.h"
+#include "foc_integral.h"
+{_HEAD}
+int main(void)
+{{
+    const int64_t low = nondet_int64_t(), high = nondet_int64_t(), at = nondet_int64_t();
+    const int64_t now = foc_counts_f32(nondet_float(), 57), before = foc_counts_f32(nondet_float(), 57);
+    __ESBMC_assume(low >= -FOC_MOST && low <= at && at <= high && high <= FOC_MOST);
+    __ESBMC_assume(foc_held(now) && foc_held(before));
+    const int64_t then = foc_clamp64(at + (now + before), low, high);
+    SAYS(then >= low && then <= high);
+    return 0;
+}}
+"""
+    yield check(folder, "an integral and what it takes in", added, 2, "--overflow-check", seconds=300.0)
+
+
 def carry(plan: Plan, folder: Path) -> Verdict:
     """What rounding leaves over is at most half a count, for every x that can be; nothing overflows."""
     wide, half = plan.wide.ctype, (1 << plan.narrow) >> 1

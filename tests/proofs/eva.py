@@ -4,8 +4,9 @@ It follows an interval for every variable through init, reset, track or step wit
 whatever it cannot exclude: signed overflow, a read or write outside, a shift out of range, a division by
 zero, a member that leaves its interval. No report is a proof. What it cannot see is what keeps small because
 one value is taken from another, as it has one interval for each: the rounding's rest
-(:func:`tests.proofs.esbmc.carry` shows that), what modes keep (:func:`tests.proofs.esbmc.means`), and the
-filtered error that they keep it of, which rests on the recursion's l1 norm.
+(:func:`tests.proofs.esbmc.carry` shows that), what modes keep (:func:`tests.proofs.esbmc.means`), the
+filtered error that they keep it of (the recursion's l1 norm), and that a finite float has counts
+(:func:`tests.proofs.esbmc.counted`).
 """
 
 from __future__ import annotations
@@ -62,7 +63,8 @@ def check(plan: Plan, folder: Path, kernels: Kernels = PORTABLE, seconds: float 
 def elsewhere(plan: Plan) -> set[str]:
     """The members whose intervals are assumed here and shown in another way."""
     kept = {means(table, i) for table in plan.sums for i in range(len(table.banks))}
-    return kept | {"carry", "filtered"}
+    taken_in = {"increment", "inner_input"} if plan.counted else set()
+    return kept | {"carry", "filtered"} | taken_in
 
 
 def objections(plan: Plan, folder: Path, said: str) -> tuple[str, ...]:

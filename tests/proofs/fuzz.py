@@ -22,13 +22,14 @@ from focgen.codegen.state import members
 from focgen.plan.model import Plan
 from tests.c_code import lacking
 from tests.proofs.harness import inside, reachable
-from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering
+from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering, tuned
 
 FLAGS = """-std=c99 -O1 -g -ffp-contract=off
     -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all""".split()
 _SHORT, _AHEAD = 11, 27  # past samples: few, so that rings wrap often; as few as looking ahead takes
+_ALL = (*controllers(_SHORT), *tuned(_SHORT), *remembering())
 CASES = [
-    *((name, a, _SHORT, PORTABLE) for name in (*controllers(_SHORT), *remembering()) for a in ARITHMETICS),
+    *((name, a, _SHORT, PORTABLE) for name in _ALL for a in ARITHMETICS),
     *(("all", a, _AHEAD, Kernels(target)) for target, a in KERNELS),
 ]
 """What is fuzzed: a controller, its arithmetic and length, and its form of the sums."""
@@ -60,6 +61,7 @@ def target(plan: Plan, kernels: Kernels = PORTABLE) -> str:
         "signal": signal,
         "sched": sched,
         "oracle": "\n".join(_oracle(plan, kernels)),
+        "tune": _TUNE % {"name": name, "NAME": name.upper()} if plan.tuning else "",
         "flags": sum(flags(plan).values()),
     }
 
@@ -112,7 +114,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *at, size_t size)
     while (at < end) {
         const uint8_t what = *at++;
 
-        if ((what & 7u) < 5u) {
+%(tune)s        if ((what & 7u) < 5u) {
             unsigned n = 1u + (what >> 4);
             %(signal)s u;
 
@@ -136,6 +138,21 @@ int LLVMFuzzerTestOneInput(const uint8_t *at, size_t size)
     }
     return 0;
 }
+"""
+
+
+_TUNE = """        if ((what & 15u) == 12u) {
+            %(name)s_params p;
+            unsigned i;
+
+            %(name)s_default(&p);
+            for (i = 0; i < %(NAME)s_GAINS; i++) p.gain[i] = argument(&at, end);
+            if ((what & 16u) != 0u) p.u_min = argument(&at, end);
+            if ((what & 32u) != 0u) p.u_max = argument(&at, end);
+            if (%(name)s_check(&p) != %(name)s_tune(&s, &p)) __builtin_trap();
+            look();
+            continue;
+        }
 """
 
 

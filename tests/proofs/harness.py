@@ -14,6 +14,7 @@ from focgen.codegen.banks import means
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.literals import literal
 from focgen.codegen.state import Member, members
+from focgen.plan.counts import MOST
 from focgen.plan.formats import Interval, limit, span
 from focgen.plan.model import Plan
 
@@ -24,8 +25,11 @@ def reachable(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, Interval | N
     """
     kept = [m.name for m in members(plan, kernels) if not m.name.endswith("_ahead")]
     known = {"flags": None, "starting": Interval(0, 1)}
+    if plan.tuning:
+        known |= _parameters(plan)
     known |= {f"{ring}_now": Interval(0, kernels.slots(plan, ring) - 1) for ring in ("error", "filtered")}
     if plan.floating:
+        known |= _counted(plan)
         return {name: known.get(name) for name in kept}
     half = (1 << plan.narrow) >> 1
     worst = {proof.node: proof.worst for proof in plan.proofs}
@@ -46,6 +50,29 @@ def reachable(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, Interval | N
     return {name: known[name] for name in kept}
 
 
+def _counted(plan: Plan) -> dict[str, Interval]:
+    """Of a floating plan's integrals in counts."""
+    found = {}
+    for name, last, integral in (
+        ("integral", "increment", plan.integrator),
+        ("inner", "inner_input", plan.inner),
+    ):
+        if integral and not integral.state.floating:
+            found |= {name: span(integral.state).hull(0), last: _around(MOST)}
+    return found
+
+
+def _parameters(plan: Plan) -> dict[str, Interval | None]:
+    """Of what NAME_tune has taken over; a floating state may hold anything, and mends itself."""
+    names = ("gains", "slopes", "u_min", "u_max")
+    if plan.floating:
+        return dict.fromkeys(names)
+    worst = {proof.node: proof.worst for proof in plan.proofs}
+    slopes = _around(worst["tuned slope"]) if plan.schedule else None
+    ends = (Interval(*map(int, box)) for box in (plan.tuning.low, plan.tuning.high))
+    return dict(zip(names, (_around(worst["tuned gain"]), slopes, *ends)))
+
+
 def _room(plan: Plan) -> int:
     """How large two increments may be, added to an integral at its limit: all that the sum asks of them."""
     state, own = plan.integrator.state, plan.increment
@@ -63,8 +90,9 @@ def harness(plan: Plan, asked: set[str]) -> str:
     anything = [line for m in members(plan) for line in every(m, chosen(m, ranges[m.name]))]
     again = [line for m in members(plan) if m.name in asked for line in every(m, within(m, ranges[m.name]))]
     cases = [f"    case {i}: {one} break;" for i, one in enumerate(calls(plan).values())]
-    switch = [f"    switch ({any_of('uint8_t')} & 3) {{", *cases, "    }"]
-    return program(plan, [function("int main", [*anything, *arguments(plan), *switch, *again])])
+    switch = [f"    switch ({any_of('uint8_t')} & 7) {{", *cases, "    }"]
+    given = [*arguments(plan), *parameters(plan)]
+    return program(plan, [function("int main", [*anything, *given, *switch, *again])])
 
 
 def program(plan: Plan, functions: list[str]) -> str:
@@ -104,10 +132,21 @@ def arguments(plan: Plan) -> list[str]:
     return [f"    {signal} {argument} = {any_of(signal)};" for argument in "abc"]
 
 
+def parameters(plan: Plan) -> list[str]:
+    """The declaration of p: any parameters; nothing where there are none."""
+    if plan.tuning is None:
+        return []
+    signal = plan.output.ctype
+    gains = f"    for (unsigned i = 0; i < {plan.name.upper()}_GAINS; i++) p.gain[i] = {any_of(signal)};"
+    ends = [f"    p.{end} = {any_of(signal)};" for end in ("u_min", "u_max")]
+    return [f"    {plan.name}_params p;", gains, *ends]
+
+
 def calls(plan: Plan) -> dict[str, str]:
     """A call of each function that changes a state, by what it does."""
     name = plan.name
-    return {
+    tune = {"tune": f"(void){name}_tune(&s, &p);"} if plan.tuning else {}
+    return tune | {
         "init": f"{name}_init(&s);",
         "reset": f"{name}_reset(&s, a, b, c);",
         "track": f"{name}_track(&s, a);",

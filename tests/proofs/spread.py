@@ -7,7 +7,7 @@ from pathlib import Path
 
 from focgen.codegen.generate import folder_files
 from focgen.codegen.kernels import PORTABLE, Kernels
-from focgen.control.controller import Controller, ControllerRanges, GainSchedule
+from focgen.control.controller import Controller, ControllerRanges, GainSchedule, Tunable
 from focgen.control.files import controller_text
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_files
@@ -44,6 +44,14 @@ def controllers(length: int) -> dict[str, Controller]:
     }
 
 
+def tuned(length: int) -> dict[str, Controller]:
+    """With parameters: "inverse_tuned", a schedule ahead of an integrator, and "filter_tuned", neither."""
+    found = controllers(length)
+    limits = {"inverse": Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0))}
+    limits["filter"] = Tunable((0.25, 1.5), (-3.0, -1.0), (1.0, 3.0))
+    return {f"{n}_tuned": replace(found[n], name=f"{n}_tuned", tunable=box) for n, box in limits.items()}
+
+
 def remembering() -> dict[str, Controller]:
     """The same with an exponential memory: in the numerator alone, and in everything; and "slow_modes", which
     remembers changes (an order above 1) for so long that every arithmetic needs its bank for slow modes.
@@ -61,7 +69,7 @@ def remembering() -> dict[str, Controller]:
 
 def generated(folder: Path, name: str, arithmetic: str, length: int, kernels: Kernels = PORTABLE) -> Plan:
     """Write one of them into a folder, under its own name, and return its plan."""
-    controller = {**controllers(length), **remembering()}[name]
-    plan = build_plan(controller, arithmetic, name=name)
+    controller = {**controllers(length), **tuned(length), **remembering()}[name]
+    plan = build_plan(controller, arithmetic, name=name, tunable=controller.tunable is not None)
     write_files(folder, folder_files(plan, controller_text(controller).encode(), kernels=kernels))
     return plan

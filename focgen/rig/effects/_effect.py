@@ -61,6 +61,7 @@ class Run:
     0, 2 where it comes from equilibrium with that sample's input; ``clock`` (n,) is the session's time in s;
     ``duration`` of the longest experiment in s; ``carried``: what of an effect outlived an earlier session.
     ``begins``: what the input was before each experiment, in its order; none where all come from rest.
+    ``rough``: what is integrated in steps may take them twice as long, for fits that are but compared.
     """
 
     h: float
@@ -69,6 +70,7 @@ class Run:
     duration: float
     carried: Mapping[str, float] = field(default_factory=dict)
     begins: tuple[Begin, ...] = ()
+    rough: bool = False
 
     @property
     def spans(self) -> list[tuple[int, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ _SETTLING = 8.0  # body times before each experiment: it hangs as it hangs
 _STAGE_OF = {form.name: stage for stage, forms in (*VOCABULARY.values(), *OUTSIDE.values()) for form in forms}
 
 
-def engine():
+def engine() -> Any:
     """The physics engine. Raises InputError where it is not installed."""
     try:
         import mujoco

@@ -20,6 +20,7 @@
 #include "finger_f32.h"
 
 #include "foc_memory.h"
+#include "foc_integral.h"
 #include "foc_rt.h"
 #include "foc_save.h"
 
@@ -31,6 +32,9 @@
 #endif
 #if FOC_MEMORY_VERSION != 2
 #error "foc_memory.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
+#endif
+#if FOC_INTEGRAL_VERSION != 2
+#error "foc_integral.h is not the one that came with finger_f32.c: run focgen generate again and copy both"
 #endif
 
 /* The bits are those of the reference where each operation is rounded once. */
@@ -183,7 +187,7 @@ static float finger_f32_denominator_sum(finger_f32_state *s)
 /* Take the error of one more sample; return the filtered error v. */
 static float finger_f32_filter(finger_f32_state *s, float e)
 {
-    float r;
+    int64_t r;
     float x;
     float v;
 
@@ -192,10 +196,15 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     x = finger_f32_numerator_sum(s);
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
-    r = finger_f32_integrand_sum(s);
-    s->inner = foc_clamp_f32(s->inner + (r + s->inner_input), (-0.687674999f), 0.687674999f);
+    r = foc_counts_f32(finger_f32_integrand_sum(s), 61);
+    if (!foc_held(r)) {
+        return foc_nothing_f32();
+    }
+    /* |sum| <= 6197356608029196288 < 2^63 */
+    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-1585670589601808384),
+                           1585670589601808384);
     s->inner_input = r;
-    x += s->inner;
+    x += foc_value_f32(s->inner, 4.3368086899420177e-19f);
 
     s->filtered_now = foc_ring_next(s->filtered_now, FINGER_F32_FILTERED);
     x -= finger_f32_denominator_sum(s);
@@ -204,10 +213,10 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     return v;
 }
 
-/* The filtered error times the gain times h/2; in V. */
-static float finger_f32_increment(float gain, float v)
+/* The filtered error times the gain times h/2; counts of 2^-57 V. */
+static int64_t finger_f32_increment(float gain, float v)
 {
-    return gain * v;
+    return foc_counts_f32(gain * v, 57);
 }
 
 /* The flags of an output at its ends. */
@@ -259,25 +268,28 @@ static void finger_f32_settle(finger_f32_state *s, float e)
         s->denominator_slow_means[i] = v;
         s->denominator_slow_rests[i] = 0.0f;
     }
-    s->inner = 0.0f;
-    s->inner_input = finger_f32_integrand_sum(s);
-    s->increment = 0.0f;
+    s->inner = 0;
+    s->inner_input = foc_counts_f32(finger_f32_integrand_sum(s), 61);
+    s->increment = 0;
     s->resting = v;
     s->starting = 1; /* the first step completes it: only then the gain is known */
     s->flags = 0;
 }
 
 /* Whether an output is one that a step can have left: NaN is not. */
-static uint8_t finger_f32_within(float u)
+static uint8_t finger_f32_within(const finger_f32_state *s)
 {
-    return (uint8_t)(foc_finite_f32(u) && u >= FINGER_F32_U_MIN && u <= FINGER_F32_U_MAX);
+    const int64_t now = s->integral;
+
+    return (uint8_t)(s->error_now < FINGER_F32_ERRORS
+                     && now >= 0
+                     && now <= 1441151880758558720);
 }
 
 /* An input of the step cannot be used: the output stays, and so does everything else. */
 static finger_f32_sig finger_f32_hold(finger_f32_state *s)
 {
-    const float known = s->integral;
-    const float u = finger_f32_within(known) ? known : 0.0f;
+    const float u = finger_f32_within(s) ? foc_value_f32(s->integral, 6.9388939039072284e-18f) : 0.0f;
 
     s->flags = (uint8_t)(FINGER_F32_FLAG_INVALID | finger_f32_ends(u));
     return u;
@@ -290,7 +302,7 @@ static finger_f32_sig finger_f32_recover(finger_f32_state *s, float e)
     const uint8_t flags = s->flags;
 
     finger_f32_settle(s, e);
-    s->integral = u;
+    s->integral = foc_counts_f32(u, 57);
     s->flags = flags;
     return u;
 }
@@ -298,7 +310,7 @@ static finger_f32_sig finger_f32_recover(finger_f32_state *s, float e)
 void finger_f32_init(finger_f32_state *s)
 {
     finger_f32_settle(s, 0.0f);
-    s->integral = 0.0f; /* 0 V */
+    s->integral = 0; /* 0 V */
 }
 
 void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas, finger_f32_sig u0)
@@ -306,7 +318,7 @@ void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig me
     const int known = foc_usable_f32(ref) && foc_usable_f32(meas);
 
     finger_f32_settle(s, known ? ref - meas : 0.0f);
-    s->integral = 0.0f; /* where u0 cannot be used */
+    s->integral = 0; /* where u0 cannot be used */
     finger_f32_track(s, u0);
     if (!known) {
         s->flags = FINGER_F32_FLAG_INVALID;
@@ -319,11 +331,16 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
     if (!foc_usable_f32(ref) || !foc_usable_f32(meas) || !foc_usable_f32(sched)) {
         return finger_f32_hold(s);
     }
+    if (!finger_f32_within(s) ||
+        !foc_held(s->inner_input) ||
+        !(s->inner >= (-1585670589601808384) && s->inner <= 1585670589601808384)) {
+        return finger_f32_recover(s, ref - meas);
+    }
 
     const float gain = foc_schedule_f32(sched, finger_f32_points, finger_f32_gains, finger_f32_slopes,
                                         3);
     const float v = finger_f32_filter(s, ref - meas);
-    const float d = finger_f32_increment(gain, v);
+    const int64_t d = finger_f32_increment(gain, v);
     unsigned flags = 0;
     float u;
 
@@ -331,12 +348,13 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
         s->increment = finger_f32_increment(gain, s->resting);
         s->starting = 0;
     }
-    if (!foc_finite_f32(s->integral + (d + s->increment)) || !finger_f32_within(s->integral)) {
+    if (!foc_held(d) || !foc_held(s->increment)) {
         return finger_f32_recover(s, ref - meas);
     }
-    s->integral = foc_clamp_f32(s->integral + (d + s->increment), 0.0f, 10.0f);
+    /* |sum| <= 6052837899185946624 < 2^63 */
+    s->integral = foc_clamp64(s->integral + (d + s->increment), 0, 1441151880758558720);
     s->increment = d;
-    u = s->integral;
+    u = foc_value_f32(s->integral, 6.9388939039072284e-18f);
 
     if (sched < finger_f32_points[0] || sched > finger_f32_points[2]) {
         flags |= FINGER_F32_FLAG_SCHEDULE;
@@ -351,7 +369,7 @@ void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied)
         s->flags = (uint8_t)(s->flags | FINGER_F32_FLAG_INVALID);
         return;
     }
-    s->integral = foc_clamp_f32(u_applied, FINGER_F32_U_MIN, FINGER_F32_U_MAX);
+    s->integral = foc_counts_f32(foc_clamp_f32(u_applied, FINGER_F32_U_MIN, FINGER_F32_U_MAX), 57);
 }
 
 uint8_t finger_f32_flags(const finger_f32_state *s)
@@ -367,11 +385,11 @@ void finger_f32_save(const finger_f32_state *s, uint8_t *to)
     uint32_t at = foc_put(to, 0, FINGER_F32_CONFIGURATION, 8);
     uint16_t i;
 
-    at = foc_put(to, at, foc_bits_f32(s->integral), 4);
-    at = foc_put(to, at, foc_bits_f32(s->increment), 4);
+    at = foc_put(to, at, (uint64_t)s->integral, 8);
+    at = foc_put(to, at, (uint64_t)s->increment, 8);
+    at = foc_put(to, at, (uint64_t)s->inner, 8);
+    at = foc_put(to, at, (uint64_t)s->inner_input, 8);
     at = foc_put(to, at, foc_bits_f32(s->resting), 4);
-    at = foc_put(to, at, foc_bits_f32(s->inner), 4);
-    at = foc_put(to, at, foc_bits_f32(s->inner_input), 4);
     at = foc_put(to, at, (uint64_t)s->error_now, 2);
     at = foc_put(to, at, (uint64_t)s->filtered_now, 2);
     at = foc_put(to, at, (uint64_t)s->flags, 1);
@@ -425,11 +443,11 @@ uint8_t finger_f32_restore(finger_f32_state *s, const uint8_t *from)
     if (foc_get(from, &at, 8) != FINGER_F32_CONFIGURATION) {
         return 1;
     }
-    s->integral = foc_float_f32(foc_get(from, &at, 4));
-    s->increment = foc_float_f32(foc_get(from, &at, 4));
+    s->integral = (int64_t)foc_get(from, &at, 8);
+    s->increment = (int64_t)foc_get(from, &at, 8);
+    s->inner = (int64_t)foc_get(from, &at, 8);
+    s->inner_input = (int64_t)foc_get(from, &at, 8);
     s->resting = foc_float_f32(foc_get(from, &at, 4));
-    s->inner = foc_float_f32(foc_get(from, &at, 4));
-    s->inner_input = foc_float_f32(foc_get(from, &at, 4));
     s->error_now = (uint16_t)foc_get(from, &at, 2);
     s->filtered_now = (uint16_t)foc_get(from, &at, 2);
     s->flags = (uint8_t)foc_get(from, &at, 1);

@@ -39,17 +39,17 @@ typedef float finger_f32_sig;
 
 #define FINGER_F32_ERRORS      2    /* the present error and those before it */
 #define FINGER_F32_FILTERED    2    /* the same of the filtered error */
-#define FINGER_F32_SAVED_BYTES 286u /* what finger_f32_save writes */
+#define FINGER_F32_SAVED_BYTES 302u /* what finger_f32_save writes */
 
-/* One controller. It belongs to the caller: one for each loop, 276 bytes each. Its members may
+/* One controller. It belongs to the caller: one for each loop, 296 bytes each. Its members may
    change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
    lock. */
 typedef struct {
-    float integral;                      /* the output */
-    float increment;                     /* half a trapezoid, of the latest sample */
+    int64_t integral;                    /* the output before rounding, counts of 2^-57 V */
+    int64_t increment;                   /* half a trapezoid, of the latest sample */
+    int64_t inner;                       /* integral of the terms of negative order, counts of 2^-61 */
+    int64_t inner_input;                 /* what was added to it last, half a trapezoid */
     float resting;                       /* filtered error that reset has left, until a step */
-    float inner;                         /* integral of the terms of negative order */
-    float inner_input;                   /* what was added to it last, half a trapezoid */
     uint16_t error_now;                  /* slot of the latest error */
     uint16_t filtered_now;               /* slot of the latest filtered error */
     uint8_t flags;                       /* FINGER_F32_FLAG_... */

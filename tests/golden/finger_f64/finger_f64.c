@@ -182,16 +182,17 @@ static void finger_f64_settle(finger_f64_state *s, double e)
 }
 
 /* Whether an output is one that a step can have left: NaN is not. */
-static uint8_t finger_f64_within(double u)
+static uint8_t finger_f64_within(const finger_f64_state *s)
 {
-    return (uint8_t)(foc_finite_f64(u) && u >= FINGER_F64_U_MIN && u <= FINGER_F64_U_MAX);
+    const double now = s->integral;
+
+    return (uint8_t)(foc_finite_f64(now) && now >= FINGER_F64_U_MIN && now <= FINGER_F64_U_MAX);
 }
 
 /* An input of the step cannot be used: the output stays, and so does everything else. */
 static finger_f64_sig finger_f64_hold(finger_f64_state *s)
 {
-    const double known = s->integral;
-    const double u = finger_f64_within(known) ? known : 0.0;
+    const double u = finger_f64_within(s) ? s->integral : 0.0;
 
     s->flags = (uint8_t)(FINGER_F64_FLAG_INVALID | finger_f64_ends(u));
     return u;
@@ -245,7 +246,7 @@ finger_f64_sig finger_f64_step(finger_f64_state *s, finger_f64_sig ref, finger_f
         s->increment = finger_f64_increment(gain, s->resting);
         s->starting = 0;
     }
-    if (!foc_finite_f64(s->integral + (d + s->increment)) || !finger_f64_within(s->integral)) {
+    if (!foc_finite_f64(s->integral + (d + s->increment)) || !finger_f64_within(s)) {
         return finger_f64_recover(s, ref - meas);
     }
     s->integral = foc_clamp_f64(s->integral + (d + s->increment), 0.0, 10.0);

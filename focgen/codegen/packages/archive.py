@@ -1,0 +1,113 @@
+"""``NAME.fmu``: the zip of an FMU's description, its C, and what this computer's compiler makes of that.
+
+Everything in it but the binary is rendered, and the dates are fixed: the same input and the same compiler
+give the same bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import platform
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from focgen.compiler import compile_shared
+
+_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can tell
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
+_SYSTEMS = {"Linux": ("linux", "so"), "Darwin": ("darwin", "dylib"), "Windows": ("windows", "dll")}
+_MACHINES = {"AMD64": "x86_64", "arm64": "aarch64", "ARM64": "aarch64"}
+_OLD = {"x86_64-linux": "linux64", "x86_64-darwin": "darwin64", "x86_64-windows": "win64"}  # of FMI 2.0
+_BINARIES = "binaries/"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """How a ``NAME.fmu`` differs from what its folder gives, and what is to be said of it besides."""
+
+    differences: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def archived(name: str, files: Mapping[str, str | bytes], fmi: int | None) -> dict[str, bytes]:
+    """The archive by its name in the folder, from the folder's other ``files``; none where ``fmi`` is None.
+
+    Raises BuildError where there is no C compiler, or it refuses the C.
+    """
+    if fmi is None:
+        return {}
+    inside = _members(name, files, fmi)
+    system, ending = _SYSTEMS.get(platform.system(), ("linux", "so"))
+    machine = f"{_MACHINES.get(platform.machine(), platform.machine())}-{system}"
+    place = f"{_BINARIES}{machine if fmi == 3 else _OLD.get(machine, machine)}/{name}.{ending}"
+    return {f"{name}.fmu": _zip({**inside, place: _binary(name, inside, fmi)})}
+
+
+def _members(name: str, files: Mapping[str, str | bytes], fmi: int) -> dict[str, bytes]:
+    """What the archive has beside its binary, by its name there."""
+    found = {"modelDescription.xml": files["fmu/modelDescription.xml"]}
+    found |= {f"sources/{file.removeprefix('fmu/')}": files[file] for file in files if _is_source(file, name)}
+    if fmi == 3:
+        found["sources/buildDescription.xml"] = files["fmu/buildDescription.xml"]
+    found["documentation/licenses/license.txt"] = files["LICENSE"]
+    return {file: text if isinstance(text, bytes) else text.encode("utf-8") for file, text in found.items()}
+
+
+def _is_source(file: str, name: str) -> bool:
+    """Of what the binary is compiled: the controller, the runtime's headers, the interface."""
+    runtime = file.startswith("foc_") and file.endswith(".h")
+    return runtime or file in (f"{name}.c", f"{name}.h", f"fmu/{name}_fmi2.c", f"fmu/{name}_fmi3.c")
+
+
+def _binary(name: str, inside: Mapping[str, bytes], fmi: int) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+        for file in inside:
+            if file.startswith("sources/"):
+                (Path(scratch) / Path(file).name).write_bytes(inside[file])
+        sources = [Path(scratch) / f"{name}_fmi{fmi}.c", Path(scratch) / f"{name}.c"]
+        target = Path(scratch) / f"{name}.library"
+        compile_shared(sources, target, _FLAGS, [scratch])
+        return target.read_bytes()
+
+
+def _zip(members: Mapping[str, bytes]) -> bytes:
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in sorted(members, key=lambda file: (file != "modelDescription.xml", file)):
+            entry = zipfile.ZipInfo(file, _DATE)
+            entry.compress_type, entry.create_system = zipfile.ZIP_DEFLATED, 3
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, members[file])
+    return made.getvalue()
+
+
+def compare_archive(path: Path, name: str, files: Mapping[str, str | bytes], fmi: int | None) -> Compared:
+    """Compare an archive with what is rendered; the binary, which no rule renders, is told of and not run."""
+    if fmi is None:
+        return Compared()
+    if not path.is_file():
+        return Compared(notes=(f"{path.name}: is missing",))
+    try:
+        with zipfile.ZipFile(path) as archive:
+            faults = tuple(_faults(archive, _members(name, files, fmi)))
+    except (zipfile.BadZipFile, zlib.error, OSError, NotImplementedError, RuntimeError, EOFError):
+        return Compared((f"{path.name}: is no zip that can be read",))
+    return Compared(
+        tuple(f"{path.name}: {fault}" for fault in faults),
+        (f"{path.name}: its binary was not compared, only the C that it is made from",),
+    )
+
+
+def _faults(archive: zipfile.ZipFile, expected: Mapping[str, bytes]) -> Iterator[str]:
+    found = {entry.filename: entry for entry in archive.infolist()}
+    for file, content in expected.items():
+        if file not in found:
+            yield f"lacks {file}"
+        elif found[file].file_size != len(content) or archive.read(file) != content:
+            yield f"{file} is not what focgen writes for this controller.toml"
+    if any(file not in expected and not file.startswith(_BINARIES) for file in found):
+        yield "has files that do not belong to it"
