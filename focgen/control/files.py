@@ -8,6 +8,8 @@ length = 1000                            # memory length L, samples
 memory = "short"                         # or "exponential", with
 tolerance = 1e-4                         # optional: relative error of its weights, up to
 horizon = 1000000                        # optional: so many samples
+operator = "gl"                          # optional; "continuous": s^α itself, within tolerance over
+band = [0.01, 10.0]                      # optional: these frequencies, rad/s; with it there is no horizon
 arithmetic = "q31"
 
 [transfer]                               # eq. (8): terms [coefficient, order of s]
@@ -52,6 +54,7 @@ import tomlkit
 from focgen.control.controller import (
     ARITHMETICS,
     MEMORIES,
+    TOLERANCES,
     Controller,
     ControllerRanges,
     GainSchedule,
@@ -60,6 +63,7 @@ from focgen.control.controller import (
     Units,
 )
 from focgen.errors import ControllerError
+from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
 from focgen.tomlfile import Table, terms_of
@@ -104,8 +108,8 @@ def controller_of(top: Table, name: str) -> Controller:
         arithmetic=_choice(top, "arithmetic", "q31", ARITHMETICS),
         units=_units(top.table("units")),
         designed_from=_source(top.table("designed_from")),
-        tolerance=top.number("tolerance", 1e-4, above=0.0),
         horizon=_whole(top, "horizon", 1_000_000),
+        **_operator(top),
         tunable=_tunable(top.table("tunable"), gain, ranges),
         slew_limit=_slew_limit(top, integrator),
     )
@@ -215,6 +219,22 @@ def _choice(top: Table, key: str, default: str, choices: tuple[str, ...]) -> str
     return value
 
 
+def _operator(top: Table) -> dict:
+    """What an exponential memory follows, and how closely. A band of "gl" is refused, never ignored."""
+    operator = _choice(top, "operator", "gl", OPERATORS)
+    found = {"operator": operator, "tolerance": top.number("tolerance", TOLERANCES[operator], above=0.0)}
+    if operator == "continuous":
+        if top.text("memory", "short") != "exponential":
+            raise top.fail("operator", "needs exponential memory", 'add memory = "exponential"')
+        if "horizon" in top:
+            raise top.fail("horizon", 'belongs to operator = "gl"', "remove it; band says where it holds")
+    if "band" not in top:
+        return found
+    if operator == "gl":
+        raise top.fail("band", 'belongs to operator = "continuous"', "add that, or remove it")
+    return {**found, "band": top.span("band")}
+
+
 def _units(table: Table | None) -> Units:
     if table is None:
         return Units()
@@ -242,6 +262,14 @@ def controller_text(controller: Controller) -> str:
     return tomlkit.dumps(controller_table(controller))
 
 
+def _followed(controller: Controller) -> dict:
+    """What an exponential memory follows, and where."""
+    if controller.operator == "gl":
+        return {"horizon": controller.horizon}
+    band = {} if controller.band is None else {"band": list(controller.band)}
+    return {"operator": controller.operator, **band}
+
+
 def controller_table(controller: Controller) -> dict[str, Any]:
     """The controller as plain numbers, texts and tables of them."""
     plain = ("name", "sample_time", "integrator", "length", "memory", "arithmetic")
@@ -249,7 +277,7 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     if controller.slew_limit is not None:
         table["slew_limit"] = controller.slew_limit
     if controller.memory == "exponential":
-        table.update(tolerance=controller.tolerance, horizon=controller.horizon)
+        table.update(tolerance=controller.tolerance, **_followed(controller))
     if not controller.scheduled:
         table["gain"] = controller.gain
     transfer = controller.transfer
