@@ -123,7 +123,11 @@ def test_bytes_of_26_more_taps(folders):
     short, long = (cost_on(core("cortex-m4"), ZIG, read.plan, read.path) for read in reads)
     assert long.ram_bytes - short.ram_bytes == 104
     assert long.flash["constants"] - short.flash["constants"] == 104
-    assert short.flash["compiler"] == 0 and short.flash_bytes == sum(short.flash.values())
+    whole = cost_on(core("cortex-m4"), ZIG, folders["q15", 12].plan, folders["q15", 12].path)
+    assert whole.flash["compiler"] == 0 and whole.flash_bytes == sum(whole.flash.values())
+    assert (
+        0 < short.flash["compiler"] == long.flash["compiler"] < 500
+    )  # an integral in 64 bits, to a float and back
     assert 100 < short.save_bytes < 2000 and 100 < long.save_bytes < 2000
 
 
@@ -147,12 +151,15 @@ def test_flash_is_what_the_toolchain_says(folders):
 
 @pytest.mark.parametrize("name", [one.name for one in CORES])
 def test_the_stack_that_is_used_is_the_stack_that_is_told(folders, name):
-    """Painted memory against paths through machine code: never more, and not much less."""
+    """Painted memory against paths through machine code: never more, and not much less but for the call that
+    mends a damaged state, which these steps do not make.
+    """
     for key in (("q15", 12), ("f32", 12)):
         read = folders[key]
         found = cost_on(core(name), ZIG, read.plan, read.path)
         told = Stack(library_of(read, name).program).depth(f"{read.plan.name}_step")
-        assert told.bytes - 16 <= found.stack_seen <= told.bytes <= found.stack_bytes
+        mending = [int(part.split()[-1]) for part in told.path if "_recover " in part]
+        assert told.bytes - 16 - sum(mending) <= found.stack_seen <= told.bytes <= found.stack_bytes
         assert sum(int(part.split()[-1]) for part in found.stack_path) == found.stack_bytes
 
 
