@@ -26,6 +26,7 @@ EXAMPLES = shipped("examples")
 RIG, LOG, CONTROLLER = EXAMPLES / "rig.toml", EXAMPLES / "logs" / "steps.csv", EXAMPLES / "controller.toml"
 NASTY = "<b>&$x$"
 KINDS = (
+    "Proposal",
     "Identification",
     "Design",
     "Simulation",
@@ -55,6 +56,7 @@ def results(tmp_path_factory):
     rows = (Row("named", 0.9, (0.8, 0.95), 20, "≥ 0.85", True), Row("set", None, None, 0, "", None))
     scores = Scores("cases", "C", "full", 7, 20, 1, 0, rows, {"leak": {"leak": 3, "creep": 1}}, ())
     return {
+        "Proposal": focgen.init(LOG, name="spba"),
         "Identification": found,
         "Design": focgen.design(RIG, setpoints=[0.006, 0.012]),
         "Simulation": focgen.simulate(RIG, controller, [0.006, 0.01]),
@@ -72,13 +74,14 @@ def results(tmp_path_factory):
 def test_a_result_is_one_line(results, kind):
     line = repr(results[kind])
     assert line.startswith(f"<{kind} ") and line.endswith(">") and "\n" not in line and len(line) < 260
-    assert f"{results[kind]}" == line and isinstance(results[kind], Shown)
+    assert isinstance(results[kind], Shown)
 
 
 def test_the_lines_hold_the_figures_that_matter(results):
     joint, replayed = results["Identification"].joint, results["Replay"]
     mean = np.mean([one.gof for one in replayed.logs.values()])
     for kind, piece in {
+        "Proposal": "spba: command u_V, pressure p_bar",
         "Identification": f"T {joint.T:.4g}, α {joint.alpha:.4g}, GOF",
         "Design": f"settles in {results['Design'].settling_s:.4g} s",
         "Simulation": "2 of 2 set points settle",
@@ -152,6 +155,10 @@ def test_a_long_table_says_what_is_left_out(results):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_figure_is_drawn(results, kind):
+    if kind == "Proposal":
+        with pytest.raises(InputError, match=r"Proposal: has no figure; look at its numbers: to_frame\(\)"):
+            results[kind].plot()
+        return
     for which in range(20):
         try:
             figure = results[kind].plot(which)
@@ -185,6 +192,8 @@ def test_frames_hold_every_number(results):
     assert list(frames["Identification"]["T"]) == [fit.T for fit in found.experiments]
     assert list(frames["Identification"]["K_low"]) == [fit.ci95["K"][0] for fit in found.experiments]
     assert frames["Design"]["settling_s"].mean() == pytest.approx(design.settling_s)
+    assert list(frames["Proposal"]["role"])[:3] == ["time", "command", "pressure"]
+    assert str(results["Proposal"]) == results["Proposal"].text
     assert list(frames["Simulation"]["reference"]) == [0.006, 0.01]
     assert frames["Verification"].loc[0, "mismatches"] == 0
     assert list(frames["Costs"]["skipped"].dropna()) == ["no compiler"]

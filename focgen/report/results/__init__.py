@@ -8,6 +8,7 @@ from focgen.report.results import chain, findings
 from focgen.report.results.view import View
 
 _VIEWS: dict[str, View[Any]] = {
+    "Proposal": chain.PROPOSAL,
     "Identification": chain.IDENTIFICATION,
     "Design": chain.DESIGN,
     "Simulation": chain.SIMULATION,

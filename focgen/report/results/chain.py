@@ -29,10 +29,50 @@ from focgen.report.pages.identification import identification_lead, identificati
 from focgen.report.pages.parts import figures_of, notes, number, sentence, warnings
 from focgen.report.results.view import Rows, View
 from focgen.report.style import CYCLE
+from focgen.rig.proposal import Proposal
 from focgen.verification.costs import Costs
 from focgen.verification.verify import Verification
 
 _PROVED = ("node", "worst", "type", "margin_bits", "how")
+
+
+# -------------------------------------------------------------------------------------------- proposal
+
+
+def _proposed(found: Proposal) -> str:
+    roles = ", ".join(f"{role} {column}" for role, column in found.rig.signals.columns().items())
+    doubts = "1 doubt" if len(found.doubts) == 1 else f"{len(found.doubts)} doubts"
+    return f"{found.rig.name}: {roles}; {doubts}"
+
+
+def _roles(found: Proposal) -> Rows:
+    """A row for each role, the time among them."""
+    signals, ranges = found.rig.signals, found.rig.ranges
+    rows = []
+    for role, column in {"time": signals.time, **signals.columns()}.items():
+        low, high = getattr(ranges, role, None) or (None, None)
+        unit = "s" if role == "time" else signals.units.get(role)
+        rows.append({"role": role, "column": column, "unit": unit, "low": low, "high": high})
+    return rows
+
+
+def _roles_table(found: Proposal) -> TableOf:
+    cells = (
+        (row["role"], row["column"], row["unit"] or "?", number(row["low"]), number(row["high"]))
+        for row in _roles(found)
+    )
+    caption = "The rig that is proposed; print() shows its file"
+    return TableOf(("role", "column", "unit", "from", "to"), tuple(cells), caption)
+
+
+PROPOSAL = View[Proposal](
+    _proposed,
+    lambda found: f"One sample every {found.rig.sample_time:g} s. Next: {found.next}",
+    _roles_table,
+    _roles,
+    lambda found: (),
+    lambda found: tuple(f"Unsure: {sentence(doubt)}" for doubt in found.doubts),
+)
 
 
 # -------------------------------------------------------------------------------------- identification
