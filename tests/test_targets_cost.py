@@ -35,7 +35,7 @@ def folders(tmp_path_factory):
     """Generated folders, by arithmetic and length."""
     base = tmp_path_factory.mktemp("cost")
     made = {}
-    for arithmetic, length in (("q15", 12), ("q31", 12), ("f32", 12), ("f32", 37)):
+    for arithmetic, length in (("q15", 12), ("q31", 12), ("f32", 12), ("f32", 38)):
         path = base / f"{arithmetic}_{length}"
         generate(paper_controller(length), path, arithmetic, name=f"c{arithmetic}{length}")
         made[arithmetic, length] = read_folder(path)
@@ -111,19 +111,23 @@ def per_tap(reads, core_name, steps):
 
 def test_a_tap_costs_the_slope_between_two_lengths(folders):
     """On the Cortex-M4 a multiplication, an addition, two loads and a share of the loop."""
-    reads = folders["f32", 12], folders["f32", 37]
+    reads = folders["f32", 12], folders["f32", 38]
     instructions, cycles = per_tap(reads, "cortex-m4", 30)
     assert 4.0 <= instructions <= 9.0 and instructions < cycles < 13.0
     assert per_tap(reads, "cortex-m7", 4)[1] is None
 
 
-def test_bytes_of_25_more_taps(folders):
+def test_bytes_of_26_more_taps(folders):
     """In float each is a word of flash and a word of RAM; the code stays within what unrolling changes."""
-    reads = folders["f32", 12], folders["f32", 37]
+    reads = folders["f32", 12], folders["f32", 38]
     short, long = (cost_on(core("cortex-m4"), ZIG, read.plan, read.path) for read in reads)
-    assert long.ram_bytes - short.ram_bytes == 100
-    assert long.flash["constants"] - short.flash["constants"] == 100
-    assert short.flash["compiler"] == 0 and short.flash_bytes == sum(short.flash.values())
+    assert long.ram_bytes - short.ram_bytes == 104
+    assert long.flash["constants"] - short.flash["constants"] == 104
+    whole = cost_on(core("cortex-m4"), ZIG, folders["q15", 12].plan, folders["q15", 12].path)
+    assert whole.flash["compiler"] == 0 and whole.flash_bytes == sum(whole.flash.values())
+    assert (
+        0 < short.flash["compiler"] == long.flash["compiler"] < 500
+    )  # an integral in 64 bits, to a float and back
     assert 100 < short.save_bytes < 2000 and 100 < long.save_bytes < 2000
 
 
@@ -147,12 +151,15 @@ def test_flash_is_what_the_toolchain_says(folders):
 
 @pytest.mark.parametrize("name", [one.name for one in CORES])
 def test_the_stack_that_is_used_is_the_stack_that_is_told(folders, name):
-    """Painted memory against paths through machine code: never more, and not much less."""
+    """Painted memory against paths through machine code: never more, and not much less but for the call that
+    mends a damaged state, which these steps do not make.
+    """
     for key in (("q15", 12), ("f32", 12)):
         read = folders[key]
         found = cost_on(core(name), ZIG, read.plan, read.path)
         told = Stack(library_of(read, name).program).depth(f"{read.plan.name}_step")
-        assert told.bytes - 16 <= found.stack_seen <= told.bytes <= found.stack_bytes
+        mending = [int(part.split()[-1]) for part in told.path if "_recover " in part]
+        assert told.bytes - 16 - sum(mending) <= found.stack_seen <= told.bytes <= found.stack_bytes
         assert sum(int(part.split()[-1]) for part in found.stack_path) == found.stack_bytes
 
 
