@@ -35,7 +35,7 @@ _LENGTHS, _TOLERANCES = (50, 200, 1000), (0.1, 0.03, 1e-3, 1e-5)
 _SEED = 5  # of the sealed case
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Demo:
     """Everything the demo found, and the ``folder`` and ``report`` where it stands.
 
@@ -53,6 +53,10 @@ class Demo:
     verified: dict[str, Verification]
     diagnosis: Diagnosis
     sealed: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        verdict = "everything holds" if self.holds else "NOT everything holds"
+        return f"<Demo {self.folder}: {verdict}; the page is {self.report}>"
 
     @property
     def holds(self) -> bool:

@@ -4,10 +4,13 @@ them.
 
 import doctest
 import re
+import typing
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+import focgen
 from focgen.cli.main import commands
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -28,8 +31,18 @@ def test_every_command_named_exists(page):
 
 def test_the_page_of_python_is_true(monkeypatch):
     monkeypatch.chdir(ROOT)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
     failed, tried = doctest.testfile(str(ROOT / "docs" / "python.md"), module_relative=False)
-    assert tried > 20 and not failed
+    import_module("matplotlib.pyplot").close("all")
+    assert tried > 50 and not failed
+
+
+def test_every_function_has_its_row_on_the_page_of_python():
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `([a-z]+)\([^|]*` \| (?:the )?`([A-Z][A-Za-z]+)`", page, re.MULTILINE))
+    assert set(rows) == set(commands())
+    for name in set(rows) - {"report", "trial"}:  # a room that is called, and one of three results
+        assert typing.get_type_hints(getattr(focgen, name))["return"].__name__ == rows[name]
 
 
 def test_readme_begins_with_what_it_is_and_how_to_start():

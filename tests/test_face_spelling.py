@@ -9,7 +9,7 @@ import pytest
 
 import focgen
 from focgen.diagnosis.plan import plan
-from focgen.errors import LogError, RigError
+from focgen.errors import ControllerError, LogError, RigError
 from focgen.logs.experiment import Experiment
 from focgen.resources import shipped
 from focgen.rig import Signals
@@ -18,7 +18,6 @@ from focgen.spelling import respelled
 EXAMPLES = shipped("examples")
 RIG, LOG = EXAMPLES / "rig.toml", EXAMPLES / "logs" / "steps.csv"
 TABLE = tomllib.loads(RIG.read_text(encoding="utf-8"))
-QUICK = {"to": 3.0, "stages": ("sensor",)}
 
 
 def columns():
@@ -55,20 +54,32 @@ def test_either_order_is_told_by_the_types(rig, logs, turned, truth, recwarn):
     assert all(w.filename == __file__ for w in said)
 
 
-def test_identify_as_it_was_called_before():
-    session = focgen.read_logs(RIG, LOG)[:1]
-    new = focgen.identify(RIG, session, **QUICK).rig
-    ways = {
-        "both by place": lambda: focgen.identify(session, RIG, None, **QUICK),
-        "the logs by place": lambda: focgen.identify(session, rig=RIG, **QUICK),
-        "one experiment": lambda: focgen.identify(session[0], TABLE, **QUICK),
-    }
-    for name, way in ways.items():
+class _Asked(Exception):
+    """What identify takes for its rig."""
+
+
+def test_identify_as_it_was_called_before(monkeypatch):
+    from focgen.identification import identify as module
+
+    def asked(rig):
+        raise _Asked(rig)
+
+    monkeypatch.setattr(module, "rig_of", asked)
+    rig, experiment = focgen.read_rig(RIG), Experiment("a", 0.01, {"output": np.zeros(5)})
+    for way in (
+        lambda: focgen.identify([LOG], rig, None, stages=("sensor",)),
+        lambda: focgen.identify(experiment, rig=rig),
+        lambda: focgen.identify(columns(), rig),
+    ):
         with pytest.warns(DeprecationWarning, match=r"order is now identify\(rig, logs"):
-            assert way().rig == new, name
+            with pytest.raises(_Asked) as caught:
+                way()
+        assert caught.value.args[0] is rig
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert focgen.identify(logs=session, rig=RIG, **QUICK).rig == new
+        for way in (lambda: focgen.identify(logs=[LOG], rig=rig), lambda: focgen.identify(rig, LOG)):
+            with pytest.raises(_Asked):
+                way()
 
 
 def test_the_names_are_those_of_the_options(tmp_path):
@@ -105,6 +116,34 @@ def test_logs_are_read_as_the_rig_says_them():
     assert [e.name for e in old] == [e.name for e in new] and len(new) > 1
     assert all(np.array_equal(a["output"], b["output"]) for a, b in zip(old, new))
     assert len(focgen.read_logs(RIG, LOG, from_=1.0, to=2.0)[0]) == 51
+
+
+def test_rigs_and_controllers_are_files_dictionaries_or_objects(tmp_path):
+    """The same comes out, whichever is given."""
+    path = EXAMPLES / "controller.toml"
+    table, made = tomllib.loads(path.read_text(encoding="utf-8")), focgen.read_controller(path)
+    steps = [
+        focgen.simulate(rig, controller, [0.01]).setpoints
+        for rig, controller in ((RIG, path), (TABLE, table), (focgen.read_rig(RIG), made))
+    ]
+    assert steps[0] == steps[1] == steps[2]
+    assert focgen.design(TABLE, setpoints=[0.01]).controller.designed_from is None
+    folders = [focgen.generate(given, tmp_path / str(i)) for i, given in enumerate((path, table, made))]
+    assert folders[0].manifest["proofs"] == folders[1].manifest["proofs"] == folders[2].manifest["proofs"]
+    with pytest.raises(ControllerError, match="give a Controller, a controller.toml or a dictionary"):
+        focgen.generate(3.0, tmp_path)
+    with pytest.raises(ControllerError, match="controller: lacks the table"):
+        focgen.generate({"sample_time": 0.01}, tmp_path)
+
+
+def test_a_study_without_a_folder_leaves_nothing(tmp_path):
+    from focgen.studies import study
+
+    with study._folder(None) as place:
+        (place / "row.json").write_text("{}", encoding="utf-8")
+    with study._folder(tmp_path) as kept:
+        (kept / "row.json").write_text("{}", encoding="utf-8")
+    assert not place.exists() and (tmp_path / "row.json").exists()
 
 
 @pytest.mark.parametrize("rig", [7, None, [RIG]])

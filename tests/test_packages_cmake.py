@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 import focgen
+from focgen.cli.main import main
+from focgen.codegen.manifest import sha256
 from focgen.verification.folder import read_folder
 from tests.build_tools import build_tool
 from tests.c_code import compiler, run
@@ -83,6 +86,46 @@ def test_build_files_are_the_users_to_change(tmp_path):
         (folder / name).write_text("mine") if "edited" in note else (folder / name).unlink()
         assert read_folder(folder).differences == () and f"{name}: {note}" in read_folder(folder).notes
     assert focgen.verify(folder, 50).holds
+
+
+UNUSABLE = {
+    "[package]: is 'zephyr'": {"for": "zephyr", "files": {}},
+    "[package]: belongs to --for fmu": {"for": "cmake", "fmi": 3, "files": {}},
+    "[package]: is 4": {"for": "fmu", "fmi": 4, "files": {}},
+    "lacks 'package'": ["cmake"],
+    "lacks fmu/spba_fmi2.c": {"for": "fmu", "fmi": 2, "files": {}},
+    "lacks src/spba.h": {"for": "arduino", "files": {}},
+}
+
+
+def test_manifests_of_packages_that_there_are_not(tmp_path, capsys):
+    focgen.generate(seed_controller(9), tmp_path, "q15", for_="cmake")
+    path = tmp_path / "manifest.json"
+    sound = json.loads(path.read_text())
+    for says, entry in UNUSABLE.items():
+        path.write_text(json.dumps({**sound, "package": entry}))
+        assert main(["verify", str(tmp_path)]) == 2
+        line = capsys.readouterr().err
+        assert says in line and line.count("\n") == 1, line
+    path.write_text(json.dumps({**sound, "package": {**sound["package"], "files": {}}}))
+    assert any("package.files" in line for line in read_folder(tmp_path).differences)
+
+
+def test_a_manifest_leads_to_no_file_outside_and_to_none_of_the_users(tmp_path):
+    folder = tmp_path / "spba"
+    focgen.generate(seed_controller(9), folder, "q15", for_="cmake")
+    kept = {
+        tmp_path / "mine.txt": "../mine.txt",
+        folder / "mine.c": "mine.c",
+        folder / "spba.fmu": "spba.fmu",
+    }
+    for path in kept:
+        path.write_text("mine")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["package"]["files"] |= dict.fromkeys(kept.values(), sha256("mine"))
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    focgen.generate(seed_controller(9), folder, "q15")
+    assert all(path.read_text() == "mine" for path in kept) and not (folder / "CMakeLists.txt").exists()
 
 
 def test_another_package_takes_the_place_of_the_one_before(tmp_path):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import sys
 import zipfile
 from pathlib import Path
@@ -12,12 +14,13 @@ import pytest
 
 import focgen
 from focgen.cli.main import main
-from focgen.control.controller import Units
+from focgen.control.controller import Tunable, Units
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
-from focgen.plan.scenario import Reset, Scenario, physical_trace, to_raw
+from focgen.plan.scenario import Params, Reset, Scenario, Tune, physical_trace, to_raw
 from focgen.verification.folder import read_folder
+from tests.build_tools import build_tool
 from tests.c_code import STRICT, compiler, run, tool
 from tests.controllers import seed_controller, simple
 
@@ -57,10 +60,12 @@ def held(table: np.ndarray) -> np.ndarray:
     return table
 
 
-def reference(plan, table, resets=()):
+def reference(plan, table, resets=(), tunes=()):
     """Outputs and flags of the bit-true reference for the samples of a table but the last row."""
     rows = {name: table[name][None, :-1] for name in table.dtype.names[1:]}
-    scenario = Scenario(rows["ref"], rows["meas"], rows.get("sched"), resets=tuple(resets))
+    scenario = Scenario(
+        rows["ref"], rows["meas"], rows.get("sched"), resets=tuple(resets), tunes=tuple(tunes)
+    )
     trace = physical_trace(plan, execute(plan, to_raw(plan, scenario)))
     return np.asarray(trace.u[0], dtype=float), trace.flags[0]
 
@@ -138,6 +143,64 @@ def test_it_starts_without_a_bump_and_returns_to_a_kept_state(fmpy, fmi, tmp_pat
         (unit.setFMUState if fmi == 3 else unit.setFMUstate)(kept)
 
 
+@pytest.mark.parametrize("fmi", (2, 3))
+def test_fmpy_makes_the_same_block_of_its_sources(fmpy, fmi, tmp_path, monkeypatch):
+    """For a computer that the archive has no binary for: the description lists what is to be compiled."""
+    from fmpy.build import build_platform_binary
+
+    monkeypatch.setenv("PATH", str(Path(build_tool("cmake")).parent), prepend=os.pathsep)
+    folder, table = tmp_path / "unpacked", inputs(FILTER, 30)
+    path = made(tmp_path, FILTER, "q15", fmi)
+    expected = simulated(fmpy, path, table)
+    fmpy.extract(str(path), str(folder))
+    shutil.rmtree(folder / "binaries")
+    build_platform_binary(folder)
+    assert list((folder / "binaries").rglob("filter.*"))
+    assert simulated(fmpy, folder, table)["u"].tolist() == expected["u"].tolist()
+
+
+@pytest.mark.parametrize(("arithmetic", "fmi"), [("q15", 2), ("f32", 3)])
+def test_parameters_change_between_samples(fmpy, arithmetic, fmi, tmp_path):
+    """Of a tunable controller, against the reference; what is outside the box changes nothing."""
+    from fmpy.validation import validate_fmu
+
+    controller = seed_controller(30, tunable=Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0)))
+    focgen.generate(controller, tmp_path, arithmetic, for_="fmu", fmi=fmi, tunable=True)
+    path, table = tmp_path / "spba.fmu", inputs(controller, 90)
+    assert validate_fmu(str(path)) == []
+    unit, number = instantiated(fmpy, path)
+    put, get = (unit.setFloat64, unit.getFloat64) if fmi == 3 else (unit.setReal, unit.getReal)
+    put([number["u_max"], number["gain_5"]], [6.0, 0.5])
+    unit.exitInitializationMode()
+    found = []
+    for k in range(90):
+        put([number[name] for name in table.dtype.names[1:]], list(table[k])[1:])
+        if k == 30:
+            put([number["gain_2"], number["u_min"]], [1.75, 0.5])
+            with pytest.raises(Exception, match="rror"):
+                put([number["gain_3"]], [2.5])
+            assert get([number["gain_3"], number["gain_2"], number["u_max"]]) == [1.0, 1.75, 6.0]
+        unit.doStep(currentCommunicationPoint=k * STEP, communicationStepSize=STEP)
+        found += get([number["u"]])
+    first = Params((*[1.0] * 4, 0.5, *[1.0] * 4), 0.0, 6.0)
+    second = Params((1.0, 1.75, 1.0, 1.0, 0.5, *[1.0] * 4), 0.5, 6.0)
+    plan = build_plan(controller, arithmetic, tunable=True)
+    u, _ = reference(plan, table, tunes=[Tune(0, 0, first), Tune(0, 30, second)])
+    other, _ = reference(plan, table, tunes=[Tune(0, 0, first)])
+    assert found == u.tolist() and found != other.tolist()
+
+
+def instantiated(fmpy, path):
+    """The unit in its initialisation, and the numbers of its variables."""
+    folder = fmpy.extract(str(path))
+    description = fmpy.read_model_description(folder)
+    unit = fmpy.instantiate_fmu(folder, description)
+    if description.fmiVersion == "2.0":
+        unit.setupExperiment(startTime=0.0)
+    unit.enterInitializationMode()
+    return unit, {variable.name: variable.valueReference for variable in description.modelVariables}
+
+
 def test_another_token_is_refused(fmpy, tmp_path):
     folder = fmpy.extract(str(made(tmp_path, FILTER, "q15", 3)))
     description = fmpy.read_model_description(folder)
@@ -161,6 +224,7 @@ def test_the_functions_are_those_of_the_standards_headers(fmpy, arithmetic, fmi,
     wanted = set(re.findall(r"\b(fmi\d\w+)TYPE\b", declared[0]))
     if fmi == 2:  # a block for co-simulation has no functions of model exchange
         wanted |= set(re.findall(r"\b(fmi\d\w+)TYPE\b", declared[2].partition("Co-Simulation")[2]))
+    assert max(map(len, source.read_text().splitlines())) <= 110
     defined = set(run(tool("nm"), "--defined-only", "-j", tmp_path / "own.o").split())
     assert len(wanted) >= (34 if fmi == 2 else 70) and wanted - defined == set()
 

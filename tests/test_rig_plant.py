@@ -316,3 +316,13 @@ def test_a_bent_spring_with_hysteresis_against_an_integrator():
     made = respond(plant, x, rest(len(x)), H, Dynamics(spring=spring, bend=bend))
     assert np.max(np.abs(exact.y[0])) < 0.11  # where the spring goes on straight
     np.testing.assert_allclose(made, exact.y[0], atol=2e-6 * np.max(np.abs(exact.y[0])))
+
+
+@pytest.mark.parametrize("power", [0.7, 1.0, 1.3, 2.0])
+def test_a_rough_run_takes_longer_steps_and_comes_as_close_as_it_says(power):
+    h = 5 * H
+    t = h * np.arange(400)
+    x, plant = 2 * np.sin(3 * t) + 1.2 * np.sin(7.3 * t), Plant(2, 0.5, 0.3, 40.0)
+    dynamics = Dynamics(spring=Spring(0.5, 1.0, 3.0, power, 0.1))
+    exact, rough = (respond(plant, x, rest(len(x)), h, dynamics, rough=r) for r in (False, True))
+    assert 0.0 < np.max(np.abs(rough - exact)) < 1e-3 * np.max(np.abs(exact))

@@ -7,6 +7,8 @@
  */
 #include "mirrored.h"
 
+#include <math.h>
+
 /* The weights of 0.4 s^0.5 + 1, the oldest first, as focgen has them; and 3 times h/2. */
 static const float weights[MIRRORED_TAPS] = {
     -0.0137890643f, -0.0147083346f, -0.0157344975f, -0.0168858021f,
@@ -22,6 +24,16 @@ static const float gain = 0.00749999983f;
 static float limited(float u)
 {
     return u < 0.0f ? 0.0f : u > 10.0f ? 10.0f : u;
+}
+
+static int64_t counts(float x)
+{
+    return llroundf(ldexpf(x, 57));
+}
+
+static float output(const mirrored_state *s)
+{
+    return ldexpf((float)s->integral, -57);
 }
 
 /* What NaN, infinity and absurd numbers are not. */
@@ -60,28 +72,29 @@ void mirrored_reset(mirrored_state *s, float ref, float meas, float u0)
         s->errors[i] = error;
     }
     s->oldest = 0;
-    s->before = gain * filtered(s);
-    s->output = limited(usable(u0) ? u0 : 0.0f);
+    s->before = counts(gain * filtered(s));
+    s->integral = counts(limited(usable(u0) ? u0 : 0.0f));
 }
 
 float mirrored_step(mirrored_state *s, float ref, float meas)
 {
-    float now;
+    int64_t now;
 
     if (!usable(ref) || !usable(meas)) {
-        return s->output;
+        return output(s);
     }
     s->errors[s->oldest] = s->errors[s->oldest + MIRRORED_TAPS] = ref - meas;
     s->oldest = s->oldest + 1 >= MIRRORED_TAPS ? 0 : s->oldest + 1;
-    now = gain * filtered(s);
-    s->output = limited(s->output + (now + s->before));
+    now = counts(gain * filtered(s));
+    s->integral += now + s->before;
+    s->integral = s->integral < 0 ? 0 : s->integral > counts(10.0f) ? counts(10.0f) : s->integral;
     s->before = now;
-    return s->output;
+    return output(s);
 }
 
 void mirrored_track(mirrored_state *s, float u)
 {
     if (usable(u)) {
-        s->output = limited(u);
+        s->integral = counts(limited(u));
     }
 }

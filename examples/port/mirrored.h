@@ -5,12 +5,14 @@
 #ifndef MIRRORED_H
 #define MIRRORED_H
 
+#include <stdint.h>
+
 #define MIRRORED_TAPS 25
 
 typedef struct {
     unsigned oldest;                   /* where the oldest of the samples stands */
-    float before;                      /* half a trapezoid, of the sample before */
-    float output;
+    int64_t before;                    /* half a trapezoid, of the sample before */
+    int64_t integral;                  /* the output, in counts of 2^-57: a float that holds 5 takes in no 1e-8 */
     float errors[2 * MIRRORED_TAPS];   /* every sample twice, so that the history is straight anywhere */
 } mirrored_state;
 

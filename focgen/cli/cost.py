@@ -9,6 +9,7 @@ from focgen.cli.outcome import Outcome
 from focgen.codegen.kernels import TARGETS
 from focgen.report.page import TableOf, text_table
 from focgen.targets.asked import entry_of
+from focgen.targets.calls import CallCost
 from focgen.targets.cost import COUNTED, Cost, PerStep
 from focgen.verification.costs import COMPILERS, ControllerCost, cost
 
@@ -81,10 +82,42 @@ def _text(controllers: tuple[ControllerCost, ...]) -> str:
     if not rows:
         return "\n".join(why)
     table = text_table(TableOf(_HEADS, tuple(rows)))
+    table = "\n".join([table, *_calls(controllers), *_runtimes(controllers)])
     stacks = ["", "deepest stack, each function with its bytes:", *(f"  {path}" for path in paths)]
     how = ["", f"compiled by {', '.join(compilers)}", f"instructions: {COUNTED}"]
     how += [f"cycles: {one}" for one in hows]
     return "\n".join([table, *why, *stacks, *how])
+
+
+_CALLS = ("init", "reset", "track", "tune", "save", "restore")
+
+
+def _calls(controllers: tuple[ControllerCost, ...]) -> list[str]:
+    """What the other calls cost, cycles where there is a model of them, else instructions."""
+    rows = []
+    for one in controllers:
+        for name, counted in one.targets.items():
+            if counted.calls:
+                cells = [counted.calls.get(call) for call in _CALLS]
+                unit = "instructions" if cells[0].cycles is None else "cycles"
+                rows.append((one.name, name, unit, *(_call(cell) for cell in cells)))
+    return ["", text_table(TableOf(("controller", "core", "counted", *_CALLS), tuple(rows)))] if rows else []
+
+
+def _call(cost: CallCost | None) -> str:
+    return "-" if cost is None else f"{cost.instructions if cost.cycles is None else cost.cycles:.0f}"
+
+
+def _runtimes(controllers: tuple[ControllerCost, ...]) -> list[str]:
+    """The step with each compiler's own functions, on cores that need them."""
+    lines = []
+    for one in controllers:
+        for name, counted in one.targets.items():
+            for title, runtime in (counted.runtimes or {}).items():
+                lacking = (runtime.skipped or "").partition(": ")[2]
+                said = lacking or f"{runtime.instructions_per_step:.0f} instructions a step"
+                lines.append(f"  {one.name}, {name}, functions of {title}: {said}")
+    return ["", *lines] if lines else []
 
 
 def _cells(now: Cost, before: Cost | None) -> list[str]:

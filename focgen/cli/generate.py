@@ -50,16 +50,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--operator",
         choices=OPERATORS,
-        default="gl",
-        help="what the exponential memory follows: the weights of Gruenwald and Letnikov (gl, the default),"
-        " or s^alpha itself over a band of frequencies, within --tolerance of it",
+        help="what the exponential memory follows: the weights of Gruenwald and Letnikov (gl),"
+        " or s^alpha itself over a band of frequencies, within --tolerance of it;"
+        " default: the controller's, else gl",
     )
     parser.add_argument(
         "--band",
         type=float,
         nargs=2,
         metavar=("LOW", "HIGH"),
-        help="of --operator continuous, in rad/s; default: four decades up to a tenth of Nyquist",
+        help="of --operator continuous, in rad/s; default: the controller's, else four decades up to a tenth"
+        " of Nyquist",
     )
     parser.add_argument("--target", metavar="CORE", help=f"sums for a core: {', '.join(TARGETS)}")
     parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
@@ -143,7 +144,7 @@ def _text(made: Generated) -> str:
 def _least(made: Generated) -> list[str]:
     """What the integral acts on, and what it cannot hold."""
     least, unit = made.manifest.get("smallest_error"), made.plan.controller.units.measurement
-    found = [] if least is None else [f"the integral acts on a steady error of {least:.3g} {unit}".rstrip()]
+    found = [] if least is None else [f"the integral acts on errors down to {least:.3g} {unit}".rstrip()]
     return found + [f"note: {remark}" for remark in made.manifest.get("remarks", [])]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from focgen.cli.outcome import Outcome
-from focgen.targets.asked import entry_of
+from focgen.report.firmware_summary import verification_payload
 from focgen.verification.compare import TargetResult
 from focgen.verification.verify import TARGETS, Verification, verify
 
@@ -44,15 +44,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> Outcome:
     found = verify(args.folder, args.samples, args.seed, args.target, args.edited)
-    payload = {
-        "name": found.name,
-        "arithmetic": found.arithmetic,
-        "targets": {name: entry_of(result) for name, result in found.targets.items()},
-        "differences": list(found.differences),
-        "notes": list(found.notes),
-        "holds": found.holds,
-    }
-    return Outcome(payload, verification_text(found), found.holds)
+    return Outcome(verification_payload(found), verification_text(found), found.holds)
 
 
 def verification_text(found: Verification) -> str:

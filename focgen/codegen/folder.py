@@ -69,6 +69,7 @@ class ReadmeContext:
     selftest: bool
     files: list[str]
     box: list[str]
+    slew: UserText | None
 
 
 def readme_context(
@@ -113,6 +114,7 @@ def readme_context(
         selftest=selftest,
         files=[f"{plan.name}.h", f"{plan.name}.c", *runtime_files(plan, kernels)],
         box=_box(plan),
+        slew=None if plan.controller.slew_limit is None else _quantity(plan.controller.slew_limit, unit),
     )
 
 

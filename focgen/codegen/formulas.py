@@ -46,7 +46,10 @@ def _output_formulas(plan: Plan) -> list[str]:
     unit = comment(plan.controller.units.output)
     clamp = f"clamped to {low:.6g} ... {high:.6g} {unit}".rstrip()
     if plan.integrator:
-        return [f"d = {_gain_text(plan)} v h/2", f"u = u + d + d of the sample before (trapezoid), {clamp}"]
+        slew = plan.controller.slew_limit
+        held = "" if slew is None else f", by at most {f'{slew:.6g} {unit}'.rstrip()} a second"
+        found = f"u = u + d + d of the sample before (trapezoid){held}, {clamp}"
+        return [f"d = {_gain_text(plan)} v h/2", found]
     return [f"u = {_gain_text(plan)} v, {clamp}"]
 
 

@@ -28,13 +28,14 @@ from focgen.output import check_apart, remove, write_files
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST, Plan
 from focgen.resources import shipped
+from focgen.shown import Shown
 from focgen.spelling import respelled
 
 __all__ = ["PACKAGES", "Generated", "folder_files", "generate"]
 
 
-@dataclass(frozen=True)
-class Generated:
+@dataclass(frozen=True, repr=False)
+class Generated(Shown):
     """What :func:`generate` has written: the ``files`` of ``folder``, ``plan`` and ``manifest``."""
 
     folder: Path
@@ -57,7 +58,7 @@ def generate(
     horizon: int | None = None,
     selftest: bool = False,
     no_float: bool = False,
-    operator: str = "gl",
+    operator: str | None = None,
     band: tuple[float, float] | None = None,
     tunable: bool = False,
     fmi: int | None = None,
@@ -67,16 +68,16 @@ def generate(
 
     ``controller`` is a :class:`Controller`, the path of its file, or a dictionary like it. ``arithmetic``
     (f64, f32, q31, q15), ``memory`` ("short" or "exponential"), ``length`` (past samples) of the one,
-    ``tolerance`` (1e-8 … 0.1) and ``horizon`` (100 … 1e8 samples) of the other, and ``name`` (a C identifier)
-    default to the controller's own. ``selftest`` adds NAME_selftest.c and .h. ``target`` names a core whose
-    own instructions the history sums shall use; without it they take their portable form. The bits are the
-    same. ``no_float`` leaves the conversions from and to physical values out of the header. ``operator``
-    "continuous" fits the exponential memory to (jω)^α itself within ``tolerance`` over ``band`` (rad/s; None:
-    four decades up to a tenth of the Nyquist frequency); it has no horizon, and a tolerance of 1e-3 unless
-    another is given. "gl" fits it to the weights of eq. (11). ``tunable`` adds NAME_params, NAME_default,
-    NAME_check and NAME_tune: factors on the gains and output limits that change at run time, within the box
-    that the controller's ``tunable`` gives. ``for_`` adds what an ecosystem expects: one of ``PACKAGES``; the
-    interface of an "fmu" is version ``fmi``, 2 or 3 (the default).
+    ``tolerance`` (1e-8 … 0.1) and ``horizon`` (100 … 1e8 samples) of the other, ``operator`` and ``band``,
+    and ``name`` (a C identifier) default to the controller's own. ``selftest`` adds NAME_selftest.c and .h.
+    ``target`` names a core whose own instructions the history sums shall use; without it they take their
+    portable form. The bits are the same. ``no_float`` leaves the conversions from and to physical values out
+    of the header. ``operator`` "continuous" fits the exponential memory to (jω)^α itself within ``tolerance``
+    over ``band`` (rad/s; without one four decades up to a tenth of the Nyquist frequency); it has no horizon,
+    and a tolerance of 1e-3 unless another is given. "gl" fits it to the weights of eq. (11). ``tunable`` adds
+    NAME_params, NAME_default, NAME_check and NAME_tune: factors on the gains and output limits that change at
+    run time, within the box that the controller's ``tunable`` gives. ``for_`` adds what an ecosystem expects:
+    one of ``PACKAGES``; the interface of an "fmu" is version ``fmi``, 2 or 3 (the default).
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
@@ -89,7 +90,8 @@ def generate(
     _check(arithmetic, memory, made.length if length is None else length)
     form = made.memory if memory is None else memory
     _check_form(form, length, tolerance, horizon)
-    _check_operator(form, operator, band, horizon, made.sample_time)
+    own = made.operator if form == "exponential" else "gl"
+    _check_operator(form, own if operator is None else operator, band, horizon, made.sample_time)
     called = check_name(made.name if name is None else name, where)
     plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band, tunable)
     files = folder_files(plan, text, selftest, kernels, not no_float, wanted)
@@ -130,7 +132,7 @@ def folder_files(
         "README.md": render("README.md.jinja", readme_context(plan, title, selftest, kernels, floats)),
         "example/main.c": render("main.c.jinja", example_context(plan, title, floats)),
     }
-    made = Made(plan, compiled, package.name, package.fmi, floats)
+    made = Made(plan, compiled, package.name, package.fmi)
     files = {**compiled, "controller.toml": controller_toml, **packed(beside, made)}
     inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
     manifest = manifest_of(plan, inputs, selftest, kernels, floats)

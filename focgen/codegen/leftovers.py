@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from focgen.codegen.manifest import sha256
 from focgen.codegen.packages.package import moved, package_file
@@ -27,7 +28,7 @@ def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tupl
     runtime = [(file, digest) for file, digest in written if re.fullmatch(r"foc_\w+\.h", file)]
     headers = [file for file, digest in runtime if _is(folder / file, digest)]
     package = [file for file, digest in _packaged(manifest, name) if _is(folder / file, digest)]
-    archive = [f"{name}.fmu"] if (folder / f"{name}.fmu").is_file() and "package" in manifest else []
+    archive = [f"{name}.fmu"] if _of(manifest.get("package"), "for") == "fmu" else []
     elsewhere = [
         other for file, text in files.items() for other in moved(file) if _is(folder / other, sha256(text))
     ]
@@ -38,11 +39,15 @@ def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tupl
 def _packaged(manifest: dict, name: str) -> Iterator[tuple[str, str]]:
     """Yield file and digest of what a package added, where these are its own names: a manifest from elsewhere
     leads to no other file."""
-    package = manifest.get("package")
-    listed = package.get("files") if isinstance(package, dict) else None
+    listed = _of(manifest.get("package"), "files")
     for file, digest in listed.items() if isinstance(listed, dict) else ():
         if package_file(file, name) and isinstance(digest, str):
             yield file, digest
+
+
+def _of(entry: Any, key: str) -> Any:
+    """What an object has under a key; None where it is no object."""
+    return entry.get(key) if isinstance(entry, dict) else None
 
 
 def _manifest(folder: Path) -> dict:

@@ -323,7 +323,7 @@ def _integral(plan: Plan) -> IntegralText | None:
         return None
     state, by, u = plan.integrator.state, plan.integrator.to_output, plan.output
     ends = ", ".join(integral_ends(plan))
-    total = f"s->integral + ({converted('d', plan.increment.ctype, state.ctype)} + s->increment)"
+    total = f"s->integral + {_change(plan)}"
     start = min(max(0, state.low), state.high)
     clamped = f"{CLAMP[u.ctype]}(u_applied, {limits(plan).low}, {limits(plan).high})"
     return IntegralText(
@@ -339,6 +339,15 @@ def _integral(plan: Plan) -> IntegralText | None:
         else converted("u", u.ctype, state.ctype) + scaled_up(state.ctype, by),
         starting=starts(plan),
     )
+
+
+def _change(plan: Plan) -> str:
+    """By how much the integral moves ahead of its limits: two half trapezoids, within the slew limit."""
+    state, slew = plan.integrator.state, plan.integrator.slew
+    both = f"{converted('d', plan.increment.ctype, state.ctype)} + s->increment"
+    if slew is None:
+        return f"({both})"
+    return f"{CLAMP[state.ctype]}({both}, {constant(-slew, state.ctype)}, {literal(slew, state.ctype)})"
 
 
 def _output(plan: Plan) -> str:

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from focgen.fractional.continuous import DEFAULT_TOLERANCE
 from focgen.fractional.transfer import TransferFunction
 
 ARITHMETICS = ("f64", "f32", "q31", "q15")
 MEMORIES = ("short", "exponential")
+TOLERANCES = {"gl": 1e-4, "continuous": DEFAULT_TOLERANCE}
+"""By operator, an exponential memory's where none is given."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,11 @@ class Controller:
     j = 1 … L take part. ``sample_time`` in s. ``arithmetic`` is the one it was designed for.
 
     ``memory`` is "short" or "exponential"; the latter keeps the weights within the relative ``tolerance`` up
-    to ``horizon`` samples and has no use for ``length``.
+    to ``horizon`` samples and has no use for ``length``. Where ``operator`` is "continuous" it follows (jω)^α
+    itself within ``tolerance`` over ``band`` (rad/s; None: the default one), and ``horizon`` has no use.
+
+    ``slew_limit`` is how fast the output may move, in its units a second; it needs the integrator. A reset, a
+    track and a limit that changes move it at once.
 
     ``tunable`` is what C that is generated for it may change at run time; None: nothing.
     """
@@ -104,7 +111,10 @@ class Controller:
     designed_from: Source | None = None
     tolerance: float = 1e-4
     horizon: int = 1_000_000
+    operator: str = "gl"
+    band: tuple[float, float] | None = None
     tunable: Tunable | None = None
+    slew_limit: float | None = None
 
     @property
     def scheduled(self) -> bool:

@@ -3,10 +3,13 @@
 name = "spba"
 sample_time = 0.01                       # s
 integrator = true                        # trapezoidal, clamped to ranges.output
+slew_limit = 5.0                         # optional, with an integrator: units of the output a second
 length = 1000                            # memory length L, samples
 memory = "short"                         # or "exponential", with
 tolerance = 1e-4                         # optional: relative error of its weights, up to
 horizon = 1000000                        # optional: so many samples
+operator = "gl"                          # optional; "continuous": s^α itself, within tolerance over
+band = [0.01, 10.0]                      # optional: these frequencies, rad/s; with it there is no horizon
 arithmetic = "q31"
 
 [transfer]                               # eq. (8): terms [coefficient, order of s]
@@ -51,6 +54,7 @@ import tomlkit
 from focgen.control.controller import (
     ARITHMETICS,
     MEMORIES,
+    TOLERANCES,
     Controller,
     ControllerRanges,
     GainSchedule,
@@ -59,6 +63,7 @@ from focgen.control.controller import (
     Units,
 )
 from focgen.errors import ControllerError
+from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
 from focgen.tomlfile import Table, terms_of
@@ -103,9 +108,10 @@ def controller_of(top: Table, name: str) -> Controller:
         arithmetic=_choice(top, "arithmetic", "q31", ARITHMETICS),
         units=_units(top.table("units")),
         designed_from=_source(top.table("designed_from")),
-        tolerance=top.number("tolerance", 1e-4, above=0.0),
         horizon=_whole(top, "horizon", 1_000_000),
+        **_operator(top),
         tunable=_tunable(top.table("tunable"), gain, ranges),
+        slew_limit=_slew_limit(top, integrator),
     )
     top.done()
     return controller
@@ -171,9 +177,18 @@ def _tunable(table: Table | None, gain: float | GainSchedule, ranges: Controller
     if box.output_low[1] >= box.output_high[0]:
         what = f"reaches {box.output_low[1]:g}, and output_high {box.output_high[0]:g}"
         raise table.fail("output_low", what, "keep the two apart, so that the limits cannot cross")
-    if "gain" in table and isinstance(gain, GainSchedule):
+    if "gain" in table and isinstance(gain, GainSchedule) and ranges.schedule:
         _check_inside(table, gain, ranges.schedule)
     return box
+
+
+def _slew_limit(top: Table, integrator: bool) -> float | None:
+    if "slew_limit" not in top:
+        return None
+    if not integrator:
+        remedy = "set integrator = true, or limit the output behind the controller and track it"
+        raise top.fail("slew_limit", "is given without an integrator, which alone can keep it", remedy)
+    return top.number("slew_limit", above=0.0)
 
 
 def _check_factors(table: Table, span: tuple[float, float]) -> None:
@@ -204,6 +219,22 @@ def _choice(top: Table, key: str, default: str, choices: tuple[str, ...]) -> str
     return value
 
 
+def _operator(top: Table) -> dict[str, Any]:
+    """What an exponential memory follows, and how closely. A band of "gl" is refused, never ignored."""
+    operator = _choice(top, "operator", "gl", OPERATORS)
+    found = {"operator": operator, "tolerance": top.number("tolerance", TOLERANCES[operator], above=0.0)}
+    if operator == "continuous":
+        if top.text("memory", "short") != "exponential":
+            raise top.fail("operator", "needs exponential memory", 'add memory = "exponential"')
+        if "horizon" in top:
+            raise top.fail("horizon", 'belongs to operator = "gl"', "remove it; band says where it holds")
+    if "band" not in top:
+        return found
+    if operator == "gl":
+        raise top.fail("band", 'belongs to operator = "continuous"', "add that, or remove it")
+    return {**found, "band": top.span("band")}
+
+
 def _units(table: Table | None) -> Units:
     if table is None:
         return Units()
@@ -222,7 +253,10 @@ def _source(table: Table | None) -> Source | None:
 
 
 def write_controller(controller: Controller, path: str | Path) -> None:
-    """Write a controller so that :func:`read_controller` gives an equal one."""
+    """Write a controller so that :func:`read_controller` gives an equal one.
+
+    Raises InputError where it cannot be written.
+    """
     write_file(path, controller_text(controller))
 
 
@@ -231,12 +265,22 @@ def controller_text(controller: Controller) -> str:
     return tomlkit.dumps(controller_table(controller))
 
 
+def _followed(controller: Controller) -> dict[str, Any]:
+    """What an exponential memory follows, and where."""
+    if controller.operator == "gl":
+        return {"horizon": controller.horizon}
+    band = {} if controller.band is None else {"band": list(controller.band)}
+    return {"operator": controller.operator, **band}
+
+
 def controller_table(controller: Controller) -> dict[str, Any]:
     """The controller as plain numbers, texts and tables of them."""
     plain = ("name", "sample_time", "integrator", "length", "memory", "arithmetic")
     table: dict[str, Any] = {key: getattr(controller, key) for key in plain}
+    if controller.slew_limit is not None:
+        table["slew_limit"] = controller.slew_limit
     if controller.memory == "exponential":
-        table.update(tolerance=controller.tolerance, horizon=controller.horizon)
+        table.update(tolerance=controller.tolerance, **_followed(controller))
     if not controller.scheduled:
         table["gain"] = controller.gain
     transfer = controller.transfer
@@ -246,7 +290,7 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     spans = {key: list(span) for key, span in asdict(controller.ranges).items() if span is not None}
     table["ranges"] = spans
     if controller.tunable:
-        table["tunable"] = _box(controller)
+        table["tunable"] = _box(controller.tunable)
     units = {key: unit for key, unit in asdict(controller.units).items() if unit}
     if units:
         table["units"] = units
@@ -255,7 +299,7 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     return table
 
 
-def _box(controller: Controller) -> dict[str, list[float]]:
+def _box(tunable: Tunable) -> dict[str, list[float]]:
     """The spans of [tunable]; one that holds a single value is left out."""
-    spans = asdict(controller.tunable).items()
+    spans = asdict(tunable).items()
     return {key: list(span) for key, span in spans if span[0] < span[1]}

@@ -19,6 +19,7 @@ from focgen.logs.between import white_level
 BURSTS = (12.0, 5.0)
 RESTLESS = (6.0, 4.0)  # kurtosis and loudest of what may be an effect that is a little wrong, but is no noise
 HUMS = 0.25  # of the power in one line, in the greater part of the long experiments; up to a tenth for noise
+SLOWEST = 100.0  # samples: slower than that, and than four responses, is no tone
 _LONG = 400  # samples of an experiment in which a line stands out
 # root mean square over that of what is white, and power at periods of two to ten responses over that at an
 # eighth to half a one: of sound rigs, their sensors' noise coloured, at most 2.4 and 40
@@ -111,7 +112,7 @@ def _line(parts: list[np.ndarray], h: float, response: float) -> float:
     """The part of the power within two bins of the strongest line, slow ones left out; the median over
     experiments. Slow is a period beyond four responses, whatever the samples, or beyond a
     hundred samples where these are more."""
-    shares, slow = [], max(100.0, 4.0 * response / h)
+    shares, slow = [], max(SLOWEST, 4.0 * response / h)
     for p in parts:
         if len(p) >= _LONG:
             power = np.abs(np.fft.rfft((p - p.mean()) * np.hanning(len(p)))) ** 2

@@ -97,7 +97,13 @@ class Explanation:
 
 def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
     """Every form that may act in this segment. In a rig of one stage every family may, but of those that
-    share a formula only the one at home there."""
+    share a formula only the one at home there. Where every experiment begins at rest, none that says where
+    something lay before."""
+    every = _placed_in(segment, rig)
+    return every if segment.run.begins else [c for c in every if not c.form.begun]
+
+
+def _placed_in(segment: Segment, rig: Rig) -> list[Clue]:
     if not is_single(rig):
         return [
             Clue(e.name, form, stage)
@@ -110,7 +116,7 @@ def clues_for(segment: Segment, rig: Rig) -> list[Clue]:
     for effect in sorted(library().values(), key=lambda e: e.stage != stage):
         for form in effect.forms:
             if fits_in(form, stage, rig):
-                found.setdefault(form.act, Clue(effect.name, form, stage))
+                found.setdefault((form.act, form.begun), Clue(effect.name, form, stage))
     return list(found.values())
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from focgen.diagnosis.menu import Choice
 from focgen.jsontext import UNWRITTEN
 from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 if TYPE_CHECKING:
     from focgen.diagnosis.drawn import Drawn
@@ -93,8 +94,8 @@ class NextExperiment:
     inputs: dict[str, object] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Shown):
     """The answer to where, which and how far. Files are named relative to ``--out``. ``notes``: what was done
     to the logs; ``warnings``: what in them is implausible. ``refitted`` and ``augmented``: the rigs of those
     files, ``drawn``: what its figures draw; None where it was read from a file."""

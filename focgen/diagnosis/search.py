@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.diagnosis.fit import WHITE, Fit, Weighing, fit, innovations, jacobian
+from focgen.diagnosis.jumps import by_trying
 from focgen.diagnosis.noise import fit_ar
 from focgen.diagnosis.problem import Clue, Problem
 from focgen.diagnosis.repeats import without_hearsay
@@ -193,6 +194,8 @@ def best_start(problem: Problem, from_: Sequence[Footing], clue: Clue) -> Fit | 
     iterations each, and a few more for the best of them."""
     extended = problem.with_clues([*problem.clues, clue])
     starts, fits = extended.starts(clue), []
+    if clue.form.jumps:
+        return by_trying(extended, from_[0].vector, starts, from_[0].rows)
     if len(starts) > _TRIED:
         starts = _likeliest(extended, from_[0], starts)
     for start in starts:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,8 +28,9 @@ class Segment:
     experiments. ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a
     difference beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has
     no part in: the reference in a closed loop, else the input; ``led``: whether it is a reference;
-    ``closed``: whether a loop was closed around the rig. ``unsure`` (n, k): ways in which an input that was
-    simulated may be off, a standard deviation each. ``loose`` (n, k): what the output would be off by, were
+    ``closed``: whether a loop was closed around the rig; ``wanted`` (n,): its reference where it was, else
+    the input, empty where none was. ``unsure`` (n, k): ways in which an input that was simulated may be off,
+    a standard deviation each. ``loose`` (n, k): what the output would be off by, were
     experiments to begin a little otherwise than ``run`` says, in the output's unit. ``pace``: s after which
     an error no longer counts, of a rig that integrates; 0: none is forgotten."""
 
@@ -48,6 +49,7 @@ class Segment:
     unsure: np.ndarray
     loose: np.ndarray
     pace: float = 0.0
+    wanted: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def level_in(self) -> float:
@@ -79,10 +81,10 @@ class Segment:
         return self.x - (before - 2 * self.x + after) / 12.0
 
     def thinned(self, factor: int) -> Segment:
-        """The same in means of ``factor`` samples at a time; what does not fill the last of an experiment is
-        left out."""
+        """The same in means of ``factor`` samples at a time, for a rough run; what does not fill the last of
+        an experiment is left out."""
         if factor == 1:
-            return self
+            return replace(self, run=replace(self.run, rough=True))
         counts = [(last - first) // factor for first, last in self.run.spans]
         kept = np.concatenate(
             [first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)]
@@ -93,7 +95,7 @@ class Segment:
         )
         rest = np.zeros(len(x), np.uint8)
         rest[np.cumsum([0, *counts[:-1]])] = 1
-        run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock)
+        run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock, rough=True)
         thin = replace(self, x=x, y=y, trust=trust, asked=asked, run=run, between=False)
         return replace(thin, unsure=unsure, loose=loose)
 
@@ -158,8 +160,8 @@ def make(
     x, y = joined(logs, entry) if x is None else x, joined(logs, exit)
     unsure = np.zeros((len(x), 0)) if unsure is None else unsure
     names = tuple(log.name for log in logs)
-    closed = [_is_led(log) for log in logs]
-    led = [exit == "output" and followed for followed in closed]
+    led = [exit == "output" and _is_led(log) for log in logs]
+    closed = [_is_closed(log) for log in logs]
     trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
     return Segment(
         entry,
@@ -176,6 +178,7 @@ def make(
         any(closed),
         unsure[:, _felt(unsure, x, y)],
         np.zeros((len(x), 0)),
+        wanted=_asked(logs, x, closed) if any(closed) else np.zeros(0),
     )
 
 
@@ -187,7 +190,8 @@ def _felt(unsure: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def _asked(logs: Sequence[Experiment], x: np.ndarray, led: Sequence[bool]) -> np.ndarray:
-    """In a closed loop the input carries the output's noise, and would foretell it."""
+    """The reference of those that are ``led``, the input of the others: in a closed loop that carries the
+    output's noise, and would foretell it."""
     ends = np.cumsum([len(log) for log in logs])[:-1]
     inputs = np.split(x / (float(np.max(np.abs(x))) or 1.0), ends)
     top = max(
@@ -204,6 +208,16 @@ def _is_led(log: Experiment) -> bool:
     if not np.all(np.isfinite(reference)) or min(np.ptp(reference), np.ptp(log["output"])) == 0.0:
         return False
     return bool(np.corrcoef(reference, log["output"])[0, 1] > _FOLLOWED)
+
+
+def _is_closed(log: Experiment) -> bool:
+    """Whether a loop was closed: the output follows a reference, or is held at one that never moves while
+    the command does."""
+    if _is_led(log):
+        return True
+    reference, inputs = (log[role] if role in log else np.zeros(1) for role in ("reference", "command"))
+    still = bool(np.all(np.isfinite(reference))) and np.ptp(reference) == 0.0 < np.ptp(inputs)
+    return still and len(reference) > 1 and abs(np.mean(log["output"]) - reference[0]) < np.std(log["output"])
 
 
 def _unsteadiness(log: Experiment) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from focgen.diagnosis.disturbance import Disturbance, disturbance
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.leftover import LEFT
+from focgen.diagnosis.outside import from_outside
 from focgen.rig.effects import library
 
 _UNEXPLAINED = 0.25  # of what could be explained: beyond it no effect of the library is the cause
@@ -22,6 +23,8 @@ def is_unknown(e: Explanation) -> bool:
         return False
     left = disturbed(e)
     if _stirred(e, left) or (e.segment.closed and _hidden(e, left)):
+        return True
+    if e.causes and not is_rounded(e) and from_outside(e):
         return True
     if e.left.share < LEFT:
         return False

@@ -11,6 +11,7 @@ from focgen.identification.integer import IntegerFit
 from focgen.identification.past import Past
 from focgen.identification.stages import StageFit
 from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 Span = tuple[float, float]
 
@@ -36,11 +37,11 @@ class ExperimentFit:
     gof: float
     fitted: str
     driven_by: str
-    time: np.ndarray
-    pressure: np.ndarray
-    measured: np.ndarray
-    simulated: np.ndarray
-    integer: tuple[IntegerFit, ...]
+    time: np.ndarray = field(repr=False)
+    pressure: np.ndarray = field(repr=False)
+    measured: np.ndarray = field(repr=False)
+    simulated: np.ndarray = field(repr=False)
+    integer: tuple[IntegerFit, ...] = field(repr=False)
     step: bool
     past: bool
 
@@ -61,8 +62,8 @@ class Joint:
     gain: tuple[float, ...]
     gain_r2: float | None
     ci95: dict[str, Span | tuple[Span, ...]]
-    simulated: dict[str, np.ndarray]
-    pasts: Mapping[str, Past]
+    simulated: dict[str, np.ndarray] = field(repr=False)
+    pasts: Mapping[str, Past] = field(repr=False)
     closed_loop: bool
 
 
@@ -71,15 +72,15 @@ class Unseen:
     """A log that was not fitted beside the identified rig's answer, all (n,); ``swings``: it is no step."""
 
     name: str
-    pressure: np.ndarray
-    measured: np.ndarray
-    simulated: np.ndarray
+    pressure: np.ndarray = field(repr=False)
+    measured: np.ndarray = field(repr=False)
+    simulated: np.ndarray = field(repr=False)
     gof: float
     swings: bool
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Shown):
     """The identified ``rig``, what it rests on, and how it compares with integer-order models.
 
     ``gof`` maps a model ("fom", "iom_1p", …, "rig" for the joint one) to experiment → GOF, with "mean";

@@ -13,7 +13,7 @@ from focgen.logs.begin import REST, Begin
 ROLES = ("command", "pressure", "curvature", "output", "reference")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Experiment:
     """Uniformly sampled signals of one experiment, by role.
 
@@ -40,6 +40,10 @@ class Experiment:
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
         if self.rows is not None:
             object.__setattr__(self, "rows", MappingProxyType(dict(self.rows)))
+
+    def __repr__(self) -> str:
+        told = f"{len(self)} samples every {self.sample_time:g} s: {', '.join(self.signals)}"
+        return f"<Experiment {self.name!r}: {told}>"
 
     def __len__(self) -> int:
         return len(next(iter(self.signals.values())))

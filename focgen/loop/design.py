@@ -19,6 +19,7 @@ from focgen.control.measures import StepMeasures
 from focgen.control.schedule import TOLERANCE, Table, gain_table
 from focgen.control.units import units_of
 from focgen.errors import DesignError, check_choice
+from focgen.jsontext import UNWRITTEN
 from focgen.loop.bench import Bench, prepare
 from focgen.loop.memory import MemoryChoice, choose_memory
 from focgen.loop.response import PointMargins, margins_at, shapes
@@ -29,6 +30,8 @@ from focgen.output import check_apart, write_file
 from focgen.plan.build import build_plan
 from focgen.plan.model import LONGEST, Plan
 from focgen.rig.arguments import RigLike, file_of, rig_of
+from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 SETTLING = 1.5  # s, where nothing is wished and it is feasible
 _SLACK = 1.02  # of the wish, for the controller as it will run
@@ -82,14 +85,14 @@ class ScheduleReport:
     K_zero: float | None
 
 
-@dataclass(frozen=True)
-class Design:
+@dataclass(frozen=True, repr=False)
+class Design(Shown):
     """A controller, the wish it was designed for, and the proof in simulation.
 
     ``settling_s`` (mean over the operating points) and ``overshoot_pct`` (largest) are of the controller
     as it will run, on the rig with its effects; ``holds`` says whether they keep the wish and every loop is
     stable. ``worst``: what becomes of margins and steps within the rig's uncertainty, which the wish is not
-    judged by.
+    judged by. ``rig``: what it was designed for.
     """
 
     controller: Controller
@@ -104,6 +107,7 @@ class Design:
     holds: bool
     worst: Worst
     notes: tuple[str, ...] = field(default=())
+    rig: Rig | None = field(default=None, metadata=UNWRITTEN, compare=False)
 
 
 def design(
@@ -298,6 +302,7 @@ def _judged(
         kept and all(m.running.stable for m in found),
         _worst(bench, controller, plan, points, _horizon(tuned, wish)),
         tuple(notes),
+        bench.rig,
     )
 
 

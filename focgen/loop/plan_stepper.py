@@ -12,6 +12,7 @@ from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest
 from focgen.plan.model import Format, Plan, Sum
 from focgen.plan.scenario import nearest_raw
+from focgen.plan.slewing import slewed
 
 
 class PlanStepper:
@@ -90,7 +91,7 @@ class PlanStepper:
         if plan.integrator is None:
             return clamp(d, plan.output)
         d = taken_in(d, plan.increment)
-        self.total = clamp(self.total + (d + self.d), plan.integrator.state)
+        self.total = clamp(self.total + slewed(plan, d + self.d), plan.integrator.state)
         self.d = d
         return output_of(plan, self.total) if plan.floating else shift(self.total, plan.integrator.to_output)
 

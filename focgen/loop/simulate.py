@@ -29,6 +29,7 @@ from focgen.plan.build import build_plan
 from focgen.plan.model import Plan
 from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 _SETTLINGS = 8.0  # time constants of the slowest frozen loop that a step is followed for
 _FEWEST, _MOST, _UNKNOWN = 200, 60_000, 1000  # samples; the last where no loop gain reaches 1
@@ -63,8 +64,8 @@ class SetpointResult:
     nominal: StepMeasures | None
 
 
-@dataclass(frozen=True, eq=False)
-class Simulation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Shown):
     """The set points' results and the signals behind them.
 
     ``running`` and ``ideal``: one column a set point, or one column in all where they are

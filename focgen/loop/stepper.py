@@ -42,6 +42,8 @@ class FloatStepper:
         self._gain = gain or controller.gain_at
         self._limits = controller.ranges.output
         self._half = 0.5 * controller.sample_time if controller.integrator else None
+        slew = controller.slew_limit
+        self._slew = np.inf if slew is None else slew * controller.sample_time
         self._integral = np.full(columns, float(start))
         self._previous = np.zeros(columns)
 
@@ -50,7 +52,8 @@ class FloatStepper:
         if self._half is None:
             return np.clip(self._gain(schedule) * filtered, *self._limits)
         increment = self._half * self._gain(schedule) * filtered
-        self._integral = np.clip(self._integral + increment + self._previous, *self._limits)
+        change = np.clip(increment + self._previous, -self._slew, self._slew)
+        self._integral = np.clip(self._integral + change, *self._limits)
         self._previous = increment
         return self._integral
 

@@ -215,7 +215,8 @@ class _Fixed(_Account):
     def output(self, static: float, growth: float, operator: float) -> float:
         """An output's own rounding and that of a limit or a reset's u0 are half a count each."""
         if self.plan.integrator:
-            return self.plan.sample_time * operator + self.plan.output.lsb
+            slew = 0.5 * self.plan.integrator.state.lsb * (self.plan.integrator.slew is not None)
+            return self.plan.sample_time * operator + self.plan.output.lsb + slew
         return max(static + growth, 0.5 * self.plan.output.lsb)
 
 
@@ -363,4 +364,7 @@ class _Floating(_Account):
         d = 2.0 * self.half_step * self.largest_gain * self.reach + plan.sample_time * operator
         state, each = plan.integrator.state, _DOUBLE * 1.01 * (largest + 2.0 * d)
         each += here * (largest + 2.0 * d) if state.floating else here * largest + 3.0 * state.lsb
+        if plan.integrator.slew is not None:  # rounded, here and in the reference
+            most = plan.controller.slew_limit * plan.sample_time
+            each += (here * most if state.floating else 0.5 * state.lsb) + _DOUBLE * 1.01 * most
         return plan.sample_time * operator + each + 2.0 * edge + 4.0 * self.tiny

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
+from focgen.control.controller import ARITHMETICS, MEMORIES, TOLERANCES, Controller
 from focgen.errors import PlanError
-from focgen.fractional.continuous import DEFAULT_TOLERANCE
 from focgen.plan import fixed, floating
 from focgen.plan.bounds import error_bound
 from focgen.plan.canonical import Tables, realise, tables
@@ -18,6 +17,7 @@ from focgen.plan.integrals import counted
 from focgen.plan.memory import Memory, band_memories_of, checked_band, exponential_tables, memories_of
 from focgen.plan.model import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
+from focgen.plan.slewing import with_slew
 from focgen.plan.stability import check_stable
 from focgen.plan.tuning import with_limits
 from focgen.plan.usable import check_room
@@ -33,13 +33,13 @@ def build_plan(
     memory: str | None = None,
     tolerance: float | None = None,
     horizon: int | None = None,
-    operator: str = "gl",
+    operator: str | None = None,
     band: tuple[float, float] | None = None,
     tunable: bool = False,
 ) -> Plan:
     """Plan a controller in ``arithmetic`` (f64, f32, q31, q15) with ``memory`` "short", of ``length`` past
     samples, or "exponential", within ``tolerance`` up to ``horizon`` samples; all default to the
-    controller's.
+    controller's, as do ``operator`` and ``band``.
 
     ``tolerance``: 1e-8 … 0.1, the largest relative error of the exact memory's weights up to the horizon, 100
     … 1e8 samples (:class:`focgen.fractional.exponential.ExponentialMemory`). ``operator`` "gl", or
@@ -52,12 +52,11 @@ def build_plan(
     range cannot be represented, or a node cannot be proved; the remedy says what would work.
     """
     controller = _tunable(controller, tunable)
-    if operator == "continuous" and tolerance is None:
-        tolerance = DEFAULT_TOLERANCE  # the controller's own is one of weights
     given = dict(arithmetic=arithmetic, length=length, memory=memory, tolerance=tolerance, horizon=horizon)
     wanted = replace(controller, **{key: value for key, value in given.items() if value is not None})
+    wanted = _operated(wanted, operator, band, tolerance)
     _check(wanted)
-    band = checked_band(wanted, operator, band)
+    operator, band = wanted.operator, checked_band(wanted, wanted.operator, wanted.band)
     folded, memories = _tables(wanted, band)
     check_stable(controller, folded, wanted.length)
     draft = _fixed if wanted.arithmetic in WORDS else _floating
@@ -70,9 +69,24 @@ def build_plan(
         plan = replace(plan, length=max(plan.error_lags, plan.filtered_lags))
     _check_at_rest(plan, folded)
     check_room(plan)
-    plan = with_limits(counted(plan))
+    plan = with_slew(with_limits(counted(plan)))
     plan = replace(plan, proofs=prove(plan))
     return replace(plan, error_bound=error_bound(plan, folded))
+
+
+def _operated(
+    controller: Controller, operator: str | None, band: tuple[float, float] | None, tolerance: float | None
+) -> Controller:
+    """The controller with the operator that is asked for. Its own goes with an exponential memory alone; a
+    tolerance is of one operator, so another has its default.
+    """
+    own = controller.operator if controller.memory == "exponential" else "gl"
+    if operator is None or operator == own:
+        kept = controller.band if own != "gl" else None
+        return replace(controller, operator=own, band=kept if band is None else band)
+    if tolerance is None:
+        tolerance = TOLERANCES.get(operator, controller.tolerance)
+    return replace(controller, operator=operator, band=band, tolerance=tolerance)
 
 
 def _tunable(controller: Controller, tunable: bool) -> Controller:

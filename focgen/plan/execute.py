@@ -29,6 +29,7 @@ from focgen.plan.model import (
     Sum,
 )
 from focgen.plan.scenario import Reset, Scenario, Trace
+from focgen.plan.slewing import slewed
 from focgen.plan.tuning import Applied, courses, tuned
 from focgen.plan.usable import holding, invalid_samples, usable
 
@@ -332,7 +333,8 @@ class Run:
                 before[lane] = self.increment(self.g[lane, k] * self.v_rest[lane, k])
             for t in tracks.get(k, ()):
                 total[t.lane] = self.tracked(t.lane, k, t.u)
-            total = np.minimum(np.maximum(total + (d[:, k] + before), low[:, k]), high[:, k])
+            total = total + slewed(plan, d[:, k] + before)
+            total = np.minimum(np.maximum(total, low[:, k]), high[:, k])
             out[:, k], before = total, d[:, k].copy()
         self.integral = total
         if plan.floating:

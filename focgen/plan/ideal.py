@@ -204,6 +204,7 @@ def _integrated(
     and what stands where they change, likewise.
     """
     within = lambda u, lane, k: min(max(u, low[lane, k]), high[lane, k])  # noqa: E731
+    most = np.inf if controller.slew_limit is None else controller.slew_limit * controller.sample_time
     starts, tracks = {}, {}
     for s in _segments(scenario):
         starts.setdefault(s.start, []).append(s)
@@ -216,7 +217,7 @@ def _integrated(
             total[s.lane], before[s.lane] = within(s.u0, s.lane, k), first[s.lane, s.start]
         for t in tracks.get(k, ()):
             total[t.lane] = within(t.u, t.lane, k)
-        total = total + 0.5 * controller.sample_time * (d[:, k] + before)
+        total = total + np.clip(0.5 * controller.sample_time * (d[:, k] + before), -most, most)
         total = np.minimum(np.maximum(total, low[:, k]), high[:, k])
         out[:, k], before = total, d[:, k].copy()
     return out

@@ -17,7 +17,8 @@ One step, at sample k (steps that a plan does not need are ``None`` and leave no
 5. ``schedule``: g, linear between breakpoints, held beyond them. Without it g is ``constant_gain``.
 6. d_k = shift(g·v_k, gain_shift), in physical output units (per second, times h/2, where an integrator
    follows).
-7. ``integrator``: I = clamp(I + (d_k + d_{k−1})), u = shift(I, to_output). Floating: u = I.
+7. ``integrator``: I = clamp(I + (d_k + d_{k−1})), u = shift(I, to_output). Floating: u = I. With a ``slew``
+   d_k + d_{k−1} is clamped to ± slew first; what is cut off is forgotten, so nothing winds up.
    Without an integrator d is in counts of the output and u = clamp(d_k) to ``low`` … ``high`` of ``output``.
 
 Histories hold the past ``error_lags`` samples of e and the past ``filtered_lags`` samples of v.
@@ -228,6 +229,7 @@ class Integrator:
 
     state: Format
     to_output: int
+    slew: Count | None = None
 
 
 @dataclass(frozen=True)
@@ -344,6 +346,13 @@ class Plan:
     def exponential(self) -> bool:
         """Whether the memory is a sum of exponentials."""
         return self.memory == "exponential"
+
+    @property
+    def box(self) -> Tuning:
+        """``tuning`` of a plan that has it. Raises ValueError for any other."""
+        if self.tuning is None:
+            raise ValueError(f"{self.name} has no parameters")
+        return self.tuning
 
     @property
     def sums(self) -> tuple[Sum, ...]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,6 +77,18 @@ _RC: dict[str, Any] = {
 }
 
 
+@cache
+def _notebooks() -> type[Figure]:
+    """matplotlib's figure, which a notebook shows whether or not pyplot was ever imported."""
+    from matplotlib import figure as drawing
+
+    class Figure(drawing.Figure):
+        def _repr_png_(self) -> bytes:
+            return png(self)
+
+    return Figure
+
+
 def _matplotlib():
     try:
         import matplotlib
@@ -97,9 +110,8 @@ def figure(
     matplotlib = _matplotlib()
     with matplotlib.rc_context(_RC | {"axes.prop_cycle": matplotlib.cycler(color=CYCLE)}):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
 
-        fig = Figure(figsize=size or (7.0, 2.8 * rows + 0.4), dpi=DPI)
+        fig = _notebooks()(figsize=size or (7.0, 2.8 * rows + 0.4), dpi=DPI)
         FigureCanvasAgg(fig)
         yield fig, fig.subplots(rows, columns, **subplots)
 

@@ -209,7 +209,7 @@ def _linear(actuator: LinearActuator, dynamics: Dynamics, between, delay: float)
 
 def _plant(plant: plants.Plant, dynamics: Dynamics, between, delay: float) -> Step:
     def act(x: np.ndarray, run: Run) -> np.ndarray:
-        made = plants.respond(plant, x, run.rest, run.h, dynamics, between)
+        made = plants.respond(plant, x, run.rest, run.h, dynamics, between, run.rough)
         return delayed(made, run.rest, run.h, delay) if delay else made
 
     return (plant, dynamics, between, delay), act, None

@@ -134,18 +134,17 @@ void focgen_play(int n, const double *x, double *y, const unsigned char *rest, d
     }
 }
 
-/* Stick-slip: held until x has left the band around it, then jumps to x less `left` of the band. */
-void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double left)
+/* Stick-slip: held until x has left the band around it, then jumps to x less `left` of the band, and follows there until x turns
+ * round; `anew`: it is held again at once. Where x was the same for ever, it lies `place` below x, or where coming from 0 left it. */
+void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double left, int anew, double place)
 {
-    double now = 0.0;
-    int moving = 0;
-    double past = 0.0;
+    double now = 0.0, past = 0.0, way = 0.0;
     for (int k = 0; k < n; k++) {
-        if (rest[k]) now = past = 0.0, moving = 0;
-        double gap = x[k] - now, dir = x[k] - past;
-        if (fabs(gap) > band) moving = 1;
-        else if (dir == 0.0 || dir * gap < 0.0) moving = 0;
-        if (moving) now = x[k] - left * (gap > 0.0 ? 1.0 : -1.0);
+        if (rest[k]) now = past = way = 0.0;
+        if (rest[k] == BALANCED && !isnan(place)) now = x[k] - place, past = x[k];
+        if (anew || (x[k] - past) * way <= 0.0) way = 0.0;
+        if (fabs(x[k] - now) > band) way = x[k] > now ? 1.0 : -1.0;
+        if (way != 0.0) now = x[k] - way * left;
         past = x[k];
         y[k] = now;
     }

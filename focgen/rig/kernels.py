@@ -32,7 +32,7 @@ void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, d
 void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double
     start);
 void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double
-    left);
+    left, int anew, double place);
 void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width);
 void focgen_power_creep(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
     double scale, double power);
@@ -148,9 +148,11 @@ def play(x, rest, width: float, start: float = 0.0) -> np.ndarray:
     return _call("focgen_play", x, rest, float(width), float(start))
 
 
-def stick(x, rest, band: float, left: float) -> np.ndarray:
-    """Stick–slip: held within ``band`` of ``x``, then slips to ``left`` from it; units of x."""
-    return _call("focgen_stick", x, rest, float(band), float(left))
+def stick(x, rest, band: float, left: float, anew: bool = False, place: float = np.nan) -> np.ndarray:
+    """Stick–slip: held within ``band`` of ``x``, then slips to ``left`` from it, and follows at that distance
+    until x turns round, or ``anew`` is held at once. ``place``: how far below x it lies where an experiment
+    begins in equilibrium (not a number: where coming from 0 leaves it); units of x."""
+    return _call("focgen_stick", x, rest, float(band), float(left), int(anew), float(place))
 
 
 def bouc_wen(x, rest, width: float) -> np.ndarray:

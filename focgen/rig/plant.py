@@ -69,14 +69,17 @@ def respond(
     h: float,
     dynamics: Dynamics = UNCHANGED,
     between: Between | bool = Between.STRAIGHT,
+    rough: bool = False,
 ) -> np.ndarray:
     """The output (n,) for the input ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is not
     0; of ``dynamics`` the drag, the hysteretic spring and the bend count.
 
     ``between``: what the input does from one sample to the next. In straight lines it comes from 0 within the
     sample ahead of an experiment, as in :func:`~focgen.rig.linear.run`; else it jumps at the first sample.
+    ``rough``: steps of a hysteretic or bent spring are twice as long, and the error below 1e-3 of the
+    motion.
     """
-    base, last = _levels(plant, dynamics, h)
+    base, last = _levels(plant, dynamics, h, rough)
     tables, spring, bend = _tables(plant, h, base, last), dynamics.spring, dynamics.bend
     numbers = [h, plant.m, plant.c, plant.k, *dynamics.drag.held, spring.share * plant.k]
     numbers += [spring.loading, spring.unloading, spring.power, spring.scale]
@@ -87,13 +90,13 @@ def respond(
     return kernels.plant(x, rest, moves, levels, np.array(numbers), tables)
 
 
-def _levels(plant: Plant, dynamics: Dynamics, h: float) -> tuple[int, int]:
+def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> tuple[int, int]:
     """How often a sample is halved: for the motion, and at most, for an event."""
     spring, bend = dynamics.spring, dynamics.bend
     steepest = 1.0 + spring.share * max(abs(spring.loading), abs(spring.unloading)) * spring.scale
     steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second)
     pace = np.sqrt(plant.k * steepest / plant.m) if plant.order == 2 else plant.k * steepest / plant.m
-    short = _SHORT if dynamics.changed & {"spring", "bend"} else _SWING
+    short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend"} else _SWING
     short *= 1.0 if spring.power == 1.0 else 0.5
     base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
     base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _MOST))

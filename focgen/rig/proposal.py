@@ -19,6 +19,7 @@ from focgen.logs.table import LogTable, stem
 from focgen.output import check_apart, write_file
 from focgen.rig.files import read_rig
 from focgen.rig.model import Rig
+from focgen.shown import Shown
 
 _MEANING = {
     "time": "s",
@@ -37,8 +38,8 @@ _COLUMN = 40  # where comments begin
 Ask = Callable[[str, str, Sequence[str]], str]
 
 
-@dataclass(frozen=True)
-class Proposal:
+@dataclass(frozen=True, repr=False)
+class Proposal(Shown):
     """``rig`` without models; ``text``: its file, with comments; ``doubts``: what to check; ``next``: the
     command that identifies the models."""
 
@@ -46,6 +47,9 @@ class Proposal:
     text: str
     doubts: tuple[str, ...]
     next: str
+
+    def __str__(self) -> str:
+        return self.text
 
 
 @dataclass(frozen=True)

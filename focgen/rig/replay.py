@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from focgen.errors import LogError, RigError
+from focgen.jsontext import UNWRITTEN
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
@@ -19,6 +20,7 @@ from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import begun
 from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
+from focgen.shown import Shown
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 _CLOSER = (
@@ -37,15 +39,18 @@ class Replayed:
     rmse_by_signal: dict[str, float]
 
 
-@dataclass(frozen=True)
-class Replay:
+@dataclass(frozen=True, repr=False)
+class Replay(Shown):
     """``logs``: every experiment by its name. ``simulated``: its signals, shape (n,), by role. ``notes``:
-    what was done to the logs. ``warnings``: what in them is implausible."""
+    what was done to the logs. ``warnings``: what in them is implausible. ``rig`` and ``experiments``: what
+    was run, on what."""
 
     logs: dict[str, Replayed]
     simulated: dict[str, dict[str, np.ndarray]]
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    rig: Rig | None = field(default=None, metadata=UNWRITTEN, compare=False)
+    experiments: tuple[Experiment, ...] = field(default=(), metadata=UNWRITTEN, compare=False)
 
 
 @rig_then_logs
@@ -62,7 +67,7 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
     simulated = simulate_session(told, session)
     results = {log.name: _compared(log, made) for log, made in zip(session, simulated)}
     made = {log.name: made for log, made in zip(session, simulated)}
-    return Replay(results, made, notes_of(session), doubts(told, session))
+    return Replay(results, made, notes_of(session), doubts(told, session), told, tuple(session))
 
 
 def experiments(

@@ -108,7 +108,7 @@ class LoadedController:
         """The parameters that controller.toml describes: factors of 1, the widest limits."""
         self._check_tunable("default")
         made, plan = self._machine.params(), self.plan
-        gain = tuple(self._signals.back(count, plan.tuning.factor) for count in made.gain)
+        gain = tuple(self._signals.back(count, plan.box.factor) for count in made.gain)
         ends = (self._signals.back(end, plan.output) for end in (made.u_min, made.u_max))
         return Params(gain, *ends)
 
@@ -173,7 +173,7 @@ class LoadedController:
         self._check_tunable(call)
         if not isinstance(given, Params):
             raise InputError(f"{self.name}: params", f"is {given!r}", "change what default() gives")
-        box, count = self.plan.tuning, len(self.plan.tuning.nominal)
+        box, count = self.plan.box, len(self.plan.box.nominal)
         factors = tuple(self._one("gain", factor, box.factor) for factor in given.gain)
         if len(factors) != count:
             what, remedy = f"has {len(factors)} factors for {count} gains", "give one for each gain"

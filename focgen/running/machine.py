@@ -104,7 +104,7 @@ def _loaded(ffi: FFI, plan: Plan, folder: Path) -> Any:
 
 def _tunable(plan: Plan) -> str:
     name, signal = plan.name, plan.output.ctype
-    members = f"{signal} gain[{len(plan.tuning.nominal)}]; {signal} u_min; {signal} u_max;"
+    members = f"{signal} gain[{len(plan.box.nominal)}]; {signal} u_min; {signal} u_max;"
     return (
         f"typedef struct {{ {members} }} {name}_params; void {name}_default({name}_params *); "
         f"uint8_t {name}_check(const {name}_params *); uint8_t {name}_tune(void *, const {name}_params *); "

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from focgen.errors import BuildError, MissingExtra
 from focgen.plan.model import Plan
 from focgen.targets import avr
+from focgen.targets.calls import CallCost, call_costs
 from focgen.targets.cores import Core
 from focgen.targets.run import TargetLibrary
 from focgen.targets.stack import Stack
@@ -21,7 +23,6 @@ from focgen.targets.timing import HOW
 from focgen.targets.toolchains import Toolchain, compile_object
 
 COUNTED = "executed instructions, counted in the emulator"
-_INTERFACE = ("init", "reset", "step", "track", "flags")
 _UNWINDING = (".ARM.", ".eh_frame", ".note", ".riscv")
 _SAVING = re.compile(r"\w+_(save|restore)|foc_(put|get|crc32|crc_bit|bits_f\d\d|float_f\d\d)")
 _FEW = 128  # steps, where floating point without a unit makes them long
@@ -38,6 +39,15 @@ class PerStep:
 
 
 @dataclass(frozen=True)
+class RuntimeCost:
+    """The mean step with one compiler and its own functions; ``skipped``: why it was not counted."""
+
+    instructions_per_step: float | None = None
+    cycles_per_step: float | None = None
+    skipped: str | None = None
+
+
+@dataclass(frozen=True)
 class Cost:
     """What a controller costs on a core, built by ``compiler``.
 
@@ -47,7 +57,9 @@ class Cost:
     state, and what else the controller keeps. ``stack_bytes``: the most that a call of its interface uses,
     from machine code, ``stack_path``: the functions on that path, each with its bytes; ``stack_seen``: the
     most that the measured steps have used. ``cycles_per_step`` is None for a core whose timings are not
-    published. ``skipped``: why nothing was counted; the rest is None then.
+    published. ``calls``: what the calls beside the step cost, counted in the same way; None for an AVR.
+    ``runtimes``: of a core whose wide products are functions of the compiler's, the step with each one's.
+    ``skipped``: why nothing was counted; the rest is None then.
     """
 
     compiler: str | None = None
@@ -61,6 +73,8 @@ class Cost:
     stack_seen: int | None = None
     skipped: str | None = None
     save_bytes: int | None = None
+    calls: dict[str, CallCost] | None = None
+    runtimes: dict[str, RuntimeCost] | None = None
 
 
 def cost_of(entry: dict[str, Any]) -> Cost:
@@ -70,6 +84,9 @@ def cost_of(entry: dict[str, Any]) -> Cost:
     """
     made = {key: entry[key] and PerStep(**entry[key]) for key in ("instructions_per_step", "cycles_per_step")}
     path = entry["stack_path"]
+    for key, kind in (("calls", CallCost), ("runtimes", RuntimeCost)):
+        parts = entry.get(key)
+        made[key] = parts and {name: kind(**part) for name, part in parts.items()}
     return Cost(**{**entry, **made, "stack_path": None if path is None else tuple(path)})
 
 
@@ -82,7 +99,9 @@ def cost_on(core: Core, chain: Toolchain, plan: Plan, folder: Path) -> Cost:
     costs = step_costs(library, plan, measured_steps(plan, core))
     stack = Stack(library.program)
     try:
-        deepest = max((stack.depth(f"{plan.name}_{part}") for part in _INTERFACE), key=lambda d: d.bytes)
+        deepest = max(
+            (stack.depth(f"{plan.name}_{part}") for part in _interface(plan)), key=lambda d: d.bytes
+        )
     except ValueError as reason:
         raise BuildError(str(folder), f"the stack on {core.name} cannot be told: {reason}",
                          "generate the folder again") from None  # fmt: skip
@@ -98,7 +117,26 @@ def cost_on(core: Core, chain: Toolchain, plan: Plan, folder: Path) -> Cost:
         deepest.path,
         _stack_seen(plan, stack, costs),
         save_bytes=save,
+        calls=call_costs(library, plan),
     )
+
+
+def with_runtimes(
+    found: Cost, core: Core, others: Sequence[Toolchain], lacking: Sequence[str], plan: Plan, folder: Path
+) -> Cost:
+    """Beside what the compiler's own functions make of a step, what those of ``others`` do, and of the
+    compilers that are ``lacking`` what installs them.
+    """
+    cycles = found.cycles_per_step
+    runtimes = {found.compiler: RuntimeCost(found.instructions_per_step.mean, cycles and cycles.mean)}
+    for chain in others:
+        library = TargetLibrary(core, chain, [plan], [folder])
+        costs = step_costs(library, plan, measured_steps(plan, core))
+        mean = None if costs.cycles is None else float(costs.cycles.mean())
+        runtimes[chain.title] = RuntimeCost(float(costs.instructions.mean()), mean)
+    for line in lacking:
+        runtimes[line.partition(":")[0]] = RuntimeCost(skipped=line)
+    return replace(found, runtimes=runtimes)
 
 
 def cost_on_avr(plan: Plan, folder: Path) -> Cost:
@@ -128,6 +166,11 @@ def cost_on_avr(plan: Plan, folder: Path) -> Cost:
     )
 
 
+def _interface(plan: Plan) -> tuple[str, ...]:
+    """The calls whose code, stack and helpers count; what saves a state is told by itself."""
+    return ("init", "reset", "step", "track", "flags", *["tune"] * (plan.tuning is not None))
+
+
 def measured_steps(plan: Plan, core: Core) -> int:
     """Once around the memory, so that no place of the ring's end is left out; fewer where steps are long."""
     has = {"f64": core.double, "f32": core.single}.get(plan.arithmetic, True)
@@ -149,7 +192,7 @@ def _sizes(core: Core, chain: Toolchain, plan: Plan, folder: Path, library: Targ
            stack: Stack) -> tuple[dict[str, int], int, int]:  # fmt: skip
     """Bytes of flash by part, of memory besides the state, and of what saves it."""
     sizes, own = object_sizes(compile_object(chain, core, folder / f"{plan.name}.c", [folder]))
-    reached = stack.reached([f"{plan.name}_{part}" for part in _INTERFACE])
+    reached = stack.reached([f"{plan.name}_{part}" for part in _interface(plan)])
     helpers = sum(library.program[name].size for name in reached - own)
     flash = {"code": sizes["code"], "constants": sizes["constants"], "compiler": helpers}
     return flash, sizes["data"], sizes["save"]

@@ -26,6 +26,10 @@ REFUSED = 128
 """Beside the flags of a step: a reset or a track ahead of it has raised INPUT or INVALID."""
 UNTUNED = 64
 """Beside them, too: of parameters something else has been said than :func:`refused` does."""
+CALLS = ("init", "reset", "track", "save", "restore", "tune")
+"""The calls that NAME_call makes, by number."""
+PREPARE = len(CALLS)
+"""The number for which it takes parameters ready, so that ``tune`` is nothing but the call."""
 RESUME = 4
 """Event of a first sample: go on from the state that is there, without init."""
 

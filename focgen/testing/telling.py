@@ -50,7 +50,7 @@ def _events(plan: Plan, judged: Judged, lane: int, k: int) -> list[str]:
 
 def _call(plan: Plan, event: Reset | Track | Tune) -> str:
     if isinstance(event, Tune):
-        p, factor = event.params, plan.tuning.factor
+        p, factor = event.params, plan.box.factor
         gains = ", ".join(_value(count, factor) for count in p.gain)
         return f"tune([{gains}], {_value(p.u_min, plan.output)}, {_value(p.u_max, plan.output)})"
     if isinstance(event, Track):

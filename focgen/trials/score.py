@@ -16,6 +16,7 @@ from typing import Any
 from focgen.errors import FocgenError, InputError
 from focgen.output import write_file
 from focgen.progress import say, track
+from focgen.shown import Shown
 from focgen.trials import achieved, baselines
 from focgen.trials.asked import ask, resolved
 from focgen.trials.facts import achieved_in, diagnosis_in, facts_of
@@ -52,8 +53,8 @@ class Scores:
         return all(row.reached is not False for row in self.rows)
 
 
-@dataclass(frozen=True)
-class Summary:
+@dataclass(frozen=True, repr=False)
+class Summary(Shown):
     """The scores of several trials, in the order they were given."""
 
     sets: tuple[Scores, ...]

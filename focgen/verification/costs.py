@@ -14,14 +14,16 @@ from focgen.codegen.kernels import TARGETS
 from focgen.errors import InputError, MissingExtra, check_choice
 from focgen.jsontext import read_json
 from focgen.output import write_file
+from focgen.shown import Shown
 from focgen.targets.asked import asked_for, entry_of
 from focgen.targets.cores import core
-from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr
+from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr, with_runtimes
 from focgen.targets.emulator import emulator_title
 from focgen.targets.toolchains import Toolchain, absent, toolchains
 from focgen.verification.folder import REMEMBERED, GeneratedFolder, read_folder, sources
 
 COMPILERS = ("zig", "gcc")
+_BY_FUNCTIONS = "cortex-m0plus"  # wide products, shifts and floating point are functions of the compiler's
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,8 @@ class ControllerCost:
     against: Path | None = None
 
 
-@dataclass(frozen=True)
-class Costs:
+@dataclass(frozen=True, repr=False)
+class Costs(Shown):
     """The costs of every generated folder, by folder."""
 
     controllers: tuple[ControllerCost, ...]
@@ -111,7 +113,11 @@ def _compiled(name: str, read: GeneratedFolder, compiler: str) -> Cost:
         return Cost(skipped=f"{missing.what} ({missing.remedy})")
     if chain is None:
         return Cost(skipped=next(line for line in absent(one) if ("zig" in line) == (compiler == "zig")))
-    return cost_on(one, chain, read.plan, read.path)
+    found = cost_on(one, chain, read.plan, read.path)
+    if name != _BY_FUNCTIONS:
+        return found
+    others = [c for c in toolchains(one) if c.title != chain.title]
+    return with_runtimes(found, one, others, absent(one), read.plan, read.path)
 
 
 def _chain(name: str, compiler: str) -> Toolchain | None:

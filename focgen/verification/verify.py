@@ -8,6 +8,7 @@ from pathlib import Path
 
 from focgen.codegen.kernels import TARGETS as CORES
 from focgen.errors import InputError
+from focgen.shown import Shown
 from focgen.targets.asked import asked_for
 from focgen.verification.compare import TargetResult, compare, observed, self_tested
 from focgen.verification.elsewhere import on_avr, on_core
@@ -21,8 +22,8 @@ _SAMPLES = 10_000  # on the host
 _LEFT = "the folder has been edited, so nothing of it was compiled (--edited does)"
 
 
-@dataclass(frozen=True)
-class Verification:
+@dataclass(frozen=True, repr=False)
+class Verification(Shown):
     """``targets`` by name; ``differences`` between the folder and what its controller.toml gives; ``notes``
     on files that nothing is compiled from; ``agrees``: what ran does; ``holds``: it does, and nothing was
     edited.

@@ -62,6 +62,8 @@ def target(plan: Plan, kernels: Kernels = PORTABLE) -> str:
         "sched": sched,
         "oracle": "\n".join(_oracle(plan, kernels)),
         "tune": _TUNE % {"name": name, "NAME": name.upper()} if plan.tuning else "",
+        "low": "s.u_min" if plan.tuning else f"{name}_U_MIN",
+        "high": "s.u_max" if plan.tuning else f"{name}_U_MAX",
         "flags": sum(flags(plan).values()),
     }
 
@@ -122,7 +124,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *at, size_t size)
             if ((what & 2u) == 0u) meas = argument(&at, end);
             for (; n > 0u; n--) {
                 u = %(name)s_step(&s, ref, meas%(sched)s);
-                if (!(u >= %(name)s_U_MIN && u <= %(name)s_U_MAX)) __builtin_trap();
+                if (!(u >= %(low)s && u <= %(high)s)) __builtin_trap();
                 look();
             }
         } else if ((what & 7u) == 5u) {
@@ -146,9 +148,15 @@ _TUNE = """        if ((what & 15u) == 12u) {
             unsigned i;
 
             %(name)s_default(&p);
-            for (i = 0; i < %(NAME)s_GAINS; i++) p.gain[i] = argument(&at, end);
-            if ((what & 16u) != 0u) p.u_min = argument(&at, end);
-            if ((what & 32u) != 0u) p.u_max = argument(&at, end);
+            for (i = 0; i < %(NAME)s_GAINS; i++) {
+                const unsigned corner = what >> i & 16u;
+
+                p.gain[i] = corner ? %(NAME)s_GAIN_MIN : %(NAME)s_GAIN_MAX;
+                if ((what & 128u) != 0u) p.gain[i] = argument(&at, end);
+            }
+            if ((what & 16u) != 0u) p.u_min = %(NAME)s_U_MIN_HIGHEST;
+            if ((what & 32u) != 0u) p.u_max = %(NAME)s_U_MAX_LOWEST;
+            if ((what & 64u) != 0u) p.u_max = argument(&at, end);
             if (%(name)s_check(&p) != %(name)s_tune(&s, &p)) __builtin_trap();
             look();
             continue;

@@ -14,14 +14,13 @@ from focgen.resources import shipped
 @dataclass(frozen=True, eq=False)
 class Made:
     """A plan and its C: ``files``, name and content of what is compiled; ``package`` and ``fmi`` as in
-    :class:`~focgen.codegen.packages.package.Package`; whether the header has conversions (``floats``).
+    :class:`~focgen.codegen.packages.package.Package`.
     """
 
     plan: Plan
     files: Mapping[str, str | bytes]
     package: str
     fmi: int | None
-    floats: bool
 
     @property
     def sources(self) -> list[str]:

@@ -22,6 +22,18 @@ class Variable:
 
 
 @dataclass(frozen=True)
+class Parameter:
+    """A variable that may be set between steps, from ``low`` to ``high``; ``member`` of the C's parameters,
+    ``lsb`` the macro with the size of its count."""
+
+    variable: Variable
+    low: str
+    high: str
+    member: str
+    lsb: str
+
+
+@dataclass(frozen=True)
 class FmuContext:
     """Everything the templates of an FMU ask for; times in s."""
 
@@ -39,6 +51,7 @@ class FmuContext:
     low: str
     high: str
     units: list[UserText]
+    parameters: list[Parameter]
 
 
 def fmu_files(made: Made) -> dict[str, str | bytes]:
@@ -72,6 +85,7 @@ def _context(made: Made) -> FmuContext:
         low=_value(plan, plan.output.low),
         high=_value(plan, plan.output.high),
         units=[UserText(text) for text in dict.fromkeys(v.unit.text for v in (*inputs, output) if v.unit)],
+        parameters=_parameters(plan),
     )
 
 
@@ -93,6 +107,29 @@ def _variables(plan: Plan) -> tuple[list[Variable], Variable]:
         for i, (name, about, span, unit) in enumerate(rows, 1)
     ]
     return inputs, Variable(4, "u", "output", UserText(units.output), "0.0")
+
+
+def _parameters(plan: Plan) -> list[Parameter]:
+    """Of a tunable plan: the limits of the output, and a factor for each gain."""
+    box, unit = plan.tuning, UserText(plan.controller.units.output)
+    if box is None:
+        return []
+    name, one = plan.name.upper(), 1.0 if plan.output.floating else box.factor.lsb
+    limits = ("u_min", "lower", plan.output.low, box.low), ("u_max", "upper", plan.output.high, box.high)
+    found = [
+        Parameter(
+            Variable(number, member, f"{which} limit of the output", unit, _value(plan, start)),
+            *(_value(plan, end) for end in ends),
+            member,
+            f"{name}_U_LSB",
+        )
+        for number, (member, which, start, ends) in enumerate(limits, 8)
+    ]
+    ends = [repr(float(end) * one) for end in (box.factor.low, box.factor.high)]
+    for i in range(len(box.nominal)):
+        gain = Variable(10 + i, f"gain_{i + 1}", "factor on a gain of the schedule", UserText(""), "1.0")
+        found.append(Parameter(gain, *ends, f"gain[{i}]", f"{name}_GAIN_LSB"))
+    return found
 
 
 def _token(made: Made) -> str:

@@ -150,10 +150,10 @@ def bode_figure(loops: Shapes, worst: PointMargins, controller: Controller, numb
 def simulation_page(simulation: Simulation) -> Page:
     """The page of a simulated loop."""
     name = f"The closed loop of {simulation.rig.name} and {simulation.controller.name}"
-    return Page(name, _lead(simulation), simulation_sections(simulation))
+    return Page(name, simulation_lead(simulation), simulation_sections(simulation))
 
 
-def _lead(simulation: Simulation) -> str:
+def simulation_lead(simulation: Simulation) -> str:
     results, count = simulation.setpoints, len(simulation.setpoints)
     bad = [r for r in results if r.verdict != "settles"]
     if bad:
@@ -168,7 +168,7 @@ def _lead(simulation: Simulation) -> str:
 def simulation_sections(simulation: Simulation) -> tuple[Section, ...]:
     """The steps, and what becomes of them within the rig's uncertainty."""
     worst = tuple(map(sentence, worst_sentences(simulation.worst)))
-    told = (_lead(simulation), *worst, *notes(simulation.notes))
+    told = (simulation_lead(simulation), *worst, *notes(simulation.notes))
     tables = (worst_table(simulation.worst),)
     return (Section("Closed loop", told, tables, figures=(_steps(simulation),)),)
 

@@ -27,12 +27,12 @@ _SHRINK = (
 def diagnosis_page(found: Diagnosis, drawn: Drawn | None, name: str) -> Page:
     """The page of a diagnosis of the rig ``name``; without figures of signals where ``drawn`` is None."""
     sections = diagnosis_sections(found, drawn)
-    return Page(f"What the model of {name} lacks", _lead(found, _units(drawn)), sections)
+    return Page(f"What the model of {name} lacks", diagnosis_lead(found, units_of(drawn)), sections)
 
 
 def diagnosis_sections(found: Diagnosis, drawn: Drawn | None) -> tuple[Section, ...]:
     """Where, which, how far, what next, and what has to be said."""
-    units = _units(drawn)
+    units = units_of(drawn)
     story = diagnosis_story(found, units)
     figures = diagnosis_figures(found, drawn, units)
     parts = [
@@ -42,7 +42,7 @@ def diagnosis_sections(found: Diagnosis, drawn: Drawn | None) -> tuple[Section, 
             (_shares(found),) if found.where.share else (),
             figures=figures["where"],
         ),
-        Section("Which", _told(story["which"]), _sizes(found, units), figures=figures["which"]),
+        Section("Which", _told(story["which"]), sizes(found, units), figures=figures["which"]),
         Section("How far", _told(story["far"]), (), figures=figures["far"]),
     ]
     ahead = (*_told(story["next"]), *(_files(found) if found.verdict != "none" else ()))
@@ -63,7 +63,7 @@ def diagnosis_sections(found: Diagnosis, drawn: Drawn | None) -> tuple[Section, 
     return (*parts, Section("What has to be said", said)) if said else tuple(parts)
 
 
-def _units(drawn: Drawn | None) -> Mapping[str, str]:
+def units_of(drawn: Drawn | None) -> Mapping[str, str]:
     return drawn.units if drawn else {}
 
 
@@ -80,7 +80,7 @@ def _told(lines: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _lead(found: Diagnosis, units: Mapping[str, str]) -> str:
+def diagnosis_lead(found: Diagnosis, units: Mapping[str, str]) -> str:
     """The answer in one paragraph."""
     story = diagnosis_story(found, units)
     return " ".join((*_told(story["where"]), *_told(story["which"])[:1], *_told(story["far"])))
@@ -98,7 +98,7 @@ def _shares(found: Diagnosis) -> TableOf:
     return TableOf(("stage", "share of the gap"), rows, "The gap by stage")
 
 
-def _sizes(found: Diagnosis, units: Mapping[str, str]) -> tuple[TableOf, ...]:
+def sizes(found: Diagnosis, units: Mapping[str, str]) -> tuple[TableOf, ...]:
     """Every candidate with its confidence and its parameters, in the log's units."""
     rows = []
     for i, cause in enumerate(found.causes, 1):

@@ -29,10 +29,14 @@ _TIME = Axis("time (s)")
 
 def identification_page(found: Identification) -> Page:
     """The page of an identification."""
-    return Page(f"The identified model of {found.rig.name}", _lead(found), identification_sections(found))
+    return Page(
+        f"The identified model of {found.rig.name}",
+        identification_lead(found),
+        identification_sections(found),
+    )
 
 
-def _lead(found: Identification) -> str:
+def identification_lead(found: Identification) -> str:
     if found.joint is None:
         return " ".join(sentence(stage_text(fit)) for fit in found.stages.values())
     joint, gof = found.joint, found.gof

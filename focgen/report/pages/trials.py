@@ -21,17 +21,21 @@ from focgen.trials.tables import title
 
 def trials_page(sets: Sequence[Scores]) -> Page:
     """The page of the scores of several trials."""
+    return Page("How often the diagnosis is right", trials_lead(sets), tuple(map(section, sets)))
+
+
+def trials_lead(sets: Sequence[Scores]) -> str:
+    """What came out, in two sentences."""
     asked = [row for scores in sets for row in scores.rows if row.reached is not None]
     missed = [row for row in asked if row.reached is False]
     cases = sum(scores.cases for scores in sets)
-    lead = (
+    return (
         f"{cases} sealed cases were diagnosed blind. "
         f"{len(asked) - len(missed)} of {len(asked)} scores that have a target reach it."
     )
-    return Page("How often the diagnosis is right", lead, tuple(map(_section, sets)))
 
 
-def _section(scores: Scores) -> Section:
+def section(scores: Scores) -> Section:
     table = TableOf(
         ("score", "value", "90 % interval", "cases", "to reach", "reached"),
         tuple(map(_line, scores.rows)),

@@ -61,6 +61,7 @@ class Run:
     0, 2 where it comes from equilibrium with that sample's input; ``clock`` (n,) is the session's time in s;
     ``duration`` of the longest experiment in s; ``carried``: what of an effect outlived an earlier session.
     ``begins``: what the input was before each experiment, in its order; none where all come from rest.
+    ``rough``: what is integrated in steps may take them twice as long, for fits that are but compared.
     """
 
     h: float
@@ -69,6 +70,7 @@ class Run:
     duration: float
     carried: Mapping[str, float] = field(default_factory=dict)
     begins: tuple[Begin, ...] = ()
+    rough: bool = False
 
     @property
     def spans(self) -> list[tuple[int, int]]:
@@ -101,7 +103,8 @@ class Form:
     is not there. ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is
     linear, None where not. ``wanders``: it follows the session's time through free values, so that it
-    foretells nothing of a later one.
+    foretells nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
+    ``begun``: it says where something lay that was held when an experiment began elsewhere than at rest.
     """
 
     name: str
@@ -112,6 +115,8 @@ class Form:
     leaves: Callable[[np.ndarray, tuple[float, ...], Run], dict[str, float]] | None = None
     response: Callable[[tuple[float, ...], np.ndarray], np.ndarray] | None = None
     wanders: bool = False
+    jumps: bool = False
+    begun: bool = False
 
     @property
     def drawn(self) -> bool:

@@ -1,9 +1,20 @@
 """A valve that does nothing until a change of the command has crossed a band."""
 
+from itertools import product
+
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter
 
-_BAND = Parameter("band", level=1, lower=0.0, upper=0.5, starts=(0.01, 0.04, 0.12), zero=0.0)
+_BANDS = tuple(0.003 * 1.3**k for k in range(17))  # of the largest command, far above whose swing it may lie
+_LEFTS, _PLACES = (0.0, 0.35, 0.7), (0.0,)
+
+
+def _parameters(*further):
+    """Band, what of it is left after a slip, and where the valve lay: every combination to begin with."""
+    starts = zip(*product(_BANDS, _LEFTS, *further))
+    band = Parameter("band", level=1, lower=0.0, upper=0.5, starts=next(starts), zero=0.0)
+    left = Parameter("left", lower=0.0, upper=0.95, starts=next(starts))
+    return (band, left, *(Parameter("place", lower=-1.0, upper=1.0, starts=s, zero=0.0) for s in starts))
 
 
 def _play(x, values, run):
@@ -15,9 +26,16 @@ def _stick(x, values, run):
 
 
 def _slip(x, values, run):
-    band, left = values
-    return kernels.stick(x, run.rest, band, left * band)
+    band, left, *place = values
+    return kernels.stick(x, run.rest, band, left * band, False, *(p * band for p in place))
 
+
+def _slips(x, values, run):
+    band, left, *place = values
+    return kernels.stick(x, run.rest, band, left * band, True, *(p * band for p in place))
+
+
+_BAND = Parameter("band", level=1, lower=0.0, upper=0.5, starts=_BANDS, zero=0.0)
 
 EFFECT = Effect(
     name="valve_stiction",
@@ -28,15 +46,12 @@ EFFECT = Effect(
     needs=lambda e: None if e.reversals else "the input never turns round above zero",
     forms=[
         Form("play", "command", (_BAND,), _play),
-        Form("stick", "command", (_BAND,), _stick),
-        Form(
-            "stick_slip",
-            "command",
-            (
-                _BAND,
-                Parameter("left", lower=0.0, upper=0.95, starts=(0.5, 0.5, 0.5)),
-            ),
-            _slip,
-        ),
+        Form("stick", "command", (_BAND,), _stick, jumps=True),
+        # after a slip it follows until the command turns round, or is held anew at once
+        Form("stick_slip", "command", _parameters(), _slip, jumps=True),
+        Form("slips", "command", _parameters(), _slips, jumps=True),
+        # a valve that is in use lies anywhere in its band
+        Form("stick_slip_begun", "command", _parameters(_PLACES), _slip, jumps=True, begun=True),
+        Form("slips_begun", "command", _parameters(_PLACES), _slips, jumps=True, begun=True),
     ],
 )
