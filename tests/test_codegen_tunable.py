@@ -19,6 +19,7 @@ from focgen.control.files import controller_text, read_controller, write_control
 from focgen.errors import ControllerError, InputError, PlanError
 from focgen.output import write_files
 from focgen.plan.build import build_plan
+from focgen.plan.model import FLAG_INVALID
 from focgen.plan.scenario import Params
 from focgen.testing import assert_equivalent, from_c
 from tests.c_code import STRICT, compiler, run
@@ -31,6 +32,8 @@ FINGER = replace(read_controller(CONTROLLER), tunable=BOX)
 """A schedule, an integrator, a recursion and a term of negative order."""
 FILTER = replace(filter_controller(), tunable=Tunable((0.25, 1.5), (-3.0, -1.0), (1.0, 3.0)))
 """None of the first two."""
+FINE = replace(FINGER, tunable=Tunable((0.5, 2.0), (0.0, 1e-16), (5.0, 10.0)))
+"""Lower limits that are no whole number of the counts in which f32 adds up."""
 CONTROLLERS = {"finger": FINGER, "filter": FILTER}
 
 
@@ -40,6 +43,7 @@ def folders(tmp_path_factory) -> Path:
     for name, controller in CONTROLLERS.items():
         for a in ARITHMETICS:
             generate(controller, root / f"{name}_{a}", a, name=f"{name}_{a}", tunable=True, selftest=True)
+    generate(FINE, root / "fine_f32", "f32", name="fine_f32", tunable=True)
     for a in ("f32", "q31"):
         options = dict(memory="exponential", tolerance=1e-3, horizon=100_000)
         generate(FINGER, root / f"modes_{a}", a, name=f"modes_{a}", tunable=True, **options)
@@ -47,6 +51,7 @@ def folders(tmp_path_factory) -> Path:
 
 
 FOLDERS = [f"{name}_{a}" for name in CONTROLLERS for a in ARITHMETICS] + ["modes_f32", "modes_q31"]
+FOLDERS += ["fine_f32"]
 
 
 # --------------------------------------------------------------------------------------------------- the bits
@@ -57,7 +62,7 @@ def test_every_bit_is_the_references(folders, name):
     """With parameters inside and outside the box at random moments; and the errors within their bounds."""
     result = focgen.verify(folders / name, samples=2000).targets["host"]
     assert result.first is None and result.sound and result.samples > 2000
-    assert result.selftest == (None if name.startswith("modes") else 0)
+    assert result.selftest == (None if name.startswith(("modes", "fine")) else 0)
 
 
 WRONG = {
@@ -212,6 +217,24 @@ def test_a_gain_changes_without_a_bump_and_a_narrower_limit_moves_the_output_at_
     one.init()  # brings the default ones back
     one.track(9.0)
     assert abs(one.step(0.01, 0.01, 0.1) - 9.0) <= count
+
+
+@pytest.mark.parametrize("arithmetic", ["f32", "f64"])
+def test_a_damaged_gain_leaves_one_step_out(folders, arithmetic):
+    """It is within the box, and the slope from it is one of parameters; where that leads to is not."""
+    one = focgen.load(folders / f"finger_{arithmetic}")
+    gains = np.array(one.plan.tuning.nominal, np.float32 if arithmetic == "f32" else np.float64)
+    content = one._machine.content(one._state)
+    assert content.count(gains.tobytes()) == 1
+    damaged = gains.copy()
+    damaged[1] = 0.9
+    one._state = one._machine.state(content.replace(gains.tobytes(), damaged.tobytes()))
+    one.reset(0.01, 0.0099, 3.0)
+    u, flags = one.run(np.full(20, 0.01), np.full(20, 0.0099), np.full(20, 0.199), with_flags=True)
+    assert flags.tolist() == [FLAG_INVALID] + [0] * 19
+    again = one.new()
+    again.reset(0.01, 0.0099, 3.0)
+    assert u[1:].tolist() == again.run(np.full(19, 0.01), np.full(19, 0.0099), np.full(19, 0.199)).tolist()
 
 
 @pytest.mark.parametrize("name", ["finger_q15", "finger_f32", "filter_f64"])

@@ -1,10 +1,13 @@
 """Floating states that no step has left: finite outputs within their limits, a flag, a good state again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import focgen
 from focgen.codegen.generate import generate
+from focgen.control.controller import Tunable
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.ending import endings
@@ -23,6 +26,10 @@ FORMS = {
     "filter": (filter_controller(), {}),
     "modes": (paper_controller(), {"memory": "exponential", "tolerance": 1e-3, "horizon": 10_000}),
     "ahead": (paper_controller(64), {"target": "cortex-m4"}),
+    "tuned": (
+        replace(paper_controller(40), tunable=Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0))),
+        {"tunable": True},
+    ),
     "plain": (simple(TransferFunction([(1.0, 0.0)]), integrator=True), {}),
 }
 
@@ -68,6 +75,7 @@ def test_whatever_is_in_the_state_outputs_are_within_their_limits(sound, name, a
     for content in states:
         u, flags = stepped(fill(one, content), rng, 150)
         assert np.all(np.isfinite(u)) and u.min() >= low and u.max() <= high
+        assert not flags[-1] & FLAG_INVALID
         invalid += int(np.any(flags & FLAG_INVALID))
     assert 1 <= invalid < len(states)
 

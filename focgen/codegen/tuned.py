@@ -16,7 +16,6 @@ _WITHIN = {
     "float": "foc_within_f32",
     "double": "foc_within_f64",
 }
-_SLACK = 1.0 + 2.0**-10  # over the largest slope, for its own rounding
 
 
 @dataclass(frozen=True)
@@ -31,9 +30,9 @@ class Limits:
 @dataclass(frozen=True)
 class TunedText:
     """How parameters are taken over. ``gain`` and ``slope``: of index i; ``slope`` is empty without a
-    schedule. ``one``: the default factor. ``within``: the function that asks for a box. ``least``, ``most``
-    and ``steepest``: what a gain and a slope in a state can be. ``moved``: the output, or the integral,
-    within the new limits; empty where no output is kept. ``kept``: its member.
+    schedule. ``one``: the default factor. ``within``: the function that asks for a box. ``least`` and
+    ``most``: what a gain in a state can be. ``moved``: the output, or the integral, within the new limits;
+    empty where no output is kept. ``kept``: its member.
     """
 
     tables: list[TableText]
@@ -43,7 +42,6 @@ class TunedText:
     within: str
     least: str
     most: str
-    steepest: str
     kept: str
     moved: str
 
@@ -106,7 +104,6 @@ def tuned_text(plan: Plan) -> TunedText | None:
         within=_WITHIN[signal],
         least=constant(plan.gain.low, plan.gain.ctype),
         most=constant(plan.gain.high, plan.gain.ctype),
-        steepest=_steepest(plan),
         kept=kept,
         moved=f"{CLAMP[kind]}({kept}, {ends[0]}, {ends[1]})" if kept else "",
     )
@@ -126,17 +123,6 @@ def _slope(plan: Plan) -> str:
     rise = "((int64_t)s->gains[i + 1u] - s->gains[i])"
     product = f"foc_shift64({rise} * {plan.name}_reciprocals[i], {plan.name}_coarser[i])"
     return converted(product, "int64_t", plan.gain.ctype)
-
-
-def _steepest(plan: Plan) -> str:
-    """The largest magnitude of a slope that parameters in the box give; floating only."""
-    if plan.schedule is None or not plan.floating:
-        return ""
-    box, found = plan.tuning, 0.0
-    ends = [[end * nominal for end in (box.factor.low, box.factor.high)] for nominal in box.nominal]
-    for before, after, per in zip(ends, ends[1:], box.reciprocals):
-        found = max(found, max(abs(b - a) for a in before for b in after) * per)
-    return literal(found * _SLACK, plan.gain.ctype)
 
 
 def _tables(plan: Plan) -> list[TableText]:

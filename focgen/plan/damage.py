@@ -15,6 +15,7 @@ import numpy as np
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Damage, Reset, Scenario, Trace, Tune
 from focgen.plan.tuning import courses, default_params
+from focgen.plan.usable import standing
 
 
 def mended(plan: Plan, scenario: Scenario, execute: Callable[[Plan, Scenario], Trace]) -> Scenario:
@@ -35,16 +36,20 @@ def _mended(plan: Plan, scenario: Scenario, damages: tuple[Damage, ...], execute
     for d in damages:
         left_out[d.lane, d.sample] = np.nan
     without = replace(scenario, ref=left_out)
-    standing = execute(plan, without).u
-    stands = [
-        _start(plan, scenario, d) if d.what in ("integral", "all") else standing[d.lane, d.sample]
-        for d in damages
-    ]
+    stood = execute(plan, without).u
+    stands = [_stands(plan, scenario, d, stood[d.lane, d.sample]) for d in damages]
     resets = [_begun(scenario, damage, u0) for damage, u0 in zip(damages, stands)]
     places = {(d.lane, d.sample) for d in damages}
     tracks = tuple(t for t in scenario.tracks if (t.lane, t.sample) not in places)
     lost = [Tune(d.lane, d.sample, default_params(plan)) for d in damages if _untuned(plan, d)]
     return replace(without, resets=(*scenario.resets, *resets), tracks=tracks, tunes=(*scenario.tunes, *lost))
+
+
+def _stands(plan: Plan, scenario: Scenario, damage: Damage, u: np.floating) -> float:
+    """The output at a damage, where ``u`` stood before."""
+    if damage.what in ("integral", "all"):
+        return _start(plan, scenario, damage)
+    return standing(plan, u, (plan.output.low, plan.output.high)) if _untuned(plan, damage) else u
 
 
 def _untuned(plan: Plan, damage: Damage) -> bool:

@@ -144,7 +144,8 @@ integrator the output kept), as every clamp to the output's limits from then on;
 only the rate at which u moves changes. Parameters outside the box (``refused``) change nothing. After a
 reset d_{k−1} is taken with the first step's own g, with and without a schedule. ``reset`` and ``track`` keep
 the parameters. A floating step that finds parameters that no ``tune`` has taken (NaN, a gain or a limit
-outside the box) has a damaged state, and the default ones return with the mended one.
+outside the box) has a damaged state, and the default ones return with the mended one. The gain that a slope
+leads to is asked about, too.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ import numpy as np
 
 from focgen.errors import PlanError
 from focgen.fractional.elementary import l1
+from focgen.plan.counts import taken_in, values_of
 from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
 from focgen.plan.proofs import inverse_of_recursion
 from focgen.plan.scenario import Reset, Scenario, Trace, Track, Tune
@@ -206,16 +207,28 @@ def events(scenario: Scenario) -> list[Reset | Track | Tune]:
     return sorted(found, key=lambda event: event.sample)
 
 
+def standing(plan: Plan, u: np.floating, ends: tuple[float, float]) -> np.floating:
+    """The output that stands once ``u`` is kept within the limits ``ends``. Kept in counts, a limit that is
+    no whole number of them is not met exactly.
+    """
+    kind = type(u)
+    kept = limited = min(max(u, kind(ends[0])), kind(ends[1]))
+    if plan.integrator and not plan.integrator.state.floating:
+        kept = kind(values_of(taken_in(limited, plan.integrator.state), plan.integrator.state))
+    return min(max(kept, kind(ends[0])), kind(ends[1]))
+
+
 def _hold(plan: Plan, scenario: Scenario, lane: int, invalid: np.ndarray, u: np.ndarray) -> None:
     """Fill in the outputs of steps that were left out, in place."""
     kind, ends = u.dtype.type, _ends(plan)
-    limited = lambda value: min(max(kind(value), kind(ends[0])), kind(ends[1]))  # noqa: E731
+    limited = lambda value: standing(plan, kind(value), ends)  # noqa: E731
     happening: dict[int, list] = {}
     for event in events(scenario):
         if event.lane == lane:
             happening.setdefault(event.sample, []).append(event)
     now = limited(0)
     for k in range(len(u)):
+        returned = None
         for event in happening.get(k, ()):
             if isinstance(event, Tune):
                 ends = _taken(plan, event, ends)
@@ -226,7 +239,11 @@ def _hold(plan: Plan, scenario: Scenario, lane: int, invalid: np.ndarray, u: np.
             given, keeps = (event.u0, event.keeps) if isinstance(event, Reset) else (event.u, False)
             if (plan.integrator or keeps) and usable(given, plan.output):
                 now = limited(given)
-        now = u[k] = now if invalid[k] else u[k]
+                returned = kind(given) if keeps else None  # and kept after that
+        if invalid[k]:
+            u[k] = now if returned is None else returned
+        else:
+            now = u[k]
 
 
 def refused_events(plan: Plan, scenario: Scenario, flags: np.ndarray) -> np.ndarray:

@@ -249,8 +249,12 @@ static void finger_f32_mend(finger_f32_state *s)
             known = 0;
         }
     }
+    /* Each can be known and lead to a gain that is not. Rounding keeps the order of what it rounds, so what
+       is within at both ends of a segment is so in between. */
     for (i = 0; i < FINGER_F32_GAINS - 1u; i++) {
-        if (!foc_within_f32(s->slopes[i], -79.0771494f, 79.0771494f)) {
+        const float run = finger_f32_points[i + 1u] - finger_f32_points[i];
+
+        if (!foc_within_f32(s->gains[i] + s->slopes[i] * run, 0.873779297f, 5.0012207f)) {
             known = 0;
         }
     }
