@@ -183,6 +183,31 @@ static inline uint16_t foc_ring_slot(uint16_t now, uint16_t size, uint16_t lag)
     return (uint16_t)(now >= lag ? now - lag : size - (lag - now));
 }
 
+/* Sum of weights[i] * samples[i], eight at a time: in a loop of one product the loop costs more than that. */
+static inline int32_t foc_run_q15(const FOC_ROM int16_t *weights, const int16_t *samples, uint16_t count)
+{
+    int32_t sum = 0;
+
+    for (; count >= 8u; count = (uint16_t)(count - 8u)) {
+        sum += (int32_t)weights[0] * samples[0];
+        sum += (int32_t)weights[1] * samples[1];
+        sum += (int32_t)weights[2] * samples[2];
+        sum += (int32_t)weights[3] * samples[3];
+        sum += (int32_t)weights[4] * samples[4];
+        sum += (int32_t)weights[5] * samples[5];
+        sum += (int32_t)weights[6] * samples[6];
+        sum += (int32_t)weights[7] * samples[7];
+        weights += 8;
+        samples += 8;
+    }
+    for (; count > 0u; count--) {
+        sum += (int32_t)*weights * *samples;
+        weights++;
+        samples++;
+    }
+    return sum;
+}
+
 /* Sum of weights[i] * x_(k-oldest+i) for i = 0 ... taps-1, from the oldest sample to the newest, over
    a ring: first up to the ring's end, then on from its beginning.
 
@@ -194,16 +219,8 @@ static inline int32_t foc_dot_q15(const FOC_ROM int16_t *weights, uint16_t taps,
     const uint16_t start = foc_ring_slot(now, size, oldest);
     const uint16_t straight = (uint16_t)(size - start);
     const uint16_t wrap = taps < straight ? taps : straight;
-    int32_t sum = 0;
-    uint16_t i;
 
-    for (i = 0; i < wrap; i++) {
-        sum += (int32_t)weights[i] * ring[start + i];
-    }
-    for (; i < taps; i++) {
-        sum += (int32_t)weights[i] * ring[i - straight];
-    }
-    return sum;
+    return foc_run_q15(weights, &ring[start], wrap) + foc_run_q15(weights + wrap, ring, (uint16_t)(taps - wrap));
 }
 
 static inline int64_t foc_dot_q31(const FOC_ROM int32_t *weights, uint16_t taps, const int32_t *ring,

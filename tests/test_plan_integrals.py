@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from fractions import Fraction
 
@@ -17,8 +18,9 @@ from focgen.plan.build import build_plan
 from focgen.plan.counts import MOST, NOTHING, counts_of, values_of
 from focgen.plan.ending import endings
 from focgen.plan.execute import execute
-from focgen.plan.integrals import STEPS, added_up, remarks, smallest_error
+from focgen.plan.integrals import STEPS, added_up, smallest_error
 from focgen.plan.model import Format
+from focgen.plan.remarks import remarks
 from focgen.plan.scenario import Reset, Scenario, nearest_raw, to_raw
 from focgen.resources import shipped
 from focgen.verification.host import FLAGS
@@ -147,3 +149,31 @@ def test_what_cannot_be_held_is_said(tmp_path):
     assert "rounding adds up" in remarks(build_plan(wild, "f32"))[0]
     manifest = generate(wild, tmp_path, "f32").manifest
     assert manifest["remarks"] and manifest["smallest_error"] > 0.0
+
+
+NEGATIVE = TransferFunction([(0.5, 0.7), (2.0, 0.0), (0.3, -0.4)])
+
+
+def test_the_open_loop_ramp_of_short_memory_is_said_and_is_there():
+    """Long after a step the integral of s^-0.4 rises by what the remark says, a second."""
+    controller = replace(simple(NEGATIVE, length=60), gain=0.01)
+    plan = build_plan(controller, "f64")
+    said = [remark for remark in remarks(plan) if "a ramp of" in remark]
+    slope = float(re.search(r"a ramp of (\S+) times", said[0])[1])
+    e = np.full((1, 400), 0.5)
+    u = execute(plan, Scenario(e, np.zeros_like(e))).u[0] / 0.01
+    assert np.diff(u)[100:] / 0.01 == pytest.approx(slope * 0.5, rel=3e-3)  # three digits are said
+    longer = build_plan(replace(controller, memory="exponential"), "f64")
+    assert not any("a ramp of" in remark for remark in remarks(longer))
+
+
+def test_what_negative_orders_cost_is_said():
+    """That the bound is the clamp, until when it is better, and what the trapezoid is off by."""
+    given = dict(memory="exponential", operator="continuous", tolerance=0.02)
+    plan = build_plan(simple(NEGATIVE), "f32", **given)
+    clamp, trapezoid = remarks(plan)
+    samples, bound = int(re.search(r"within (\d+) samples", clamp)[1]), plan.error_bound
+    assert samples * bound.operator_per_sample <= 0.01 * bound.operator
+    half = 0.05 * np.pi
+    assert f"{100 * (1 - half / np.tan(half)):.2g} % low" in trapezoid
+    assert len(remarks(build_plan(simple(NEGATIVE), "f32", band=(0.01, 1.0), **given))) == 1

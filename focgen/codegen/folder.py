@@ -14,8 +14,9 @@ from focgen.codegen.literals import quantity, wrapped
 from focgen.codegen.manifest import sizes
 from focgen.codegen.texts import UserText, markdown
 from focgen.plan.canonical import memory_bias
-from focgen.plan.integrals import remarks, smallest_error
+from focgen.plan.integrals import smallest_error
 from focgen.plan.model import Plan
+from focgen.plan.remarks import remarks
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from focgen.codegen.selftest import selftest_entry
 from focgen.codegen.state import plain_bytes, size_of, state_bytes
 from focgen.fractional.elementary import rounded_up
 from focgen.plan.canonical import memory_bias
-from focgen.plan.integrals import remarks, smallest_error
+from focgen.plan.integrals import smallest_error
 from focgen.plan.model import (
     FLAG_HIGH,
     FLAG_INPUT,
@@ -26,6 +26,7 @@ from focgen.plan.model import (
     Sum,
 )
 from focgen.plan.tuning import default_params
+from focgen.plan.remarks import remarks
 from focgen.plan.usable import EXPONENT
 
 

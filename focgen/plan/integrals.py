@@ -88,20 +88,6 @@ def coarse(plan: Plan) -> bool:
     return least is not None and least > max(_DIGITS * inputs, 0.0 if plan.floating else plan.error.lsb)
 
 
-def remarks(plan: Plan) -> list[str]:
-    """What the integrals of a plan cannot hold, with a remedy, a sentence each."""
-    found, added = [], added_up(plan)
-    wider = {"q15": "choose q31 or f32", "q31": "choose f64"}.get(plan.arithmetic, "lengthen the sample time")
-    if coarse(plan):
-        what = f"a steady error below {smallest_error(plan):.3g} never moves the integral"
-        found.append(f"{plan.name} [gain]: {what}; raise the gain, or {wider}")
-    if added is not None and added > 0.5:
-        what = f"one increment can be so large that rounding adds up to {added:.2g} digits of the output"
-        remedy = "narrow the input ranges, or choose q31 or f64"
-        found.append(f"{plan.name} [ranges]: {what} in {STEPS:.0e} samples; {remedy}")
-    return found
-
-
 def _gains(plan: Plan) -> list[float]:
     """Every gain, in counts, that is not 0; of a tunable one at both ends of its factor."""
     if plan.tuning is None:

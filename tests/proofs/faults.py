@@ -33,13 +33,16 @@ def _modes(file: str, pattern: str, by: str) -> Fault:
 
 FAULTS = {
     "off-by-one tap": Fault(
-        "foc_rt.h", r"for \(; i < taps; i\+\+\)", "for (; i <= taps; i++)", lambda *of: [esbmc.reads(*of)]
+        "foc_rt.h",
+        r"for \(; count > 0u; count--\)",
+        "for (count++; count > 0u; count--)",
+        lambda *of: [esbmc.reads(*of)],
     ),
     "ring wraps with >": Fault(
         "foc_rt.h", r"now \+ 1u < size", "now < size", lambda _, folder: [esbmc.ring(folder)]
     ),
     "product too large": Fault(
-        "foc_rt.h", r"\(int32_t\)weights\[i\] \*", "4 * (int32_t)weights[i] *", esbmc.overflow
+        "foc_rt.h", r"\(int32_t\)(\*weights|weights\[\d\]) \*", r"4 * (int32_t)\1 *", esbmc.overflow
     ),
     "mode's shift off by one": _modes(
         "all_modes.c", r"(means, \d+, (?:past|change), 1)4(?=, 15\))", r"\g<1>5"
