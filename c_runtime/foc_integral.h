@@ -16,9 +16,16 @@
 
 #define FOC_MOST ((int64_t)1 << 61)
 
+/* Called from several places: one copy in flash is enough. */
+#if defined(__GNUC__)
+#define FOC_APART __attribute__((noinline))
+#else
+#define FOC_APART
+#endif
+
 /* x * 2^up, the nearest whole number, halves away from zero, at most FOC_MOST; INT64_MIN where x is NaN or
    infinite. From the bits alone: the same on every core, whatever its library rounds like. */
-static inline int64_t foc_counts_f32(float x, int16_t up)
+static FOC_APART int64_t foc_counts_f32(float x, int16_t up)
 {
     union {
         float value;

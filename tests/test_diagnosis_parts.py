@@ -258,6 +258,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
     """A segment of which effects leave ``ratio`` of the gap, as the disturbance ``left``, of which inputs
     foretell ``share``."""
     monkeypatch.setattr(unexplained, "disturbed", lambda e: left)
+    monkeypatch.setattr(unexplained, "from_outside", lambda e: False)
     nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
     return SimpleNamespace(
         segment=SimpleNamespace(pace=0.0, closed=closed),

@@ -104,6 +104,10 @@ def test_the_promise_holds_on_new_experiments(tmp_path):
     achieved = (squares[0] - squares[1]) / (squares[0] - noise)
     assert abs(achieved - found.shrink) < 0.1
     assert found.shrink_interval[0] <= achieved <= found.shrink_interval[1] + 0.02
+    carried = [
+        replay(rig, unseen).logs[unseen[0].name].rmse ** 2 for rig in (found.refitted, found.augmented)
+    ]
+    assert carried == pytest.approx(squares, rel=1e-9)  # the rigs as objects are those of the files
 
 
 def test_the_floor_under_a_coarse_reading_is_its_noise():

@@ -83,15 +83,15 @@ def test_a_held_valve_moves_as_its_rule_says(left, anew):
 
 @pytest.mark.parametrize("band, left", [(4.5, 1.5), (2.5, 2.5)])
 def test_a_valve_that_sticks_in_a_loop_is_no_hysteresis(band, left):
-    found = explained(loop(3, band, left))
+    found = explained(loop(3, band, left, count=600))
     first = found.causes[0].rivals[0]
     assert first.effect == "valve_stiction" and not is_unknown(found)
     assert found.best.problem.values(found.best.vector)[0][0] == pytest.approx(band, rel=0.1)
 
 
-@pytest.mark.parametrize("steps", [False, True])
+@pytest.mark.parametrize("steps", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_a_tone_from_outside_is_not_put_down_to_what_lies_in_the_loop(steps):
-    found = explained(loop(3, tone=2.0, steps=steps))
+    found = explained(loop(3, tone=2.0, steps=steps, count=1000 if steps else 600))
     assert found.causes  # what follows a tone fits it
     assert found.segment.closed and from_outside(found) and is_unknown(found)
 

@@ -80,6 +80,7 @@ def test_the_archives_hold_what_they_should(built):
         names = [Path(*Path(name).parts[1:]).as_posix() for name in archive.getnames()]
     assert {name.split("/")[0] for name in names} == set(SOURCES)
     inside = zipfile.ZipFile(wheel).namelist()
+    assert "focgen/py.typed" in inside
     tops = {name.split("/")[0] for name in inside}
     assert tops == {"focgen", f"focgen-{focgen.__version__}.dist-info"}
     assert all(any(name.startswith(f"focgen/{part}/") for name in inside) for part in SHIPPED)

@@ -5,6 +5,7 @@ them.
 import doctest
 import re
 import typing
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,7 @@ def test_the_page_of_python_is_true(monkeypatch):
     monkeypatch.chdir(ROOT)
     monkeypatch.setenv("MPLBACKEND", "Agg")
     failed, tried = doctest.testfile(str(ROOT / "docs" / "python.md"), module_relative=False)
+    import_module("matplotlib.pyplot").close("all")
     assert tried > 50 and not failed
 
 

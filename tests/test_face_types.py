@@ -2,6 +2,7 @@
 
 import ast
 import importlib
+import inspect
 import subprocess
 import sys
 import tomllib
@@ -40,6 +41,18 @@ def test_every_command_is_a_function_of_its_name():
 
     assert all(callable(getattr(focgen, command)) and command in focgen.__all__ for command in commands())
     assert (Path(focgen.__file__).parent / "py.typed").is_file()
+
+
+@pytest.mark.parametrize("name", ["focgen", "focgen.fractional", "focgen.testing"])
+def test_whatever_is_public_says_what_it_does(name):
+    """Functions and classes, and every public function and property of these."""
+    package = importlib.import_module(name)
+    for public in set(package.__all__) - {"__version__"}:
+        found = getattr(package, public)
+        assert inspect.getdoc(found), public
+        for member, one in vars(found).items() if inspect.isclass(found) else ():
+            if not member.startswith("_") and (inspect.isfunction(one) or isinstance(one, property)):
+                assert one.__doc__, f"{public}.{member}"
 
 
 def test_a_bare_import_loads_nothing_large():

@@ -170,7 +170,7 @@ def test_parameters_change_between_samples(fmpy, arithmetic, fmi, tmp_path):
     assert validate_fmu(str(path)) == []
     unit, number = instantiated(fmpy, path)
     put, get = (unit.setFloat64, unit.getFloat64) if fmi == 3 else (unit.setReal, unit.getReal)
-    put([number["u_max"]], [6.0])
+    put([number["u_max"], number["gain_5"]], [6.0, 0.5])
     unit.exitInitializationMode()
     found = []
     for k in range(90):
@@ -182,8 +182,8 @@ def test_parameters_change_between_samples(fmpy, arithmetic, fmi, tmp_path):
             assert get([number["gain_3"], number["gain_2"], number["u_max"]]) == [1.0, 1.75, 6.0]
         unit.doStep(currentCommunicationPoint=k * STEP, communicationStepSize=STEP)
         found += get([number["u"]])
-    first = Params((1.0,) * 9, 0.0, 6.0)
-    second = Params((1.0, 1.75, *[1.0] * 7), 0.5, 6.0)
+    first = Params((*[1.0] * 4, 0.5, *[1.0] * 4), 0.0, 6.0)
+    second = Params((1.0, 1.75, 1.0, 1.0, 0.5, *[1.0] * 4), 0.5, 6.0)
     plan = build_plan(controller, arithmetic, tunable=True)
     u, _ = reference(plan, table, tunes=[Tune(0, 0, first), Tune(0, 30, second)])
     other, _ = reference(plan, table, tunes=[Tune(0, 0, first)])

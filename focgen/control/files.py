@@ -219,7 +219,7 @@ def _choice(top: Table, key: str, default: str, choices: tuple[str, ...]) -> str
     return value
 
 
-def _operator(top: Table) -> dict:
+def _operator(top: Table) -> dict[str, Any]:
     """What an exponential memory follows, and how closely. A band of "gl" is refused, never ignored."""
     operator = _choice(top, "operator", "gl", OPERATORS)
     found = {"operator": operator, "tolerance": top.number("tolerance", TOLERANCES[operator], above=0.0)}
@@ -253,7 +253,10 @@ def _source(table: Table | None) -> Source | None:
 
 
 def write_controller(controller: Controller, path: str | Path) -> None:
-    """Write a controller so that :func:`read_controller` gives an equal one."""
+    """Write a controller so that :func:`read_controller` gives an equal one.
+
+    Raises InputError where it cannot be written.
+    """
     write_file(path, controller_text(controller))
 
 
@@ -262,7 +265,7 @@ def controller_text(controller: Controller) -> str:
     return tomlkit.dumps(controller_table(controller))
 
 
-def _followed(controller: Controller) -> dict:
+def _followed(controller: Controller) -> dict[str, Any]:
     """What an exponential memory follows, and where."""
     if controller.operator == "gl":
         return {"horizon": controller.horizon}

@@ -32,11 +32,13 @@ def write(
     """Write all files into ``out``, or none; pictures where they are to be ``drawn``. Raises InputError where
     one of ``inputs`` would be written over.
     """
+    shown = diagnosis.drawn or drawn_of(rigs.refitted, evidence, logs)
+    augmented = diagnosis.augmented or rigs.augmented(logs, diagnosis.shrink)
     files: dict[str, str | bytes] = {
         "diagnosis.json": to_json(diagnosis),
-        FILE: drawn_text(drawn_of(rigs.refitted, evidence, logs)),
+        FILE: drawn_text(shown),
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
-        diagnosis.augmented_rig: tomlkit.dumps(rig_table(rigs.augmented(logs, diagnosis.shrink))),
+        diagnosis.augmented_rig: tomlkit.dumps(rig_table(augmented)),
     }
     if evidence.next_input is not None:
         files[NEXT] = _next(evidence.next_input)

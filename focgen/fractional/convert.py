@@ -105,7 +105,7 @@ def corners(transfer: TransferFunction) -> np.ndarray:
 def bode(transfer: TransferFunction, omega: ArrayLike | None = None, delay: float = 0.0, **how: Any) -> Any:
     """Draw the Bode plot with ``control.bode_plot``, and return what that returns; ``how`` goes to it.
 
-    ``omega`` and ``delay`` as for :func:`to_frd`, which says what is raised.
+    ``omega`` and ``delay`` as for :func:`to_frd`, which says what is raised (ValueError, MissingExtra).
     """
     return _control().bode_plot(to_frd(transfer, omega, delay), **how)
 
@@ -115,7 +115,7 @@ def nyquist(
 ) -> Any:
     """Draw the Nyquist plot with ``control.nyquist_plot``, and return what that returns; ``how`` goes to it.
 
-    ``omega`` and ``delay`` as for :func:`to_frd`, which says what is raised.
+    ``omega`` and ``delay`` as for :func:`to_frd`, which says what is raised (ValueError, MissingExtra).
     """
     return _control().nyquist_plot(to_frd(transfer, omega, delay), **how)
 

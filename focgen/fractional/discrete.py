@@ -39,7 +39,8 @@ def gl_frequency_response(
 ) -> Any:
     """Return the complex gain of eq. (10) at the angular frequencies ``omega`` (rad/s), shape of ``omega``.
 
-    ``length`` is the memory L, None for infinite memory; ``step`` is h in s.
+    ``length`` is the memory L, None for infinite memory; ``step`` is h in s. Raises ValueError for orders
+    beyond ±100.
     """
     omega = np.asarray(omega, dtype=float)
     delay = np.exp(-1j * omega * step)

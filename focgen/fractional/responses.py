@@ -29,7 +29,8 @@ def step_response(transfer: TransferFunction, t: ArrayLike) -> np.ndarray:
 
 
 def ramp_response(transfer: TransferFunction, t: ArrayLike) -> np.ndarray:
-    """Return the response to the ramp u = t (t in s), as :func:`step_response`."""
+    """Return the response to the ramp u = t (t in s), shape of ``t``; exact, and raises ValueError, as
+    :func:`step_response`."""
     return step_response(transfer * TransferFunction([(1.0, 0.0)], [(1.0, 1.0)]), t)
 
 

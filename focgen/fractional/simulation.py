@@ -49,6 +49,10 @@ class Convolution:
         self._kernel = self._first = np.empty(0)
 
     def run(self, u: ArrayLike) -> np.ndarray:
+        """Return the output at the instants of the input samples ``u``, shape (n,) -> (n,), from rest.
+
+        Raises ValueError where the input is no row of samples.
+        """
         row = _signal(u)
         if len(row) > len(self._kernel):
             self._prepare(len(row))
@@ -191,6 +195,10 @@ class GrunwaldLetnikov:
         return num, den
 
     def run(self, u: ArrayLike) -> np.ndarray:
+        """Return the output at the instants of the input samples ``u``, shape (n,) -> (n,), from rest.
+
+        Raises ValueError where the input is no row of samples.
+        """
         row = _signal(u)
         if not len(row):
             return row.copy()
@@ -203,7 +211,10 @@ class GrunwaldLetnikov:
 
 
 def gl_operator(terms: Polynomial, step: float, length: int) -> np.ndarray:
-    """Return the coefficients c_0 … c_L of Σ aᵢ s^αᵢ as one Grünwald–Letnikov sum, shape (length + 1,)."""
+    """Return the coefficients c_0 … c_L of Σ aᵢ s^αᵢ as one Grünwald–Letnikov sum, shape (length + 1,).
+
+    ``step`` is h in s. Raises ValueError for orders beyond ±100, as :func:`gl_weights` does.
+    """
     total = np.zeros(length + 1)
     for term in terms:
         total += term.coefficient * step**-term.order * gl_weights(term.order, length)

@@ -44,7 +44,8 @@ def gl_weights(order: float, count: int) -> np.ndarray:
 def gl_weights_at(order: float, indices: ArrayLike) -> np.ndarray:
     """Return w_j of eq. (11)–(12) at the whole numbers ``indices`` ≥ 0, shape of ``indices``.
 
-    Accurate as :func:`gl_weights`, without computing the weights between.
+    Accurate as :func:`gl_weights`, without computing the weights between. Raises ValueError for orders
+    beyond ±100.
     """
     if not abs(order) <= _LARGEST_ORDER:
         raise ValueError(f"the order {order} is not a number between -100 and 100")

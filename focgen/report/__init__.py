@@ -15,6 +15,10 @@ class _Room(ModuleType):
     """``focgen.report(paths, out)``: a command's function has the command's name, here the room's, too."""
 
     def __call__(self, paths: str | Path | Sequence[str | Path], out: str | Path) -> Path:
+        """Write one page of ``paths`` to the file ``out``, :func:`focgen.report.paths.report`, and return it.
+
+        Raises InputError for a path that no page is made of, MissingExtra where Bokeh is not installed.
+        """
         from focgen.report.paths import report
 
         return report(paths, out)

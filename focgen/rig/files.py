@@ -226,7 +226,10 @@ def _effects(top: Table) -> tuple[Mapping[str, Any], ...]:
 
 
 def write_rig(rig: Rig, path: str | Path) -> None:
-    """Write a rig so that :func:`read_rig` gives an equal one."""
+    """Write a rig so that :func:`read_rig` gives an equal one.
+
+    Raises InputError where it cannot be written.
+    """
     write_file(path, rig_text(rig))
 
 

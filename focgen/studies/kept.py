@@ -81,6 +81,7 @@ def _study(told: dict[str, Any], kept: dict[str, Any], where: str) -> Study:
         notes=tuple(told["notes"]),
         curves=tuple(curves for _, curves in rows),
         ideal_curves=tuple(curves for _, curves in ideal),
+        operators=tuple(read_row({"row": row, "curves": asdict(Curves())})[0] for row in told["operators"]),
     )
 
 

@@ -16,7 +16,8 @@ class Variant:
     """One way to run the controller.
 
     ``memory``: "short" with ``length`` past samples, "exponential" with a ``tolerance`` up to ``horizon``
-    samples, or "infinite" (the ideal in float64, every past sample). ``sample_time`` in s.
+    samples, or "infinite" (the ideal in float64, every past sample). ``sample_time`` in s. With the
+    ``operator`` "continuous" the exponential memory follows (jω)^α over ``band`` (rad/s), without a horizon.
     """
 
     memory: str
@@ -25,6 +26,8 @@ class Variant:
     length: int | None = None
     tolerance: float | None = None
     horizon: int | None = None
+    operator: str = "gl"
+    band: tuple[float, float] | None = None
 
     @property
     def label(self) -> str:
@@ -137,13 +140,14 @@ class Row:
     instructions: float | None = None
     cycles: float | None = None
     note: str | None = None
+    operator: str = "gl"
+    band: tuple[float, float] | None = None
 
     @property
     def variant(self) -> Variant:
         """What was measured."""
-        return Variant(
-            self.memory, self.arithmetic, self.sample_time, self.length, self.tolerance, self.horizon
-        )
+        of = (self.memory, self.arithmetic, self.sample_time, self.length, self.tolerance, self.horizon)
+        return Variant(*of, self.operator, self.band)
 
 
 @dataclass(frozen=True)
@@ -207,7 +211,8 @@ class Plant:
 
 @dataclass(frozen=True, repr=False)
 class Study(Shown):
-    """All that was found. ``recommendation``: one sentence; ``notes``: what has to be said about it.
+    """All that was found. ``recommendation``: one sentence, and one on the operator; ``notes``: what has to
+    be said about it. ``operators``: the memories of both operators that were compared, "gl" first.
 
     ``rig``: the name of the rig that closed the loop, None where there was none. ``pareto``: for each cost
     (the name of a column of the rows) the indices of the rows, at the controller's own sample time, that no
@@ -228,3 +233,4 @@ class Study(Shown):
     notes: tuple[str, ...]
     curves: tuple[Curves, ...]
     ideal_curves: tuple[Curves, ...]
+    operators: tuple[Row, ...] = ()

@@ -53,6 +53,8 @@ def variant_of(controller: Controller, variant: Variant) -> Controller:
         sample_time=variant.sample_time,
         memory=variant.memory,
         arithmetic=variant.arithmetic,
+        operator=variant.operator,
+        band=variant.band,
         **{key: value for key, value in given.items() if value is not None},
     )
 
@@ -116,6 +118,8 @@ def _proved(plan: Plan, sizes: np.ndarray) -> float | None:
     An exponential memory's certificate knows more of step and ramp: they only rise, so that behind one
     difference their relative error is at most that of the weights.
     """
+    if plan.band:
+        return None  # what is proved of it is against s^α, not against the weights
     proved, samples = plan.error_bound, sizes.shape[1]
     left_out = proved.truncation
     if plan.exponential and samples <= plan.horizon:

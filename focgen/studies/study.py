@@ -25,6 +25,7 @@ from focgen.studies.grid import Grid, grid_of
 from focgen.studies.jobs import Job, read_ideal, read_plant, read_row
 from focgen.studies.model import Curves, Ideal, Plant, PlantRow, Row, Setup, Study, Variant
 from focgen.studies.operator import fractional_terms
+from focgen.studies.operators import Choice, chosen, compared_band, continuous_variants
 from focgen.studies.plant import exact_step, plant_of, plant_times
 from focgen.studies.recommend import Wish, leanest, pareto, sentence, shortest
 from focgen.studies.spectrum import band_of
@@ -156,6 +157,9 @@ def _setpoints(controller: Controller, rig: Rig | None, given: Sequence[float] |
     return points
 
 
+_FAITHFUL = 0.03  # of the weights: what such a memory is off by is their lag, not its own error
+
+
 class _Sweep:
     """The jobs of one study, and what becomes of them."""
 
@@ -177,6 +181,7 @@ class _Sweep:
         rows = [read_row(a) for a in answers[len(ideals) : len(ideals) + len(variants)]]
         plants = tuple(read_plant(a) for a in answers[len(ideals) + len(variants) :])
         said, rows = self._recommended(rows, perfect[self.grid.sample_times.index(self._first())][0])
+        choice = self._operator([row for row, _ in rows])
         every = tuple(row for row, _ in rows)
         return Study(
             controller,
@@ -188,7 +193,7 @@ class _Sweep:
             tuple(ideal for ideal, _ in perfect),
             self._plant(plant, plants) if plant is not None else None,
             pareto(every, self._first()),
-            said,
+            said if choice is None else f"{said} {choice.why}",
             tuple(
                 [
                     *notes,
@@ -198,6 +203,7 @@ class _Sweep:
             ),
             tuple(curves for _, curves in rows),
             tuple(curves for _, curves in perfect),
+            () if choice is None else choice.rows,
         )
 
     def _first(self) -> float:
@@ -229,6 +235,24 @@ class _Sweep:
         as_run = replace(self.setup.controller, arithmetic=arithmetic, sample_time=h)
         said = sentence(as_run, wish, short, exponential, set(self.grid.memories), max(self.grid.lengths))
         return said, [*rows, *added]
+
+    def _operator(self, rows: list[Row]) -> Choice | None:
+        """Both operators in the loop, in the arithmetic and at the sample time that are recommended for."""
+        if "exponential" not in self.grid.memories:
+            return None
+        h, own = self._first(), self.setup.controller.arithmetic
+        arithmetic = own if own in self.grid.arithmetics else self.grid.arithmetics[0]
+        mine = [r for r in rows if (r.memory, r.arithmetic, r.sample_time) == ("exponential", arithmetic, h)]
+        near = [r for r in mine if r.error is not None and r.error <= _FAITHFUL]
+        weights = min(near, key=lambda r: (r.ram_bytes, r.error), default=None)
+        band = compared_band(self.setup.band, h)
+        if weights is None or band is None:
+            return None
+        asked = [weights.variant, *continuous_variants(band, arithmetic, h)]
+        setup = replace(self.setup, band=band)
+        answers = sweep([Job("row", setup, v) for v in asked], self.store, self.workers)
+        first, *fits = (read_row(answer)[0] for answer in answers)
+        return chosen(first, fits)
 
     def _plant(self, plant: TransferFunction, rows: tuple[PlantRow, ...]) -> Plant:
         times = plant_times(self.own) * self.own

@@ -52,6 +52,7 @@ def payload(study: Study) -> dict[str, Any]:
         "pareto": {cost: list(front) for cost, front in study.pareto.items()},
         "ideal": [asdict(ideal) for ideal in study.ideal],
         "plant": None if study.plant is None else _plant(study),
+        "operators": [asdict(row) for row in study.operators],
         "recommendation": study.recommendation,
         "notes": list(study.notes),
     }
