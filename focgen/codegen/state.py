@@ -129,10 +129,24 @@ def _parameters(plan: Plan) -> list[Member]:
         Member(signal, "u_min", "lower limit of the output"),
         Member(signal, "u_max", "upper limit of the output"),
     ]
+    if counts_limits(plan):
+        state = plan.integrator.state
+        found += [
+            Member(state.ctype, "low", f"the lower one{_counts(state)}"),
+            Member(state.ctype, "high", f"the upper one{_counts(state)}"),
+        ]
     if plan.schedule:
         about = "from each breakpoint to the next"
         found.append(Member(plan.gain.ctype, "slopes", about, count - 1, f"{gains} - 1"))
     return found
+
+
+def counts_limits(plan: Plan) -> bool:
+    """Whether the state holds tuned limits in counts of its integral, too: then no step has to turn them."""
+    integrator = plan.integrator
+    return (
+        plan.tuning is not None and plan.floating and integrator is not None and not integrator.state.floating
+    )
 
 
 def _bytes(plan: Plan) -> list[Member]:

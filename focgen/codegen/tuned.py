@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from focgen.codegen.expressions import CLAMP, converted, counts, scaled_up, shifted
 from focgen.codegen.literals import constant, literal, rows, scale
+from focgen.codegen.state import counts_limits
 from focgen.codegen.tables import Group, TableText
+from focgen.plan.counts import taken_in
 from focgen.plan.model import Plan
 from focgen.plan.tuning import default_params
 
@@ -32,7 +36,8 @@ class TunedText:
     """How parameters are taken over. ``gain`` and ``slope``: of index i; ``slope`` is empty without a
     schedule. ``one``: the default factor. ``within``: the function that asks for a box. ``least`` and
     ``most``: what a gain in a state can be. ``moved``: the output, or the integral, within the new limits;
-    empty where no output is kept. ``kept``: its member.
+    empty where no output is kept. ``kept``: its member. ``counted``: limits that the state holds in counts
+    as well.
     """
 
     tables: list[TableText]
@@ -44,6 +49,17 @@ class TunedText:
     most: str
     kept: str
     moved: str
+    counted: list[CountedEnd]
+
+
+@dataclass(frozen=True)
+class CountedEnd:
+    """A limit in counts of the integral: its ``member``, ``taken`` from p; its box."""
+
+    member: str
+    taken: str
+    low: str
+    high: str
 
 
 def limits(plan: Plan) -> Limits:
@@ -68,8 +84,10 @@ def integral_ends(plan: Plan) -> tuple[str, str]:
         return constant(state.low, state.ctype), constant(state.high, state.ctype)
     up = scaled_up(state.ctype, plan.integrator.to_output)
     ends = limits(plan)
+    if counts_limits(plan):
+        return "s->low", "s->high"
     if plan.floating:
-        return counts(ends.low, state), counts(ends.high, state)
+        return ends.low, ends.high
     low, high = (converted(end, plan.output.ctype, state.ctype) + up for end in (ends.low, ends.high))
     return low, high
 
@@ -106,7 +124,16 @@ def tuned_text(plan: Plan) -> TunedText | None:
         most=constant(plan.gain.high, plan.gain.ctype),
         kept=kept,
         moved=f"{CLAMP[kind]}({kept}, {ends[0]}, {ends[1]})" if kept else "",
+        counted=_counted_ends(plan) if counts_limits(plan) else [],
     )
+
+
+def _counted_ends(plan: Plan) -> list[CountedEnd]:
+    state, found = plan.integrator.state, []
+    for member, of, box in (("low", "u_min", plan.tuning.low), ("high", "u_max", plan.tuning.high)):
+        ends = (constant(int(taken_in(np.float32(end), state)), state.ctype) for end in box)
+        found.append(CountedEnd(member, counts(f"p->{of}", state), *ends))
+    return found
 
 
 def _product(plan: Plan, product: str, by: int) -> str:

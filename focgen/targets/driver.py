@@ -9,6 +9,7 @@ import numpy as np
 from focgen.codegen.conversions import period_us, tried_conversions
 from focgen.codegen.manifest import lsbs
 from focgen.codegen.render import render
+from focgen.codegen.state import counts_limits
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.plan.tuning import default_params, refused
@@ -50,6 +51,7 @@ class DriverContext:
     left: str
     tunable: bool
     width: int
+    beyond: str
 
 
 def driver(plan: Plan) -> str:
@@ -69,8 +71,16 @@ def driver_context(plan: Plan) -> DriverContext:
     left = "INT64_MAX" if plan.counted else f"{high} + ({high} - {low})"
     return DriverContext(
         plan.name, plan.increment.ctype, scheduled, integral, held, scales, tried, fixed, refusing, left,
-        plan.tuning is not None, given_width(plan),
+        plan.tuning is not None, given_width(plan), _beyond(plan),
     )  # fmt: skip
+
+
+def _beyond(plan: Plan) -> str:
+    """C that takes the upper limit of a tunable state beyond its box, as it is held in counts where it is."""
+    name = plan.name.upper()
+    if counts_limits(plan):
+        return "state->high = (int64_t)1 << 62"
+    return f"state->u_max = {name}_U_MAX + ({name}_U_MAX - {name}_U_MIN)"
 
 
 def given_width(plan: Plan) -> int:

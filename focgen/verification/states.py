@@ -9,7 +9,8 @@ import numpy as np
 from focgen.codegen.banks import means, rests
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.lookahead import AHEAD, LookAhead
-from focgen.codegen.state import Member, members, size_of
+from focgen.codegen.state import Member, counts_limits, members, size_of
+from focgen.plan.counts import taken_in
 from focgen.plan.ending import Ending
 from focgen.plan.formats import shift
 from focgen.plan.model import Plan
@@ -64,6 +65,9 @@ def remembered(plan: Plan, ending: Ending, kernels: Kernels = PORTABLE) -> dict[
     if ending.applied:
         now = ending.applied
         found |= {"gains": now.gains, "slopes": now.slopes, "u_min": now.low, "u_max": now.high}
+        if counts_limits(plan):
+            ends = (taken_in(np.float32(end), plan.integrator.state) for end in (now.low, now.high))
+            found |= dict(zip(("low", "high"), ends))
     for history, past, rest in (("error", ending.error, ending.error_rest),
                                 ("filtered", ending.filtered, ending.filtered_rest)):  # fmt: skip
         size = kernels.slots(plan, history)

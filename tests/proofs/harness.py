@@ -66,7 +66,7 @@ def _parameters(plan: Plan) -> dict[str, Interval | None]:
     """Of what NAME_tune has taken over; a floating state may hold anything, and mends itself."""
     names = ("gains", "slopes", "u_min", "u_max")
     if plan.floating:
-        return dict.fromkeys(names)
+        return dict.fromkeys((*names, "low", "high"))
     worst = {proof.node: proof.worst for proof in plan.proofs}
     slopes = _around(worst["tuned slope"]) if plan.schedule else None
     ends = (Interval(*map(int, box)) for box in (plan.tuning.low, plan.tuning.high))

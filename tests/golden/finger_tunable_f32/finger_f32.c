@@ -188,6 +188,8 @@ static void finger_f32_take(finger_f32_state *s, const finger_f32_params *p)
     }
     s->u_min = p->u_min;
     s->u_max = p->u_max;
+    s->low = foc_counts_f32(p->u_min, 56);
+    s->high = foc_counts_f32(p->u_max, 56);
 }
 
 /* The parameters that finger_f32_default gives. */
@@ -227,15 +229,17 @@ static uint8_t finger_f32_within(const finger_f32_state *s)
     const int64_t now = s->integral;
 
     return (uint8_t)(s->error_now < FINGER_F32_ERRORS
-                     && now >= foc_counts_f32(s->u_min, 56)
-                     && now <= foc_counts_f32(s->u_max, 56));
+                     && now >= s->low
+                     && now <= s->high);
 }
 
 /* Whether the limits are ones that finger_f32_tune can have taken. */
 static uint8_t finger_f32_limits_known(const finger_f32_state *s)
 {
     return (uint8_t)(foc_within_f32(s->u_min, FINGER_F32_U_MIN, FINGER_F32_U_MIN_HIGHEST)
-                     && foc_within_f32(s->u_max, FINGER_F32_U_MAX_LOWEST, FINGER_F32_U_MAX));
+                     && foc_within_f32(s->u_max, FINGER_F32_U_MAX_LOWEST, FINGER_F32_U_MAX)
+                     && s->low >= 0 && s->low <= 72057594037927936
+                     && s->high >= 360287970189639680 && s->high <= 720575940379279360);
 }
 
 /* The default parameters, where those in the state are none that finger_f32_tune has taken. */
@@ -333,8 +337,7 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
         return finger_f32_recover(s, ref - meas);
     }
     /* |sum| <= 5332261958806667264 < 2^63 */
-    s->integral = foc_clamp64(s->integral + (d + s->increment), foc_counts_f32(s->u_min, 56),
-                              foc_counts_f32(s->u_max, 56));
+    s->integral = foc_clamp64(s->integral + (d + s->increment), s->low, s->high);
     s->increment = d;
     u = foc_clamp_f32(foc_value_f32(s->integral, 1.3877787807814457e-17f), s->u_min, s->u_max);
 
@@ -390,8 +393,7 @@ uint8_t finger_f32_tune(finger_f32_state *s, const finger_f32_params *p)
 
     if (refused == 0u) {
         finger_f32_take(s, p);
-        s->integral = foc_clamp64(s->integral, foc_counts_f32(s->u_min, 56), foc_counts_f32(s->u_max,
-                                  56));
+        s->integral = foc_clamp64(s->integral, s->low, s->high);
     }
     return refused;
 }
@@ -413,6 +415,8 @@ void finger_f32_save(const finger_f32_state *s, uint8_t *to)
     at = foc_put(to, at, (uint64_t)s->increment, 8);
     at = foc_put(to, at, (uint64_t)s->inner, 8);
     at = foc_put(to, at, (uint64_t)s->inner_input, 8);
+    at = foc_put(to, at, (uint64_t)s->low, 8);
+    at = foc_put(to, at, (uint64_t)s->high, 8);
     at = foc_put(to, at, foc_bits_f32(s->resting), 4);
     at = foc_put(to, at, foc_bits_f32(s->u_min), 4);
     at = foc_put(to, at, foc_bits_f32(s->u_max), 4);
@@ -452,6 +456,8 @@ uint8_t finger_f32_restore(finger_f32_state *s, const uint8_t *from)
     s->increment = (int64_t)foc_get(from, &at, 8);
     s->inner = (int64_t)foc_get(from, &at, 8);
     s->inner_input = (int64_t)foc_get(from, &at, 8);
+    s->low = (int64_t)foc_get(from, &at, 8);
+    s->high = (int64_t)foc_get(from, &at, 8);
     s->resting = foc_float_f32(foc_get(from, &at, 4));
     s->u_min = foc_float_f32(foc_get(from, &at, 4));
     s->u_max = foc_float_f32(foc_get(from, &at, 4));

@@ -59,9 +59,9 @@ typedef struct {
 
 #define FINGER_F32_ERRORS      41   /* the present error and those before it */
 #define FINGER_F32_FILTERED    41   /* the same of the filtered error */
-#define FINGER_F32_SAVED_BYTES 410u /* what finger_f32_save writes */
+#define FINGER_F32_SAVED_BYTES 426u /* what finger_f32_save writes */
 
-/* One controller. It belongs to the caller: one for each loop, 400 bytes each. Its members may
+/* One controller. It belongs to the caller: one for each loop, 416 bytes each. Its members may
    change without notice. Not to be shared between an interrupt and a task, or two tasks, without a
    lock. */
 typedef struct {
@@ -69,6 +69,8 @@ typedef struct {
     int64_t increment;                   /* half a trapezoid, of the latest sample */
     int64_t inner;                       /* integral of the terms of negative order, counts of 2^-60 */
     int64_t inner_input;                 /* what was added to it last, half a trapezoid */
+    int64_t low;                         /* the lower one, counts of 2^-56 V */
+    int64_t high;                        /* the upper one, counts of 2^-56 V */
     float resting;                       /* filtered error that reset has left, until a step */
     float u_min;                         /* lower limit of the output */
     float u_max;                         /* upper limit of the output */
