@@ -220,7 +220,8 @@ static inline int32_t foc_dot_q15(const FOC_ROM int16_t *weights, uint16_t taps,
     const uint16_t straight = (uint16_t)(size - start);
     const uint16_t wrap = taps < straight ? taps : straight;
 
-    return foc_run_q15(weights, &ring[start], wrap) + foc_run_q15(weights + wrap, ring, (uint16_t)(taps - wrap));
+    return foc_run_q15(weights, &ring[start], wrap)
+        + foc_run_q15(weights + wrap, ring, (uint16_t)(taps - wrap));
 }
 
 static inline int64_t foc_dot_q31(const FOC_ROM int32_t *weights, uint16_t taps, const int32_t *ring,
