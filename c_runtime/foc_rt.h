@@ -219,9 +219,9 @@ static inline int32_t foc_dot_q15(const FOC_ROM int16_t *weights, uint16_t taps,
     const uint16_t start = foc_ring_slot(now, size, oldest);
     const uint16_t straight = (uint16_t)(size - start);
     const uint16_t wrap = taps < straight ? taps : straight;
+    const uint16_t rest = (uint16_t)(taps - wrap);
 
-    return foc_run_q15(weights, &ring[start], wrap)
-        + foc_run_q15(weights + wrap, ring, (uint16_t)(taps - wrap));
+    return foc_run_q15(weights, &ring[start], wrap) + foc_run_q15(weights + wrap, ring, rest);
 }
 
 static inline int64_t foc_dot_q31(const FOC_ROM int32_t *weights, uint16_t taps, const int32_t *ring,
