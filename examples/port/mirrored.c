@@ -24,6 +24,22 @@ static float limited(float u)
     return u < 0.0f ? 0.0f : u > 10.0f ? 10.0f : u;
 }
 
+/* The nearest count of 2^-57, halves away from zero, at most 2^61. */
+static int64_t counts(float x)
+{
+    const double wide = (double)x * 0x1p57;
+
+    if (wide >= 0x1p61 || wide <= -0x1p61) {
+        return wide > 0.0 ? (int64_t)1 << 61 : -((int64_t)1 << 61);
+    }
+    return (int64_t)(wide + (wide < 0.0 ? -0.5 : 0.5));
+}
+
+static float value(int64_t n)
+{
+    return (float)n * 0x1p-57f;
+}
+
 /* What NaN, infinity and absurd numbers are not. */
 static int usable(float x)
 {
@@ -60,28 +76,30 @@ void mirrored_reset(mirrored_state *s, float ref, float meas, float u0)
         s->errors[i] = error;
     }
     s->oldest = 0;
-    s->before = gain * filtered(s);
-    s->output = limited(usable(u0) ? u0 : 0.0f);
+    s->before = counts(gain * filtered(s));
+    s->output = counts(limited(usable(u0) ? u0 : 0.0f));
 }
 
 float mirrored_step(mirrored_state *s, float ref, float meas)
 {
-    float now;
+    const int64_t high = counts(10.0f);
+    int64_t now;
 
     if (!usable(ref) || !usable(meas)) {
-        return s->output;
+        return value(s->output);
     }
     s->errors[s->oldest] = s->errors[s->oldest + MIRRORED_TAPS] = ref - meas;
     s->oldest = s->oldest + 1 >= MIRRORED_TAPS ? 0 : s->oldest + 1;
-    now = gain * filtered(s);
-    s->output = limited(s->output + (now + s->before));
+    now = counts(gain * filtered(s));
+    s->output += now + s->before;
+    s->output = s->output < 0 ? 0 : s->output > high ? high : s->output;
     s->before = now;
-    return s->output;
+    return value(s->output);
 }
 
 void mirrored_track(mirrored_state *s, float u)
 {
     if (usable(u)) {
-        s->output = limited(u);
+        s->output = counts(limited(u));
     }
 }

@@ -5,12 +5,14 @@
 #ifndef MIRRORED_H
 #define MIRRORED_H
 
+#include <stdint.h>
+
 #define MIRRORED_TAPS 25
 
 typedef struct {
     unsigned oldest;                   /* where the oldest of the samples stands */
-    float before;                      /* half a trapezoid, of the sample before */
-    float output;
+    int64_t before;                    /* half a trapezoid, of the sample before, counts of 2^-57 */
+    int64_t output;                    /* the same counts: a float would take in no small increment */
     float errors[2 * MIRRORED_TAPS];   /* every sample twice, so that the history is straight anywhere */
 } mirrored_state;
 
