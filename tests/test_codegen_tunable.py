@@ -332,3 +332,22 @@ def test_what_cannot_be_planned_is_refused(tmp_path, capsys):
     write_controller(replace(FINGER, tunable=None), tmp_path / "c.toml")
     assert main(["generate", str(tmp_path / "c.toml"), "--out", str(tmp_path / "out"), "--tunable"]) == 2
     assert "--tunable needs" in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+def test_no_bit_of_a_tuned_state_that_flips_holds_the_output_for_ever(tmp_path):
+    """Red where a part of the state stands beside another that says something else, and neither gives way."""
+    focgen.generate(FINGER, tmp_path, "f32", name="finger", tunable=True)
+    one, rng = focgen.load(tmp_path), np.random.default_rng(11)
+    inputs = [rng.uniform(0.0, FINGER.ranges.reference[1], 40) for _ in range(2)]
+    inputs += [rng.uniform(0.05, 0.2, 40)] if one.scheduled else []
+    low, high = FINGER.ranges.output
+    one.tune(replace(one.default(), u_max=0.5 * sum(FINGER.tunable.output_high)))
+    one.run(*inputs)
+    good = one._machine.content(one._state)
+    for bit in range(8 * len(good)):
+        flipped = bytearray(good)
+        flipped[bit // 8] ^= 1 << bit % 8
+        damaged = one.copy()
+        damaged._state = damaged._machine.state(bytes(flipped))
+        u, flags = damaged.run(*inputs, with_flags=True)
+        assert np.all((u >= low) & (u <= high)) and not flags[-1] & FLAG_INVALID, bit
