@@ -8,11 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.control.units import unit_of_role
 from focgen.errors import DesignError
 from focgen.rig.model import UNITY, Actuator, LinearActuator, Ranges, Rig
 
 _COMMAND = (0.0, 10.0)  # V, where the rig does not say
 _GRID = 2001
+_APART = 2.0  # times: command and pressure whose ranges differ by more are not the same quantity
+_WITHIN = "give set points, or [ranges] output, within the rig's reach"
+_REGULATOR = "`focgen identify LOG --stages regulator,actuator` fits one"
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,8 @@ def derived_ranges(rig: Rig) -> tuple[Ranges, tuple[str, ...]]:
     follow through the stages' static gains. Raises DesignError where a stage has no finite static gain.
     """
     given, notes = rig.ranges, []
+    if counts := counted_alike(rig):
+        notes.append(f"{counts}; {_REGULATOR}")
     command = given.command
     if command is None:
         merged = rig.regulator == UNITY and rig.signals.command is None
@@ -54,6 +60,21 @@ def derived_ranges(rig: Rig) -> tuple[Ranges, tuple[str, ...]]:
             f"the output's range is not given: {_span(output)}, the pressure's through actuator and sensor"
         )
     return Ranges(command, pressure, output), tuple(notes)
+
+
+def counted_alike(rig: Rig) -> str:
+    """How a command becomes a pressure in a rig that has no regulator though both are signals of it, in other
+    units or with other ranges; "" for any other rig.
+    """
+    signals, ranges = rig.signals, rig.ranges
+    if rig.regulator != UNITY or signals.command is None or signals.pressure is None:
+        return ""
+    units = unit_of_role(signals, "command"), unit_of_role(signals, "pressure")
+    tops = [max(map(abs, span)) for span in (ranges.command, ranges.pressure) if span is not None]
+    if (units[0] == units[1] or not all(units)) and (len(tops) < 2 or max(tops) <= _APART * min(tops)):
+        return ""
+    one, other = (f"1 {unit}".rstrip() for unit in units)
+    return f"the rig has no [regulator], so {one} of the command counts as {other} of the pressure"
 
 
 def _span(span: tuple[float, float]) -> str:
@@ -170,8 +191,7 @@ def _root(actuator: Actuator, drive: float, low: float, high: float) -> float:
 
 
 def _unreachable(rig: Rig, output: float, what: str, within: str) -> DesignError:
-    return DesignError(
-        rig.name,
-        f"the output {output:.4g} {what}; reachable is {within}",
-        "give set points, or [ranges] output, within the rig's reach",
-    )
+    told, remedy = f"the output {output:.4g} {what}; reachable is {within}", _WITHIN
+    if counts := counted_alike(rig):
+        told, remedy = f"{told}, for {counts}", f"{_REGULATOR}; design from the rig that it writes"
+    return DesignError(rig.name, told, remedy)

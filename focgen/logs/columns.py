@@ -15,7 +15,10 @@ from focgen.logs.table import LogTable
 
 SIGNALS = ("command", "pressure", "curvature", "output", "reference")
 _TIME = frozenset("t time zeit timestamp stamp clock sec seconds secs ms tiempo temps x".split())
-_RUN = frozenset("run runs experiment exp trial test segment session series".split())
+_RUN = frozenset(
+    "run runs experiment exp trial test segment session series versuch messung lauf essai prueba "
+    "ensayo".split()
+)
 _WORDS = {
     "command": "u cmd command valve pwm duty input drive pump motor voltage stell control heater",
     "pressure": "p pressure press druck gauge chamber presion",

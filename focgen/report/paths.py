@@ -5,16 +5,20 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from focgen.codegen.generate import Generated
 from focgen.control.controller import Controller
 from focgen.control.files import read_controller
 from focgen.diagnosis.drawn import FILE as SIGNALS
 from focgen.diagnosis.drawn import read_drawn
 from focgen.errors import InputError
+from focgen.identification.model import Identification
 from focgen.jsontext import fits, read_json
 from focgen.logs.experiment import Experiment
+from focgen.loop.design import Design
 from focgen.loop.simulate import simulate
 from focgen.output import check_apart, write_file
 from focgen.report.interactive import library
@@ -32,6 +36,7 @@ from focgen.report.pages.files import read_diagnosis
 from focgen.report.pages.study import study_page
 from focgen.rig.files import read_rig
 from focgen.rig.model import Actuator, Rig
+from focgen.rig.proposal import Proposal
 from focgen.rig.replay import experiments, replay
 from focgen.studies.kept import FILE as CURVES
 from focgen.studies.kept import read_study
@@ -74,19 +79,40 @@ class _Chain:
     found: list[Page] = field(default_factory=list)  # studies and diagnoses: pages by themselves
 
 
-def report(paths: str | Path | Sequence[str | Path], out: str | Path) -> Path:
+Part = str | Path | Rig | Controller | Proposal | Identification | Design | Generated
+"""A part of a page: a path, or what the commands of the chain make in memory."""
+
+
+def report(paths: Part | Sequence[Part], out: str | Path) -> Path:
     """Write one self-contained HTML page of ``paths`` to the file ``out``, and return it.
 
     A path is a rig or a controller, a log to be replayed with the rig, a folder that generate, study or
-    diagnose has written, or a file with what ``focgen verify --json`` printed. Rig and controller together
-    are simulated; nothing is compiled or run. Raises InputError for a path that is none of these,
-    MissingExtra where Bokeh is not installed.
+    diagnose has written, or a file with what ``focgen verify --json`` printed. Rigs, controllers and the
+    results of init, identify, design and generate are taken as they are. Rig and controller together are
+    simulated; nothing is compiled or run. Raises InputError for what is none of these, MissingExtra where
+    Bokeh is not installed.
     """
-    places = [Path(path) for path in ((paths,) if isinstance(paths, (str, Path)) else paths)]
+    parts = [_part(one) for one in (paths if isinstance(paths, (list, tuple)) else (paths,))]
+    places = [part for part in parts if isinstance(part, Path)]
     library()  # before anything takes time
     check_apart([out], [path for given in places for path in _files(given)])
-    write_file(out, page_of(places).self_contained(), [path for path in places if path.is_file()])
+    write_file(out, page_of(parts).self_contained(), [path for path in places if path.is_file()])
     return Path(out)
+
+
+def _part(given: object) -> Path | Rig | Controller:
+    """The path, the rig or the controller that an argument is or holds."""
+    if isinstance(given, (Proposal, Identification)):
+        return given.rig
+    if isinstance(given, Design):
+        return given.controller
+    if isinstance(given, Generated):
+        return given.folder
+    if isinstance(given, (Rig, Controller)):
+        return given
+    if isinstance(given, (str, PathLike)):
+        return Path(given)
+    raise InputError("report", f"takes no {type(given).__name__}", _TAKEN)
 
 
 def _files(path: Path) -> list[Path]:
@@ -95,11 +121,14 @@ def _files(path: Path) -> list[Path]:
     )
 
 
-def page_of(paths: Sequence[Path]) -> Page:
-    """The page of what the paths hold. Raises InputError for a path that is nothing a page is made of."""
+def page_of(parts: Sequence[Path | Rig | Controller]) -> Page:
+    """The page of what the parts hold. Raises InputError for a path that is nothing a page is made of."""
     chain = _Chain()
-    for path in paths:
-        _take(path, chain)
+    for part in parts:
+        if isinstance(part, Path):
+            _take(part, chain)
+        else:
+            _take_object(part, part.name, chain)
     if chain.logs and chain.rig is None:
         raise InputError(str(chain.logs[0]), "is a log without a rig", "name its rig.toml as well")
     sections = _sections(chain)
@@ -144,17 +173,15 @@ def _take_toml(path: Path, chain: _Chain) -> None:
         controller = "transfer" in tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         controller = False  # the reader of rigs says what is wrong
-    if controller:
-        _only_one(path, chain.controller, "controller")
-        chain.controller = read_controller(path)
-    else:
-        _only_one(path, chain.rig, "rig")
-        chain.rig = read_rig(path)
+    _take_object(read_controller(path) if controller else read_rig(path), str(path), chain)
 
 
-def _only_one(path: Path, there: Any, what: str) -> None:
-    if there is not None:
-        raise InputError(str(path), f"is a second {what}", f"make a page of one {what} at a time")
+def _take_object(one: Rig | Controller, where: str, chain: _Chain) -> None:
+    """Put a rig or a controller in its place. Raises InputError where one is there."""
+    what = "rig" if isinstance(one, Rig) else "controller"
+    if getattr(chain, what) is not None:
+        raise InputError(where, f"is a second {what}", f"make a page of one {what} at a time")
+    setattr(chain, what, one)
 
 
 def _diagnosis(folder: Path) -> Page:

@@ -41,7 +41,7 @@ Ask = Callable[[str, str, Sequence[str]], str]
 @dataclass(frozen=True, repr=False)
 class Proposal(Shown):
     """``rig`` without models; ``text``: its file, with comments; ``doubts``: what to check; ``next``: the
-    command that identifies the models."""
+    command that identifies the models, of logs in memory the call."""
 
     rig: Rig
     text: str
@@ -84,7 +84,7 @@ def init(
     roles = {role: by_name[guess.column] for role, guess in guesses.items()}
     doubts = (*time.doubts, *_doubts(guesses, roles, [c.name for c in columns]))
     label = name or (stem(tables[0].path) if isinstance(given[0], str | Path) else "rig")
-    files = [str(log) for log in given if isinstance(log, str | Path)] or ["LOG"]
+    files = [str(log) for log in given if isinstance(log, str | Path)]
     told = _next(files, roles, out)
     text = _text(label, run, time, roles, guesses, doubts, told)
     rig = read_rig(tomllib.loads(text))
@@ -182,6 +182,10 @@ def _doubts(
 def _next(files: Sequence[str], roles: Mapping[str, Column], out: str | Path | None) -> str:
     stages = ["regulator"] * ({"command", "pressure"} <= set(roles)) + ["actuator"]
     stages += ["sensor"] * ("curvature" in roles)
+    if not files:
+        asked = f", stages={stages}".replace("'", '"') if len(stages) > 1 else ""
+        rig = "proposal.rig" if out is None else _quoted(str(out))
+        return f"focgen.identify({rig}, logs{asked})"
     asked = f" --stages {','.join(stages)}" if len(stages) > 1 else ""
     return f"focgen identify {' '.join(files)} --rig {out or 'rig.toml'}{asked} --out identified.toml"
 
