@@ -11,8 +11,8 @@ CEILING = Candidate(
     0.9,
     "hard",
     {
-        "ceiling": Estimate(0.152, (0.151, 0.153), "pressure unit"),
-        "width": Estimate(0.1, (-3.0, 3.2), "pressure unit"),
+        "ceiling": Estimate(0.152, (0.151, 0.153), "bar"),
+        "width": Estimate(0.1, (-3.0, 3.2), "bar"),
     },
     0.0,
 )

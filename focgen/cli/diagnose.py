@@ -8,7 +8,7 @@ from pathlib import Path
 from focgen.cli.outcome import Outcome
 from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.diagnosis.diagnose import diagnose
-from focgen.diagnosis.drawn import units_of_rig
+from focgen.control.units import units_of_rig
 from focgen.errors import FocgenError
 from focgen.progress import led_by
 from focgen.report.diagnosis_summary import diagnosis_text

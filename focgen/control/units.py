@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from focgen.control.controller import Units
-from focgen.rig.model import Rig, Signals
+from focgen.rig.model import UNITY, Rig, Signals
 
 _KNOWN = (
     "V",
@@ -44,6 +44,21 @@ def unit_of_role(signals: Signals, role: str) -> str:
     """The unit of a role's signal: the rig's own, else as its column's name tells it, "" where neither
     does."""
     return signals.units.get(role) or ("" if role in signals.scales else unit_of(getattr(signals, role)))
+
+
+def units_of_rig(rig: Rig) -> dict[str, str]:
+    """The unit of command, pressure, curvature and output as far as the rig tells it, "" where it does not.
+
+    Where no regulator is given, a pressure without a column is the command; where the sensor has a gain of 1,
+    a curvature without one is in the output's unit.
+    """
+    signals = rig.signals
+    units = {role: unit_of_role(signals, role) for role in ("command", "pressure", "curvature", "output")}
+    if not units["pressure"] and signals.pressure is None and rig.regulator == UNITY:
+        units["pressure"] = units["command"]
+    if not units["curvature"] and signals.curvature is None and rig.sensor.dc_gain == 1.0:
+        units["curvature"] = units["output"]
+    return units
 
 
 def units_of(rig: Rig, scheduled: bool) -> Units:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from focgen.control.units import unit_of_role
+from focgen.control.units import units_of_rig
 from focgen.diagnosis.explain import Explanation
 from focgen.diagnosis.fit import problem_residual
 from focgen.diagnosis.model import Evidence
@@ -116,13 +116,6 @@ def drawn_of(rig: Rig, evidence: Evidence, logs: Sequence[Experiment]) -> Drawn:
             for cause in e.causes
         ),
     )
-
-
-def units_of_rig(rig: Rig) -> dict[str, str]:
-    """The unit of each signal as far as its column tells it; the curvature's is the output's where it has
-    none."""
-    units = {role: unit_of_role(rig.signals, role) for role in LOGGED}
-    return units | {"curvature": units["curvature"] or units["output"]}
 
 
 def entry_of(logs: Sequence[Experiment]) -> str:

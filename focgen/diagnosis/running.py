@@ -189,10 +189,11 @@ def _limited(replay: Replayed) -> Iterator[_Suspect]:
     """Outputs that stop short of the controller's own limits, whether the integrator is told or winds up."""
     controller, joined = replay.controller, np.concatenate(replay.commands)
     low, high = controller.ranges.output
+    unit = controller.units.output or "command unit"
     for end, own in ((float(joined.max()), high), (float(joined.min()), low)):
         stays = np.sum(np.abs(joined - end) < 1e-4 * (high - low))
         if stays >= _STAYS and abs(end - own) > 2e-3 * (high - low):
             ends = (low, end) if own == high else (end, high)
             told = replace(controller, ranges=replace(controller.ranges, output=ends))
             for made in (replay.with_memory(replay.length, told), [np.clip(u, *ends) for u in replay.ideal]):
-                yield Departure("output_saturation", 0.0, "limit", end, "command unit"), made
+                yield Departure("output_saturation", 0.0, "limit", end, unit), made

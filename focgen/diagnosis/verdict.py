@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.control.units import unit_of_role
 from focgen.diagnosis import compose
 from focgen.diagnosis.confidence import confidences, tied
 from focgen.diagnosis.explain import Explanation
@@ -20,13 +21,13 @@ from focgen.diagnosis.running import Departure, Running
 from focgen.diagnosis.search import evidence as nats
 from focgen.diagnosis.promise import paths, promised
 from focgen.diagnosis.shrink import Shrink
+from focgen.diagnosis.sizes import estimates
 from focgen.diagnosis.unexplained import disturbed, is_rounded, is_unknown
 from focgen.diagnosis.unseen import own_share
 from focgen.diagnosis.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
 from focgen.rig.effects import library
-from focgen.rig.engine import slot_in
 from focgen.rig.model import Rig
 from focgen.rig.replay import goodness
 
@@ -211,7 +212,7 @@ def _found(
     read = library()[kept[0].effect].forms[0].seen is not None  # off the signal itself: nothing else does
     sure = confidences(kept, 1.0 if read else 0.0 if e.freed else cause.share)
     lost = _share_lost(cause, rigs, logs, squares, floor, total or Shrink(0.0, (0.0, 0.0)))
-    candidates = tuple(_candidate(r, float(p)) for r, p in zip(kept, sure))
+    candidates = tuple(_candidate(r, float(p), rigs.fitted) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
 
 
@@ -231,46 +232,14 @@ def _share_lost(cause: Cause, rigs: compose.Rigs, logs, squares, floor: float, t
     return Shrink(value, (max(value - wide, -1.0), min(value + wide, 1.0)))
 
 
-def _candidate(rival, confidence: float) -> Candidate:
+def _candidate(rival, confidence: float, rig: Rig) -> Candidate:
     clue = rival.fit.problem.clues
     places = [i for i, c in enumerate(clue) if c.effect == rival.effect]
     parameters = {}
     for i in places:
         prefix = "" if i == places[0] else f"{clue[i].form.name}."
-        parameters |= {prefix + k: v for k, v in estimates(rival.fit, i).items()}
+        parameters |= {prefix + k: v for k, v in estimates(rival.fit, i, rig).items()}
     return Candidate(rival.effect, confidence, clue[places[0]].form.name, parameters, float(rival.separation))
-
-
-def estimates(of, which: int) -> dict[str, Estimate]:
-    """A clue's parameters with 95 % intervals from the fit's information, in the log's units."""
-    problem, clue = of.problem, of.problem.clues[which]
-    place = problem.head + sum(len(c.form.parameters) for c in problem.clues[:which])
-    sigma = of.sse / max(len(of.innovations) - len(of.vector), 1)
-    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(of.information)) * sigma, 0.0))
-    found = {}
-    for i, parameter in enumerate(clue.form.parameters):
-        v, s = of.vector[place + i], 1.96 * spread[place + i]
-        scale = problem.references.scale(parameter, slot_in(clue.form, clue.stage))
-        ends = [
-            float(scale * (np.exp(np.clip(e, -60, 60)) if parameter.log else e)) for e in (v - s, v, v + s)
-        ]
-        found[parameter.name] = Estimate(
-            ends[1], (ends[0], ends[2]), _unit(parameter, parameter.at or slot_in(clue.form, clue.stage))
-        )
-    return found
-
-
-def _unit(parameter, slot: str) -> str:
-    level = {"command": "command", "supply": "pressure", "load": "pressure", "reading": "output"}.get(
-        slot, "curvature"
-    )
-    words = [
-        f"{level} unit^{parameter.level:g}"
-        if parameter.level not in (0, 1)
-        else f"{level} unit" * parameter.level,
-        f"s^{parameter.time:g}" if parameter.time not in (0, 1) else "s" * parameter.time,
-    ]
-    return " ".join(w for w in words if w)
 
 
 def _ordered(found: Sequence[Found]) -> tuple[Found, ...]:
@@ -285,9 +254,8 @@ def _gap(rig: Rig, logs, made, squares, floor: float) -> Gap:
     }
     spread = [np.std(log["output"]) for log in logs]
     gof["possible"] = float(np.mean([1 - np.sqrt(floor) / s for s in spread if s > 0] or [0.0]))
-    return Gap(
-        rms["as given"], rms["refitted"], rms["explained"], float(np.sqrt(floor)), rig.signals.output, gof
-    )
+    unit = unit_of_role(rig.signals, "output") or rig.signals.output
+    return Gap(rms["as given"], rms["refitted"], rms["explained"], float(np.sqrt(floor)), unit, gof)
 
 
 def _description(unknown: Sequence[Explanation]) -> dict[str, object]:

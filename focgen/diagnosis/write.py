@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
+from focgen.control.units import units_of_rig
 from focgen.diagnosis.compose import Rigs
-from focgen.diagnosis.drawn import FILE, drawn_of, drawn_text, units_of_rig
+from focgen.diagnosis.drawn import FILE, drawn_of, drawn_text
 from focgen.diagnosis.menu import Choice
 from focgen.diagnosis.model import Diagnosis, Evidence
 from focgen.diagnosis.next_experiment import NEXT

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from focgen.diagnosis.drawn import LOGGED
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found
 
 _SHOWN = 3  # parameters of an effect
@@ -18,7 +17,7 @@ _MEANS = (
 
 def diagnosis_text(found: Diagnosis, units: Mapping[str, str], out: str) -> str:
     """The diagnosis for people; ``units`` by role, ``out`` the folder it is written to."""
-    lines = [_where(found), *_which(found, units), _how_far(found, units), *_next(found)]
+    lines = [_where(found), *_which(found), _how_far(found, units), *_next(found)]
     lines += [f"warning: {w}" for w in found.warnings] + [f"note: {n}" for n in found.notes]
     return "\n".join([*lines, f"written to {out}"])
 
@@ -38,24 +37,24 @@ def _where(found: Diagnosis) -> str:
     return f"Where: the {where.stage}{part}, {how}."
 
 
-def _which(found: Diagnosis, units: Mapping[str, str]) -> list[str]:
+def _which(found: Diagnosis) -> list[str]:
     if found.verdict == "parameters":
         return [
             f"Which: no effect; the rig's own numbers were off, and {found.refitted_rig} has better ones."
         ]
     if found.verdict == "none":
         return ["Which: no effect."]
-    said = [_cause(cause, units) for cause in found.causes]
+    said = [_cause(cause) for cause in found.causes]
     said += [_unexplained(place, what) for place, what in found.unexplained.items()]
     first = f"Which: {said[0]}" if said else "Which: none that is known."
     also = [f"  also: {one}" for one in said[1:]]
     return [first, *also, *_nearest(found), *([_MEANS] if found.causes else [])]
 
 
-def _cause(cause: Found, units: Mapping[str, str]) -> str:
+def _cause(cause: Found) -> str:
     best, *others = cause.candidates
     whole = "its departure from the described controller" if cause.stage == "controller" else "the gap"
-    size = _size(best, units)
+    size = _size(best)
     rivals = f"; it may as well be {_listed(others)}" if others else ""
     return (
         f"{best.effect} in the {cause.stage}{size}, {best.confidence:.0%} confident, "
@@ -67,11 +66,9 @@ def _listed(candidates: list[Candidate]) -> str:
     return ", ".join(f"{c.effect} ({c.confidence:.0%})" for c in candidates)
 
 
-def _size(candidate: Candidate, units: Mapping[str, str]) -> str:
-    """The parameters that are known, with the log's units."""
-    known = [
-        _value(name, e, units) for name, e in candidate.parameters.items() if name != "scale" and _is_known(e)
-    ]
+def _size(candidate: Candidate) -> str:
+    """The parameters that are known, with their units."""
+    known = [_value(name, e) for name, e in candidate.parameters.items() if name != "scale" and _is_known(e)]
     return f" ({', '.join(known[:_SHOWN])})" if known else ""
 
 
@@ -80,12 +77,9 @@ def _is_known(estimate: Estimate) -> bool:
     return 0.5 * (high - low) < _SURE * abs(estimate.value)
 
 
-def _value(name: str, estimate: Estimate, units: Mapping[str, str]) -> str:
-    unit = estimate.unit
-    for role in LOGGED:
-        unit = unit.replace(f"{role} unit", units.get(role) or f"{role} unit")
+def _value(name: str, estimate: Estimate) -> str:
     half = 0.5 * (estimate.ci95[1] - estimate.ci95[0])
-    return f"{name} {estimate.value:.3g} ± {half:.1g} {unit}".rstrip()
+    return f"{name} {estimate.value:.3g} ± {half:.1g} {estimate.unit}".rstrip()
 
 
 def _unexplained(place: str, what: Mapping) -> str:
@@ -135,7 +129,7 @@ def diagnosis_story(found: Diagnosis, units: Mapping[str, str]) -> dict[str, tup
     """The same sentences apart: "where", "which", "far" and "next"."""
     return {
         "where": (_where(found),),
-        "which": tuple(_which(found, units)),
+        "which": tuple(_which(found)),
         "far": (_how_far(found, units),),
         "next": tuple(_next(found)),
     }
