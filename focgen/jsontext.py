@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from focgen.errors import InputError
+from focgen.textfile import LARGEST_JSON, read_regular
 
 UNWRITTEN = {"json": False}
 """Metadata of a dataclass field that :func:`plain` leaves out."""
@@ -46,7 +47,7 @@ def to_json(value: Any) -> str:
 def read_json(path: Path, remedy: str) -> Any:
     """The content of a JSON file. Raises InputError with ``remedy`` where it cannot be read or is no JSON."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(read_regular(path, LARGEST_JSON).decode("utf-8"))
     except OSError as reason:
         raise InputError(str(path), f"cannot be read ({reason.strerror})", remedy) from None
     except (ValueError, RecursionError):  # no UTF-8, no JSON, endless digits, brackets without end

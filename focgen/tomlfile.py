@@ -10,6 +10,7 @@ from typing import Any, overload
 
 from focgen.errors import InputError
 from focgen.fractional.transfer import TransferFunction
+from focgen.textfile import LARGEST_SETTING, read_regular
 
 
 class Table:
@@ -26,8 +27,8 @@ class Table:
     def read(cls, path: str | Path, error: type[InputError]) -> Table:
         """Read a file. Raises ``error`` where it is missing or is not TOML."""
         try:
-            text = Path(path).read_text(encoding="utf-8")
-            return cls(tomllib.loads(text), str(path), error)
+            text = read_regular(path, LARGEST_SETTING, error).decode("utf-8")
+            return cls(tomllib.loads(text.replace("\r\n", "\n")), str(path), error)
         except OSError as reason:
             raise error(str(path), f"cannot be read ({reason.strerror})", "check the path") from None
         except UnicodeDecodeError:
@@ -35,6 +36,10 @@ class Table:
         except tomllib.TOMLDecodeError as reason:
             fault = str(reason).replace("\n", " ")
             raise error(str(path), f"is not TOML: {fault}", "correct the syntax") from None
+        except RecursionError:
+            raise error(str(path), "is nested too deeply", "write it flatter") from None
+        except ValueError:  # of a path with a null character, and of digits without end
+            raise error(str(path), "has a number of too many digits, or is no path", "correct it") from None
 
     def fail(self, key: str | None, what: str, remedy: str) -> InputError:
         """Return (not raise) the error for a fault at ``key``."""

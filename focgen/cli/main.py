@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -13,6 +12,7 @@ from pkgutil import iter_modules
 import focgen
 import focgen.cli
 from focgen.cli.completion import SHELLS, PrintCompletion
+from focgen.cli.faults import as_one_line, open_streams, say_error, write_out
 from focgen.errors import FocgenError
 from focgen.jsontext import to_json
 
@@ -113,26 +113,28 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns 0 (done), 1 (a check does not hold) or 2 (unusable input)."""
+    """Run a command; returns 0 (done), 1 (what was checked does not hold), 2 (unusable input, or a fault:
+    one line on stderr) or 130 (interrupted).
+    """
+    argv = sys.argv[1:] if argv is None else list(argv)
     try:
-        argv = sys.argv[1:] if argv is None else list(argv)
-        if not argv:
-            print(_short_help())
-            return 0
-        if not argv[0].startswith("-") and argv[0] not in commands():
-            raise FocgenError(argv[0], "is no command", _meant(argv[0], commands(), "focgen"))
-        args = parser(argv[0] if argv else None).parse_args(argv)
-        outcome = args.run(args)
-        sys.stdout.write(to_json(outcome.payload) if args.json else outcome.text.rstrip("\n") + "\n")
-        sys.stdout.flush()
-    except FocgenError as error:
-        line = " ".join(str(error).split())
-        print(f"focgen: error: {line}", file=sys.stderr)
-        return 2
-    except BrokenPipeError:  # the reader of a pipe went away; nothing is wrong
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        open_streams()
+        return _run(argv)
     except KeyboardInterrupt:
-        print("focgen: interrupted", file=sys.stderr)
+        say_error("focgen: interrupted")
         return 130
+    except Exception as error:  # noqa: BLE001 - 1 would say that a check does not hold
+        say_error(f"focgen: error: {as_one_line(error, argv)}")
+        return 2
+
+
+def _run(argv: Sequence[str]) -> int:
+    if not argv:
+        write_out(_short_help() + "\n")
+        return 0
+    if not argv[0].startswith("-") and argv[0] not in commands():
+        raise FocgenError(argv[0], "is no command", _meant(argv[0], commands(), "focgen"))
+    args = parser(argv[0]).parse_args(argv)
+    outcome = args.run(args)
+    write_out(to_json(outcome.payload) if args.json else outcome.text.rstrip("\n") + "\n")
     return 0 if outcome.holds else 1

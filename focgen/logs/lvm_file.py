@@ -14,7 +14,8 @@ import numpy as np
 
 from focgen.errors import LogError
 from focgen.logs.table import LogTable
-from focgen.logs.text_file import decoded, table_of, unpacked
+from focgen.logs.text_file import decoded, table_of
+from focgen.textfile import read_log_bytes
 
 _END = "***End_of_Header***"
 _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
@@ -33,7 +34,7 @@ class _Segment:
 def read(path: Path) -> LogTable:
     """Read a file. Raises LogError where it is not whole; text without the format's first line is read as a
     table."""
-    text, encoding = decoded(unpacked(path), path)
+    text, encoding = decoded(read_log_bytes(path), path)
     lines = text.splitlines()
     if not lines or not lines[0].startswith("LabVIEW Measurement"):
         return table_of(path, text, encoding)

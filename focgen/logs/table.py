@@ -15,6 +15,7 @@ import numpy as np
 from focgen.errors import LogError
 from focgen.logs import stamps
 from focgen.logs.dialect import MISSING, is_stamp
+from focgen.textfile import check_regular
 
 # The reader of each kind of file: a module of this room with ``read(path) -> LogTable``.
 _READERS = {
@@ -142,10 +143,15 @@ def read_table(path: str | Path) -> LogTable:
             str(path), "is not a kind of log that can be read", f"give one of {', '.join(_READERS)}"
         )
     try:
+        check_regular(path, LogError)
         table = _reader(kind)(Path(path))
     except OSError as reason:
         why = reason.strerror or " ".join(str(reason).split())
         raise LogError(str(path), f"cannot be read ({why})", "check the path") from None
+    except ValueError as reason:
+        if "\0" not in str(path):
+            raise
+        raise LogError(str(path), f"is no path ({reason})", "check the path") from None
     if not len(table):
         raise LogError(str(path), "holds no samples", "give a log with a header and one row a sample")
     return table

@@ -9,22 +9,23 @@ from __future__ import annotations
 
 import codecs
 import csv
-import gzip
 import re
-import zlib
+from collections import Counter
 from pathlib import Path
 
 from focgen.errors import LogError
 from focgen.logs.dialect import Dialect, is_number, rows_of, sniffed
 from focgen.logs.table import LogTable
+from focgen.textfile import read_log_bytes
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+MOST_COLUMNS = 4096
 _IN_BRACKETS = re.compile(r"(.+?)\s*[\[(]([^\[\]()]*)[\])]")
 
 
 def read(path: Path) -> LogTable:
     """Read a file. Raises LogError naming the line, OSError where it cannot be opened."""
-    text, encoding = decoded(unpacked(path), path)
+    text, encoding = decoded(read_log_bytes(path), path)
     return table_of(path, text, encoding)
 
 
@@ -63,17 +64,6 @@ def _taken(rows: list[list[str]], dialect: Dialect, encoding: str) -> tuple[str,
     return (f"read with {note}",) if note else ()
 
 
-def unpacked(path: Path) -> bytes:
-    """The file's bytes, unpacked where its name ends in .gz."""
-    raw = path.read_bytes()
-    if path.name.lower().endswith(".gz"):
-        try:
-            raw = gzip.decompress(raw)
-        except (gzip.BadGzipFile, EOFError, zlib.error):
-            raise LogError(str(path), "is not a whole gzip file", "pack it again") from None
-    return raw
-
-
 def decoded(raw: bytes, path: Path) -> tuple[str, str]:
     """The text, and the encoding where it is none that says so itself. Raises LogError for binary files."""
     marked = next((name for mark, name in _MARKS if raw.startswith(mark)), None)
@@ -93,11 +83,14 @@ def _header(path: Path, rows: list[list[str]], dialect: Dialect) -> list[str]:
             str(path), "starts with numbers instead of a header", "put the columns' names in line 1"
         )
     names = list(rows[dialect.header])
+    if len(names) > MOST_COLUMNS:
+        what = f"has {len(names)} columns, of which {MOST_COLUMNS} can be read"
+        raise LogError(str(path), what, "leave out those that the rig does not use")
     body = [row for row in rows[dialect.data :] if row]
     while names and not names[-1] and not any("".join(row[len(names) - 1 :]) for row in body):
         names.pop()  # a delimiter at the end of each line
     names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
-    doubled = next((name for name in names if names.count(name) > 1), None)
+    doubled = next((name for name, count in Counter(names).items() if count > 1), None)
     if doubled is not None:
         raise LogError(str(path), f"has the column {doubled!r} twice", "give each column a name of its own")
     return names
@@ -130,6 +123,6 @@ def _without_units(names: list[str], units: dict[str, str]) -> tuple[dict[str, s
     """Units by column, those in names like "p (kPa)" among them; and such columns by their bare names."""
     split = {name: match for name in names if (match := _IN_BRACKETS.fullmatch(name))}
     units = {name: match[2].strip() for name, match in split.items() if match[2].strip()} | units
-    bare = [match[1] for match in split.values()]
-    aliases = {m[1]: name for name, m in split.items() if bare.count(m[1]) == 1 and m[1] not in names}
+    bare, given = Counter(match[1] for match in split.values()), set(names)
+    aliases = {m[1]: name for name, m in split.items() if bare[m[1]] == 1 and m[1] not in given}
     return units, aliases

@@ -48,8 +48,8 @@ def exponent_for(largest: float, counts: int, where: str, what: str) -> int:
     reach."""
     if largest == 0.0:
         return -_FARTHEST
-    k = math.ceil(math.log2(largest) - math.log2(counts)) - 1
-    while nearest(largest * 2.0**-k) > counts:
+    k = math.ceil(math.log2(largest) - math.log2(counts)) - 1 if math.isfinite(largest) else _FARTHEST
+    while -_FARTHEST < k < _FARTHEST and nearest(largest * 2.0**-k) > counts:
         k += 1
     if not -_FARTHEST < k < _FARTHEST:
         remedy = "choose units in which it is nearer to 1"

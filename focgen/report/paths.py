@@ -40,6 +40,7 @@ from focgen.rig.proposal import Proposal
 from focgen.rig.replay import experiments, replay
 from focgen.studies.kept import FILE as CURVES
 from focgen.studies.kept import read_study
+from focgen.textfile import LARGEST_SETTING, read_regular
 
 _TAKEN = (
     "name a rig or a controller (.toml), a folder of generate, study or diagnose, what `verify --json` "
@@ -170,8 +171,8 @@ def _take_folder(folder: Path, chain: _Chain) -> None:
 def _take_toml(path: Path, chain: _Chain) -> None:
     """A rig has signals, a controller a transfer function."""
     try:
-        controller = "transfer" in tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        controller = "transfer" in tomllib.loads(read_regular(path, LARGEST_SETTING).decode("utf-8"))
+    except (OSError, ValueError, RecursionError, InputError):
         controller = False  # the reader of rigs says what is wrong
     _take_object(read_controller(path) if controller else read_rig(path), str(path), chain)
 

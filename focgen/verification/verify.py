@@ -19,6 +19,8 @@ __all__ = ["TARGETS", "TargetResult", "Verification", "compare", "verify"]
 
 TARGETS = ("host", *CORES)
 _SAMPLES = 10_000  # on the host
+MOST_SAMPLES = 10_000_000
+"""Of mixed inputs in one run, which take some 4 GB."""
 _LEFT = "the folder has been edited, so nothing of it was compiled (--edited does)"
 
 
@@ -69,6 +71,9 @@ def verify(
     """
     if samples is not None and (not isinstance(samples, int) or samples < 1):
         raise InputError("--samples", f"is {samples!r}", "give at least 1")
+    if samples is not None and samples > MOST_SAMPLES:
+        what = f"is {samples:.3g}, of which {MOST_SAMPLES:.0e} fit in a run"
+        raise InputError("--samples", what, "verify several times, each with a --seed of its own")
     if seed < 0:
         raise InputError("--seed", f"is {seed}", "give 0 or more")
     names, read = asked_for(target, TARGETS), read_folder(folder)

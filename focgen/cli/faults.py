@@ -1,0 +1,119 @@
+"""Whatever a command raises as one line, and what nobody foresaw as a file to send in."""
+
+from __future__ import annotations
+
+import errno
+import os
+import platform
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+
+import focgen
+from focgen.errors import FocgenError
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_SCARCE = (errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM)
+
+
+def as_one_line(error: BaseException, argv: Sequence[str]) -> str:
+    """What is printed of an exception behind ``focgen: error:``; where nobody foresaw it, its trace is in a
+    file, which the line names."""
+    said = error if isinstance(error, FocgenError) else _foreseen(error, argv[0] if argv else "focgen")
+    return " ".join(str(said or _unforeseen(error, argv)).split())
+
+
+def _foreseen(error: BaseException, command: str) -> FocgenError | None:
+    """Of what a machine runs out of, whoever asks; None for anything else."""
+    if isinstance(error, MemoryError):
+        return FocgenError(command, "takes more memory than there is", "ask for less, or cut the logs")
+    if isinstance(error, RecursionError):
+        return FocgenError(command, "is given something nested too deeply", "write it flatter")
+    if not isinstance(error, OSError):
+        return None
+    where, why = str(error.filename or command), error.strerror or type(error).__name__
+    if error.errno in _FULL:
+        return FocgenError(where, f"cannot be written ({why})", "make room, or write to another disk")
+    if error.errno in _SCARCE:
+        return FocgenError(where, f"cannot be had ({why})", "end other programs, or raise the limit (ulimit)")
+    if error.filename is not None:
+        return FocgenError(where, f"cannot be used ({why})", "check the path and its rights")
+    return None
+
+
+def _unforeseen(error: BaseException, argv: Sequence[str]) -> FocgenError:
+    what = f"has met a fault of its own ({type(error).__name__})"
+    try:
+        return FocgenError(_command(argv), what, f"send in {_written(error, argv)}, which tells where")
+    except OSError:  # the disk may be what is at fault
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        at = f"{os.path.basename(place.filename)}:{place.lineno}"
+        return FocgenError(_command(argv), what, f"report it with these words: {at}, {str(error)[:100]}")
+
+
+def _command(argv: Sequence[str]) -> str:
+    return f"focgen {argv[0]}"[:60] if argv else "focgen"
+
+
+def _written(error: BaseException, argv: Sequence[str]) -> str:
+    """The path of a new file, for this user alone, with the trace and what it takes to meet it again."""
+    text = "\n".join(
+        (
+            f"focgen {focgen.__version__}, Python {platform.python_version()}, {platform.platform()}",
+            f"arguments: {list(argv)!r}",
+            "",
+            *traceback.format_exception(error),
+        )
+    )
+    handle, path = tempfile.mkstemp(prefix="focgen-fault-", suffix=".txt")
+    try:
+        with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write(text)
+    except OSError:
+        os.unlink(path)
+        raise
+    return path
+
+
+def open_streams() -> None:
+    """Give closed standard streams a place to go: else the next file that is opened would stand for one."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free: this one
+
+
+def write_out(text: str) -> None:
+    """Write a result to stdout, whole. Where the reader of a pipe has gone, nothing is wrong.
+
+    Raises FocgenError where it cannot be written: nobody would have the result.
+    """
+    if sys.stdout is None:
+        raise FocgenError("stdout", "is closed", "leave it open, or send it to a file")
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _discard_rest()
+    except (OSError, ValueError) as reason:  # a full disk; a character that the encoding lacks
+        why = getattr(reason, "strerror", None) or " ".join(str(reason).split())
+        _discard_rest()
+        raise FocgenError("stdout", f"cannot be written ({why})", "send it to another place") from None
+
+
+def _discard_rest() -> None:
+    """What is left in the buffer must not fail a second time when the interpreter ends."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (OSError, ValueError):  # no file stands behind it
+        pass
+
+
+def say_error(line: str) -> None:
+    """One line on stderr, if there is one."""
+    try:
+        print(line, file=sys.stderr)
+    except (OSError, ValueError, AttributeError):
+        pass

@@ -1,0 +1,57 @@
+"""Files from outside as bytes and text: regular ones, of a bounded size."""
+
+from __future__ import annotations
+
+import gzip
+import stat
+import zlib
+from pathlib import Path
+
+from focgen.errors import InputError, LogError
+
+LARGEST_LOG = 512 << 20
+"""Bytes of a log in text, unpacked: ten million rows of five columns."""
+LARGEST_SETTING = 16 << 20
+"""Bytes of a file of TOML."""
+LARGEST_JSON = 512 << 20
+"""Bytes of a file of JSON: what has been drawn of a diagnosis is the largest."""
+
+
+def read_regular(path: str | Path, most: int, error: type[InputError] = InputError) -> bytes:
+    """The bytes of a regular file; a ``.gz`` is not unpacked.
+
+    Raises OSError where it cannot be opened, and ``error`` where it is no regular file or has more than
+    ``most`` bytes.
+    """
+    path = Path(path)
+    check_regular(path, error)
+    with path.open("rb") as file:
+        return _at_most(file, most, path, error)
+
+
+def check_regular(path: str | Path, error: type[InputError] = InputError) -> None:
+    """Raise ``error`` for a pipe or a device, which may never end; OSError where there is nothing."""
+    mode = Path(path).stat().st_mode
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # of a folder the system has its own words
+        raise error(str(path), "is no regular file", "save its content to a file first")
+
+
+def read_log_bytes(path: Path) -> bytes:
+    """The bytes of a log in text, unpacked where its name ends in .gz.
+
+    Raises OSError, and LogError for more than ``LARGEST_LOG`` bytes unpacked, however few they are packed.
+    """
+    if not path.name.lower().endswith(".gz"):
+        return read_regular(path, LARGEST_LOG, LogError)
+    try:
+        with gzip.open(path, "rb") as file:
+            return _at_most(file, LARGEST_LOG, path, LogError)
+    except (gzip.BadGzipFile, EOFError, zlib.error):
+        raise LogError(str(path), "is not a whole gzip file", "pack it again") from None
+
+
+def _at_most(file, most: int, path: Path, error: type[InputError]) -> bytes:
+    content = file.read(most + 1)
+    if len(content) > most:
+        raise error(str(path), f"has more than {most >> 20} MiB", "split it into smaller files")
+    return bytes(content)
