@@ -161,7 +161,11 @@ def test_its_length_is_bearable_and_it_fills_the_memory(length):
 
 FAULTS = {
     "ring": ("foc_rt.h", r"now \+ 1u < size", "now + 2u < size"),
-    "tap": ("foc_rt.h", r"for \(; i < taps; i\+\+\)", "for (; i + 1u < taps; i++)"),
+    "tap": (
+        "foc_rt.h",
+        r"for \(; (i|count) ([<>]) (taps|0u); (i\+\+|count--)\)",
+        r"for (; \1 \2 \3 && \1 != 1u; \4)",
+    ),
     "reset": ("@.c", r"s->error\[i\] = e;", "(void)e;"),
     "track": ("@.c", r"s->integral = (.*u_applied.*|\(int\d\d_t\)u\b.*);", "(void)u_applied;"),
     "schedule": ("foc_rt.h", r"slopes\[i\] \*", "0 *"),
