@@ -212,7 +212,7 @@ def run() -> str:
     )
     title = f"s^{ALPHA} on a {CORE}, {chain.title}: Oustaloup and Tustin as biquads (poles/poles a section),"
     return "\n".join([
-        title, "beside the leanest exponential form that is at least as close; then the rival's costs over its own.",
+        title, "beside the leanest exponential form that is at least as close; then its costs over those.",
         "Words and cycles: less those of the same controller with a plain gain; whole: with them.",
         head, *rows("q31", chain), *rows("f32", chain),
     ])  # fmt: skip
