@@ -184,7 +184,7 @@ static inline uint16_t foc_ring_slot(uint16_t now, uint16_t size, uint16_t lag)
 }
 
 /* Sum of weights[i] * samples[i], eight at a time: in a loop of one product the loop costs more than that. */
-static inline int32_t foc_run_q15(const FOC_ROM int16_t *weights, const int16_t *samples, uint16_t count)
+static inline int32_t foc_products_q15(const FOC_ROM int16_t *weights, const int16_t *samples, uint16_t count)
 {
     int32_t sum = 0;
 
@@ -221,7 +221,7 @@ static inline int32_t foc_dot_q15(const FOC_ROM int16_t *weights, uint16_t taps,
     const uint16_t wrap = taps < straight ? taps : straight;
     const uint16_t rest = (uint16_t)(taps - wrap);
 
-    return foc_run_q15(weights, &ring[start], wrap) + foc_run_q15(weights + wrap, ring, rest);
+    return foc_products_q15(weights, &ring[start], wrap) + foc_products_q15(weights + wrap, ring, rest);
 }
 
 static inline int64_t foc_dot_q31(const FOC_ROM int32_t *weights, uint16_t taps, const int32_t *ring,
