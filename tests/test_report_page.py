@@ -1,6 +1,9 @@
 """The report page: everything it is given appears, escaped, and equal pages give equal bytes."""
 
+from dataclasses import replace
 from html.parser import HTMLParser
+
+import pytest
 
 from focgen.report.page import Page, Picture, Section, TableOf, text_table
 
@@ -60,3 +63,17 @@ def test_text_table_aligns_columns():
         and lines[2].startswith("q31 ")
         and lines[2].endswith(" 4 012 B")
     )
+
+
+def test_a_long_table_is_folded_and_words_stand_to_the_left():
+    rows = tuple((f"L = {i}", "q31", str(i), "" if i else "–") for i in range(13))
+    long = TableOf(("memory", "arithmetic", "states", "bound"), rows, "sample time 0.01 s")
+    assert long.words == (True, True, False, False)
+    assert TableOf(("at", "gain"), (("p = 1", "inf"), ("p = 2", "20.1"), ("p = 3", "9"))).words == (
+        True,
+        False,
+    )
+    pytest.importorskip("bokeh")
+    text = Page("p", "", (Section("s", tables=(long, replace(long, rows=rows[:12]))),)).self_contained()
+    assert "<summary>sample time 0.01 s: 13 rows</summary>" in text and text.count("<summary>") == 1
+    assert text.count('<td class="words">q31</td>') == 25

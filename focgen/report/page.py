@@ -15,6 +15,7 @@ from focgen.resources import shipped
 
 LARGEST = 3_000_000
 """Bytes of a page with its figures."""
+_LONGEST = 12  # rows of a table that stands open: the figures behind it are not far
 _POINTS = (MOST, MOST // 2, MOST // 4, 500)  # of a curve
 
 
@@ -25,6 +26,14 @@ class TableOf:
     heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str = ""
+
+    @property
+    def words(self) -> tuple[bool, ...]:
+        """Which columns hold words, not numbers: most of their cells that are not empty begin with a letter
+        or a bracket."""
+        columns = ([row[i] for row in self.rows if row[i]] for i in range(len(self.heads)))
+        told = ([cell[0].isalpha() or cell[0] == "(" for cell in column] for column in columns)
+        return tuple(2 * sum(column) > len(column) for column in told)
 
 
 @dataclass(frozen=True)
@@ -85,7 +94,7 @@ class Page:
         names = [f"figure{i}" for i in range(1, len(figures) + 1)]
         documents = {name: document(figure, most, name) for name, figure in zip(names, figures)}
         template = _environment().get_template("report/page.html")
-        values = {"documents": data(documents), "library": library(), "most": most}
+        values = {"documents": data(documents), "library": library(), "most": most, "longest": _LONGEST}
         legends = [legend(figure) for figure in figures]
         return template.render(page=self, version=focgen.__version__, legends=legends, **values)
 
