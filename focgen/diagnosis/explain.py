@@ -179,7 +179,7 @@ def explain(
         segment = replace(problem.segment, pace=_KEPT * problem.segment.pace)
         kept = replace(problem, segment=segment, memory={})
         other = _explained(rig, kept, threshold, only, trusted)
-        problem, found = (kept, other) if other.causes else (problem, found)
+        problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
     if not found.strained or problem.own.far or found.left.share < LEFT:
         return found
     freed, asked = replace(problem, own=replace(problem.own, far=True), memory={}), _FREED * found.square
@@ -188,6 +188,16 @@ def explain(
         return found
     other = _explained(rig, freed, threshold, only, trusted)
     return other if other.square < asked else found
+
+
+def _borne_out(kept: Explanation, usual: Explanation) -> bool:
+    """Whether what a longer path shows is seen a little at the usual pace, too: what an input was measured
+    wrong adds up in the path, and no force is behind it."""
+    clues = kept.best.problem.clues
+    if not kept.causes:
+        return False
+    beside, weighing = usual.nominal.problem.with_clues(clues), Weighing(usual.ar)
+    return evidence(fit(beside, kept.best.vector, weighing, 12), usual.nominal) > 0.0
 
 
 def _explained(
