@@ -36,6 +36,8 @@ _SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which t
 _RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
 _FREED = 0.7  # of the mean square left: what is unlikely, such as an actuator far from the one given, has to
 # leave less
+_KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
+# force the path shows more above the sensor's noise the longer it is kept
 _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
 _TELLING = 0.01  # of a residual's mean square foretold by inputs: below it no form is tried
 
@@ -173,6 +175,11 @@ def explain(
     """
     problem = _widened(_gauged(_held(rig, segment, logs)))
     found = _explained(rig, problem, threshold, only, trusted)
+    if problem.segment.pace and not found.causes:
+        segment = replace(problem.segment, pace=_KEPT * problem.segment.pace)
+        kept = replace(problem, segment=segment, memory={})
+        other = _explained(rig, kept, threshold, only, trusted)
+        problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
     if not found.strained or problem.own.far or found.left.share < LEFT:
         return found
     freed, asked = replace(problem, own=replace(problem.own, far=True), memory={}), _FREED * found.square
@@ -181,6 +188,16 @@ def explain(
         return found
     other = _explained(rig, freed, threshold, only, trusted)
     return other if other.square < asked else found
+
+
+def _borne_out(kept: Explanation, usual: Explanation) -> bool:
+    """Whether what a longer path shows is seen a little at the usual pace, too: what an input was measured
+    wrong adds up in the path, and no force is behind it."""
+    clues = kept.best.problem.clues
+    if not kept.causes:
+        return False
+    beside, weighing = usual.nominal.problem.with_clues(clues), Weighing(usual.ar)
+    return evidence(fit(beside, kept.best.vector, weighing, 12), usual.nominal) > 0.0
 
 
 def _explained(

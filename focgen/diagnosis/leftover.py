@@ -49,13 +49,23 @@ def _groups(segment: Segment, response: float) -> dict[str, np.ndarray]:
     knots = [np.maximum(slow - k, 0.0) for k in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)]
     quick_knots = [np.maximum(quick - k, 0.0) for k in (0.25, 0.5, 0.75)]
     edges = [np.maximum(rate, 0.0), np.minimum(rate, 0.0), np.abs(rate) * rate, rate * slow]
-    return {
+    groups = {
         "level": np.stack([slow, slow**2, quick, *knots, *quick_knots], axis=1),
         "rate": np.stack([x - a for a in lags] + edges + _jumps(x, run.rest), axis=1),
         "direction": np.stack([direction, direction * slow, *play], axis=1),
         "history": np.stack([lags[3], lags[4], most, most * slow, lags[4] * slow], axis=1),
         "time": np.stack([clock, clock**2, clock**3, clock * slow, clock**2 * slow], axis=1),
     }
+    return {name: _kept(columns, segment) for name, columns in groups.items()}
+
+
+def _kept(columns: np.ndarray, segment: Segment) -> np.ndarray:
+    """Regressors (n, k), with what a rig that integrates keeps of them for as long as its residual counts."""
+    if not segment.pace:
+        return columns
+    run, pace = segment.run, segment.pace
+    kept = [kernels.lag(np.ascontiguousarray(c), run.rest, run.h, pace, pace) for c in columns.T]
+    return np.hstack([columns, np.stack(kept, axis=1)])
 
 
 def _ringing(segment: Segment, response: float) -> list[np.ndarray]:
