@@ -5,7 +5,7 @@ RUN    := $(VENV)/bin/python
 JOBS   ?= 2
 FUZZ_SECONDS ?= 600
 
-.PHONY: help demo test test-long test-pythons types docs bench trials trial-cases trial-report foreign records prove fuzz clean
+.PHONY: help demo test test-long test-pythons types docs bench trials trial-cases trial-report foreign records prove fuzz trust clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -113,6 +113,14 @@ prove: $(VENV)/ready-prove     ## no overflow, no access outside, by the verifie
 
 fuzz: $(VENV)/ready-test       ## led random calls under the sanitisers, FUZZ_SECONDS=600 (needs clang)
 	$(RUN) -m tests.proofs.fuzz --seconds $(FUZZ_SECONDS)
+
+# SECONDS that each fault lasts, RUNS from seeds of their own, MEMORY short or exponential.
+SECONDS ?= 180
+RUNS    ?= 3
+MEMORY  ?= short
+
+trust: $(VENV)/ready-test      ## generated C in a loop under faults, a table (SECONDS=180 RUNS=3 MEMORY=short)
+	OMP_NUM_THREADS=1 $(RUN) -m tests.trust --seconds $(SECONDS) --runs $(RUNS) --memory $(MEMORY)
 
 clean:                         ## remove everything that was built
 	rm -rf $(VENV) build

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import os
-import secrets
 import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from focgen.errors import InputError
+from focgen.scratch import scratch_file, scratch_folder, synced
+
+_CONTENTS = "manifest.json"
 
 
 def check_apart(outputs: Iterable[str | Path], inputs: Iterable[Any]) -> None:
@@ -47,20 +48,22 @@ def new_folder(target: str | Path, inputs: Iterable[Any] = ()) -> Iterator[Path]
     other bytes.
     """
     target = Path(target)
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-        scratch = Path(tempfile.mkdtemp(prefix=".focgen-", dir=target))
-    except OSError as reason:
-        raise InputError(
-            str(target), f"cannot be written ({reason.strerror})", "choose another --out"
-        ) from None
-    try:
+    with ExitStack() as stack:
+        stack.callback(_remove_empty, target)
+        try:
+            target.mkdir(parents=True, exist_ok=True)
+            scratch = stack.enter_context(scratch_folder(target))
+        except OSError as reason:
+            raise InputError(
+                str(target), f"cannot be written ({reason.strerror})", "choose another --out"
+            ) from None
         yield scratch
         _move(scratch, target, tuple(inputs))
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
-        if not any(target.iterdir()):
-            target.rmdir()
+
+
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):  # it holds something, or was never made
+        folder.rmdir()
 
 
 def _move(scratch: Path, target: Path, inputs: tuple) -> None:
@@ -73,13 +76,17 @@ def _move(scratch: Path, target: Path, inputs: tuple) -> None:
         for parent in list(name.parents)[:-1]:
             if (target / parent).exists() and not (target / parent).is_dir():
                 raise InputError(str(target / parent), "is a file where a folder belongs", "move it away")
-    for name in files:
+    for name in files:  # all of them are on the disk before the first takes its place
+        synced(scratch / name)
+    for name in sorted(files, key=lambda name: name.name == _CONTENTS):  # what tells of the others comes last
         try:
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(scratch / name, target / name)
         except OSError as reason:
             what = f"cannot be written ({reason.strerror})"
             raise InputError(str(target / name), what, "choose another --out") from None
+    for folder in {(target / name).parent for name in files}:
+        synced(folder)
 
 
 def _equal(one: Path, other: Path) -> bool:
@@ -116,17 +123,16 @@ def write_file(path: str | Path, text: str, inputs: Iterable[Any] = ()) -> None:
     """
     check_apart([path], inputs)
     path = Path(path)
-    scratch = path.with_name(f".focgen-{secrets.token_hex(8)}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with scratch.open("x", encoding="utf-8") as file:  # never a file, or a link, that is there
-            file.write(text)
-        os.replace(scratch, path)
+        with scratch_file(path.parent) as (scratch, handle):
+            with open(handle, "w", encoding="utf-8", closefd=False) as file:
+                file.write(text)
+            os.fsync(handle)
+            os.replace(scratch, path)
+        synced(path.parent)
     except OSError as reason:
         raise InputError(str(path), f"cannot be written ({reason.strerror})", "choose another path") from None
-    finally:
-        with suppress(OSError):
-            scratch.unlink()
 
 
 def replace_folder(made: Path, target: Path, within: Path) -> None:
@@ -140,8 +146,17 @@ def replace_folder(made: Path, target: Path, within: Path) -> None:
         raise InputError(str(target), f"leads out of {within}", "put a folder in the place of the link")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        if target.exists():
-            shutil.rmtree(target)
-        shutil.move(made, target)
-    except OSError as reason:
-        raise InputError(str(target), f"cannot be written ({reason.strerror})", "move it away") from None
+        with scratch_folder(target.parent) as scratch:
+            shutil.copytree(
+                made, scratch / "new"
+            )  # from another disk, maybe: slow, so it is not the last step
+            for file in (scratch / "new").rglob("*"):
+                synced(file)
+            if target.exists():
+                os.rename(target, scratch / "old")
+            os.rename(scratch / "new", target)
+        shutil.rmtree(made, ignore_errors=True)
+    except (OSError, shutil.Error) as reason:
+        raise InputError(
+            str(target), f"cannot be written ({reason.strerror or reason})", "move it away"
+        ) from None

@@ -45,7 +45,13 @@ def without_digests(files: dict[str, bytes]) -> bytes:
     """The manifest's text with its digests, which are those of the folder's own ``files``, left out: a change
     of the runtime is none of the generator."""
     text = files["manifest.json"].decode()
-    for name, digest in json.loads(text)["inputs"].items():
+    whole = json.loads(text)
+    digests = {
+        name: hashlib.sha256(one).hexdigest() for name, one in files.items() if name != "manifest.json"
+    }
+    assert digests and digests.items() <= whole.pop("files").items()
+    text = json.dumps(whole, indent=2, ensure_ascii=False) + "\n"
+    for name, digest in whole["inputs"].items():
         assert digest == hashlib.sha256(files[name]).hexdigest(), name
         text = text.replace(digest, f"sha256 of {name}")
     return text.encode()

@@ -14,7 +14,7 @@ from focgen.cli.main import main
 from focgen.codegen.generate import folder_files, generate
 from focgen.codegen.selftest import RESET, TRACK, scenario_of, selftest_rows
 from focgen.control.files import controller_text
-from focgen.errors import PlanError
+from focgen.errors import InputError, PlanError
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
@@ -234,7 +234,9 @@ def test_generated_again_without_one_it_is_gone_and_nothing_else(tmp_path):
     assert (tmp_path / "foc_memory.h").is_file() and (tmp_path / "spba_selftest.c").is_file()
     generate(CONTROLLERS["filter"], tmp_path, "q15")  # another controller takes the manifest, no file
     assert (tmp_path / "spba_selftest.c").is_file() and (tmp_path / "foc_memory.h").is_file()
-    again(selftest=True, target="cortex-m4")
+    with pytest.raises(InputError, match="spba.c"):  # whose bytes nothing tells of any more
+        again(selftest=True, target="cortex-m4")
+    again(selftest=True, target="cortex-m4", force=True)
     changed = tmp_path / "foc_ahead_q15.h"
     changed.write_text(changed.read_text() + "/* mine */")
     made = again()

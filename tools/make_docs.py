@@ -40,7 +40,7 @@ NAV = {
         "records",
     ),
     "Look up": ("commands", "python", "reference", "c-interface", "targets", "glossary"),
-    "About": ("limits", "comparison", "architecture", "changelog"),
+    "About": ("limits", "trust", "comparison", "architecture", "changelog"),
 }
 CONF = f"""
 project = "focgen"

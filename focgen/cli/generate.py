@@ -83,6 +83,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what to add to the plain files: a CMake package, an Arduino or PlatformIO library, an FMU",
     )
     parser.add_argument("--fmi", type=int, choices=FMI, help="version of an FMU's interface; default: 3")
+    parser.add_argument(
+        "--force", action="store_true", help="replace files also where they have been edited since"
+    )
 
 
 def run(args: argparse.Namespace) -> Outcome:
@@ -104,6 +107,7 @@ def run(args: argparse.Namespace) -> Outcome:
         args.band and tuple(args.band),
         args.tunable,
         args.fmi,
+        args.force,
     )
     return Outcome(made.manifest, _text(made))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.codegen.edited import check_unedited
 from focgen.codegen.folder import example_context, readme_context
 from focgen.codegen.header import header_context
 from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels, runtime_files
@@ -62,6 +63,7 @@ def generate(
     band: tuple[float, float] | None = None,
     tunable: bool = False,
     fmi: int | None = None,
+    force: bool = False,
 ) -> Generated:
     """Write C for a controller into the folder ``out``, whole or not at all; what an earlier run wrote there
     for it and this one does not, goes.
@@ -77,12 +79,13 @@ def generate(
     and a tolerance of 1e-3 unless another is given. "gl" fits it to the weights of eq. (11). ``tunable`` adds
     NAME_params, NAME_default, NAME_check and NAME_tune: factors on the gains and output limits that change at
     run time, within the box that the controller's ``tunable`` gives. ``for_`` adds what an ecosystem expects:
-    one of ``PACKAGES``; the interface of an "fmu" is version ``fmi``, 2 or 3 (the default).
+    one of ``PACKAGES``; the interface of an "fmu" is version ``fmi``, 2 or 3 (the default). ``force``
+    replaces files also where they are not as an earlier run has written them.
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
-    written, or one where a file would replace the controller's own by other bytes; BuildError where an FMU
-    finds no C compiler.
+    written, or one where a file would replace the controller's own by other bytes, or what somebody has
+    edited; BuildError where an FMU finds no C compiler.
     """
     wanted = check_package(for_, fmi)
     kernels = _kernels(target)
@@ -98,6 +101,8 @@ def generate(
     files.update(archived(plan.name, files, wanted.fmi))
     old = leftovers(Path(out), called, files)
     check_apart(old, [controller])
+    if not force:
+        check_unedited(Path(out), files, old)
     write_files(out, files, [controller])
     remove(old)
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
@@ -140,6 +145,7 @@ def folder_files(
         added = {name: sha256(text) for name, text in files.items() if name not in (*compiled, *beside)}
         added.pop("controller.toml")
         manifest["package"] = {**package.entry, "files": added}
+    manifest["files"] = {name: sha256(content) for name, content in sorted(files.items())}
     return {**files, "manifest.json": _json(manifest)}
 
 

@@ -1,0 +1,52 @@
+"""What stands in a folder and was not written by ``generate``: somebody's work, which is not replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from focgen.codegen.manifest import sha256
+from focgen.errors import InputError
+from focgen.jsontext import read_json
+
+_NAMED = 3
+
+
+def check_unedited(folder: Path, files: Mapping[str, str | bytes], old: Iterable[Path] = ()) -> None:
+    """Raise InputError, naming them, where new ``files`` or the removal of ``old`` ones would lose work.
+
+    Lost would be a file whose bytes are neither those that the folder's manifest recorded when it was written
+    nor those that take its place. The manifest itself is always ``generate``'s own.
+    """
+    written = _written(folder / "manifest.json")
+    bytes_of = {name: text.encode("utf-8") if isinstance(text, str) else text for name, text in files.items()}
+    names = [*bytes_of, *(path.relative_to(folder).as_posix() for path in old)]
+    found = [
+        name for name in dict.fromkeys(names) if _lost(folder / name, bytes_of.get(name), written.get(name))
+    ]
+    if found:
+        more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+        what = f"{', '.join(found[:_NAMED])}{more} would be replaced, but {_not_as(len(found))}"
+        raise InputError(str(folder), what, "choose another --out, or give --force to lose what was edited")
+
+
+def _not_as(count: int) -> str:
+    return "is not as generate wrote it" if count == 1 else "are not as generate wrote them"
+
+
+def _lost(path: Path, new: bytes | None, written: Any) -> bool:
+    if path.name in ("manifest.json",) or path.suffix == ".fmu" or not path.is_file():
+        return False  # an archive is built by a compiler, which promises no bytes
+    content = path.read_bytes()
+    return content != new and sha256(content) != written
+
+
+def _written(manifest: Path) -> dict[str, Any]:
+    """Name → SHA-256 of what an earlier run has written."""
+    try:
+        found = read_json(manifest, "")
+    except InputError:
+        return {}
+    files = found.get("files") if isinstance(found, dict) else None
+    return files if isinstance(files, dict) else {}
