@@ -71,6 +71,7 @@ class ReadmeContext:
     files: list[str]
     box: list[str]
     slew: UserText | None
+    aim: str
 
 
 def readme_context(
@@ -116,6 +117,7 @@ def readme_context(
         files=[f"{plan.name}.h", f"{plan.name}.c", *runtime_files(plan, kernels)],
         box=_box(plan),
         slew=None if plan.controller.slew_limit is None else _quantity(plan.controller.slew_limit, unit),
+        aim=f"{plan.controller.setpoint_filter:.6g} s" if plan.set_point else "",
     )
 
 

@@ -29,6 +29,9 @@ def transfer_text(plan: Plan) -> str:
 def step_formulas(plan: Plan) -> list[str]:
     """One step, line by line, in physical quantities."""
     form, lines, terms = realise(plan.controller), ["e = ref - meas"], []
+    if plan.set_point:
+        lag = f"y = y + (1 - exp(-h/T)) (ref - y), T = {plan.controller.setpoint_filter:.6g} s"
+        lines = [lag, "e = y - meas"]
     if plan.inner:
         lines.append(f"z = 1/s ({polynomial_text(form.rest)}) e, a trapezoid, clamped")
     if plan.direct:

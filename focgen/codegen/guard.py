@@ -16,8 +16,8 @@ from focgen.plan.usable import EXPONENT
 class GuardText:
     """Conditions on the arguments of reset, step and track; ``within``: whether ``now``, what is ``kept`` of
     the output that stands, ``held``, can be; ``keep``: what puts u in its place. ``damaged``: what tells a
-    step that the state is none that a step has left; ``unsound``: the same of integrals in counts, before the
-    step adds to them.
+    step that the state is none that a step has left; ``unsound``: the same of integrals in counts and of
+    the set-point filter, before the step adds to them.
     """
 
     error_usable: str
@@ -112,6 +112,9 @@ def _unset(plan: Plan) -> str:
 def _unsound(plan: Plan) -> list[str]:
     """Of what is in counts, a line each; empty where nothing is."""
     asked = []
+    if plan.set_point:  # a lag reaches twice as far as an input, and the rounding of a few
+        ask = f"!foc_usable_{plan.arithmetic}"
+        asked += [f"{ask}(s->latest)", f"{ask}({literal(0.25, plan.reference.ctype)} * s->lag)"]
     if plan.integrator and not plan.integrator.state.floating:
         asked += [f"!{plan.name}_within(s)"]
     elif plan.counted:

@@ -64,6 +64,7 @@ def manifest_of(
         "proofs": [proof_entry(proof) for proof in plan.proofs],
         "error_bound": bound_entry(plan.error_bound),
         **_least(plan),
+        **({"setpoint_filter": plan.controller.setpoint_filter} if plan.set_point else {}),
         **({} if plan.controller.slew_limit is None else {"slew_limit": plan.controller.slew_limit}),
         "memory_bias": _bias(plan),
         **({"kernels": kernel_entry(plan, kernels)} if kernels.target else {}),

@@ -21,6 +21,7 @@ from focgen.codegen.guard import GuardText, guard_text, output_of
 from focgen.codegen.kernels import PORTABLE, Kernels, runtime_files
 from focgen.codegen.literals import constant, literal, quantity, scale
 from focgen.codegen.saved import SavedText, saved_text
+from focgen.codegen.setpoint import SetPointText, set_point_text
 from focgen.codegen.state import carries, inner_input, starts
 from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
 from focgen.codegen.texts import UserText, comment
@@ -129,6 +130,7 @@ class SourceContext:
     guard: GuardText | None
     saved: SavedText
     output: str
+    set_point: SetPointText | None
     limits: Limits
     gain_call: str
     tuned: TunedText | None
@@ -177,6 +179,7 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
         guard=guard_text(plan),
         saved=saved_text(plan, sha256, kernels),
         output=_output(plan),
+        set_point=set_point_text(plan),
         limits=limits(plan),
         gain_call=_gain_call(plan),
         tuned=tuned_text(plan),

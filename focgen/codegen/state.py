@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from focgen.codegen.banks import means, rests, state_about
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
@@ -34,7 +34,14 @@ def members(plan: Plan, kernels: Kernels = PORTABLE) -> tuple[Member, ...]:
     Sums that look ahead stand before the rings that they look at, and these before other rings, so that they
     begin at a word.
     """
-    found = [*_integral(plan), *_inner(plan), *_recursion(plan), *_histories(plan, kernels), *_means(plan)]
+    found = [
+        *_set_point(plan),
+        *_integral(plan),
+        *_inner(plan),
+        *_recursion(plan),
+        *_histories(plan, kernels),
+        *_means(plan),
+    ]
     found += [*_parameters(plan), *_bytes(plan)]
     found += [_ahead(table, name) for name, table in named_sums(plan).items() if kernels.ahead(plan, table)]
     grouped = [h for h in ("error", "filtered") if kernels.grouped(plan, h)]
@@ -77,6 +84,18 @@ def _means(plan: Plan) -> list[Member]:
                 about = "what the means above have still to take up"
                 found.append(Member(ctype, rests(table, i), about, count, str(count)))
     return found
+
+
+def _set_point(plan: Plan) -> list[Member]:
+    if plan.set_point is None:
+        return []
+    if not plan.floating:
+        fine = replace(plan.reference, lsb=plan.reference.lsb * 2.0**-plan.set_point.up)
+        return [Member("int64_t", "set_point", f"filtered{_counts(fine)}")]
+    return [
+        Member(plan.reference.ctype, "lag", "by which the filtered set point is behind"),
+        Member(plan.reference.ctype, "latest", "the reference of the latest step"),
+    ]
 
 
 def _inner(plan: Plan) -> list[Member]:

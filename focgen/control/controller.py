@@ -95,6 +95,9 @@ class Controller:
     ``slew_limit`` is how fast the output may move, in its units a second; it needs the integrator. A reset, a
     track and a limit that changes move it at once.
 
+    ``setpoint_filter`` is the time constant in seconds of a lag of first order between the reference and the
+    error; None: none.
+
     ``tunable`` is what C that is generated for it may change at run time; None: nothing.
     """
 
@@ -115,6 +118,7 @@ class Controller:
     band: tuple[float, float] | None = None
     tunable: Tunable | None = None
     slew_limit: float | None = None
+    setpoint_filter: float | None = None
 
     @property
     def scheduled(self) -> bool:

@@ -4,6 +4,7 @@ name = "spba"
 sample_time = 0.01                       # s
 integrator = true                        # trapezoidal, clamped to ranges.output
 slew_limit = 5.0                         # optional, with an integrator: units of the output a second
+setpoint_filter = 0.2                    # optional: time constant of a lag ahead of the error, s; 0 for none
 length = 1000                            # memory length L, samples
 memory = "short"                         # or "exponential", with
 tolerance = 1e-4                         # optional: relative error of its weights, up to
@@ -112,6 +113,7 @@ def controller_of(top: Table, name: str) -> Controller:
         **_operator(top),
         tunable=_tunable(top.table("tunable"), gain, ranges),
         slew_limit=_slew_limit(top, integrator),
+        setpoint_filter=_setpoint_filter(top),
     )
     top.done()
     return controller
@@ -189,6 +191,13 @@ def _slew_limit(top: Table, integrator: bool) -> float | None:
         remedy = "set integrator = true, or limit the output behind the controller and track it"
         raise top.fail("slew_limit", "is given without an integrator, which alone can keep it", remedy)
     return top.number("slew_limit", above=0.0)
+
+
+def _setpoint_filter(top: Table) -> float | None:
+    seconds = top.number("setpoint_filter", 0.0)
+    if seconds < 0.0:
+        raise top.fail("setpoint_filter", f"is {seconds:g}", "give a time constant in seconds, or 0 for none")
+    return seconds or None
 
 
 def _check_factors(table: Table, span: tuple[float, float]) -> None:
@@ -279,6 +288,8 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     table: dict[str, Any] = {key: getattr(controller, key) for key in plain}
     if controller.slew_limit is not None:
         table["slew_limit"] = controller.slew_limit
+    if controller.setpoint_filter is not None:
+        table["setpoint_filter"] = controller.setpoint_filter
     if controller.memory == "exponential":
         table.update(tolerance=controller.tolerance, **_followed(controller))
     if not controller.scheduled:

@@ -12,17 +12,19 @@ from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest
 from focgen.plan.model import Format, Plan, Sum
 from focgen.plan.scenario import nearest_raw
+from focgen.plan.setpoint import Aim
 from focgen.plan.slewing import slewed
 
 
 class PlanStepper:
     """The controller as it will run. Takes and gives physical values; inside they are the plan's counts.
 
-    Starts at rest with error 0 at the output ``start``, for ``columns`` loops. Measurement and set point are
-    rounded to the nearest count and, in fixed point, clamped to their ranges, as a caller of the C does.
+    Starts at rest with error 0 at the output ``start`` and the set point ``reference``, for ``columns``
+    loops. Measurement and set point are rounded to the nearest count and, in fixed point, clamped to their
+    ranges, as a caller of the C does.
     """
 
-    def __init__(self, plan: Plan, columns: int, start: float = 0.0):
+    def __init__(self, plan: Plan, columns: int, start: float = 0.0, reference: float = 0.0):
         self.plan = plan
         self.kind = kind_of(plan.error)
         self.direct = _Window(plan.direct, self.kind, columns)
@@ -33,6 +35,9 @@ class PlanStepper:
         self.z = self.r = zero.astype(kind_of(plan.inner.state)) if plan.inner else zero
         u0 = np.full(columns, clamp(nearest_raw(start, plan.output), plan.output))
         self.total = u0.astype(self.kind)
+        self.aim = Aim(plan, self.kind, columns) if plan.set_point else None
+        for lane in range(columns if self.aim else 0):
+            self.aim.settle(lane, self._input(reference, plan.reference)[()])
         if plan.integrator and plan.floating:
             self.total = taken_in(self.total, plan.integrator.state)
         elif plan.integrator:
@@ -41,7 +46,9 @@ class PlanStepper:
     def step(self, reference, measurement, schedule):
         """One sample of all loops: physical values in, the outputs out, each of shape (columns,)."""
         plan = self.plan
-        e = self._input(reference, plan.reference) - self._input(measurement, plan.measurement)
+        r = self._input(reference, plan.reference)
+        y = self.aim.step(r) if self.aim else r
+        e = y - self._input(measurement, plan.measurement)
         v = self._filtered(e)
         g = self.kind(plan.constant_gain)
         if plan.schedule is not None:

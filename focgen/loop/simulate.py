@@ -248,7 +248,7 @@ class _Trial:
         count = self.samples(duration)
         reference = self._reference(count)
         total, columns = reference.shape
-        exact = FloatStepper(self.controller, total, columns, self.start.command)
+        exact = FloatStepper(self.controller, total, columns, self.start.command, reference=self.start.output)
         running, ideal = (self._run(stepper, reference) for stepper in (self._planned(columns), exact))
         nominal = self._without_effects(self._planned(columns), reference) if self.rig.effects else None
         frozen = tuple(self._frozen(i, count) for i in range(len(self.points)))
@@ -301,7 +301,7 @@ class _Trial:
         return measure_step(self._part(run, index, count), self.controller.sample_time, begin, target)
 
     def _planned(self, columns: int) -> PlanStepper:
-        return PlanStepper(self.plan, columns, self.start.command)
+        return PlanStepper(self.plan, columns, self.start.command, reference=self.start.output)
 
     def _run(self, stepper: Stepper, reference: np.ndarray) -> LoopRun:
         """The loop with the rig as it is, effects included."""

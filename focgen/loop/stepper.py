@@ -10,6 +10,7 @@ import numpy as np
 from focgen.control.controller import Controller
 from focgen.loop.online import OnlineConvolution
 from focgen.plan.canonical import Tables, inner_limits, tables
+from focgen.plan.setpoint import rate_of
 
 
 class Stepper(Protocol):
@@ -23,7 +24,8 @@ class FloatStepper:
     """The controller in float64: Grünwald–Letnikov sums of memory ``length`` (None: infinite), no rounding
     planned.
 
-    Starts at rest with error 0 at the output ``start``, for up to ``samples`` samples of ``columns`` loops.
+    Starts at rest with error 0 at the output ``start`` and the set point ``reference``, for up to ``samples``
+    samples of ``columns`` loops.
     ``gain`` replaces the controller's gain: it takes the scheduling signal (columns,) and returns gains.
     Raises PlanError where the transfer function cannot be realised.
     """
@@ -36,6 +38,7 @@ class FloatStepper:
         start: float = 0.0,
         length: int | None = None,
         gain: Callable | None = None,
+        reference: float = 0.0,
     ):
         memory = samples if length is None else min(length, samples)
         self._sums = _Sums(tables(controller, max(1, memory)), columns, samples, inner_limits(controller))
@@ -44,11 +47,15 @@ class FloatStepper:
         self._half = 0.5 * controller.sample_time if controller.integrator else None
         slew = controller.slew_limit
         self._slew = np.inf if slew is None else slew * controller.sample_time
+        seconds = controller.setpoint_filter
+        self._rate = 1.0 if seconds is None else rate_of(seconds, controller.sample_time)
+        self._aim = np.full(columns, float(reference))
         self._integral = np.full(columns, float(start))
         self._previous = np.zeros(columns)
 
     def step(self, reference, measurement, schedule):
-        filtered = self._sums.step(reference - measurement)
+        self._aim = self._aim + self._rate * (reference - self._aim)
+        filtered = self._sums.step(self._aim - measurement)
         if self._half is None:
             return np.clip(self._gain(schedule) * filtered, *self._limits)
         increment = self._half * self._gain(schedule) * filtered

@@ -38,8 +38,8 @@ def run_steps(bench: Bench, controller: Controller, plan: Plan, seconds: float) 
     prepared, columns = chain(bench.rig, controller.sample_time, samples), len(bench.points)
     reference = np.tile(bench.references, (samples, 1))
     steppers = (
-        FloatStepper(controller, samples, columns, bench.start.command),
-        PlanStepper(plan, columns, bench.start.command),
+        FloatStepper(controller, samples, columns, bench.start.command, reference=bench.start.output),
+        PlanStepper(plan, columns, bench.start.command, reference=bench.start.output),
     )
     ideal, running = (
         run_loop(prepared, stepper, reference, bench.start, bench.delay, bench.pressure_known, False)
@@ -66,7 +66,7 @@ def run_corner(
         found = _with_effects(there, controller, plan, reference)
     else:
         prepared = chain(rig, controller.sample_time, samples)
-        stepper = PlanStepper(plan, len(bench.points), there.start.command)
+        stepper = PlanStepper(plan, len(bench.points), there.start.command, reference=there.start.output)
         run = run_loop(prepared, stepper, reference, there.start, bench.delay, bench.pressure_known, False)
         found = _measures(run, there)
     reached = within_reach(rig, bench.references, bench.ranges.output)
@@ -77,7 +77,7 @@ def _with_effects(bench: Bench, controller: Controller, plan: Plan, reference) -
     if not bench.rig.effects:
         return [None] * len(bench.points)
     plant = Plant.of(bench.rig, controller.sample_time, bench.start, len(reference))
-    stepper = PlanStepper(plan, len(bench.points), bench.start.command)
+    stepper = PlanStepper(plan, len(bench.points), bench.start.command, reference=bench.start.output)
     run = run_with_effects(plant, stepper, reference, bench.start, bench.delay, bench.pressure_known)
     return _measures(run, bench)
 

@@ -33,6 +33,7 @@ from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error, tuned_error
 from focgen.plan.model import Bank, ErrorBound, Plan, Sum
 from focgen.plan.proofs import at_rest, reset_error
+from focgen.plan.setpoint import set_point_error
 from focgen.plan.stability import inverse_of
 from focgen.plan.truncation import largest_error, truncation
 from focgen.plan.truncation_band import band_truncation
@@ -157,7 +158,7 @@ class _Fixed(_Account):
 
     @property
     def input_error(self) -> float:
-        return self.plan.error.lsb
+        return self.plan.error.lsb + set_point_error(self.plan)
 
     def sum_error(self, made: Sum | None, table: Table | None, largest: float) -> float:
         """The alignments' rounding, and that of the modes' drives."""
@@ -262,6 +263,7 @@ class _Floating(_Account):
         ranges = self.plan.controller.ranges
         largest = max(map(abs, ranges.reference)) + max(map(abs, ranges.measurement))
         own = 0.0 if self.plan.arithmetic == "f64" else self.u * largest
+        own += set_point_error(self.plan)
         return own + (self.u + _DOUBLE) * largest * 1.01
 
     def sum_error(self, made: Sum | None, table: Table | None, largest: float) -> float:

@@ -17,6 +17,7 @@ from focgen.plan.integrals import counted
 from focgen.plan.memory import Memory, band_memories_of, checked_band, exponential_tables, memories_of
 from focgen.plan.model import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
+from focgen.plan.setpoint import with_set_point
 from focgen.plan.slewing import with_slew
 from focgen.plan.stability import check_stable
 from focgen.plan.tuning import with_limits
@@ -69,7 +70,7 @@ def build_plan(
         plan = replace(plan, length=max(plan.error_lags, plan.filtered_lags))
     _check_at_rest(plan, folded)
     check_room(plan)
-    plan = with_slew(with_limits(counted(plan)))
+    plan = with_set_point(with_slew(with_limits(counted(plan))))
     plan = replace(plan, proofs=prove(plan))
     return replace(plan, error_bound=error_bound(plan, folded))
 

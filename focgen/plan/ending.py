@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from focgen.plan.damage import mended
 from focgen.plan.execute import Run, execute
 from focgen.plan.model import Plan
 from focgen.plan.scenario import Reset, Scenario, Trace, Track
+from focgen.plan.setpoint import begun
 from focgen.plan.tuning import Applied, applied, refused
 from focgen.plan.usable import good_samples, invalid_samples, usable
 
@@ -22,7 +23,8 @@ class Ending:
     ``error`` and ``filtered``: the samples since init or the latest reset, oldest first; before them each was
     ``error_rest`` and ``filtered_rest`` for ever. ``r``: the inner integral's latest addend. ``starting``:
     no step has been made since. ``means`` and ``rests``: of every mode, by the name of its sum and the
-    number of its bank. ``applied``: of the parameters. What a plan does not have is 0.
+    number of its bank. ``applied``: of the parameters. ``aim``: of the set-point
+    filter, by the names of its members. What a plan does not have is 0.
     """
 
     error: np.ndarray
@@ -40,6 +42,7 @@ class Ending:
     output: np.generic
     flags: int
     applied: Applied | None = None
+    aim: dict[str, np.generic] = field(default_factory=dict)
 
 
 def endings(plan: Plan, scenario: Scenario) -> tuple[Trace, tuple[Ending, ...]]:
@@ -118,6 +121,7 @@ def _ended(run: Run, lane: int, trace: Trace, of: int) -> Ending:
         output=trace.u[of, -1],
         flags=int(trace.flags[of, -1]),
         applied=run.tuned[lane][-1][1] if run.tuned else None,
+        aim={name: values[lane] for name, values in run.aim.items()},
     )
 
 
@@ -140,4 +144,5 @@ def _begun(run: Run, start: int, trace: Trace, of: int) -> Ending:
         integral=run.wide(rest.u0),
         increment=increment,
         starting=scheduled,
+        aim=begun(plan, run.scenario, run.kind, 0, start),
     )

@@ -29,6 +29,7 @@ from focgen.plan.model import (
     Sum,
 )
 from focgen.plan.scenario import Reset, Scenario, Trace
+from focgen.plan.setpoint import error_of
 from focgen.plan.slewing import slewed
 from focgen.plan.tuning import Applied, courses, tuned
 from focgen.plan.usable import holding, invalid_samples, usable
@@ -76,7 +77,7 @@ class _Segment:
 
 class Run:
     """One execution; attributes are signals of shape (lanes, samples), but for what the last sample leaves:
-    ``carry``, ``inner`` and ``integral`` (lanes,), and the modes in ``memory``.
+    ``carry``, ``inner``, ``integral`` and those in ``aim`` (lanes,), and the modes in ``memory``.
     """
 
     def __init__(self, plan: Plan, scenario: Scenario):
@@ -85,7 +86,7 @@ class Run:
         self.shape = scenario.ref.shape
         self.ref = self._input(scenario.ref, plan.reference)
         self.meas = self._input(scenario.meas, plan.measurement)
-        self.e = self.ref - self.meas
+        self.e, self.aim = error_of(plan, scenario, self.ref, self.meas)
         self.memory: dict[str, list[BankRun]] = {}
         self.carry = self.inner = self.integral = np.zeros(self.shape[0], self.kind)
         self.tuned = courses(plan, scenario) if plan.tuning else {}

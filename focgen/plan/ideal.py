@@ -154,17 +154,33 @@ class _Operator:
     def __init__(self, form: Realisation, controller: Controller, count: int, memories: dict[float, Memory]):
         h, parts = controller.sample_time, (form.direct, form.rest, form.den)
         self.form, self.limits, self.half_step = form, inner_limits(controller), 0.5 * h
+        self.setpoint_filter, self.span = controller.setpoint_filter, controller.ranges.reference
         self.direct, self.rest, self.den = (_Sum(terms, h, count, memories) for terms in parts)
 
     def run(self, scenario: Scenario, endless: bool) -> tuple[np.ndarray, dict]:
         """v of every sample, and what it was before each segment (key: lane, start)."""
-        e, out, before = scenario.ref - scenario.meas, np.empty(scenario.ref.shape), {}
+        e, out, before = self.aimed(scenario) - scenario.meas, np.empty(scenario.ref.shape), {}
         for s in _segments(scenario):
             part = e[s.lane, s.start : s.stop] - s.constant
             still = self.still(endless) * s.constant
             out[s.lane, s.start : s.stop] = still + self.moved(part, s.constant, endless)
             before[s.lane, s.start] = still
         return out, before
+
+    def aimed(self, scenario: Scenario) -> np.ndarray:
+        """The set point, through its filter where there is one: y = p y z^−1 + (1 − p) ref, p = exp(−h/T).
+
+        It starts from the reset's ref; after init from what is nearest to 0 in the range.
+        """
+        if self.setpoint_filter is None:
+            return scenario.ref
+        p, out = np.exp(-2.0 * self.half_step / self.setpoint_filter), np.empty(scenario.ref.shape)
+        given = {(r.lane, r.sample): r.ref for r in scenario.resets}
+        for s in _segments(scenario):
+            start = given.get((s.lane, s.start), min(max(0.0, self.span[0]), self.span[1]))
+            part = scenario.ref[s.lane, s.start : s.stop]
+            out[s.lane, s.start : s.stop] = lfilter([1.0 - p], [1.0, -p], part, zi=[p * start])[0]
+        return out
 
     def still(self, endless: bool) -> float:
         """The gain for a constant error."""

@@ -7,6 +7,7 @@ One step, at sample k (steps that a plan does not need are ``None`` and leave no
 --------------------------------------------------------------------------------------------
 1. Inputs. Fixed point: reference, measurement and schedule are clamped to ``low`` … ``high`` of their
    formats. e_k = reference − measurement (counts of ``error``; exact, no rounding).
+   With a ``set_point`` the reference is filtered first: :mod:`focgen.plan.setpoint`.
 2. ``direct``: p = Σ_{j=0…} w_j e_{k−j}, the numerator's terms of order ≥ 0 in one table.
 3. ``inner`` (numerator terms of negative order): r_k = Σ_{j=0…} w_j e_{k−j}, where the trapezoid's h/2 is
    inside the weights; z = clamp(z + (r_k + r_{k−1})); p = p + shift(z, to_wide).
@@ -156,7 +157,7 @@ from dataclasses import dataclass
 from focgen.control.controller import Controller
 from focgen.fractional.continuous import ContinuousMemory
 from focgen.fractional.exponential import ExponentialMemory
-from focgen.plan.sums import Bank, Block, Count, Format, Sum
+from focgen.plan.sums import Bank, Block, Count, Format, SetPoint, Sum
 
 __all__ = [
     "Bank",
@@ -175,6 +176,7 @@ __all__ = [
     "Plan",
     "Proof",
     "Schedule",
+    "SetPoint",
     "Sum",
     "Tuning",
 ]
@@ -341,6 +343,7 @@ class Plan:
     operator: str = "gl"
     band: tuple[float, float] | None = None
     tuning: Tuning | None = None
+    set_point: SetPoint | None = None
 
     @property
     def exponential(self) -> bool:

@@ -60,6 +60,11 @@ class _Ledger:
         plan = self.plan
         reach = span(plan.reference) - span(plan.measurement)
         self.add("error", reach, plan.error.ctype, "range")
+        if plan.set_point:
+            made, far = plan.set_point, span(plan.reference) - span(plan.reference)
+            self.add("set point product", far * Interval(0, int(made.rate)), "int64_t", "range")
+            kept = Interval(int(made.low), int(made.high))
+            self.add("set point", kept, "int64_t", "mean of its inputs", (1 << made.up) >> 1)
 
     def integrals(self) -> None:
         """Those that a floating plan has in counts; an increment beyond ``MOST`` is cut to it."""

@@ -37,6 +37,19 @@ class Format:
 
 
 @dataclass(frozen=True)
+class SetPoint:
+    """The set-point filter, as :mod:`focgen.plan.setpoint` tells: its rate, in fixed point a count of
+    2^−``up``, and the ends of its state in counts; floating, the lag up to which it is 0.
+    """
+
+    rate: Count
+    up: int = 0
+    low: Count = 0
+    high: Count = 0
+    drop: float = 0.0
+
+
+@dataclass(frozen=True)
 class Block:
     """Taps ``first`` … ``last`` (lags, both included), which share one scale.
 

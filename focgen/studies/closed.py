@@ -76,7 +76,7 @@ def _samples(rig: Rig, controller: Controller, points: tuple[Equilibrium, ...]) 
 def running_loop(base: Controller, rig: Rig, setpoints: tuple[float, ...], plan: Plan) -> Steps:
     """The loop of a ``plan``; ``base`` is the study's controller at the plan's sample time."""
     bench = _bench(rig, base, setpoints)
-    stepper = PlanStepper(plan, len(bench.points), bench.start.command)
+    stepper = PlanStepper(plan, len(bench.points), bench.start.command, reference=bench.start.output)
     at = any_schedule(base)
     unit = running_gain(plan, at)
     open_loop = _curve(rig, base, lambda omega: running_response(plan, omega, at) / unit)
@@ -90,7 +90,9 @@ def running_loop(base: Controller, rig: Rig, setpoints: tuple[float, ...], plan:
 def ideal_loop(base: Controller, rig: Rig, setpoints: tuple[float, ...]) -> Steps:
     """The loop of infinite memory in float64."""
     bench = _bench(rig, base, setpoints)
-    stepper = FloatStepper(base, bench.chain.samples, len(bench.points), bench.start.command)
+    stepper = FloatStepper(
+        base, bench.chain.samples, len(bench.points), bench.start.command, reference=bench.start.output
+    )
     open_loop = _curve(rig, base, lambda omega: sampled_response(base, omega))
     found = [open_loop.times(float(base.gain_at(p)) * slope_at(rig, p)) for p in _pressures(bench)]
     return _judged(bench, stepper, found)

@@ -61,6 +61,7 @@ def remembered(plan: Plan, ending: Ending, kernels: Kernels = PORTABLE) -> dict[
         "carry": ending.carry,
         "output": ending.output,
         "flags": ending.flags,
+        **ending.aim,
     }
     if ending.applied:
         now = ending.applied

@@ -46,12 +46,13 @@ def controllers(length: int) -> dict[str, Controller]:
 
 def tuned(length: int) -> dict[str, Controller]:
     """With parameters: "inverse_tuned", a schedule ahead of an integrator that has a slew limit, and
-    "filter_tuned", neither of them.
+    "filter_tuned", neither of them, but a set-point filter.
     """
     found = controllers(length)
     limits = {"inverse": Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0))}
     limits["filter"] = Tunable((0.25, 1.5), (-3.0, -1.0), (1.0, 3.0))
     found["inverse"] = replace(found["inverse"], slew_limit=20.0)
+    found["filter"] = replace(found["filter"], setpoint_filter=0.1)
     return {f"{n}_tuned": replace(found[n], name=f"{n}_tuned", tunable=box) for n, box in limits.items()}
 
 
