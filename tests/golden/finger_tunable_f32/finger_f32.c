@@ -248,6 +248,12 @@ static void finger_f32_mend(finger_f32_state *s)
     uint8_t known = finger_f32_limits_known(s);
     uint16_t i;
 
+    if (s->low != foc_counts_f32(s->u_min, 56)) { /* no count of its limit */
+        known = 0;
+    }
+    if (s->high != foc_counts_f32(s->u_max, 56)) { /* no count of its limit */
+        known = 0;
+    }
     for (i = 0; i < FINGER_F32_GAINS; i++) {
         if (!foc_within_f32(s->gains[i], 0.873779297f, 5.0012207f)) {
             known = 0;
