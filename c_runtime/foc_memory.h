@@ -91,7 +91,11 @@ static inline int32_t foc_slow_modes_q15(const FOC_ROM foc_slow_mode_q15 *modes,
     return sum;
 }
 
-/* --- Floating point -------------------------------------------------------------------------------- */
+#endif
+
+/* Floating point, as in foc_rt.h. */
+#if !defined(FOC_NO_FLOAT) && !defined(FOC_MEMORY_FLOAT_H)
+#define FOC_MEMORY_FLOAT_H
 
 typedef struct {
     double rate;

@@ -59,16 +59,6 @@ static inline int64_t foc_clamp64(int64_t x, int64_t low, int64_t high)
     return x < low ? low : x > high ? high : x;
 }
 
-static inline float foc_clamp_f32(float x, float low, float high)
-{
-    return x < low ? low : x > high ? high : x;
-}
-
-static inline double foc_clamp_f64(double x, double low, double high)
-{
-    return x < low ? low : x > high ? high : x;
-}
-
 /* The nearest value that the narrower type can hold. */
 static inline int16_t foc_sat16(int32_t x)
 {
@@ -78,65 +68,6 @@ static inline int16_t foc_sat16(int32_t x)
 static inline int32_t foc_sat32(int64_t x)
 {
     return (int32_t)foc_clamp64(x, INT32_MIN, INT32_MAX);
-}
-
-/* --- Usable numbers ------------------------------------------------------------------------------- */
-
-/* 1 where a controller can compute with x: |x| < 2^48, which neither NaN nor infinity is. Asked of the
-   bits, which grow with |x|: a comparison of floating values is what -ffast-math may take for granted. */
-static inline uint8_t foc_usable_f32(float x)
-{
-    union {
-        float value;
-        uint32_t bits;
-    } view;
-
-    view.value = x;
-    return (uint8_t)((view.bits & 0x7fffffffu) < 0x57800000u);
-}
-
-/* The same for |x| < 2^512. Where double has 32 bits, as it may on an AVR, it is a float. */
-static inline uint8_t foc_usable_f64(double x)
-{
-#if defined(__SIZEOF_DOUBLE__) && __SIZEOF_DOUBLE__ == 4
-    return foc_usable_f32((float)x);
-#else
-    union {
-        double value;
-        uint64_t bits;
-    } view;
-
-    view.value = x;
-    return (uint8_t)((view.bits & 0x7fffffffffffffffu) < 0x5ff0000000000000u);
-#endif
-}
-
-/* 1 where x is a number: neither NaN nor infinity. What a good state gives always is (proved); so whatever is
-   not comes from a state that no step has left. */
-static inline uint8_t foc_finite_f32(float x)
-{
-    union {
-        float value;
-        uint32_t bits;
-    } view;
-
-    view.value = x;
-    return (uint8_t)((view.bits & 0x7fffffffu) < 0x7f800000u);
-}
-
-static inline uint8_t foc_finite_f64(double x)
-{
-#if defined(__SIZEOF_DOUBLE__) && __SIZEOF_DOUBLE__ == 4
-    return foc_finite_f32((float)x);
-#else
-    union {
-        double value;
-        uint64_t bits;
-    } view;
-
-    view.value = x;
-    return (uint8_t)((view.bits & 0x7fffffffffffffffu) < 0x7ff0000000000000u);
-#endif
 }
 
 /* --- Rounding shifts ------------------------------------------------------------------------------ */
@@ -242,42 +173,6 @@ static inline int64_t foc_dot_q31(const FOC_ROM int32_t *weights, uint16_t taps,
     return sum;
 }
 
-static inline float foc_dot_f32(const FOC_ROM float *weights, uint16_t taps, const float *ring,
-                                uint16_t size, uint16_t now, uint16_t oldest)
-{
-    const uint16_t start = foc_ring_slot(now, size, oldest);
-    const uint16_t straight = (uint16_t)(size - start);
-    const uint16_t wrap = taps < straight ? taps : straight;
-    float sum = 0.0f;
-    uint16_t i;
-
-    for (i = 0; i < wrap; i++) {
-        sum += weights[i] * ring[start + i];
-    }
-    for (; i < taps; i++) {
-        sum += weights[i] * ring[i - straight];
-    }
-    return sum;
-}
-
-static inline double foc_dot_f64(const FOC_ROM double *weights, uint16_t taps, const double *ring,
-                                 uint16_t size, uint16_t now, uint16_t oldest)
-{
-    const uint16_t start = foc_ring_slot(now, size, oldest);
-    const uint16_t straight = (uint16_t)(size - start);
-    const uint16_t wrap = taps < straight ? taps : straight;
-    double sum = 0.0;
-    uint16_t i;
-
-    for (i = 0; i < wrap; i++) {
-        sum += weights[i] * ring[start + i];
-    }
-    for (; i < taps; i++) {
-        sum += weights[i] * ring[i - straight];
-    }
-    return sum;
-}
-
 /* A table of weights is cut into blocks, each with a scale of its own: Gruenwald-Letnikov weights fall
    so fast that in one scale most of them would be lost. Blocks stand oldest first, as their weights
    do. */
@@ -360,6 +255,120 @@ static inline int32_t foc_schedule_q31(int32_t x, const FOC_ROM int32_t *points,
         i++;
     }
     return (int32_t)(gains[i] + foc_shift64(slopes[i] * ((int64_t)x - points[i]), shifts[i]));
+}
+
+#endif
+
+/* Floating point. Left out by C that defines FOC_NO_FLOAT ahead of it: integer controllers do. */
+#if !defined(FOC_NO_FLOAT) && !defined(FOC_RT_FLOAT_H)
+#define FOC_RT_FLOAT_H
+
+/* x, but not below low nor above high; low <= high. */
+static inline float foc_clamp_f32(float x, float low, float high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+static inline double foc_clamp_f64(double x, double low, double high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/* --- Usable numbers ------------------------------------------------------------------------------- */
+
+/* 1 where a controller can compute with x: |x| < 2^48, which neither NaN nor infinity is. Asked of the
+   bits, which grow with |x|: a comparison of floating values is what -ffast-math may take for granted. */
+static inline uint8_t foc_usable_f32(float x)
+{
+    union {
+        float value;
+        uint32_t bits;
+    } view;
+
+    view.value = x;
+    return (uint8_t)((view.bits & 0x7fffffffu) < 0x57800000u);
+}
+
+/* The same for |x| < 2^512. Where double has 32 bits, as it may on an AVR, it is a float. */
+static inline uint8_t foc_usable_f64(double x)
+{
+#if defined(__SIZEOF_DOUBLE__) && __SIZEOF_DOUBLE__ == 4
+    return foc_usable_f32((float)x);
+#else
+    union {
+        double value;
+        uint64_t bits;
+    } view;
+
+    view.value = x;
+    return (uint8_t)((view.bits & 0x7fffffffffffffffu) < 0x5ff0000000000000u);
+#endif
+}
+
+/* 1 where x is a number: neither NaN nor infinity. What a good state gives always is (proved); so whatever is
+   not comes from a state that no step has left. */
+static inline uint8_t foc_finite_f32(float x)
+{
+    union {
+        float value;
+        uint32_t bits;
+    } view;
+
+    view.value = x;
+    return (uint8_t)((view.bits & 0x7fffffffu) < 0x7f800000u);
+}
+
+static inline uint8_t foc_finite_f64(double x)
+{
+#if defined(__SIZEOF_DOUBLE__) && __SIZEOF_DOUBLE__ == 4
+    return foc_finite_f32((float)x);
+#else
+    union {
+        double value;
+        uint64_t bits;
+    } view;
+
+    view.value = x;
+    return (uint8_t)((view.bits & 0x7fffffffffffffffu) < 0x7ff0000000000000u);
+#endif
+}
+
+/* --- Sums and gain schedule, as above -------------------------------------------------------------- */
+
+static inline float foc_dot_f32(const FOC_ROM float *weights, uint16_t taps, const float *ring,
+                                uint16_t size, uint16_t now, uint16_t oldest)
+{
+    const uint16_t start = foc_ring_slot(now, size, oldest);
+    const uint16_t straight = (uint16_t)(size - start);
+    const uint16_t wrap = taps < straight ? taps : straight;
+    float sum = 0.0f;
+    uint16_t i;
+
+    for (i = 0; i < wrap; i++) {
+        sum += weights[i] * ring[start + i];
+    }
+    for (; i < taps; i++) {
+        sum += weights[i] * ring[i - straight];
+    }
+    return sum;
+}
+
+static inline double foc_dot_f64(const FOC_ROM double *weights, uint16_t taps, const double *ring,
+                                 uint16_t size, uint16_t now, uint16_t oldest)
+{
+    const uint16_t start = foc_ring_slot(now, size, oldest);
+    const uint16_t straight = (uint16_t)(size - start);
+    const uint16_t wrap = taps < straight ? taps : straight;
+    double sum = 0.0;
+    uint16_t i;
+
+    for (i = 0; i < wrap; i++) {
+        sum += weights[i] * ring[start + i];
+    }
+    for (; i < taps; i++) {
+        sum += weights[i] * ring[i - straight];
+    }
+    return sum;
 }
 
 static inline float foc_schedule_f32(float x, const FOC_ROM float *points, const FOC_ROM float *gains,

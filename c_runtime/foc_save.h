@@ -38,6 +38,35 @@ static inline uint64_t foc_get(const uint8_t *from, uint32_t *at, uint8_t bytes)
     return bits;
 }
 
+/* One bit of a check sum. */
+static inline uint32_t foc_crc_bit(uint32_t crc)
+{
+    return (crc & 1u) != 0u ? (crc >> 1) ^ 0xedb88320u : crc >> 1;
+}
+
+/* The check sum of so many bytes. Two bits at a time: of one at a time, clang makes a table of 1024 bytes. */
+static inline uint32_t foc_crc32(const uint8_t *from, uint32_t count)
+{
+    uint32_t crc = 0xffffffffu;
+    uint32_t i;
+
+    for (i = 0; i < count; i++) {
+        uint8_t pair;
+
+        crc ^= from[i];
+        for (pair = 0; pair < 4u; pair++) {
+            crc = foc_crc_bit(foc_crc_bit(crc));
+        }
+    }
+    return crc ^ 0xffffffffu;
+}
+
+#endif
+
+/* Floating point, as in foc_rt.h. */
+#if !defined(FOC_NO_FLOAT) && !defined(FOC_SAVE_FLOAT_H)
+#define FOC_SAVE_FLOAT_H
+
 /* The bits of a floating number, and the number of such bits. */
 static inline uint64_t foc_bits_f32(float x)
 {
@@ -83,29 +112,6 @@ static inline double foc_float_f64(uint64_t bits)
 
     view.bits = bits;
     return view.value;
-}
-
-/* One bit of a check sum. */
-static inline uint32_t foc_crc_bit(uint32_t crc)
-{
-    return (crc & 1u) != 0u ? (crc >> 1) ^ 0xedb88320u : crc >> 1;
-}
-
-/* The check sum of so many bytes. Two bits at a time: of one at a time, clang makes a table of 1024 bytes. */
-static inline uint32_t foc_crc32(const uint8_t *from, uint32_t count)
-{
-    uint32_t crc = 0xffffffffu;
-    uint32_t i;
-
-    for (i = 0; i < count; i++) {
-        uint8_t pair;
-
-        crc ^= from[i];
-        for (pair = 0; pair < 4u; pair++) {
-            crc = foc_crc_bit(foc_crc_bit(crc));
-        }
-    }
-    return crc ^ 0xffffffffu;
 }
 
 #endif

@@ -26,16 +26,6 @@ static inline uint8_t foc_within32(int32_t x, int32_t low, int32_t high)
     return (uint8_t)(x >= low && x <= high);
 }
 
-static inline uint8_t foc_within_f32(float x, float low, float high)
-{
-    return (uint8_t)(foc_finite_f32(x) && x >= low && x <= high);
-}
-
-static inline uint8_t foc_within_f64(double x, double low, double high)
-{
-    return (uint8_t)(foc_finite_f64(x) && x >= low && x <= high);
-}
-
 /* --- Gain schedule -------------------------------------------------------------------------------- */
 
 /* What foc_schedule_... of foc_rt.h gives, from gains and slopes in RAM. */
@@ -71,6 +61,22 @@ static inline int32_t foc_tuned_q31(int32_t x, const FOC_ROM int32_t *points, co
         i++;
     }
     return (int32_t)(gains[i] + foc_shift64(slopes[i] * ((int64_t)x - points[i]), shifts[i]));
+}
+
+#endif
+
+/* Floating point, as in foc_rt.h. */
+#if !defined(FOC_NO_FLOAT) && !defined(FOC_TUNE_FLOAT_H)
+#define FOC_TUNE_FLOAT_H
+
+static inline uint8_t foc_within_f32(float x, float low, float high)
+{
+    return (uint8_t)(foc_finite_f32(x) && x >= low && x <= high);
+}
+
+static inline uint8_t foc_within_f64(double x, double low, double high)
+{
+    return (uint8_t)(foc_finite_f64(x) && x >= low && x <= high);
 }
 
 static inline float foc_tuned_f32(float x, const FOC_ROM float *points, const float *gains,

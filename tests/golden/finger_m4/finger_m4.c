@@ -16,10 +16,12 @@
  */
 #include "finger_m4.h"
 
+#define FOC_NO_FLOAT /* of the runtime, integers alone */
 #include "foc_rt.h"
 #include "foc_save.h"
 #include "foc_m4_q15.h" /* the sums in cortex-m4's own instructions; the same bits everywhere */
 #include "foc_ahead_q15.h"
+#undef FOC_NO_FLOAT
 
 #if FOC_RT_VERSION != 2
 #error "foc_rt.h is not the one that came with finger_m4.c: run focgen generate again and copy both"

@@ -16,8 +16,10 @@
  */
 #include "finger_q15.h"
 
+#define FOC_NO_FLOAT /* of the runtime, integers alone */
 #include "foc_rt.h"
 #include "foc_save.h"
+#undef FOC_NO_FLOAT
 
 #if FOC_RT_VERSION != 2
 #error "foc_rt.h is not the one that came with finger_q15.c: run focgen generate again and copy both"
