@@ -15,7 +15,7 @@ from focgen.cli.main import main
 from focgen.errors import DesignError, InputError
 from focgen.rig.files import read_rig, write_rig
 from focgen.rig.model import UNITY
-from tests.newcomers import FILES
+from tests.newcomers import FILES, experiments
 from tests.pages import ROOT, blocks, is_elsewhere, run_shell
 
 GUIDE = ROOT / "docs" / "own-log.md"
@@ -76,6 +76,18 @@ def test_what_is_in_memory_is_shown_on_a_page(tmp_path):
         focgen.report([rig, rig], tmp_path / "c.html")
 
 
+def test_offsets_that_the_rest_contradicts_are_told():
+    """With the releases, which are slower than the steps, the fits leave the rest; without them, not."""
+    log = experiments()[5][::4]
+    rig = focgen.init(log).rig
+    whole = focgen.identify(rig, log, integer=False)
+    (told,) = [warning for warning in whole.warnings if "at rest the fits are off" in warning]
+    (replayed,) = list(focgen.replay(whole.rig, log).logs.values())
+    assert replayed.gof < whole.gof["rig"]["mean"] - 0.2 and "focgen replay" in told
+    loading = focgen.identify(rig, log, to=40.0, integer=False)
+    assert not any("at rest" in warning for warning in loading.warnings)
+
+
 # ------------------------------------------------------------------------------------- the whole way
 
 
@@ -104,7 +116,7 @@ def test_a_file_leads_to_a_verified_folder_that_a_build_takes_and_to_a_page(file
     (verified,) = [text for line, text in said.items() if line.startswith("focgen verify")]
     assert verified.endswith("verified\n")
     rig = focgen.read_rig(folder / "identified.toml")
-    assert rig.actuator.T == pytest.approx(1.96, rel=0.05)  # the releases, which are faster, are in the log
+    assert rig.actuator.T == pytest.approx(1.96, rel=0.05)  # the releases, which are slower, are in the log
     if rig.signals.pressure:
         per_volt = {"kPa": 10.0, "bar": 0.1}[rig.signals.units["pressure"]]
         assert rig.regulator.dc_gain == pytest.approx(per_volt, rel=0.01)

@@ -11,10 +11,13 @@ from focgen.identification.fractional import FractionalFit
 from focgen.identification.model import ExperimentFit
 from focgen.identification.single import is_step
 from focgen.identification.sure import misfit_of, relative_halves, times_text
+from focgen.logs.between import noise_level
 from focgen.logs.notes import listed
 
 _FALL = 0.5  # of the step: the input comes nearer to 0 by at least this in a release
 _WIDE = 0.3  # of a parameter: an interval wider than this says little
+_ASTRAY = 0.1  # of the output's spread: so far off at rest is more than a zero that is a little off
+_MOVED = 0.1  # of its step: the input has left its rest
 _WORSE = 0.01  # of GOF: by so much more a rig is visibly worse than the single fits
 
 
@@ -29,6 +32,7 @@ def warnings_of(
     own."""
     misfit = misfit_of(excitations, fit)
     found = _rig_is_worse(fits, quality) or ([_model_short(misfit, fit)] if misfit else [])
+    found += _astray(excitations, fit)
     found += _unsure(excitations, fit, misfit)
     found += _singles(fits, failed, misfit)
     if all(is_step(x) for x in excitations) and not any(_releases(x) for x in excitations):
@@ -65,6 +69,30 @@ def _rig_is_worse(fits: Sequence[ExperimentFit], quality: dict[str, dict[str, fl
         "unloading, or drift; "
         "`focgen diagnose` names it"
     ]
+
+
+def _astray(excitations: Sequence[Excitation], fit: FractionalFit) -> list[str]:
+    """Offsets that the logs' own rests contradict: they stand in for what the model lacks."""
+    off = [(x, _off_at_rest(x, made)) for x, made in zip(excitations, fit.simulated)]
+    far = [(x.name, rest) for x, rest in off if abs(rest) > _ASTRAY * x.spread]
+    if 2 * len(far) <= len(off):
+        return []
+    name, worst = max(far, key=lambda one: abs(one[1]))
+    return [
+        f"at rest the fits are off, {name} by {abs(worst):.2g}: the offset that each experiment has to "
+        "itself makes up for what the model lacks; the rig has no such offset, so `focgen replay` fits less "
+        "well than this table; `focgen diagnose` names what is lacking, and --to leaves out the releases"
+    ]
+
+
+def _off_at_rest(x: Excitation, made: np.ndarray) -> float:
+    """By how much a fit (n,) misses the output while the input rests, 0 where noise explains it."""
+    moved = np.flatnonzero(np.abs(x.pressure - x.before) > _MOVED * abs(x.level - x.before))
+    rest = int(moved[0]) // 2 if len(moved) and x.rest_shown and not x.begins_up else 0
+    if rest < 2:
+        return 0.0
+    off = float(np.mean((x.measured - made)[:rest]))
+    return off if abs(off) > 3.0 * noise_level(x.measured) / np.sqrt(rest) else 0.0
 
 
 def _unsure(excitations: Sequence[Excitation], fit: FractionalFit, misfit: float | None) -> list[str]:
