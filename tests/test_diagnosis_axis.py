@@ -12,11 +12,14 @@ from scipy.signal import lsim
 
 from focgen.diagnosis.decimate import decimated
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.leftover import foretold
 from focgen.diagnosis.scales import clocks
+from focgen.diagnosis.segments import make
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
+from focgen.rig import kernels
 from focgen.rig.files import read_rig, write_rig
 from focgen.rig.model import LinearActuator, Rig, Signals
 from focgen.rig.replay import replay
@@ -91,6 +94,17 @@ def test_an_axis_without_friction_has_none():
     y = y + 0.002 * np.ptp(y) * np.random.default_rng(0).standard_normal(len(y))
     found = diagnose(AXIS, [Experiment("free", H, {"command": u, "output": y})], pictures=False)
     assert found.verdict == "parameters"
+
+
+def test_inputs_foretell_the_path_that_a_missing_force_leaves():
+    u, pace = moves(3), 2.0
+    log = Experiment("path", H, {"command": u, "output": u})
+    segment = replace(make([log], "command", "output", None, None), pace=pace)
+    force = np.sign(np.gradient(np.convolve(u, np.ones(9) / 9.0, "same")))
+    path = kernels.lag(force, segment.run.rest, H, pace, pace)
+    left = path - np.mean(path) + 0.5 * np.std(path) * np.random.default_rng(1).standard_normal(len(u))
+    kept, forgotten = (foretold(replace(segment, pace=p), left, 0.05) for p in (pace, 0.0))
+    assert kept > 0.3 and forgotten < 0.2
 
 
 def test_what_a_command_does_between_samples_is_asked_of_the_file(tmp_path):
