@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import Any
 
 from focgen.cli.outcome import Outcome
 from focgen.cli.shown import add_report, check_report, drawn, write_report
+from focgen.custody import identified_from
 from focgen.identification.identify import identify
 from focgen.output import check_apart, new_folder, write_file
 from focgen.report.identification import identification_pictures
@@ -71,6 +73,17 @@ def _next(complete: bool, args: Namespace) -> str:
     return f"next: focgen identify LOG --rig {args.out} --out NEW_RIG, for the actuator"
 
 
+def _options(args: Namespace) -> dict[str, Any]:
+    """What the rig's numbers depend on beside the files."""
+    return {
+        "from": args.first,
+        "to": args.last,
+        "gain_degree": args.gain_degree,
+        "stages": list(args.stages),
+        "delay": args.delay,
+    }
+
+
 def run(args: Namespace) -> Outcome:
     given = (*args.logs, args.rig, *args.unseen)
     check_apart([args.out], given)
@@ -87,6 +100,7 @@ def run(args: Namespace) -> Outcome:
         args.delay,
         not args.no_integer,
     )
+    written = rig_text(found.rig) + identified_from(given, args.out, _options(args))
     text = f"{identification_text(found)}\n\nwrote {args.out}\n"
     shown = drawn(args.report, lambda: identification_page(found), lambda: identification_pictures(found))
     if isinstance(shown, dict):
@@ -94,10 +108,10 @@ def run(args: Namespace) -> Outcome:
         with new_folder(args.report, given) as folder:  # pictures and rig, or neither
             for name, picture in shown.items():
                 (folder / name).write_bytes(picture)
-            write_file(args.out, rig_text(found.rig), given)
+            write_file(args.out, written, given)
         text += f"pictures in {args.report}\n"
     else:
         text += write_report(args.report, shown, given)  # ahead of the rig: a page may be without it
-        write_file(args.out, rig_text(found.rig), given)
+        write_file(args.out, written, given)
     text += _next(found.rig.actuator is not None, args)
     return Outcome(identification_payload(found) | {"new_rig": args.out}, text)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from focgen.custody import identified_from
 from focgen.errors import FitError, check_choice
 from focgen.identification.caveats import warnings_of
 from focgen.identification.digits import told_gain, told_value
@@ -94,7 +95,14 @@ def identify(
     notes = remarks_of(experiments, nominal, result) + told + result.notes
     result = replace(result, warnings=warnings, notes=notes)
     if out is not None:
-        write_file(out, rig_text(result.rig), inputs)
+        options = {
+            "from": from_,
+            "to": to,
+            "gain_degree": gain_degree,
+            "stages": list(stages),
+            "delay": delay,
+        }
+        write_file(out, rig_text(result.rig) + identified_from(inputs, out, options), inputs)
     return result
 
 

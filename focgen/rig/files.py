@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from focgen.custody import TABLE
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
@@ -56,6 +57,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         uncertainty=_uncertainty(top.table("uncertainty")),
         between=_between(top.section("signals", _WHICH)),
     )
+    top.table(TABLE)  # tells where the rig is from, and nothing of what it is
     top.done()
     return rig
 

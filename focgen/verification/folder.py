@@ -15,6 +15,7 @@ from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.manifest import sha256
 from focgen.codegen.packages.archive import compare_archive
 from focgen.control.files import read_controller
+from focgen.custody import followed
 from focgen.errors import InputError
 from focgen.output import write_files
 from focgen.plan.build import build_plan
@@ -63,7 +64,7 @@ def read_folder(path: str | Path) -> GeneratedFolder:
             raise InputError(str(path), f"lacks {name}", AGAIN)
     built = compare_archive(path / f"{plan.name}.fmu", plan.name, files, recorded.package.fmi)
     differences = (*_edited(path, files, recorded), *built.differences)
-    notes = (*_notes(path, files, plan.name), *built.notes)
+    notes = (*_notes(path, files, plan.name), *built.notes, *followed(path / "controller.toml", path))
     kernels = recorded.kernels
     return GeneratedFolder(path, plan, recorded.bound, differences, recorded.selftest, kernels, files, notes)
 

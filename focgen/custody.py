@@ -1,0 +1,82 @@
+"""The chain of custody: what a file says that it came from, and whether that is still so.
+
+A rig that was identified carries ``[identified_from]``, a controller ``[designed_from]``: relative names of
+files, their SHA-256, and options. Nothing of such a file is shown but that its hash is another.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from focgen.errors import InputError
+from focgen.textfile import LARGEST_SETTING, read_regular
+
+TABLE = "identified_from"
+_MOST = 64  # files of one link that are followed
+
+
+def sha256_of(path: str | Path) -> str:
+    """Of a file's bytes, in hexadecimal digits. Raises OSError where it cannot be read."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def identified_from(inputs: Iterable[Any], out: str | Path, options: Mapping[str, Any]) -> str:
+    """The table of a rig written to ``out``, as TOML: every input that is a file, and the options that were
+    given. Inputs in memory leave no mark."""
+    base = Path(out).resolve().parent
+    files = [one for one in inputs if isinstance(one, (str, Path)) and Path(one).is_file()]
+    named = [{"file": _beside(Path(one), base), "sha256": sha256_of(one)} for one in files]
+    given = {key: value for key, value in options.items() if value is not None}
+    table = {TABLE: {"options": given, "files": named}}
+    return "\n" + tomlkit.dumps(table)
+
+
+def _beside(path: Path, base: Path) -> str:
+    try:
+        return Path(os.path.relpath(path.resolve(), base)).as_posix()
+    except ValueError:  # another drive
+        return path.name
+
+
+def followed(controller: Path, near: Path) -> Iterator[str]:
+    """Yield what does not fit, from a controller.toml back to the logs, as far as the files are there; names
+    are looked up beside the folder ``near`` and in the one above."""
+    source = _table(controller).get("designed_from")
+    if not isinstance(source, dict):
+        return
+    rig = _found(source.get("file"), (near, near.parent))
+    if rig is None:
+        return
+    if sha256_of(rig) != source.get("sha256"):
+        yield f"{rig}: is not the rig that the controller was designed from"
+        return
+    made = _table(rig).get(TABLE)
+    files = made.get("files") if isinstance(made, dict) else None
+    for entry in files[:_MOST] if isinstance(files, list) else ():
+        path = _found(entry.get("file"), (rig.parent,)) if isinstance(entry, dict) else None
+        if path is not None and sha256_of(path) != entry.get("sha256"):
+            yield f"{path}: is not what {rig.name} was identified from"
+
+
+def _found(name: Any, places: Iterable[Path]) -> Path | None:
+    """The first regular file of a relative name."""
+    if not isinstance(name, str) or "\0" in name or os.path.isabs(name):
+        return None
+    found = (place / name for place in places)
+    return next((path for path in found if path.is_file() and os.access(path, os.R_OK)), None)
+
+
+def _table(path: Path) -> dict[str, Any]:
+    """A file of TOML; empty where it is none."""
+    try:
+        return tomllib.loads(read_regular(path, LARGEST_SETTING).decode("utf-8"))
+    except (OSError, ValueError, RecursionError, InputError):
+        return {}
