@@ -83,7 +83,7 @@ def set_point_error(plan: Plan) -> float:
     return 1.01 * (own + double)
 
 
-def start_of(plan: Plan):
+def start_of(plan: Plan) -> int | float:
     """y after init, raw."""
     return min(max(0, plan.reference.low), plan.reference.high)
 

@@ -38,6 +38,7 @@ def reachable(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, Interval | N
         known |= {name: _around(most) for name, most in each.items()}
     remembered = plan.feedback and plan.feedback.table.banks
     known |= {
+        "set_point": None,  # a step clamps it before it uses it
         "error": span(plan.error).hull(0),
         "filtered": _around(worst["v"]) if remembered else None,
         "carry": Interval(-half, half),
