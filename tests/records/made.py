@@ -12,20 +12,20 @@ NOISE = 8e-6  # m, of the benchmark's own estimation data
 M, C, K, ALPHA, BETA, GAMMA, DELTA = 2.0, 10.0, 5e4, 5e4, 1e3, 0.8, -1.1
 
 
-def bouc_wen(seed: int = 1) -> dict[str, np.ndarray]:
+def bouc_wen(seed: int = 1, samples: int = SAMPLES) -> dict[str, np.ndarray]:
     """A record of the hysteretic benchmark (J.-P. Noël and M. Schoukens, 2016) by its columns: a random
     multisine from rest, integrated at 15 kHz, with noise."""
     rng = np.random.default_rng(seed)
-    bins = np.arange(1, SAMPLES // 2)
-    spectrum = np.zeros(SAMPLES * FINER // 2 + 1, complex)
-    inside = bins[(bins * RATE / SAMPLES >= BAND[0]) & (bins * RATE / SAMPLES <= BAND[1])]
+    bins = np.arange(1, samples // 2)
+    spectrum = np.zeros(samples * FINER // 2 + 1, complex)
+    inside = bins[(bins * RATE / samples >= BAND[0]) & (bins * RATE / samples <= BAND[1])]
     spectrum[inside] = np.exp(2j * np.pi * rng.random(len(inside)))
     force = np.fft.irfft(spectrum)
     force *= FORCE / force.std()
     fine = _integrated(np.r_[force, force[:FINER]])[: len(force)]
     y = decimate(decimate(fine, 4, ftype="fir"), 5, ftype="fir")
     f = force[::FINER]
-    return {"t_s": np.arange(SAMPLES) / RATE, "f_N": f, "y_m": y + NOISE * rng.standard_normal(SAMPLES)}
+    return {"t_s": np.arange(samples) / RATE, "f_N": f, "y_m": y + NOISE * rng.standard_normal(samples)}
 
 
 def _integrated(force: np.ndarray) -> np.ndarray:
