@@ -4,9 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from focgen.codegen.generate import generate
 from focgen.control import Source, read_controller, write_controller
+from focgen.control.controller import NOTHING
 from focgen.control.files import controller_text
 from focgen.errors import ControllerError
+from focgen.plan.build import build_plan
+from focgen.verification.verify import verify
 
 CONTROLLER = """
 name = "lead"
@@ -85,3 +89,28 @@ def test_schedule_range_without_schedule_is_refused(tmp_path):
     text = CONTROLLER.replace("[gain]\nbreakpoints = [0.0, 1.0]\ngains = [1.0, 3.0]\n", "")
     with pytest.raises(ControllerError, match="not scheduled"):
         read_controller(controller_file(tmp_path, text))
+
+
+FILTER = """name = "lead"
+sample_time = 0.005
+length = 24
+gain = 3.0
+[transfer]
+num = [[0.4, 0.5], [1.0, 0.0]]
+[ranges]
+reference = [-1.0, 1.0]
+output = [-20.0, 20.0]
+"""
+
+
+@pytest.mark.parametrize("arithmetic", ["q15", "f32"])
+def test_a_pure_filter_needs_no_range_of_a_measurement(tmp_path, arithmetic):
+    """As fine as the reference allows, and no coarser for a measurement that there is not."""
+    lead = read_controller(controller_file(tmp_path, FILTER))
+    write_controller(lead, tmp_path / "again.toml")
+    assert read_controller(tmp_path / "again.toml") == lead and lead.ranges.measurement == NOTHING
+    made = generate(lead, tmp_path / "lead", arithmetic)
+    doubled = replace(lead, ranges=replace(lead.ranges, measurement=(-1.0, 1.0)))
+    invented = build_plan(doubled, arithmetic)
+    assert made.plan.error.lsb * (1 + (arithmetic == "q15")) == invented.error.lsb
+    assert verify(tmp_path / "lead", samples=2000).holds

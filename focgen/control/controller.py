@@ -37,11 +37,15 @@ class GainSchedule:
         return np.where(place == points[-1], gains[-1], gains[i] + slope * (place - points[i]))
 
 
+NOTHING = (0.0, 0.0)
+"""The range of a measurement that a pure filter does not have: it is 0 in every sample."""
+
+
 @dataclass(frozen=True)
 class ControllerRanges:
     """What each signal can reach, (low, high) in physical units; ``schedule`` is None without a schedule.
 
-    Reference and measurement are in the same unit.
+    Reference and measurement are in the same unit; the measurement of a pure filter is ``NOTHING``.
     """
 
     reference: tuple[float, float]

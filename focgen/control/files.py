@@ -53,6 +53,7 @@ from typing import Any
 import tomlkit
 
 from focgen.control.controller import (
+    NOTHING,
     ARITHMETICS,
     MEMORIES,
     TOLERANCES,
@@ -143,10 +144,10 @@ def _gain(top: Table) -> float | GainSchedule:
 
 def _ranges(top: Table, scheduled: bool) -> ControllerRanges:
     table = top.section("ranges", "give reference, measurement and output as [low, high]")
-    needed = ["reference", "measurement", "output"] + ["schedule"] * scheduled
+    needed = ["reference", "output"] + ["schedule"] * scheduled
     for key in needed:
         table.required(key)
-    ranges = _spans(table, needed)
+    ranges = _spans(table, [*needed, "measurement"])
     if "schedule" in table and not scheduled:
         raise table.fail("schedule", "is given, but the gain is not scheduled", "remove it or add [gain]")
     table.done()
@@ -155,6 +156,7 @@ def _ranges(top: Table, scheduled: bool) -> ControllerRanges:
 
 def _spans(table: Table, keys: Sequence[str]) -> ControllerRanges:
     spans: dict[str, Any] = {key: table.span(key) for key in keys}
+    spans["measurement"] = spans["measurement"] or NOTHING
     return ControllerRanges(**spans)
 
 
@@ -298,7 +300,7 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     table["transfer"] = {"num": terms_of(transfer.num), "den": terms_of(transfer.den)}
     if isinstance(controller.gain, GainSchedule):
         table["gain"] = {key: list(values) for key, values in asdict(controller.gain).items()}
-    spans = {key: list(span) for key, span in asdict(controller.ranges).items() if span is not None}
+    spans = {key: list(s) for key, s in asdict(controller.ranges).items() if s not in (None, NOTHING)}
     table["ranges"] = spans
     if controller.tunable:
         table["tunable"] = _box(controller.tunable)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.control.controller import Controller
+from focgen.control.controller import NOTHING, Controller
 from focgen.errors import PlanError
 from focgen.plan.banks import BankDraft, bank_drafts, drive_error
 from focgen.plan.blocks import Draft, coarsest, finished, split
@@ -68,7 +68,7 @@ def signals(controller: Controller, word: Word) -> Signals:
     )
     while True:
         ref = span_of(r0, r1, exponent, where, "reference")
-        meas = span_of(m0, m1, exponent, where, "measurement")
+        meas = Interval(0, 0) if (m0, m1) == NOTHING else span_of(m0, m1, exponent, where, "measurement")
         error = (ref - meas).hull(0)
         if error.worst <= word.limit:
             break
