@@ -113,17 +113,18 @@ def test_a_picture_does_not_replace_an_input(files, command, tmp_path, capsys, m
 
 
 def test_generate_beside_its_controller_keeps_it(files, capsys):
-    """The folder's copy is the controller's own bytes: nothing is lost. Other bytes are refused."""
+    """The folder's copy is the controller's own bytes: nothing is lost. Other bytes are refused, and
+    ``--force`` is no leave to lose the input."""
     controller = files["controller.toml"]
     before = controller.read_bytes()
     generate(controller, controller.parent)
     assert controller.read_bytes() == before and (controller.parent / "spba.c").is_file()
     other = controller.with_name("README.md")
     other.write_bytes(before)
-    refused(["generate", other, "--out", other.parent], {**files, "README.md": other}, capsys)
+    refused(["generate", other, "--out", other.parent, "--force"], {**files, "README.md": other}, capsys)
     runtime = controller.with_name("foc_rt.h")
     runtime.write_bytes(before)
-    refused(["generate", runtime, "--out", runtime.parent], {**files, "foc_rt.h": runtime}, capsys)
+    refused(["generate", runtime, "--out", runtime.parent, "--force"], {**files, "foc_rt.h": runtime}, capsys)
 
 
 def test_generate_does_not_remove_its_controller(files, capsys):
