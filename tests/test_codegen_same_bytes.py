@@ -53,6 +53,8 @@ SETTINGS = {
     "an old processor": {KERNELS: "Nehalem", FEATURES: features("")},
     "no AVX-512": {FEATURES: features("512", "V4")},
 }
+QUICK = ("SkylakeX", "an old processor")
+"""The farthest from one another; the others are in the long suite."""
 
 
 @functools.cache
@@ -75,7 +77,9 @@ def made(setting: str | None = None) -> dict[str, dict[str, str]]:
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("setting", SETTINGS)
+@pytest.mark.parametrize(
+    "setting", [s if s in QUICK else pytest.param(s, marks=pytest.mark.long) for s in SETTINGS]
+)
 def test_another_processor_makes_the_same_bytes(setting):
     here, there = made()["files"], made(setting)["files"]
     assert there.keys() == here.keys() and len(here) > 50

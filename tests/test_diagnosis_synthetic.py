@@ -57,6 +57,7 @@ def test_one_effect_is_named_in_its_stage(effect, stage, case):
     assert found.shrink > 0.8
 
 
+@pytest.mark.long
 def test_a_gain_that_ends_is_seen_though_own_parameters_bend_to_make_up_for_it():
     """From parameters so bent a dead zone mends more than the gain's own forms do."""
     found = diagnose(RIG, session(1, cap=0.1, roles=("pressure",)))
@@ -132,12 +133,14 @@ def _converted(log, step, uneven, lazy):
     return replace(log, signals={**log.signals, "output": step * np.array(codes)})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("uneven, lazy", [(0.15, 0.0), (0.0, 0.25), (0.1, 0.1)])
 def test_uneven_and_sluggish_steps_are_no_effect_of_their_own(uneven, lazy):
     coarse = [_converted(log, 9e-4, uneven, lazy) for log in session(4, roles=("pressure",))]
     assert named(diagnose(RIG, coarse)) == [["sensor_quantization"]]
 
 
+@pytest.mark.long
 def test_an_effect_beside_a_converter_is_found():
     coarse = [_converted(log, 4e-4, 0.1, 0.1) for log in session(5, vent=0.8, roles=())]
     found = named(diagnose(RIG, coarse))
@@ -243,6 +246,7 @@ def test_told_the_effect_it_considers_nothing_else():
         diagnose(RIG, session(11, vent=0.8), only=("valve_asymetry",))
 
 
+@pytest.mark.long
 def test_told_two_effects_it_takes_the_small_one_too():
     """A dead zone so small that it is not believed beside a loop."""
     logs = session(11, slip=0.35, zone=0.006)

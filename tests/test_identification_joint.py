@@ -235,6 +235,7 @@ def cut_trials(seeds: range, course, latest: float, step: float = 0.02) -> tuple
     return len(found), np.array(found)
 
 
+@pytest.mark.long
 def test_logs_cut_off_within_a_hold_tell_the_same():
     count, errors = cut_trials(range(3), release_course, 12.0, 0.05)
     assert count == 3 and np.mean(np.abs(errors) <= 1.0) >= 0.75 and np.abs(errors).max() < 2.0

@@ -69,6 +69,7 @@ def plainly(monkeypatch):
     monkeypatch.setattr(write, "_shown", lambda study: {})
 
 
+@pytest.mark.long
 def test_a_dask_cluster_finds_the_same(alone, tmp_path):
     """A real scheduler with two worker processes, reached by its address."""
     distributed = pytest.importorskip("distributed")
