@@ -18,8 +18,8 @@ STEPS, RIG = [EXAMPLES / "logs" / "steps.csv"], EXAMPLES / "rig.toml"
 def test_a_compromise_is_known_no_better_than_usual():
     """The example's actuator unloads more slowly than it loads. Of the steps alone the intervals are
     believed; of the releases, too, they are not: T is 1.80 ± 3 % then, and 1.32 in truth."""
-    alone = identify(STEPS, RIG, last=40.0, integer=False)
-    both = identify(STEPS, RIG, integer=False)
+    alone = identify(RIG, STEPS, last=40.0, integer=False)
+    both = identify(RIG, STEPS, integer=False)
     assert alone.rig.uncertainty.actuator.time < 0.05 and not any(
         "compromise" in note for note in alone.notes
     )
@@ -32,6 +32,6 @@ def test_a_compromise_is_known_no_better_than_usual():
 @pytest.mark.long
 def test_a_rig_identified_from_a_log_is_diagnosed_from_it(tmp_path):
     """Whoever identifies a rig asks next what it lacks, of the same log."""
-    identify(STEPS, RIG, tmp_path / "identified.toml", integer=False)
+    identify(RIG, STEPS, tmp_path / "identified.toml", integer=False)
     found = diagnose(tmp_path / "identified.toml", STEPS, tmp_path / "gap")
     assert [cause.candidates[0].effect for cause in found.causes] == ["unloading_asymmetry"]

@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from focgen.codegen.manifest import sha256
+from focgen.codegen.manifest import read_manifest, sha256
 from focgen.errors import InputError
-from focgen.jsontext import read_json
 
 _NAMED = 3
 
@@ -19,7 +18,7 @@ def check_unedited(folder: Path, files: Mapping[str, str | bytes], old: Iterable
     Lost would be a file whose bytes are neither those that the folder's manifest recorded when it was written
     nor those that take its place. The manifest itself is always ``generate``'s own.
     """
-    written = _written(folder / "manifest.json")
+    written = _written(folder)
     bytes_of = {name: text.encode("utf-8") if isinstance(text, str) else text for name, text in files.items()}
     names = [*bytes_of, *(path.relative_to(folder).as_posix() for path in old)]
     found = [
@@ -42,11 +41,7 @@ def _lost(path: Path, new: bytes | None, written: Any) -> bool:
     return content != new and sha256(content) != written
 
 
-def _written(manifest: Path) -> dict[str, Any]:
+def _written(folder: Path) -> dict[str, Any]:
     """Name → SHA-256 of what an earlier run has written."""
-    try:
-        found = read_json(manifest, "")
-    except InputError:
-        return {}
-    files = found.get("files") if isinstance(found, dict) else None
+    files = read_manifest(folder).get("files")
     return files if isinstance(files, dict) else {}

@@ -7,10 +7,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from focgen.codegen.manifest import sha256
+from focgen.codegen.manifest import read_manifest, sha256
 from focgen.codegen.packages.package import moved, package_file
-from focgen.errors import InputError
-from focgen.jsontext import read_json
 
 
 def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tuple[Path, ...]:
@@ -19,7 +17,7 @@ def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tupl
 
     Files of a controller of another name stay, and so does whatever no manifest tells of.
     """
-    manifest = _manifest(folder)
+    manifest = read_manifest(folder)
     if manifest.get("name") != name:
         return ()
     test = [f"{name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
@@ -48,14 +46,6 @@ def _packaged(manifest: dict, name: str) -> Iterator[tuple[str, str]]:
 def _of(entry: Any, key: str) -> Any:
     """What an object has under a key; None where it is no object."""
     return entry.get(key) if isinstance(entry, dict) else None
-
-
-def _manifest(folder: Path) -> dict:
-    try:
-        found = read_json(folder / "manifest.json", "")
-    except InputError:
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _is(path: Path, digest: str) -> bool:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import math
+from pathlib import Path
 from typing import Any
 
 import focgen
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.selftest import selftest_entry
 from focgen.codegen.state import plain_bytes, size_of, state_bytes
+from focgen.errors import InputError
 from focgen.fractional.elementary import rounded_up
+from focgen.jsontext import read_json
 from focgen.plan.canonical import memory_bias
 from focgen.plan.integrals import smallest_error
 from focgen.plan.model import (
@@ -28,6 +31,15 @@ from focgen.plan.model import (
 from focgen.plan.tuning import default_params
 from focgen.plan.remarks import remarks
 from focgen.plan.usable import EXPONENT
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """What an earlier run has recorded in a folder; empty where there is nothing that can be read."""
+    try:
+        found = read_json(folder / "manifest.json", "")
+    except InputError:
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def sha256(data: str | bytes) -> str:

@@ -137,18 +137,18 @@ def _actuator(
     check_determined(excitations, fit)
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
-    joint = _joint(excitations, fit, fits)
+    joint, compromise = _joint(excitations, fit, fits), is_compromise(excitations, fit)
     new = replace(
         rig,
         actuator=Actuator(joint.T, joint.alpha, joint.gain),
         delays=replace(rig.delays, actuator=joint.delay),
-        uncertainty=replace(rig.uncertainty, actuator=actuator_uncertainty(excitations, fit)),
+        uncertainty=replace(rig.uncertainty, actuator=actuator_uncertainty(excitations, fit, compromise)),
     )
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
     warnings = warnings_of(excitations, fit, fits, failed, quality)
     told = lowered + _told(experiments, excitations)
-    if is_compromise(excitations, fit):
+    if compromise:
         told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 

@@ -81,15 +81,15 @@ def relative_halves(excitations: Sequence[Excitation], fit: FractionalFit) -> di
     }
 
 
-def actuator_uncertainty(excitations: Sequence[Excitation], fit: FractionalFit) -> Relative:
-    """How well the actuator is known, for the rig's ``[uncertainty]``.
+def actuator_uncertainty(excitations: Sequence[Excitation], fit: FractionalFit, compromise: bool) -> Relative:
+    """How well the actuator is known, for the rig's ``[uncertainty]``; ``compromise``: see below.
 
     An interval says how well this model is determined, not how far it is from the rig. Where the model's own
     misfit outweighs the noise, the numbers are a compromise, and known no better than a rig's usually are.
     """
     half = relative_halves(excitations, fit)
     known = Relative(_told(half["K"]), _told(half["T"]), _told(half["alpha"]))
-    if not is_compromise(excitations, fit):
+    if not compromise:
         return known
     usual = Uncertainty().actuator
     return Relative(max(known.gain, usual.gain), max(known.time, usual.time), max(known.alpha, usual.alpha))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -18,6 +17,7 @@ from focgen.control.inversion import Inversion
 from focgen.control.measures import StepMeasures
 from focgen.control.schedule import TOLERANCE, Table, gain_table
 from focgen.control.units import units_of
+from focgen.custody import sha256_of
 from focgen.errors import DesignError, check_choice
 from focgen.jsontext import UNWRITTEN
 from focgen.loop.bench import Bench, prepare
@@ -179,7 +179,7 @@ def _check_wishes(
 
 def _source(path: Path | None) -> Source | None:
     """What the controller says it was designed from; nothing where that is no file."""
-    return None if path is None else Source(path.name, hashlib.sha256(path.read_bytes()).hexdigest())
+    return None if path is None else Source(path.name, sha256_of(path))
 
 
 def _tuned(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Sequence
 from copy import copy
@@ -16,6 +15,7 @@ from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, res
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.measures import StepMeasures, measure_step
 from focgen.control.setpoints import default_setpoints
+from focgen.custody import sha256_of
 from focgen.errors import ControllerError, DesignError
 from focgen.loop.chain import chain
 from focgen.loop.frozen import frozen_loop, frozen_margins, frozen_step
@@ -168,11 +168,7 @@ def _said(rig: Rig, controller: Controller, path: Path | None) -> list[str]:
             f"the controller runs at {controller.sample_time:g} s, the rig says {rig.sample_time:g} s"
         )
     source = controller.designed_from
-    if (
-        source is not None
-        and path is not None
-        and hashlib.sha256(path.read_bytes()).hexdigest() != source.sha256
-    ):
+    if source is not None and path is not None and sha256_of(path) != source.sha256:
         notes.append(f"the controller was designed from another state of the rig ({source.file})")
     if rig.effects:
         names = ", ".join(str(effect["name"]) for effect in rig.effects)

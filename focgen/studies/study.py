@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding, rest
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.setpoints import default_setpoints
+from focgen.custody import sha256_of
 from focgen.errors import ControllerError, DesignError, InputError, check_choice
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.arguments import RigLike, file_of, rig_of
@@ -119,7 +119,7 @@ def _rig(
     if made_from is None:
         return None, ["no rig is named in the controller: give --rig for the closed-loop columns"]
     places = _designed_from(controller, source)
-    same = [p for p in places if hashlib.sha256(p.read_bytes()).hexdigest() == made_from.sha256]
+    same = [p for p in places if sha256_of(p) == made_from.sha256]
     if same:
         return read_rig(same[0]), []
     if places:

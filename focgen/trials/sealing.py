@@ -6,6 +6,7 @@ import hashlib
 import json
 from pathlib import Path
 
+from focgen.custody import sha256_of
 from focgen.errors import InputError
 from focgen.trials.facts import sealed_label
 
@@ -41,6 +42,6 @@ def unseal(path: Path, committed: str, unseen: Path) -> dict:
 def file_hash(path: Path) -> str:
     """SHA-256 of a file, hexadecimal. Raises InputError where it cannot be read."""
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return sha256_of(path)
     except OSError as reason:
         raise InputError(str(path), f"cannot be read ({reason.strerror})", "make the cases anew") from None
