@@ -18,7 +18,7 @@ STEPS, RIG = [EXAMPLES / "logs" / "steps.csv"], EXAMPLES / "rig.toml"
 def test_a_compromise_is_known_no_better_than_usual():
     """The example's actuator unloads more slowly than it loads. Of the steps alone the intervals are
     believed; of the releases, too, they are not: T is 1.80 ± 3 % then, and 1.32 in truth."""
-    alone = identify(RIG, STEPS, last=40.0, integer=False)
+    alone = identify(RIG, STEPS, to=40.0, integer=False)
     both = identify(RIG, STEPS, integer=False)
     assert alone.rig.uncertainty.actuator.time < 0.05 and not any(
         "compromise" in note for note in alone.notes
