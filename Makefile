@@ -4,8 +4,9 @@ VENV   := .venv
 RUN    := $(VENV)/bin/python
 JOBS   ?= 2
 FUZZ_SECONDS ?= 600
+FOLDERS ?= focgen
 
-.PHONY: help demo test test-long test-pythons types docs bench trials trial-cases trial-report foreign records prove fuzz trust clean
+.PHONY: help demo test test-long test-pythons types lint house slowest docs bench trials trial-cases trial-report foreign records prove fuzz fuzz-c fuzz-inputs trust trust-lost equality mutants coverage matrix lock headers clean
 .DEFAULT_GOAL := help
 
 help:            ## this list
@@ -49,6 +50,16 @@ $(VENV)/ready-dev: $(VENV)/ready-test
 
 types: $(VENV)/ready-dev       ## what users call and get, by a strict checker of types
 	$(RUN) -m mypy
+
+lint: $(VENV)/ready-dev        ## rules of style and likely faults, and the form of every file
+	$(RUN) -m ruff check focgen tests tools
+	$(RUN) -m ruff format --check focgen tests tools
+
+house: $(VENV)/ready-dev       ## lengths and complexity of functions, longest file, what a strict checker finds
+	$(RUN) tools/house.py --types --most 5 $(FOLDERS)
+
+slowest: $(VENV)/ready-test    ## the ten slowest tests (the whole suite, by one process)
+	OMP_NUM_THREADS=1 $(RUN) -m pytest -q --durations=10 $(TESTS) | sed -n '/slowest/,$$p'
 
 $(VENV)/ready-docs: $(VENV)/ready
 	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
@@ -111,8 +122,14 @@ $(VENV)/ready-prove: $(VENV)/ready-test
 prove: $(VENV)/ready-prove     ## no overflow, no access outside, by the verifiers that are installed
 	$(RUN) -m tests.proofs
 
-fuzz: $(VENV)/ready-test       ## led random calls under the sanitisers, FUZZ_SECONDS=600 (needs clang)
+fuzz: fuzz-c fuzz-inputs        ## both of the next two, FUZZ_SECONDS=600 each; hours find more
+
+fuzz-c: $(VENV)/ready-test     ## led random calls of generated C under the sanitisers (needs clang)
 	$(RUN) -m tests.proofs.fuzz --seconds $(FUZZ_SECONDS)
+
+# Corpus, counts and what is found stay in build/fuzz/: a further run goes on. Python 3.12 leads five times as fast.
+fuzz-inputs: $(VENV)/ready-test  ## led mutations of logs, TOML, JSON, folders and command lines
+	OMP_NUM_THREADS=1 $(RUN) -m tests.fuzz --seconds $(FUZZ_SECONDS)
 
 # SECONDS that each fault lasts, RUNS from seeds of their own, MEMORY short or exponential.
 SECONDS ?= 180
@@ -121,6 +138,42 @@ MEMORY  ?= short
 
 trust: $(VENV)/ready-test      ## generated C in a loop under faults, a table (SECONDS=180 RUNS=3 MEMORY=short)
 	OMP_NUM_THREADS=1 $(RUN) -m tests.trust --seconds $(SECONDS) --runs $(RUNS) --memory $(MEMORY)
+
+KILLS ?= 200
+
+trust-lost: $(VENV)/ready-test  ## every command killed at random, on a full disk, two at once: nothing is lost (KILLS=200)
+	OMP_NUM_THREADS=1 $(RUN) -m tests.trust.lost --kills $(KILLS)
+
+# A billion samples on the host and ten million on each emulated core take some hours of one core; a further
+# `make equality` goes on where the last one ended.
+SAMPLES      ?= 1e9
+CONTROLLERS  ?= 2000
+CORE_SAMPLES ?= 1e7
+
+equality: $(VENV)/ready-test   ## C and reference over random controllers (SAMPLES=1e9 CONTROLLERS=2000 CORE_SAMPLES=1e7)
+	OMP_NUM_THREADS=1 $(RUN) -m tests.equality --samples $(SAMPLES) --controllers $(CONTROLLERS) \
+	  --core-samples $(CORE_SAMPLES)
+
+# The tests are measured once (an hour of one core); then COUNT changes of the sources from SEED on, which can be
+# resumed as well.
+COUNT ?= 320
+
+mutants: $(VENV)/ready-dev     ## one small change of the sources at a time: do the tests tell? (COUNT=320 SEED=1)
+	OMP_NUM_THREADS=1 $(RUN) -m tests.mutants --count $(COUNT) --seed $(if $(filter file,$(origin SEED)),1,$(SEED))
+
+coverage: $(VENV)/ready-dev    ## lines and branches that the suite runs, by room
+	OMP_NUM_THREADS=1 $(RUN) -m coverage run -m pytest -q $(TESTS)
+	$(RUN) tools/coverage_by_room.py
+
+matrix: $(VENV)/ready-test     ## the same bytes by every Python, numpy, processor, locale … that there is here
+	$(RUN) -m tests.matrix --folder build/matrix
+
+lock:                          ## requirements/dev.lock anew: versions and hashes of what development needs (uv)
+	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \
+	  --no-header --no-annotate --upgrade --quiet --output-file requirements/dev.lock
+
+headers: $(VENV)/ready         ## the runtime's header of 32-bit sums, printed from that of 16-bit ones
+	$(RUN) tools/twin_headers.py
 
 clean:                         ## remove everything that was built
 	rm -rf $(VENV) build

@@ -30,20 +30,20 @@ if TYPE_CHECKING:
     from focgen.diagnosis.diagnose import diagnose
     from focgen.diagnosis.model import Diagnosis
     from focgen.fractional.transfer import TransferFunction
+    from focgen.identification.identification import Identification
     from focgen.identification.identify import identify
-    from focgen.identification.model import Identification
     from focgen.logs.experiment import Experiment
     from focgen.loop.design import Design, design
     from focgen.loop.simulate import Simulation, simulate
     from focgen.report.paths import report
     from focgen.rig.files import read_rig, write_rig
-    from focgen.rig.model import Rig
     from focgen.rig.proposal import Proposal, init
     from focgen.rig.reading import read_logs
     from focgen.rig.replay import Replay, replay
+    from focgen.rig.rig import Rig
     from focgen.running.controller import LoadedController, ScheduledController
     from focgen.running.load import load
-    from focgen.studies.model import Study
+    from focgen.studies.results import Study
     from focgen.studies.study import study
     from focgen.trials.score import Summary
     from focgen.trials.trial import trial
@@ -113,19 +113,19 @@ _HOMES = {
     "diagnosis.model": ("Diagnosis",),
     "fractional.transfer": ("TransferFunction",),
     "identification.identify": ("identify",),
-    "identification.model": ("Identification",),
+    "identification.identification": ("Identification",),
     "logs.experiment": ("Experiment",),
     "loop.design": ("Design", "design"),
     "loop.simulate": ("Simulation", "simulate"),
     "report.paths": ("report",),
     "rig.files": ("read_rig", "write_rig"),
-    "rig.model": ("Rig",),
+    "rig.rig": ("Rig",),
     "rig.proposal": ("Proposal", "init"),
     "rig.reading": ("read_logs",),
     "rig.replay": ("Replay", "replay"),
     "running.controller": ("LoadedController", "ScheduledController"),
     "running.load": ("load",),
-    "studies.model": ("Study",),
+    "studies.results": ("Study",),
     "studies.study": ("study",),
     "trials.score": ("Summary",),
     "trials.trial": ("trial",),

@@ -102,5 +102,11 @@ def _is_own(path: Path, kind: Callable[[int], bool]) -> bool:
 def _temporary() -> Path:
     """A new folder of a name that nobody could foresee; it goes with the process that made it."""
     folder, maker = tempfile.mkdtemp(prefix="focgen-"), os.getpid()
-    atexit.register(lambda: os.getpid() == maker and shutil.rmtree(folder, ignore_errors=True))
+    atexit.register(_remove, folder, maker)
     return Path(folder)
+
+
+def _remove(folder: str, maker: int) -> None:
+    """Not by a process that was forked from the one that made it."""
+    if os.getpid() == maker:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -14,8 +14,8 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.drawn import FILE as SIGNALS
 from focgen.diagnosis.drawn import read_drawn
 from focgen.diagnosis.model import Diagnosis
+from focgen.identification.identification import Identification
 from focgen.identification.identify import identify
-from focgen.identification.model import Identification
 from focgen.loop.design import Design, design
 from focgen.loop.simulate import Simulation, simulate
 from focgen.output import new_folder
@@ -24,7 +24,7 @@ from focgen.report.control import design_pictures, simulation_pictures
 from focgen.report.demo_page import demo_page
 from focgen.report.identification import identification_pictures
 from focgen.resources import shipped
-from focgen.studies.model import Study
+from focgen.studies.results import Study
 from focgen.studies.study import study
 from focgen.trials.make import make
 from focgen.trials.sealing import unseal

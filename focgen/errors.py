@@ -6,7 +6,7 @@
     │   ├── RigError            a rig.toml
     │   └── ControllerError     a controller.toml
     ├── FitError                the data cannot determine what was asked for
-    ├── DesignError             no controller meets the wish
+    ├── DesignError             no controller meets the specification
     ├── PlanError               the controller cannot be realised in this arithmetic
     ├── BuildError              the C compiler is missing or refused the code
     └── MissingExtra            an optional library is not installed
@@ -17,6 +17,8 @@ The command line prints ``focgen: error: WHERE: WHAT; REMEDY`` and exits with st
 from collections.abc import Iterable
 from typing import Self
 
+_LONGEST = 600  # characters of a part of a message: a value from a file may have millions
+
 
 class FocgenError(Exception):
     """Input that cannot be used.
@@ -25,14 +27,19 @@ class FocgenError(Exception):
     ``remedy`` what to do about it.
     """
 
-    def __init__(self, where: str, what: str, remedy: str):
-        self.where, self.what, self.remedy = str(where), what, remedy
-        super().__init__(f"{where}: {what}; {remedy}")
+    def __init__(self, where: str, what: str, remedy: str) -> None:
+        self.where, self.what, self.remedy = _short(str(where)) or "''", _short(what), _short(remedy)
+        super().__init__(f"{self.where}: {self.what}; {self.remedy}")
 
     def __reduce__(
         self,
     ) -> tuple[type[Self], tuple[str, str, str]]:  # three arguments, so that errors cross process boundaries
         return type(self), (self.where, self.what, self.remedy)
+
+
+def _short(text: str) -> str:
+    """A part of the message, without the middle of what is too long to be read."""
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
 
 
 class InputError(FocgenError):
@@ -56,7 +63,7 @@ class FitError(FocgenError):
 
 
 class DesignError(FocgenError):
-    """No controller meets the wish."""
+    """No controller meets the specification."""
 
 
 class PlanError(FocgenError):
@@ -72,6 +79,7 @@ class MissingExtra(FocgenError):
 
     @classmethod
     def of(cls, library: str, extra: str, purpose: str) -> Self:
+        """The error of a ``purpose`` that needs a library from one of the project's extras."""
         return cls(purpose, f"needs {library}, which is not installed", f"pip install 'focgen[{extra}]'")
 
 

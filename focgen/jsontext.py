@@ -15,6 +15,8 @@ import numpy as np
 from focgen.errors import InputError
 from focgen.textfile import LARGEST_JSON, read_regular
 
+_INTEGERS = -(2**63), 2**64  # what an array can hold: nothing that is written here is beyond
+
 UNWRITTEN = {"json": False}
 """Metadata of a dataclass field that :func:`plain` leaves out."""
 
@@ -74,7 +76,7 @@ def fits(value: Any, shape: Any) -> bool:
     return value is None if shape is None else isinstance(value, shape)
 
 
-def _has(value: dict, key: str, shape: Any) -> bool:
+def _has(value: dict[str, Any], key: str, shape: Any) -> bool:
     name = key.rstrip("?")
     return fits(value[name], shape) if name in value else name != key
 
@@ -82,7 +84,4 @@ def _has(value: dict, key: str, shape: Any) -> bool:
 def _is_number(value: Any, kind: type) -> bool:
     if isinstance(value, bool) or not isinstance(value, int if kind is int else (int, float)):
         return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer beyond every float
-        return False
+    return _INTEGERS[0] <= value < _INTEGERS[1] if isinstance(value, int) else math.isfinite(value)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from focgen import journal
 from focgen.errors import InputError
 from focgen.scratch import scratch_file, scratch_folder, synced
 
-_CONTENTS = "manifest.json"
+Old = Callable[[], Iterable[Path]]
+"""What goes from a folder as a result takes its place there."""
 
 
 def check_apart(outputs: Iterable[str | Path], inputs: Iterable[Any]) -> None:
@@ -40,10 +42,12 @@ def _identity(path: Any) -> tuple[int, int] | None:
 
 
 @contextmanager
-def new_folder(target: str | Path, inputs: Iterable[Any] = ()) -> Iterator[Path]:
-    """Yield a temporary folder whose files move into ``target`` when the block ends well.
+def new_folder(target: str | Path, inputs: Iterable[Any] = (), old: Old = tuple) -> Iterator[Path]:
+    """Yield a temporary folder whose files move into ``target`` when the block ends well; ``old``, asked
+    then, while no other process moves files there, says which files of ``target`` go.
 
-    Files of the same name in ``target`` are replaced, others stay; on any error nothing is written.
+    Files of the same name in ``target`` are replaced, others stay; on any error nothing is written. A kill
+    leaves what was there, or what the next run makes whole (:mod:`focgen.journal`).
     Raises InputError where ``target`` cannot be written, and where a file would replace one of ``inputs`` by
     other bytes.
     """
@@ -52,13 +56,17 @@ def new_folder(target: str | Path, inputs: Iterable[Any] = ()) -> Iterator[Path]
         stack.callback(_remove_empty, target)
         try:
             target.mkdir(parents=True, exist_ok=True)
+            journal.finish(target)
             scratch = stack.enter_context(scratch_folder(target))
+            (scratch / journal.FILES).mkdir()
         except OSError as reason:
-            raise InputError(
-                str(target), f"cannot be written ({reason.strerror})", "choose another --out"
-            ) from None
-        yield scratch
-        _move(scratch, target, tuple(inputs))
+            raise _unwritable(target, reason) from None
+        yield scratch / journal.FILES
+        _move(scratch, target, tuple(inputs), old)
+
+
+def _unwritable(target: Path, reason: OSError) -> InputError:
+    return InputError(str(target), f"cannot be written ({reason.strerror})", "choose another --out")
 
 
 def _remove_empty(folder: Path) -> None:
@@ -66,27 +74,30 @@ def _remove_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _move(scratch: Path, target: Path, inputs: tuple) -> None:
-    """Every file to its place, once it is sure that nothing else stands there."""
-    files = sorted(p.relative_to(scratch) for p in scratch.rglob("*") if p.is_file())
-    check_apart((target / name for name in files if not _equal(scratch / name, target / name)), inputs)
+def _move(scratch: Path, target: Path, inputs: tuple[Any, ...], old: Old) -> None:
+    """Every file to its place, once it is sure that nothing else stands there, and all of them are on the
+    disk."""
+    made = scratch / journal.FILES
+    files = sorted(p.relative_to(made) for p in made.rglob("*") if p.is_file())
+    try:
+        for name in files:
+            synced(made / name)
+        with journal.alone(target):
+            _check_places(made, target, files, inputs)
+            journal.put(scratch, target, files, tuple(old()))
+    except OSError as reason:
+        raise _unwritable(target, reason) from None
+
+
+def _check_places(made: Path, target: Path, files: list[Path], inputs: tuple[Any, ...]) -> None:
+    """Raise InputError where an input or a folder stands at the place of a file, or a file at a folder's."""
+    check_apart((target / name for name in files if not _equal(made / name, target / name)), inputs)
     for name in files:
         if (target / name).is_dir():
             raise InputError(str(target / name), "is a folder where a file belongs", "move it away")
         for parent in list(name.parents)[:-1]:
             if (target / parent).exists() and not (target / parent).is_dir():
                 raise InputError(str(target / parent), "is a file where a folder belongs", "move it away")
-    for name in files:  # all of them are on the disk before the first takes its place
-        synced(scratch / name)
-    for name in sorted(files, key=lambda name: name.name == _CONTENTS):  # what tells of the others comes last
-        try:
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
-            os.replace(scratch / name, target / name)
-        except OSError as reason:
-            what = f"cannot be written ({reason.strerror})"
-            raise InputError(str(target / name), what, "choose another --out") from None
-    for folder in {(target / name).parent for name in files}:
-        synced(folder)
 
 
 def _equal(one: Path, other: Path) -> bool:
@@ -94,27 +105,24 @@ def _equal(one: Path, other: Path) -> bool:
     return other.is_file() and one.read_bytes() == other.read_bytes()
 
 
-def write_files(target: str | Path, files: Mapping[str, str | bytes], inputs: Iterable[Any] = ()) -> None:
-    """Write all of ``files`` (relative path → content) into a folder, or none of them.
+def write_files(
+    target: str | Path,
+    files: Mapping[str, str | bytes],
+    inputs: Iterable[Any] = (),
+    old: Old = tuple,
+) -> None:
+    """Write all of ``files`` (relative path → content) into a folder and remove ``old`` ones, or nothing.
 
     Raises InputError as :func:`new_folder` does, and for a name that leads out of the folder.
     """
     for name in files:
         if Path(name).is_absolute() or ".." in Path(name).parts:
             raise InputError(str(target), f"{name!r} would be written outside of it", "choose another name")
-    with new_folder(target, inputs) as folder:
+    with new_folder(target, inputs, old) as folder:
         for name, content in files.items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
-
-
-def remove(files: Iterable[Path]) -> None:
-    """Remove files, and each one's folder where that is empty then."""
-    for path in files:
-        path.unlink(missing_ok=True)
-        with suppress(OSError):
-            path.parent.rmdir()
 
 
 def write_file(path: str | Path, text: str, inputs: Iterable[Any] = ()) -> None:
@@ -146,15 +154,14 @@ def replace_folder(made: Path, target: Path, within: Path) -> None:
         raise InputError(str(target), f"leads out of {within}", "put a folder in the place of the link")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        journal.finish(target.parent)
         with scratch_folder(target.parent) as scratch:
-            shutil.copytree(
-                made, scratch / "new"
-            )  # from another disk, maybe: slow, so it is not the last step
-            for file in (scratch / "new").rglob("*"):
+            # from another disk, maybe: slow, so it is not the last step
+            shutil.copytree(made, scratch / journal.NEW)
+            for file in (scratch / journal.NEW).rglob("*"):
                 synced(file)
-            if target.exists():
-                os.rename(target, scratch / "old")
-            os.rename(scratch / "new", target)
+            with journal.alone(target.parent):
+                journal.put_folder(scratch, target)
         shutil.rmtree(made, ignore_errors=True)
     except (OSError, shutil.Error) as reason:
         raise InputError(

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
 
+from focgen.terminal import for_terminal
+
 Item = TypeVar("Item")
 
 _WIDTH = 24  # characters of the bar
@@ -19,7 +21,7 @@ _lead: ContextVar[str] = ContextVar("lead", default="")  # what stands before ev
 
 def say(line: str) -> None:
     """Print one line that everyone has to see; results go to stdout, this does not."""
-    print(f"{_lead.get()}{line}", file=sys.stderr, flush=True)
+    print(for_terminal(f"{_lead.get()}{line}"), file=sys.stderr, flush=True)
 
 
 def step(line: str) -> None:

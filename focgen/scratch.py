@@ -10,6 +10,7 @@ import os
 import re
 import secrets
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,6 +20,8 @@ try:
 except ImportError:  # Windows: nothing can be told of who lives, so nothing is cleared
     fcntl = None  # type: ignore[assignment]
 
+PATIENCE = 60.0
+"""Seconds that one process waits for others to move their files into the same folder."""
 _OURS = re.compile(r"\.focgen-[0-9a-f]{16}(\.part)?")
 _swept: set[tuple[int, str]] = set()  # by process: looking once is enough
 
@@ -27,14 +30,24 @@ _swept: set[tuple[int, str]] = set()  # by process: looking once is enough
 def scratch_folder(place: Path) -> Iterator[Path]:
     """Yield a new folder in ``place``, which goes at the end. Raises OSError where none can be made."""
     clear(place)
-    path = place / _name()
-    path.mkdir(mode=0o700)
-    lock = _locked(path)
+    path, held = _new_folder(place)
     try:
         yield path
     finally:
         shutil.rmtree(path, ignore_errors=True)
-        _unlock(lock)
+        unlock(held)
+
+
+def _new_folder(place: Path) -> tuple[Path, int | None]:
+    """A new folder and what holds its lock. Until that is had, another process may take it for one that was
+    left: then there is a further one."""
+    while True:
+        path = place / _name()
+        path.mkdir(mode=0o700)
+        held = lock(path)
+        if fcntl is None or (held is not None and path.is_dir()):
+            return path, held
+        unlock(held)
 
 
 @contextmanager
@@ -71,15 +84,15 @@ def clear(place: Path) -> None:
 
 
 def _clear_one(path: Path) -> None:
-    lock = _locked(path)
-    if lock is None:
+    held = lock(path)
+    if held is None:
         return
     with suppress(OSError):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
         else:
             path.unlink()
-    _unlock(lock)
+    unlock(held)
 
 
 def synced(path: Path) -> None:
@@ -96,7 +109,7 @@ def _name() -> str:
     return f".focgen-{secrets.token_hex(8)}"
 
 
-def _locked(path: Path) -> int | None:
+def lock(path: Path) -> int | None:
     """A descriptor that holds the lock of ``path``; None where another process has it."""
     if fcntl is None:
         return None
@@ -112,6 +125,22 @@ def _locked(path: Path) -> int | None:
     return handle
 
 
-def _unlock(handle: int | None) -> None:
+def waited_for(folder: Path) -> int | None:
+    """A descriptor that holds the lock of a folder, once other processes have let it go; None where they do
+    not within :data:`PATIENCE`, or where there are no locks."""
+    until = time.monotonic() + PATIENCE
+    while (held := lock(folder)) is None and fcntl is not None and time.monotonic() < until:
+        time.sleep(0.02)
+    return held
+
+
+def own(path: Path) -> bool:
+    """Whether this user made a folder, and nobody else may write in it."""
+    found = path.lstat()
+    return not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
+
+
+def unlock(handle: int | None) -> None:
+    """Let a lock go."""
     if handle is not None:
         os.close(handle)

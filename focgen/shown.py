@@ -39,5 +39,14 @@ class Shown:
         return _room().frame_of(self)
 
 
+def files_of(found: Shown) -> dict[str, str | bytes]:
+    """What is drawn of a result for the folder that it is written to, by file name.
+
+    Pictures where matplotlib is installed, and a page where the result has one of its own.
+    """
+    files: dict[str, str | bytes] = _room().files_of(found)
+    return files
+
+
 def _room() -> Any:
     return import_module("focgen.report.results")

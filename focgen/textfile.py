@@ -5,7 +5,9 @@ from __future__ import annotations
 import gzip
 import stat
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO, cast
 
 from focgen.errors import InputError, LogError
 
@@ -15,6 +17,7 @@ LARGEST_SETTING = 16 << 20
 """Bytes of a file of TOML."""
 LARGEST_JSON = 512 << 20
 """Bytes of a file of JSON: what has been drawn of a diagnosis is the largest."""
+_PART = 1 << 20  # bytes that are read at a time
 
 
 def read_regular(path: str | Path, most: int, error: type[InputError] = InputError) -> bytes:
@@ -36,22 +39,41 @@ def check_regular(path: str | Path, error: type[InputError] = InputError) -> Non
         raise error(str(path), "is no regular file", "save its content to a file first")
 
 
-def read_log_bytes(path: Path) -> bytes:
-    """The bytes of a log in text, unpacked where its name ends in .gz.
+def open_log(path: Path) -> BinaryIO:
+    """A log in text to read from, unpacked where its name ends in .gz. Raises OSError, and LogError for what
+    is no regular file."""
+    check_regular(path, LogError)
+    return cast(BinaryIO, gzip.open(path, "rb")) if path.name.lower().endswith(".gz") else path.open("rb")
+
+
+def log_parts(path: Path) -> Iterator[bytes]:
+    """Yield the bytes of a log in text, in parts.
 
     Raises OSError, and LogError for more than ``LARGEST_LOG`` bytes unpacked, however few they are packed.
     """
-    if not path.name.lower().endswith(".gz"):
-        return read_regular(path, LARGEST_LOG, LogError)
+    size = 0
     try:
-        with gzip.open(path, "rb") as file:
-            return _at_most(file, LARGEST_LOG, path, LogError)
+        with open_log(path) as file:
+            while part := file.read(_PART):
+                size += len(part)
+                if size > LARGEST_LOG:
+                    raise _too_large(path, LARGEST_LOG, LogError)
+                yield part
     except (gzip.BadGzipFile, EOFError, zlib.error):
         raise LogError(str(path), "is not a whole gzip file", "pack it again") from None
 
 
-def _at_most(file, most: int, path: Path, error: type[InputError]) -> bytes:
+def read_log_bytes(path: Path) -> bytes:
+    """All of :func:`log_parts`."""
+    return b"".join(log_parts(path))
+
+
+def _at_most(file: BinaryIO, most: int, path: Path, error: type[InputError]) -> bytes:
     content = file.read(most + 1)
     if len(content) > most:
-        raise error(str(path), f"has more than {most >> 20} MiB", "split it into smaller files")
-    return bytes(content)
+        raise _too_large(path, most, error)
+    return content
+
+
+def _too_large(path: Path, most: int, error: type[InputError]) -> InputError:
+    return error(str(path), f"has more than {most >> 20} MiB", "split it into smaller files")

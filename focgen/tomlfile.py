@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any, overload
 
 from focgen.errors import InputError
-from focgen.fractional.transfer import TransferFunction
 from focgen.textfile import LARGEST_SETTING, read_regular
+
+LARGEST = 1e60
+"""The size of a number in a file of TOML."""
 
 
 class Table:
@@ -19,7 +21,7 @@ class Table:
     Every ``get`` marks its key as known; :meth:`done` refuses what is left over.
     """
 
-    def __init__(self, values: Mapping[str, Any], where: str, error: type[InputError]):
+    def __init__(self, values: Mapping[str, Any], where: str, error: type[InputError]) -> None:
         self.values, self.where, self.error = values, where, error
         self._known: set[str] = set()
 
@@ -84,7 +86,9 @@ class Table:
         """A finite number > ``above``; required where ``default`` is None."""
         value = self.required(key) if default is None else self.raw(key, default)
         if not _is_number(value):
-            raise self.fail(key, f"is {value!r}, not a finite number", "give a number")
+            raise self.fail(
+                key, f"is {value!r}, not a finite number", f"give a number of at most {LARGEST:g}"
+            )
         if value <= above:
             raise self.fail(key, f"is {value:g}", f"give a number above {above:g}")
         return float(value)
@@ -93,7 +97,7 @@ class Table:
         """A non-empty list of finite numbers."""
         value = self.required(key)
         if not isinstance(value, list) or not value or not all(map(_is_number, value)):
-            raise self.fail(key, f"is {value!r}", "give a list of finite numbers")
+            raise self.fail(key, f"is {value!r}", f"give a list of finite numbers, of at most {LARGEST:g}")
         return tuple(map(float, value))
 
     def span(self, key: str) -> tuple[float, float] | None:
@@ -105,15 +109,8 @@ class Table:
             raise self.fail(key, f"is {list(pair)}", "give [low, high] with low < high")
         return pair[0], pair[1]
 
-    def transfer(self) -> TransferFunction:
-        """The transfer function of this table's ``num`` and (optional) ``den``."""
-        num, den = self._terms("num"), self._terms("den", [[1.0, 0.0]])
-        try:
-            return TransferFunction(num, den)
-        except ValueError as reason:
-            raise self.fail("den", str(reason), "give a denominator that is not zero") from None
-
-    def _terms(self, key: str, default: list | None = None) -> list[tuple[float, float]]:
+    def terms(self, key: str, default: list[Any] | None = None) -> list[tuple[float, float]]:
+        """Pairs of a coefficient and an order of s; ``default`` where they are absent and may be."""
         value = self.required(key) if default is None else self.raw(key, default)
         right = (
             isinstance(value, list)
@@ -149,14 +146,5 @@ class Table:
 
 
 def _is_number(value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer beyond every float
-        return False
-
-
-def terms_of(polynomial) -> list[list[float]]:
-    """A polynomial as TOML writes it: [[coefficient, order], …]."""
-    return [[t.coefficient, t.order] for t in polynomial]
+    """Whether a value is a number that can be computed with: powers and products of larger ones overflow."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and -LARGEST <= value <= LARGEST

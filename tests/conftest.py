@@ -6,7 +6,7 @@ import pytest
 
 from focgen.control.controller import Controller, ControllerRanges, GainSchedule, Units
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Actuator, Ranges, Rig, Signals
+from focgen.rig.rig import Actuator, Ranges, Rig, Signals
 
 
 def pytest_addoption(parser):

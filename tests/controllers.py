@@ -48,7 +48,7 @@ def _model_inverse(rng, h):
 
 def _fopid(rng, h):
     terms = [(rng.normal(), 0.0), (rng.normal() * 2.0, -rng.uniform(0.05, 1.0))]
-    return TransferFunction(terms + [(rng.normal() * h**0.5, rng.uniform(0.1, 1.5))])
+    return TransferFunction([*terms, (rng.normal() * h**0.5, rng.uniform(0.1, 1.5))])
 
 
 def _fopd(rng, h):

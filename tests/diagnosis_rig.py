@@ -2,11 +2,13 @@
 loops.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
-from focgen.rig.model import Actuator, Ranges, Rig, Signals
+from focgen.rig.rig import Actuator, Ranges, Rig, Signals
 
 H = 0.05
 RIG = Rig(
@@ -28,7 +30,7 @@ def commands():
     stairs = np.repeat([0, 0.4, 0.8, 1.2, 1.6, 1.2, 0.8, 0.4, 0], int(6 / H))
     hold = np.repeat([0, 1.4, 0], [int(2 / H), int(60 / H), int(40 / H)])
     corners = [0, 1.8, 0.6, 1.2, 0.8, 1.8, 0]
-    triangle = np.concatenate([np.linspace(a, b, int(8 / H)) for a, b in zip(corners, corners[1:])])
+    triangle = np.concatenate([np.linspace(a, b, int(8 / H)) for a, b in pairwise(corners)])
     return {"steps": steps, "sines": sines, "stairs": stairs, "hold": hold, "triangle": triangle}
 
 

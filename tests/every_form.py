@@ -1,7 +1,7 @@
 """Makes everything that is compared between machines, and prints the digest of each file as JSON.
 
-``python -m tests.every_form FOLDER``. Two digests are of numpy's own functions, which show what a setting
-changes.
+``python -m tests.every_form FOLDER [FORM…]``. Two digests are of numpy's own functions, which show what a
+setting changes.
 """
 
 from __future__ import annotations
@@ -16,22 +16,25 @@ import numpy as np
 from scipy import linalg
 
 from focgen.cli.main import main
-from tests.test_codegen_golden import CONTROLLER, EXPONENTIAL, FORMS, options
+from tests.codegen.test_golden import CONTROLLER, EXPONENTIAL, FORMS, options
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "rig.toml"
 FURTHER = {f"exp_{a}": ["--arithmetic", a, "--name", f"finger_{a}", *EXPONENTIAL] for a in ("q15", "f64")}
 BAND = ["--memory", "exponential", "--operator", "continuous", "--tolerance", "1e-2", "--band", "0.3", "30"]
 FURTHER["band_q31"] = ["--arithmetic", "q31", "--name", "finger_q31", *BAND]
-WISHES = {"example": [], "fastest": ["--overshoot", "10"]}
+SPECIFIED = {"example": [], "fastest": ["--overshoot", "10"]}
 
 
-def make(folder: Path) -> None:
-    """Every golden form, poles of 16 and of all their bits, and designs of the example rig with their C."""
+def make(folder: Path, few: tuple[str, ...] = ()) -> None:
+    """Every golden form, poles of 16 and of all their bits, and designs of the example rig with their C; or
+    only a ``few`` of them, by name.
+    """
     for form, how in {**{form: options(form) for form in FORMS}, **FURTHER}.items():
-        done(["generate", str(CONTROLLER), "--out", str(folder / form), *how])
-    for name, wish in WISHES.items():
+        if not few or form in few:
+            done(["generate", str(CONTROLLER), "--out", str(folder / form), *how])
+    for name, specification in SPECIFIED.items() if not few else ():
         controller = folder / f"{name}.toml"
-        done(["design", str(EXAMPLE), "--out", str(controller), *wish])
+        done(["design", str(EXAMPLE), "--out", str(controller), *specification])
         done(["generate", str(controller), "--out", str(folder / name), "--arithmetic", "f64"])
 
 
@@ -58,6 +61,6 @@ def of_numpy() -> dict[str, str]:
 
 if __name__ == "__main__":
     made = Path(sys.argv[1])
-    make(made)
+    make(made, tuple(sys.argv[2:]))
     files = {str(p.relative_to(made)): digest(p.read_bytes()) for p in sorted(made.rglob("*")) if p.is_file()}
     print(json.dumps({"files": files, "numpy": of_numpy()}))

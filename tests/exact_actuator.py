@@ -51,11 +51,11 @@ def decay_answer(
 ) -> np.ndarray:
     """The answer (count,) at ``late`` + 0, h, 2h, … to e^(−rate t) that sets in at 0; 0 ≤ ``late`` < h, s."""
     alpha, T = of.alpha, of.T
-    impulse = lambda v: mittag_leffler(alpha, alpha, -v / T) / (T * alpha)  # noqa: E731  of v = t^α
+    impulse = lambda v: mittag_leffler(alpha, alpha, -v / T) / (T * alpha)
     ends = late + step * np.arange(count)
     first = 0 if late else 1
     answer = np.zeros(count, complex if isinstance(rate, complex) else float)
-    held = lambda v: impulse(v) * np.exp(-rate * (ends[first] - v ** (1.0 / alpha)))  # noqa: E731
+    held = lambda v: impulse(v) * np.exp(-rate * (ends[first] - v ** (1.0 / alpha)))
     answer[first] = _on_halves(held, ends[first] ** alpha)
     times = ends[first:-1, None] + step * _POINTS
     h = impulse((times**alpha).ravel()).reshape(times.shape) * alpha * times ** (alpha - 1.0)
@@ -81,7 +81,7 @@ def decaying(
         for chosen in itertools.product(parts.items(), repeat=m):
             rate = sum(rate for rate, _ in chosen)
             drive[rate] = drive.get(rate, 0.0) + gain * math.prod(c for _, c in chosen)
-    value = lambda at: sum(c * np.exp(-rate * at) for rate, c in parts.items())  # noqa: E731
+    value = lambda at: sum(c * np.exp(-rate * at) for rate, c in parts.items())
     pressure = np.where(t >= -1e-9, value(np.maximum(t, 0.0)), 0.0).real
     step, late = t[1] - t[0], t - of.delay
     begin = int(np.argmax(late > -1e-9))

@@ -27,7 +27,6 @@ def diagnosis() -> Diagnosis:
         augmented_rig="augmented.toml",
         next_experiment=NextExperiment("the two differ in it", "a slow sine", 3.0),
         unexplained={},
-        tied=(("hysteresis", "friction"),),
         notes=(f"{NAMES[0]} was bridged",),
         fits=(PlainFit("hysteresis", 0.4),),
         warnings=(),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, assert_type
 
 import numpy as np
+import numpy.typing as npt
 
 import focgen
 from focgen.errors import LogError
@@ -53,7 +54,7 @@ def mathematics() -> TransferFunction:
     """The fractional side, and C of one's own."""
     model = TransferFunction([(1.0, 0.0)], [(1.32, 0.6), (1.0, 0.0)])
     assert_type(model * 2.0 + model.inverse(), TransferFunction)
-    assert_type(gl_weights(0.6, 10), np.ndarray)
+    assert_type(gl_weights(0.6, 10), npt.NDArray[np.floating[Any]])
     assert_equivalent("firmware", from_c(["port.c"], prefix="port"), within="bits")
     return model
 

@@ -25,7 +25,12 @@ from focgen.cli.main import commands
 from focgen.cli.main import main as run
 
 ROOT = Path(__file__).resolve().parents[1]
-ELSEWHERE = {"README.md": "index.md", "examples/README.md": "examples.md", "CHANGELOG.md": "changelog.md"}
+ELSEWHERE = {
+    "README.md": "index.md",
+    "examples/README.md": "examples.md",
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+}
 NAV = {
     "Start": ("own-log", "tutorial-board", "tutorial-diagnosis", "tutorial-memory", "examples"),
     "How to": ("recording-logs", "logs", "rig-file", "controller-file", "packages", "testing", "report"),
@@ -40,7 +45,8 @@ NAV = {
         "records",
     ),
     "Look up": ("commands", "python", "reference", "c-interface", "targets", "glossary"),
-    "About": ("limits", "trust", "comparison", "architecture", "changelog"),
+    "Why": tuple(f"design/{page.stem}" for page in sorted((ROOT / "docs" / "design").glob("*.md"))),
+    "About": ("limits", "trust", "comparison", "architecture", "contributing", "changelog"),
 }
 CONF = f"""
 project = "focgen"
@@ -76,11 +82,13 @@ def main(out: str) -> int:
 def gather(source: Path) -> None:
     """Every page of the site into ``source``, links between them as the site has them."""
     shutil.copytree(ROOT / "docs" / "figures", source / "figures")
-    pages = {page: page.name for page in (ROOT / "docs").glob("*.md")}
+    docs = ROOT / "docs"
+    pages = {page: page.relative_to(docs).as_posix() for page in docs.rglob("*.md")}
     pages |= {ROOT / path: name for path, name in ELSEWHERE.items()}
     for page, name in pages.items():
         text = page.read_text(encoding="utf-8")
-        (source / name).write_text(linked(text, page.parent, pages), encoding="utf-8")
+        (source / name).parent.mkdir(exist_ok=True)
+        (source / name).write_text(linked(text, page, pages), encoding="utf-8")
     (source / "commands.md").write_text(commands_page(), encoding="utf-8")
     (source / "reference.md").write_text(reference_page(), encoding="utf-8")
     (source / "index.md").write_text(
@@ -89,20 +97,23 @@ def gather(source: Path) -> None:
     (source / "conf.py").write_text(CONF, encoding="utf-8")
 
 
-def linked(text: str, base: Path, pages: dict[Path, str]) -> str:
-    """Links to pages as the site names them; what is no page of it is only named."""
+def linked(text: str, page: Path, pages: dict[Path, str]) -> str:
+    """Links of a page to others as the site names them; what is no page of it is only named."""
+
+    def there(name: str) -> str:
+        return Path(os.path.relpath(name, Path(pages[page]).parent)).as_posix()
 
     def as_here(link: re.Match) -> str:
         shown, target, anchor = link.group(1), link.group(2), link.group(3) or ""
-        file = (base / target).resolve()
+        file = (page.parent / target).resolve()
         if "://" in target or not file.exists():
             return link.group(0)
         if file in pages:
-            return f"[{shown}]({pages[file]}{anchor})"
+            return f"[{shown}]({there(pages[file])}{anchor})"
         if file.is_relative_to(ROOT / "docs"):
-            return f"[{shown}]({file.relative_to(ROOT / 'docs').as_posix()})"
+            return f"[{shown}]({there(file.relative_to(ROOT / 'docs').as_posix())})"
         if (file / "README.md") in pages:
-            return f"[{shown}]({pages[file / 'README.md']})"
+            return f"[{shown}]({there(pages[file / 'README.md'])})"
         return f"{shown} (`{file.relative_to(ROOT).as_posix()}`)"
 
     return re.sub(r"\[([^\]]*)\]\(([^)#\s]+)(#[^)]*)?\)", as_here, text)

@@ -16,8 +16,8 @@ from scipy.signal import lfilter
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.files import write_rig
-from focgen.rig.model import Actuator, Ranges, Rig, Signals
 from focgen.rig.replay import simulate_session
+from focgen.rig.rig import Actuator, Ranges, Rig, Signals
 
 STEP = 0.02  # s
 LEVELS = (0.075, 0.1, 0.125, 0.15, 0.175, 0.2)  # bar

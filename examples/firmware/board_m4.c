@@ -1,4 +1,4 @@
-/* board_m4.c: a Cortex-M4 in an emulator, whose pins are words of memory; see tests/test_examples_supply.py.
+/* board_m4.c: a Cortex-M4 in an emulator, whose pins are words of memory; see tests/docs/test_supply.py.
  *
  * SPDX-License-Identifier: 0BSD
  */

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 SHELLS = ("bash", "zsh", "fish")
 
@@ -33,7 +34,14 @@ class Command:
 class PrintCompletion(argparse.Action):
     """Prints the script for one shell, and ends."""
 
-    def __call__(self, parser, namespace, values, option_string=None):
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """As argparse calls it."""
         print(script(str(values), parser), end="")
         parser.exit()
 

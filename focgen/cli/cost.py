@@ -7,10 +7,11 @@ from typing import Any
 
 from focgen.cli.outcome import Outcome
 from focgen.codegen.kernels import TARGETS
+from focgen.present import present
 from focgen.report.page import TableOf, text_table
-from focgen.targets.asked import entry_of
 from focgen.targets.calls import CallCost
 from focgen.targets.cost import COUNTED, Cost, PerStep
+from focgen.targets.selection import entry_of
 from focgen.verification.costs import COMPILERS, ControllerCost, cost
 
 HELP = "what one step of generated C costs on microcontrollers: instructions, cycles, flash, RAM, stack"
@@ -65,7 +66,9 @@ def _entry(one: ControllerCost) -> dict[str, Any]:
 
 def _text(controllers: tuple[ControllerCost, ...]) -> str:
     """The costs for people: a table, and under it how they were counted."""
-    rows, skipped, paths, compilers, hows = [], {}, [], {}, {}
+    rows, skipped, paths = [], {}, []
+    compilers: dict[str, None] = {}
+    hows: dict[str, None] = {}
     for one in controllers:
         length = f" {one.length}" if one.memory == "short" else ""
         title = f"{one.name} {one.arithmetic} {one.memory}{length}"
@@ -74,10 +77,10 @@ def _text(controllers: tuple[ControllerCost, ...]) -> str:
                 skipped[name] = counted.skipped
                 continue
             rows.append((title, name, *_cells(counted, one.previous.get(name))))
-            compilers[counted.compiler] = None
+            compilers[present(counted.compiler)] = None
             if counted.cycles_per_step is not None:
                 hows[counted.cycles_per_step.how] = None
-            paths.append(f"{title}, {name}: {' > '.join(counted.stack_path)}")
+            paths.append(f"{title}, {name}: {' > '.join(counted.stack_path or ())}")
     why = [f"{name} skipped: {reason}" for name, reason in skipped.items()]
     if not rows:
         return "\n".join(why)
@@ -99,7 +102,7 @@ def _calls(controllers: tuple[ControllerCost, ...]) -> list[str]:
         for name, counted in one.targets.items():
             if counted.calls:
                 cells = [counted.calls.get(call) for call in _CALLS]
-                unit = "instructions" if cells[0].cycles is None else "cycles"
+                unit = "instructions" if present(cells[0]).cycles is None else "cycles"
                 rows.append((one.name, name, unit, *(_call(cell) for cell in cells)))
     return ["", text_table(TableOf(("controller", "core", "counted", *_CALLS), tuple(rows)))] if rows else []
 
@@ -134,7 +137,10 @@ def _cells(now: Cost, before: Cost | None) -> list[str]:
 def _pair(now: PerStep | None, before: PerStep | None) -> list[str]:
     if now is None:
         return ["-", "-"]
-    return [_change(getattr(now, key), before and getattr(before, key)) for key in ("mean", "worst")]
+    return [
+        _change(getattr(now, key), None if before is None else getattr(before, key))
+        for key in ("mean", "worst")
+    ]
 
 
 def _change(now: float | None, before: float | None) -> str:

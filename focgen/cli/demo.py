@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from typing import Any
 
 from focgen.cli.outcome import Outcome
 from focgen.cli.shown import add_report, check_report, is_page, write_report
 from focgen.demonstration import Demo, demo
+from focgen.present import present
 from focgen.report.demo_page import demo_lead, diagnosis_sentence, firmware_table
 from focgen.report.page import text_table
 
@@ -29,14 +31,14 @@ def run(args: Namespace) -> Outcome:
     made = demo(args.out)
     folder = made.folder / "pictures"
     if is_page(args.report):
-        shown = made.report.read_text(encoding="utf-8")
+        told = write_report(args.report, made.report.read_text(encoding="utf-8"), ())
     else:
-        shown = args.report and {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
-    told = write_report(args.report, shown, ())
+        pictures = {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+        told = write_report(args.report, pictures if args.report else None, ())
     return Outcome(_payload(made), f"{_text(made)}\n{told}", made.holds)
 
 
-def _payload(made: Demo) -> dict:
+def _payload(made: Demo) -> dict[str, Any]:
     found, designed = made.identification, made.design
     return {
         "paths": {
@@ -47,9 +49,9 @@ def _payload(made: Demo) -> dict:
             "firmware": {a: made.folder / "firmware" / a for a in made.generated},
         },
         "identify": {
-            "T": found.joint.T,
-            "alpha": found.joint.alpha,
-            "gain": found.joint.gain,
+            "T": present(found.joint).T,
+            "alpha": present(found.joint).alpha,
+            "gain": present(found.joint).gain,
             "gof": {model: values["mean"] for model, values in found.gof.items()},
         },
         "design": {

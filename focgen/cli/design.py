@@ -22,7 +22,7 @@ EXAMPLE = """example:
 
   writes controller.toml and prints the schedule, the steps from rest to seven set points in the closed loop,
   and the margins: ideal, and as it will run. --settling is the mean settling time (to within 5 %) over these
-  set points; if it is not feasible, the error says what is."""
+  set points. If it is not feasible, the error says what is."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -65,8 +65,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> Outcome:
     check_apart([args.out], [args.rig])
     check_report(args.report, [args.rig])
-    wishes = (args.settling, args.overshoot, args.arithmetic, args.length)
-    result = design(args.rig, None, *wishes, delay=args.delay, setpoints=args.setpoints)
+    specified = (args.settling, args.overshoot, args.arithmetic, args.length)
+    result = design(args.rig, None, *specified, delay=args.delay, setpoints=args.setpoints)
     rig = read_rig(args.rig)
     shown = drawn(args.report, lambda: design_page(result, rig), lambda: design_pictures(result, rig))
     if isinstance(shown, dict):

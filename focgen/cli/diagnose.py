@@ -7,8 +7,8 @@ from pathlib import Path
 
 from focgen.cli.outcome import Outcome
 from focgen.cli.shown import add_report, check_report, drawn, write_report
-from focgen.diagnosis.diagnose import diagnose
 from focgen.control.units import units_of_rig
+from focgen.diagnosis.diagnose import diagnose
 from focgen.errors import FocgenError
 from focgen.progress import led_by
 from focgen.report.diagnosis_summary import diagnosis_text
@@ -54,12 +54,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> Outcome:
-    """Do it."""
-    if args.plan:
-        from focgen.diagnosis.plan import plan
+    """Diagnose and write, or with --plan say what the logs could tell.
 
-        found = plan(args.rig, args.logs)
-        return Outcome(found, found.text())
+    Raises FocgenError for an argument that is missing.
+    """
+    if args.plan:
+        from focgen.diagnosis.proposals.identifiability import plan
+
+        planned = plan(args.rig, args.logs)
+        return Outcome(planned, planned.text())
     if not args.logs:
         raise FocgenError("diagnose", "no log is given", "name at least one log")
     if args.out is None:

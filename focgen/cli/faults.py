@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import platform
@@ -12,6 +13,7 @@ from collections.abc import Sequence
 
 import focgen
 from focgen.errors import FocgenError
+from focgen.terminal import for_terminal
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _SCARCE = (errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM)
@@ -21,7 +23,7 @@ def as_one_line(error: BaseException, argv: Sequence[str]) -> str:
     """What is printed of an exception behind ``focgen: error:``; where nobody foresaw it, its trace is in a
     file, which the line names."""
     said = error if isinstance(error, FocgenError) else _foreseen(error, argv[0] if argv else "focgen")
-    return " ".join(str(said or _unforeseen(error, argv)).split())
+    return for_terminal(" ".join(str(said or _unforeseen(error, argv)).split()))
 
 
 def _foreseen(error: BaseException, command: str) -> FocgenError | None:
@@ -105,15 +107,11 @@ def write_out(text: str) -> None:
 
 def _discard_rest() -> None:
     """What is left in the buffer must not fail a second time when the interpreter ends."""
-    try:
+    with contextlib.suppress(OSError, ValueError):  # no file stands behind it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except (OSError, ValueError):  # no file stands behind it
-        pass
 
 
 def say_error(line: str) -> None:
     """One line on stderr, if there is one."""
-    try:
+    with contextlib.suppress(OSError, ValueError, AttributeError):
         print(line, file=sys.stderr)
-    except (OSError, ValueError, AttributeError):
-        pass

@@ -11,7 +11,7 @@ from focgen.codegen.packages.package import FMI
 from focgen.control.controller import ARITHMETICS, MEMORIES
 from focgen.errors import InputError
 from focgen.fractional.continuous import OPERATORS
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 
 HELP = "Write C99 for a controller, with proofs and error bounds in its manifest."
 
@@ -30,6 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the C and its manifest")
     parser.add_argument("--arithmetic", choices=ARITHMETICS, help="default: the controller's")
+    _add_memory(parser)
+    parser.add_argument("--target", metavar="CORE", help=f"sums for a core: {', '.join(TARGETS)}")
+    parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
+    _add_extras(parser)
+
+
+def _add_memory(parser: argparse.ArgumentParser) -> None:
+    """How much of the past takes part, and in which form."""
     parser.add_argument("--memory", choices=MEMORIES, help="form of the memory; default: the controller's")
     parser.add_argument(
         "--length", type=int, metavar="L", help="past samples that take part; default: the controller's"
@@ -62,8 +70,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of --operator continuous, in rad/s; default: the controller's, else four decades up to a tenth"
         " of Nyquist",
     )
-    parser.add_argument("--target", metavar="CORE", help=f"sums for a core: {', '.join(TARGETS)}")
-    parser.add_argument("--name", help="prefix of every C name; default: the controller's name")
+
+
+def _add_extras(parser: argparse.ArgumentParser) -> None:
+    """What is written beside the five functions, and what is left out."""
     parser.add_argument(
         "--selftest", action="store_true", help="add NAME_selftest(), which a board runs: 0 if it agrees"
     )
@@ -129,8 +139,10 @@ def _text(made: Generated) -> str:
     grows = _growth(bound.operator_per_sample)
     within = _within(bound.within_horizon, rate)
     lines = [
-        f"{plan.name}: {plan.arithmetic}, {_memory(plan)}, {size['state_bytes']} bytes of state,"
-        f" {size['table_bytes']} bytes of tables",
+        (
+            f"{plan.name}: {plan.arithmetic}, {_memory(plan)}, {size['state_bytes']} bytes of state,"
+            f" {size['table_bytes']} bytes of tables"
+        ),
         f"error ahead of the {ahead}: {grows}at most {bound.operator:.3g} {rate}".rstrip()
         + f"; {_whose(plan)} at most {truncation}{within}",
         *(

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from focgen.cli.outcome import Outcome
 from focgen.rig.files import rig_table
 from focgen.rig.proposal import init
+from focgen.rig.rig import Rig
+from focgen.terminal import for_terminal
 
 HELP = "propose a rig.toml for logs: which column is what, units, ranges, and what is unsure"
 
@@ -37,7 +39,7 @@ def run(args: argparse.Namespace) -> Outcome:
     return Outcome(payload, text)
 
 
-def _roles(rig) -> str:
+def _roles(rig: Rig) -> str:
     roles = {"time": rig.signals.time, **rig.signals.columns()}
     return ", ".join(f"{role} = {column}" for role, column in roles.items())
 
@@ -45,7 +47,8 @@ def _roles(rig) -> str:
 def _ask(role: str, likely: str, columns: Sequence[str]) -> str:
     """The column that the user names; Enter takes the likely one, "-" none."""
     while True:
-        print(f"{role} [{likely}], one of {', '.join(columns)}, or - for none: ", end="", file=sys.stderr)
+        asked = f"{role} [{likely}], one of {', '.join(columns)}, or - for none: "
+        print(for_terminal(asked), end="", file=sys.stderr)
         sys.stderr.flush()
         line = sys.stdin.readline()
         answer = line.strip() or likely

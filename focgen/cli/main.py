@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any, NoReturn
 
 import focgen
 import focgen.cli
@@ -15,6 +16,7 @@ from focgen.cli.completion import SHELLS, PrintCompletion
 from focgen.cli.faults import as_one_line, open_streams, say_error, write_out
 from focgen.errors import FocgenError
 from focgen.jsontext import to_json
+from focgen.terminal import for_terminal
 
 # The order of the help page; a command exists where focgen/cli has its file.
 _COMMANDS = (
@@ -52,7 +54,7 @@ def commands() -> tuple[str, ...]:
 class _Parser(argparse.ArgumentParser):
     """Reports a wrong argument the way every other error is reported."""
 
-    def parse_known_args(self, args=None, namespace=None):
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse does, but a mistyped option is said first, not what is missing for want of it."""
         if self._subparsers is None:
             self._check_options(sys.argv[1:] if args is None else args)
@@ -67,7 +69,7 @@ class _Parser(argparse.ArgumentParser):
                     self.prog.partition(" ")[2], f"has no option {option}", _meant(option, known, self.prog)
                 )
 
-    def error(self, message: str):
+    def error(self, message: str) -> NoReturn:
         command = self.prog.partition(" ")[2] or "arguments"
         raise FocgenError(command, message, f"see `{self.prog} --help`")
 
@@ -136,5 +138,5 @@ def _run(argv: Sequence[str]) -> int:
         raise FocgenError(argv[0], "is no command", _meant(argv[0], commands(), "focgen"))
     args = parser(argv[0]).parse_args(argv)
     outcome = args.run(args)
-    write_out(to_json(outcome.payload) if args.json else outcome.text.rstrip("\n") + "\n")
+    write_out(to_json(outcome.payload) if args.json else for_terminal(outcome.text.rstrip("\n")) + "\n")
     return 0 if outcome.holds else 1

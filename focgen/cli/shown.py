@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from focgen.output import check_apart, write_file, write_files
 from focgen.report.interactive import library
@@ -22,24 +23,26 @@ def is_page(path: str | None) -> bool:
     return path is not None and Path(path).suffix.lower() in (".html", ".htm")
 
 
-def check_report(path: str | None, inputs: Iterable) -> None:
+def check_report(path: str | None, inputs: Iterable[Any]) -> None:
     """Raise before work begins that cannot be shown: MissingExtra without the library that draws on pages,
     InputError where the page would replace an input."""
-    if is_page(path):
+    if path is not None and is_page(path):
         library()
         check_apart([path], inputs)
 
 
-def drawn(path: str | None, page: Callable[[], Page], pictures: Callable[[], Mapping[str, bytes]]):
+def drawn(
+    path: str | None, page: Callable[[], Page], pictures: Callable[[], Mapping[str, bytes]]
+) -> str | Mapping[str, bytes] | None:
     """What is to be written: the page's text, or pictures by name; None where nothing is asked for."""
     if path is None:
         return None
     return page().self_contained() if is_page(path) else pictures()
 
 
-def write_report(path: str | None, what, inputs: Iterable) -> str:
+def write_report(path: str | None, what: str | Mapping[str, bytes] | None, inputs: Iterable[Any]) -> str:
     """Write what :func:`drawn` gave, and say where it is."""
-    if not what:
+    if path is None or not what:
         return ""
     if isinstance(what, str):
         write_file(path, what, inputs)

@@ -11,7 +11,7 @@ from focgen.cli.shown import add_report, check_report, drawn, write_report
 from focgen.output import write_files
 from focgen.report.pages.trials import trials_page
 from focgen.report.trials import pictures
-from focgen.trials.excitation import SUITES
+from focgen.trials.patterns import SUITES
 from focgen.trials.plan import KINDS
 from focgen.trials.tables import full_text, markdown
 from focgen.trials.trial import ACTIONS, trial
@@ -43,9 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--suite",
         choices=tuple(SUITES),
         default="full",
-        help="about 600 s, the same with regulator and sensor off or with logs cut (off, begun), 270 s, "
-        "loops of a known (closed) or unknown controller (loops), plants that integrate, oscillate or rub "
-        "(plants), or rigs moved by a physics engine (pip install 'focgen[engine]')",
+        help="Sessions of about 600 s (full), with regulator and sensor off (off), of healthy rigs with both "
+        "further off (sound), with logs cut (begun), or of 270 s (short). Loops of a known controller "
+        "(closed), of an unknown one (loops). Plants that integrate, oscillate or rub (plants). Rigs moved "
+        "by a physics engine (engine; it needs pip install 'focgen[engine]')",
     )
     parser.add_argument("--kinds", metavar="KIND,…", help=f"only these kinds of cases, of {', '.join(KINDS)}")
     parser.add_argument(
@@ -110,7 +111,7 @@ def _score(args: argparse.Namespace) -> Outcome:
     )
     text = full_text(summary.sets)
     if args.out:
-        files = {"scores.md": markdown(summary.sets), **pictures(summary.sets)}
+        files: dict[str, str | bytes] = {"scores.md": markdown(summary.sets), **pictures(summary.sets)}
         write_files(args.out, files, _inputs(args.folder))
         text += f"\ntable and pictures in {args.out}"
     shown = drawn(args.report, lambda: trials_page(summary.sets), lambda: pictures(summary.sets))

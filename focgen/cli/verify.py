@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from focgen.cli.outcome import Outcome
+from focgen.present import present
 from focgen.report.firmware_summary import verification_payload
 from focgen.verification.compare import TargetResult
 from focgen.verification.verify import TARGETS, Verification, verify
@@ -84,9 +85,11 @@ def _result(result: TargetResult) -> str:
 
 
 def _errors(result: TargetResult) -> list[str]:
-    bound, error = result.error_bound, result.max_error
+    bound, error = present(result.error_bound), present(result.max_error)
     return [
-        f"largest error {error.operator:.3g} ahead of the integrator, bound {bound['operator']:.3g}"
-        f"{'' if result.within else ': EXCEEDED'}; {error.output:.3g} at the output, which may grow by "
-        f"{bound['output_per_sample']:.3g} a sample"
+        (
+            f"largest error {error.operator:.3g} ahead of the integrator, bound {bound['operator']:.3g}"
+            f"{'' if result.within else ': EXCEEDED'}; {error.output:.3g} at the output, which may grow by "
+            f"{bound['output_per_sample']:.3g} a sample"
+        )
     ]

@@ -1,0 +1,1 @@
+"""A plan printed as C: one typed context per template, the manifest, and whole folders."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from focgen.codegen.expressions import bound, converted, scaled_up, shifted
 from focgen.codegen.literals import literal, scale
-from focgen.plan.model import Bank, Plan, Sum
+from focgen.plan.formats import runtime
+from focgen.plan.plan import Bank, Plan, Sum
 
 NAMES = {"direct": "numerator", "rest": "integrand", "feedback": "denominator"}
 """What a plan's sums are called in C."""
@@ -88,12 +89,12 @@ def _text(plan: Plan, table: Sum, bank: Bank, index: int) -> BankText:
 
 def _slow(plan: Plan, bank: Bank) -> bool:
     """Whether this is the bank of slow modes of an arithmetic that has a type for them."""
-    return bank.compensated or (plan.arithmetic == "q15" and bank.state.bits == 64)
+    return bank.compensated or (runtime(plan.arithmetic) == "q15" and bank.state.bits == 64)
 
 
 def _kind(plan: Plan, bank: Bank) -> str:
-    slow = "slow_" if _slow(plan, bank) and plan.arithmetic == "q15" else ""
-    return f"foc_{slow}mode_{plan.arithmetic}"
+    slow = "slow_" if _slow(plan, bank) and runtime(plan.arithmetic) == "q15" else ""
+    return f"foc_{slow}mode_{runtime(plan.arithmetic)}"
 
 
 def _about(plan: Plan, table: Sum, index: int) -> list[str]:
@@ -132,7 +133,7 @@ def inputs(plan: Plan, table: Sum) -> list[str]:
     ctype, needed = plan.error.ctype, {bank.differences for bank in table.banks}
     lines = [f"const {ctype} past = {_past(plan, table, 1)};"] if needed else []
     if 2 in needed:
-        wide = {"q31": "int64_t", "q15": "int32_t"}.get(plan.arithmetic, ctype)
+        wide = {"q31": "int64_t", "q15": "int32_t"}.get(runtime(plan.arithmetic), ctype)
         lines.append(f"const {wide} change = {converted('past', ctype, wide)} - {_past(plan, table, 2)};")
     return lines
 
@@ -141,9 +142,9 @@ def _call(plan: Plan, table: Sum, bank: Bank, index: int, name: str) -> str:
     slow = "slow_" if _slow(plan, bank) else ""
     states = f"s->{means(table, index)}" + (f", s->{rests(table, index)}" if bank.compensated else "")
     both = f", {bank.up}, {bank.to_drive}"
-    shifts = {"q31": f"{both}, {bank.rate_shift}", "q15": both}.get(plan.arithmetic, "")
+    shifts = {"q31": f"{both}, {bank.rate_shift}", "q15": both}.get(runtime(plan.arithmetic), "")
     u = "past" if bank.differences == 1 else "change"
-    call = f"foc_{slow}modes_{plan.arithmetic}({name}, {states}, {bank.modes}, {u}{shifts})"
+    call = f"foc_{slow}modes_{runtime(plan.arithmetic)}({name}, {states}, {bank.modes}, {u}{shifts})"
     return shifted(call, bank.sum.ctype, bank.align)
 
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from focgen.codegen.literals import constant, literal, power_of_two
-from focgen.plan.model import Format, Plan
+from focgen.plan.plan import Format, Plan
 from focgen.plan.scenario import nearest_raw
 
 _LARGEST = float(np.finfo(np.float32).max)
@@ -38,8 +38,8 @@ def counted(form: Format) -> Counted:
     """The ends of an integer type."""
     top = 1 << (form.bits - 1)
     beyond = top if form.bits == 32 else top - 1  # as far as floats are dense enough
-    ends = (f"INT{form.bits}_{end}" for end in ("MIN", "MAX"))
-    return Counted(*ends, literal(-float(top), "float"), literal(float(beyond), "float"))
+    low, high = f"INT{form.bits}_MIN", f"INT{form.bits}_MAX"
+    return Counted(low, high, literal(-float(top), "float"), literal(float(beyond), "float"))
 
 
 def inputs_of(plan: Plan) -> dict[str, Format]:

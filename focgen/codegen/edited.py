@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from focgen.codegen.manifest import read_manifest, sha256
+from focgen.codegen.neighbours import MANIFEST
 from focgen.errors import InputError
 
 _NAMED = 3
@@ -35,13 +36,21 @@ def _not_as(count: int) -> str:
 
 
 def _lost(path: Path, new: bytes | None, written: Any) -> bool:
-    if path.name in ("manifest.json",) or path.suffix == ".fmu" or not path.is_file():
+    if path.name.endswith(MANIFEST) or ".fmu" in path.suffixes or not path.is_file():
         return False  # an archive is built by a compiler, which promises no bytes
     content = path.read_bytes()
     return content != new and sha256(content) != written
 
 
 def _written(folder: Path) -> dict[str, Any]:
-    """Name → SHA-256 of what an earlier run has written."""
-    files = read_manifest(folder).get("files")
+    """Name → SHA-256 of what earlier runs have written, for whichever controller."""
+    found: dict[str, Any] = {}
+    for path in sorted(folder.glob(f"*.{MANIFEST}")):
+        files = _files(folder, path.name)
+        found |= files | {path.name.replace(MANIFEST, "controller.toml"): files.get("controller.toml")}
+    return found | _files(folder, MANIFEST)  # of what several have, the last that was generated
+
+
+def _files(folder: Path, manifest: str) -> dict[str, Any]:
+    files = read_manifest(folder, manifest).get("files")
     return files if isinstance(files, dict) else {}

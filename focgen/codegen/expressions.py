@@ -5,7 +5,7 @@ from __future__ import annotations
 from focgen.codegen.literals import power_of_two
 from focgen.errors import PlanError
 from focgen.plan.counts import up_of
-from focgen.plan.model import Format
+from focgen.plan.plan import Format
 
 CLAMP = {
     "int16_t": "foc_clamp16",

@@ -14,9 +14,11 @@ from focgen.codegen.literals import quantity, wrapped
 from focgen.codegen.manifest import sizes
 from focgen.codegen.texts import UserText, markdown
 from focgen.plan.canonical import memory_bias
+from focgen.plan.formats import runtime
 from focgen.plan.integrals import smallest_error
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.remarks import remarks
+from focgen.present import present
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ def _box(plan: Plan) -> list[str]:
     """What may be tuned, a part each, for Markdown; nothing where nothing may."""
     if plan.tuning is None:
         return []
-    box, unit = plan.controller.tunable, markdown(UserText(plan.controller.units.output))
+    box, unit = present(plan.controller.tunable), markdown(UserText(plan.controller.units.output))
     spans = (("factors on the gain", box.gain, ""), ("`u_min`", box.output_low, unit),
              ("`u_max`", box.output_high, unit))  # fmt: skip
     return [f"{what} from {low:g} to {high:g} {of}".rstrip() for what, (low, high), of in spans if low < high]
@@ -144,7 +146,9 @@ def _signals(plan: Plan) -> list[Signal]:
     ]
     if plan.schedule:
         signal = plan.schedule.signal
-        rows.insert(2, ("sched", "scheduling signal", ranges.schedule, units.schedule, signal, "SCHED_LSB"))
+        rows.insert(
+            2, ("sched", "scheduling signal", present(ranges.schedule), units.schedule, signal, "SCHED_LSB")
+        )
     return [
         Signal(name, what, f"{ends[0]:g}", f"{ends[1]:g}", UserText(unit), f"{plan.name}_{lsb}", form.bits)
         for name, what, ends, unit, form, lsb in rows
@@ -172,10 +176,10 @@ def _memory_section(plan: Plan) -> str:
         return ""
     words = (
         "The memory is a sum of exponentials. Every fractional power of s keeps a few means of its history,"
-        f" each over a time of its own ({_times(plan)}); {_followed(plan)}"
+        f" each over a time of its own ({_times(plan)}); {_followed(plan)}."
         " Nothing is cut off, so a constant is remembered without an error, and a step costs the same however"
         " far the memory reaches. Means cannot leave the range of what they average: the bounds above hold"
-        f" for any number of samples.{_SLOW[plan.arithmetic] * _has_slow(plan)}"
+        f" for any number of samples.{_SLOW[runtime(plan.arithmetic)] * _has_slow(plan)}"
     )
     return "\n".join(wrapped(words.split(" "), 116))
 
@@ -188,11 +192,11 @@ def _followed(plan: Plan) -> str:
         return (
             f"with them its response follows (jω)^α itself from {low:.4g} to {high:.4g} rad/s: {orders}"
             " (relative error, proved for every frequency of the band). Above the band it stays within twice"
-            " |jω|^α, four times where α > 1."
+            " |jω|^α, four times where α > 1"
         )
     return (
         "the weights that the past has through them follow"
-        f" the exact ones for {plan.horizon} samples: {orders} (relative error, proved for every lag)."
+        f" the exact ones for {plan.horizon} samples: {orders} (relative error, proved for every lag)"
     )
 
 
@@ -248,7 +252,7 @@ def example_context(plan: Plan, title: str, floats: bool = True) -> ExampleConte
     """
     ranges, units = plan.controller.ranges, plan.controller.units
     middle = 0.5 * (ranges.reference[0] + ranges.reference[1])
-    at = sum(ranges.schedule) / 2 if plan.schedule else 0.0
+    at = sum(present(ranges.schedule)) / 2 if plan.schedule else 0.0
     return ExampleContext(
         name=plan.name,
         title=UserText(title),

@@ -6,7 +6,7 @@ from focgen.codegen.literals import quantity, wrapped
 from focgen.codegen.texts import comment
 from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.plan.canonical import normaliser, realise
-from focgen.plan.model import Plan, Sum
+from focgen.plan.plan import Plan, Sum
 
 
 def polynomial_text(terms: Polynomial) -> str:

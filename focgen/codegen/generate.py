@@ -14,6 +14,7 @@ from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels, runtime_files
 from focgen.codegen.leftovers import leftovers
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.codegen.names import check_name
+from focgen.codegen.neighbours import kept, taken_back
 from focgen.codegen.packages.archive import archived
 from focgen.codegen.packages.context import Made
 from focgen.codegen.packages.package import PACKAGES, PLAIN, Package, check_package, packed
@@ -25,9 +26,9 @@ from focgen.control.files import ControllerLike, controller_from, controller_tex
 from focgen.errors import InputError, check_choice
 from focgen.fractional.continuous import HIGHEST, OPERATORS, RATIOS
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
-from focgen.output import check_apart, remove, write_files
+from focgen.output import check_apart, write_files
 from focgen.plan.build import build_plan
-from focgen.plan.model import LONGEST, Plan
+from focgen.plan.plan import LONGEST, Plan
 from focgen.resources import shipped
 from focgen.shown import Shown
 from focgen.spelling import respelled
@@ -75,17 +76,17 @@ def generate(
     ``target`` names a core whose own instructions the history sums shall use; without it they take their
     portable form. The bits are the same. ``no_float`` leaves the conversions from and to physical values out
     of the header. ``operator`` "continuous" fits the exponential memory to (jω)^α itself within ``tolerance``
-    over ``band`` (rad/s; without one four decades up to a tenth of the Nyquist frequency); it has no horizon,
-    and a tolerance of 1e-3 unless another is given. "gl" fits it to the weights of eq. (11). ``tunable`` adds
-    NAME_params, NAME_default, NAME_check and NAME_tune: factors on the gains and output limits that change at
-    run time, within the box that the controller's ``tunable`` gives. ``for_`` adds what an ecosystem expects:
-    one of ``PACKAGES``; the interface of an "fmu" is version ``fmi``, 2 or 3 (the default). ``force``
-    replaces files also where they are not as an earlier run has written them.
+    over ``band`` (rad/s; without one four decades up to a tenth of the Nyquist frequency). It then has no
+    horizon, and a tolerance of 1e-3 unless another is given. "gl" fits it to the weights of eq. (11).
+    ``tunable`` adds NAME_params, NAME_default, NAME_check and NAME_tune: factors on the gains and output
+    limits that change at run time, within the box that the controller's ``tunable`` gives. ``for_`` adds what
+    an ecosystem expects: one of ``PACKAGES``; the interface of an "fmu" is version ``fmi``, 2 or 3 (the
+    default). ``force`` replaces files also where they are not as an earlier run has written them.
 
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
-    in this arithmetic, InputError for a name or an option that cannot be used, a folder that cannot be
-    written, or one where a file would replace the controller's own by other bytes, or what somebody has
-    edited; BuildError where an FMU finds no C compiler.
+    in this arithmetic, BuildError where an FMU finds no C compiler. InputError: a name or an option that
+    cannot be used, a folder that cannot be written, or one where a file would replace the controller's own by
+    other bytes, or what somebody has edited.
     """
     wanted = check_package(for_, fmi)
     kernels = _kernels(target)
@@ -99,13 +100,20 @@ def generate(
     plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band, tunable)
     files = folder_files(plan, text, selftest, kernels, not no_float, wanted)
     files.update(archived(plan.name, files, wanted.fmi))
-    old = leftovers(Path(out), called, files)
+    placed = {**kept(Path(out), called), **files}
+    write_files(out, placed, [controller], lambda: _going(Path(out), called, placed, controller, force))
+    return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
+
+
+def _going(
+    out: Path, name: str, files: dict[str, str | bytes], controller: ControllerLike, force: bool
+) -> tuple[Path, ...]:
+    """What an earlier run has left; an InputError where that, or what takes its place, is somebody's work."""
+    old = (*leftovers(out, name, files), *taken_back(out, name))
     check_apart(old, [controller])
     if not force:
-        check_unedited(Path(out), files, old)
-    write_files(out, files, [controller])
-    remove(old)
-    return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
+        check_unedited(out, files, old)
+    return old
 
 
 def folder_files(

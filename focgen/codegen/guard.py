@@ -8,8 +8,9 @@ from focgen.codegen.expressions import counts, value
 from focgen.codegen.literals import constant, literal
 from focgen.codegen.tuned import integral_ends, limits
 from focgen.plan.counts import values_of
-from focgen.plan.model import Format, Plan
+from focgen.plan.plan import Format, Plan
 from focgen.plan.usable import EXPONENT
+from focgen.present import present
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def _held(plan: Plan) -> str:
 
 def output_of(plan: Plan) -> str:
     """u from a floating plan's integral; clamped where a limit need not be a whole number of counts."""
-    state, ends = plan.integrator.state, limits(plan)
+    state, ends = present(plan.integrator).state, limits(plan)
     if state.floating:
         return "s->integral"
     found = value("s->integral", state)

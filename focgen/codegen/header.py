@@ -14,7 +14,8 @@ from focgen.codegen.manifest import flags
 from focgen.codegen.saved import saved_bytes
 from focgen.codegen.state import Member, members, state_bytes
 from focgen.codegen.texts import UserText, comment
-from focgen.plan.model import Format, Plan
+from focgen.plan.plan import Format, Plan
+from focgen.present import present
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ def _limits(plan: Plan) -> list[Define]:
         found += _ends("REF", plan.reference, ranges.reference, units.measurement)
         found += _ends("MEAS", plan.measurement, ranges.measurement, units.measurement)
         if plan.schedule:
-            found += _ends("SCHED", plan.schedule.signal, ranges.schedule, units.schedule)
+            found += _ends("SCHED", plan.schedule.signal, present(ranges.schedule), units.schedule)
     return found + _ends("U", plan.output, ranges.output, units.output)
 
 
@@ -153,7 +154,7 @@ def _tunable(plan: Plan) -> list[Define]:
     """The box of the parameters; empty where there are none."""
     if plan.tuning is None:
         return []
-    box, physical, unit = plan.tuning, plan.controller.tunable, plan.controller.units.output
+    box, physical, unit = plan.tuning, present(plan.controller.tunable), plan.controller.units.output
     count = len(box.nominal)
     about = "factors: one for each gain of the schedule" if plan.schedule else "factors: one for the gain"
     ends = _ends("GAIN", box.factor, physical.gain, "")

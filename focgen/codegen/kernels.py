@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from focgen.codegen.lookahead import AHEAD, LookAhead, look_ahead
-from focgen.plan.model import Plan, Sum
+from focgen.plan.plan import Plan, Sum
 
 TARGETS = ("cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7", "rv32imac", "avr")
 """The cores that ``--target`` names. An AVR, and float64 anywhere, take the portable form: there the products
@@ -77,7 +77,7 @@ class Kernels:
         looks = any(self.ahead(plan, s) for s in named_sums(plan).values())
         if not looks and not self.long(plan):
             return ()
-        own = _FILES.get((self.target, plan.arithmetic))
+        own = _FILES.get((self.target or "", plan.arithmetic))
         return (
             *((own,) if own else ()),
             f"foc_ahead_{plan.arithmetic}.h" if looks else "foc_long.h",

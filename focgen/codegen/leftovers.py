@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from focgen.codegen.manifest import read_manifest, sha256
+from focgen.codegen.manifest import sha256
+from focgen.codegen.neighbours import manifest_of_controller, others
+from focgen.codegen.packages.archive import DIGEST
 from focgen.codegen.packages.package import moved, package_file
 
 
@@ -17,8 +19,8 @@ def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tupl
 
     Files of a controller of another name stay, and so does whatever no manifest tells of.
     """
-    manifest = read_manifest(folder)
-    if manifest.get("name") != name:
+    manifest = manifest_of_controller(folder, name)
+    if not manifest:
         return ()
     test = [f"{name}_selftest.{end}" for end in "hc"] if "selftest" in manifest else []
     inputs = manifest.get("inputs")
@@ -26,15 +28,16 @@ def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tupl
     runtime = [(file, digest) for file, digest in written if re.fullmatch(r"foc_\w+\.h", file)]
     headers = [file for file, digest in runtime if _is(folder / file, digest)]
     package = [file for file, digest in _packaged(manifest, name) if _is(folder / file, digest)]
-    archive = [f"{name}.fmu"] if _of(manifest.get("package"), "for") == "fmu" else []
+    archive = [f"{name}.fmu", f"{name}.fmu{DIGEST}"] if _of(manifest.get("package"), "for") == "fmu" else []
     elsewhere = [
         other for file, text in files.items() for other in moved(file) if _is(folder / other, sha256(text))
     ]
     old = [folder / file for file in (*test, *headers, *package, *archive, *elsewhere) if file not in files]
-    return tuple(path for path in dict.fromkeys(old) if path.is_file())
+    needed = {folder / file for _, own in others(folder, name) for file in own}
+    return tuple(path for path in dict.fromkeys(old) if path.is_file() and path not in needed)
 
 
-def _packaged(manifest: dict, name: str) -> Iterator[tuple[str, str]]:
+def _packaged(manifest: dict[str, Any], name: str) -> Iterator[tuple[str, str]]:
     """Yield file and digest of what a package added, where these are its own names: a manifest from elsewhere
     leads to no other file."""
     listed = _of(manifest.get("package"), "files")

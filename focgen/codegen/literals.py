@@ -22,7 +22,7 @@ def literal(value: int | float, ctype: str) -> str:
     if ctype == "double":
         return _pointed(f"{value:.17g}", value)
     if ctype == "float":
-        return _pointed(f"{value:.9g}", np.float32(value)) + "f"
+        return _pointed(f"{value:.9g}", float(np.float32(value))) + "f"
     if value == -(1 << 63):  # its magnitude alone fits no type
         return f"({value + 1} - 1)"
     return str(int(value))
@@ -81,4 +81,4 @@ def wrapped(words: Iterable[str], width: int = _WIDTH - 3, separator: str = " ")
             lines.append(line)
             longer = word
         line = longer
-    return lines + [line] if line else lines
+    return [*lines, line] if line else lines

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from focgen.plan.model import Block, Count, Sum
+from focgen.plan.plan import Block, Count, Sum
 
 AHEAD = 4
 NEAR, NEAR_FLOATING = 16, 8  # lags summed in their own step; 8 at least, as the others are not known before
@@ -110,7 +110,8 @@ def _whole(block: Block) -> Run:
 def _shared(blocks: list[Run]) -> tuple[tuple[Run, ...], tuple[int, ...]]:
     """Share the tiles of all blocks among four steps, so that none has much more to do than another."""
     share = (sum(run.tiles + _RUN for run in blocks) + (AHEAD - 1) * _RUN) / AHEAD
-    runs, slices, spent, at = [], [0], 0.0, 0
+    runs: list[Run] = []
+    slices, spent, at = [0], 0.0, 0
     for block in blocks:
         left = block
         while left.tiles:

@@ -16,7 +16,7 @@ from focgen.fractional.elementary import rounded_up
 from focgen.jsontext import read_json
 from focgen.plan.canonical import memory_bias
 from focgen.plan.integrals import smallest_error
-from focgen.plan.model import (
+from focgen.plan.plan import (
     FLAG_HIGH,
     FLAG_INPUT,
     FLAG_INVALID,
@@ -28,15 +28,16 @@ from focgen.plan.model import (
     Proof,
     Sum,
 )
-from focgen.plan.tuning import default_params
 from focgen.plan.remarks import remarks
+from focgen.plan.tuning import default_params
 from focgen.plan.usable import EXPONENT
+from focgen.present import present
 
 
-def read_manifest(folder: Path) -> dict[str, Any]:
+def read_manifest(folder: Path, file: str = "manifest.json") -> dict[str, Any]:
     """What an earlier run has recorded in a folder; empty where there is nothing that can be read."""
     try:
-        found = read_json(folder / "manifest.json", "")
+        found = read_json(folder / file, "")
     except InputError:
         return {}
     return found if isinstance(found, dict) else {}
@@ -204,21 +205,21 @@ def _table_bytes(plan: Plan, kernels: Kernels) -> int:
 
 def _tuning_bytes(plan: Plan) -> int:
     """Of breakpoints, nominal gains, reciprocals and shifts."""
-    one, segments = size_of(plan.error.ctype), len(plan.tuning.reciprocals)
+    one, segments = size_of(plan.error.ctype), len(present(plan.tuning).reciprocals)
     points = len(plan.schedule.breakpoints) if plan.schedule else 0
     per = one if plan.floating else 4 + 2
-    return (points + len(plan.tuning.nominal)) * one + segments * per
+    return (points + len(present(plan.tuning).nominal)) * one + segments * per
 
 
 def tunable_entry(plan: Plan) -> dict[str, Any]:
     """The box in physical units, the size of a factor's count, and the default in counts."""
-    box, default = plan.controller.tunable, default_params(plan)
+    box, default = present(plan.controller.tunable), default_params(plan)
     return {
         "gains": list(plan.controller.gains),
         "gain": list(box.gain),
         "output_low": list(box.output_low),
         "output_high": list(box.output_high),
-        "GAIN_LSB": plan.tuning.factor.lsb,
+        "GAIN_LSB": present(plan.tuning).factor.lsb,
         "default": {"gain": list(default.gain), "u_min": default.u_min, "u_max": default.u_max},
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -41,7 +42,7 @@ def _environment() -> Environment:
     return made
 
 
-def render(template: str, context) -> str:
-    """Fill a template with the fields of a dataclass."""
+def render(template: str, context: Any) -> str:
+    """Fill a template with the fields of ``context``, a dataclass of any kind."""
     fields = {field.name: getattr(context, field.name) for field in dataclasses.fields(context)}
     return _environment().get_template(template).render(fields)

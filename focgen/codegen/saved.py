@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from typing import Any
 
 import focgen
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.state import Member, members, size_of
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 
 _NAMED, _CHECKED = 8, 4  # bytes of the configuration and of the check sum
 
@@ -58,7 +59,7 @@ def _member(member: Member) -> SavedMember:
 
 def _configuration(plan: Plan, sha256: str, kernels: Kernels) -> str:
     """A number of 64 bits in C: of all that gives a state its meaning."""
-    settings: list = [focgen.__version__, sha256, plan.name, plan.arithmetic, plan.memory, plan.length]
+    settings: list[Any] = [focgen.__version__, sha256, plan.name, plan.arithmetic, plan.memory, plan.length]
     settings += [plan.tolerance, plan.horizon, kernels.target]
     settings += [plan.operator, plan.band] if plan.band else []
     settings += ["tunable"] if plan.tuning else []

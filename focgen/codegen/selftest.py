@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from focgen.codegen.literals import literal, rows
 from focgen.codegen.render import render
 from focgen.codegen.state import size_of
 from focgen.plan.execute import execute
-from focgen.plan.model import FLAG_HIGH, FLAG_LOW, Plan
+from focgen.plan.plan import FLAG_HIGH, FLAG_LOW, Plan
 from focgen.plan.scenario import Params, Reset, Scenario, Track, Tune, nearest_raw
+from focgen.plan.sums import Count, Format
 from focgen.plan.tuning import default_params
+from focgen.present import present
 
 RESET, TRACK, TUNE = 1, 2, 3
 _FEWEST, _MOST = 240, 900  # steps; in between, twice the memory
@@ -89,14 +92,14 @@ def selftest_context(plan: Plan, sha256: str) -> SelftestContext:
         infinity=f"{exponent:#x}u",
         rows=[_text(plan, row) for row in made],
         outputs=rows(answer.u[0].tolist(), plan.output.ctype),
-        flags=rows(answer.flags[0].tolist(), "uint8_t"),
+        flags=rows(present(answer.flags)[0].tolist(), "uint8_t"),
         samples=answer.u.shape[1],
         tunable=plan.tuning is not None,
     )
 
 
 def _text(plan: Plan, row: Row) -> str:
-    number = lambda value: literal(value, plan.output.ctype)  # noqa: E731
+    number = lambda value: literal(value, plan.output.ctype)
     given, inputs = (", ".join(map(number, part)) for part in (row.given, row.inputs))
     bad = f"{row.bad}, " if plan.floating else ""
     return f"{{{row.event}, {bad}{row.steps}, {{{given}}}, {{{inputs}}}}},"
@@ -119,14 +122,14 @@ def selftest_rows(plan: Plan) -> list[Row]:
 
 def _saturated(plan: Plan, made: list[Row]) -> float:
     """The share of steps that end at a limit."""
-    flags = execute(plan, scenario_of(plan, made)).flags
+    flags = present(execute(plan, scenario_of(plan, made)).flags)
     return float(np.mean(flags & (FLAG_HIGH | FLAG_LOW) != 0))
 
 
 class _Maker:
     """Rows for a plan, with errors of ``size`` times the largest."""
 
-    def __init__(self, plan: Plan, size: float):
+    def __init__(self, plan: Plan, size: float) -> None:
         self.plan, self.size, self.count = plan, size, 0
 
     def next(self) -> float:
@@ -134,11 +137,11 @@ class _Maker:
         self.count += 1
         return (self.count * 40503 % 65536) / 65536.0
 
-    def signal(self, form, at: float):
+    def signal(self, form: Format, at: float) -> Count:
         """A raw value at the share ``at`` of a range."""
         return _within(form, float(form.low) + at * (float(form.high) - float(form.low)))
 
-    def sched(self, at: float):
+    def sched(self, at: float) -> Count:
         return self.signal(self.plan.schedule.signal, at) if self.plan.schedule else 0
 
     def small(self, steps: int = 1) -> Row:
@@ -189,13 +192,13 @@ class _Maker:
             made += self.tuned()
         return [*made, self.track(self.small(2), 0.6), self.reset(self.small(), 0.3), self.small(4)]
 
-    def tune(self, row: Row, factor, low, high) -> Row:
+    def tune(self, row: Row, factor: Count, low: Count, high: Count) -> Row:
         """The row after parameters, raw."""
         return replace(row, event=TUNE, given=(factor, low, high))
 
     def tuned(self) -> list[Row]:
         """Every corner of the box; parameters that are refused; limits that the output is pushed against."""
-        box, made = self.plan.tuning, []
+        box, made = present(self.plan.tuning), []
         for corner in range(8):
             given = [span[corner >> i & 1] for i, span in enumerate(self.box())]
             made += [self.tune(self.small(), *given), self.small(), self.large(corner % 2 == 0, 3)]
@@ -208,12 +211,12 @@ class _Maker:
         one = default_params(self.plan)
         return [*made, self.tune(self.small(), one.gain[0], one.u_min, one.u_max)]
 
-    def box(self) -> list[tuple]:
+    def box(self) -> list[tuple[Any, ...]]:
         """The spans of a factor and of the limits, raw."""
-        box = self.plan.tuning
+        box = present(self.plan.tuning)
         return [(box.factor.low, box.factor.high), box.low, box.high]
 
-    def beyond(self, count):
+    def beyond(self, count: Count) -> Count:
         """More than a count of the box, within the type."""
         return count * 1.5 if self.plan.floating else _in_type(self.plan.output, count + 1)
 
@@ -229,14 +232,14 @@ class _Maker:
         return [*made, self.small()]
 
 
-def _within(form, value: float):
+def _within(form: Format, value: float) -> Count:
     """The nearest raw value within a range, as a number of its type."""
     if form.floating:
         return float(nearest_raw(min(max(value, form.low), form.high), form))
     return int(min(max(round(value), form.low), form.high))
 
 
-def _in_type(form, value):
+def _in_type(form: Format, value: float) -> Count:
     top = 1 << (form.bits - 1)
     return float(value) if form.floating else int(min(max(value, -top), top - 1))
 
@@ -252,7 +255,7 @@ def scenario_of(plan: Plan, made: list[Row]) -> Scenario:
     ref, meas, sched = (np.repeat(columns[:, i], steps)[None, :] for i in range(3))
     starts = np.cumsum([0, *steps])
     resets = [
-        Reset(0, int(at), *(_argument(row, i) for i in range(3)))
+        Reset(0, int(at), _argument(row, 0), _argument(row, 1), _argument(row, 2))
         for row, at in zip(made, starts)
         if row.event == RESET
     ]
@@ -264,10 +267,10 @@ def scenario_of(plan: Plan, made: list[Row]) -> Scenario:
 
 def _params(plan: Plan, row: Row) -> Params:
     factor, low, high = (_argument(row, i) for i in range(3))
-    return Params((factor,) * len(plan.tuning.nominal), low, high)
+    return Params((factor,) * len(present(plan.tuning).nominal), low, high)
 
 
-def _argument(row: Row, place: int):
+def _argument(row: Row, place: int) -> Count:
     """An argument as the C passes it: NaN, or infinity at odd places, where it is bad."""
     if row.bad >> place & 1:
         return float("inf") if place % 2 else float("nan")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from focgen.codegen.literals import constant, literal
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.setpoint import start_of
 
 

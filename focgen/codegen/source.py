@@ -27,7 +27,8 @@ from focgen.codegen.tables import ScheduleText, SumText, schedule_text, sum_text
 from focgen.codegen.texts import UserText, comment
 from focgen.codegen.tuned import Limits, TunedText, integral_ends, limits, tuned_gain, tuned_text
 from focgen.plan.canonical import realise
-from focgen.plan.model import Plan, Sum
+from focgen.plan.plan import Plan, Sum
+from focgen.present import present
 
 
 @dataclass(frozen=True)
@@ -264,19 +265,21 @@ def _feedback(plan: Plan, kernels: Kernels) -> FeedbackText | None:
 
 def _steady(plan: Plan) -> str:
     """v for a constant ``e``; 0 where the numerator has no gain at rest."""
-    if plan.feedback.steady == 0:
+    if present(plan.feedback).steady == 0:
         return literal(0, plan.filtered.ctype)
-    steady, form = constant(plan.feedback.steady, plan.filtered.ctype), plan.filtered.ctype
+    steady, form = constant(present(plan.feedback).steady, plan.filtered.ctype), plan.filtered.ctype
     if plan.floating:
         return f"{steady} * e"
     double = f"int{2 * plan.error.bits}_t"
-    return saturated(shifted(f"({double}){steady} * e", double, plan.feedback.steady_shift), double, form)
+    return saturated(
+        shifted(f"({double}){steady} * e", double, present(plan.feedback).steady_shift), double, form
+    )
 
 
 def _steady_about(plan: Plan) -> str:
-    if plan.feedback.steady == 0:
+    if present(plan.feedback).steady == 0:
         return ""
-    counts = plan.feedback.steady * 2.0**-plan.feedback.steady_shift
+    counts = present(plan.feedback).steady * 2.0 ** -present(plan.feedback).steady_shift
     return f"{counts * plan.filtered.lsb / plan.error.lsb:.6g}"
 
 
@@ -346,7 +349,7 @@ def _integral(plan: Plan) -> IntegralText | None:
 
 def _change(plan: Plan) -> str:
     """By how much the integral moves ahead of its limits: two half trapezoids, within the slew limit."""
-    state, slew = plan.integrator.state, plan.integrator.slew
+    state, slew = present(plan.integrator).state, present(plan.integrator).slew
     both = f"{converted('d', plan.increment.ctype, state.ctype)} + s->increment"
     if slew is None:
         return f"({both})"

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from focgen.codegen.banks import means, rests, state_about
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.literals import scale
-from focgen.plan.model import Format, Plan, Sum
+from focgen.plan.plan import Format, Plan, Sum
+from focgen.present import present
 
 _SIZES = {"uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "float": 4, "int64_t": 8, "double": 8}
 
@@ -149,7 +150,7 @@ def _parameters(plan: Plan) -> list[Member]:
         Member(signal, "u_max", "upper limit of the output"),
     ]
     if counts_limits(plan):
-        state = plan.integrator.state
+        state = present(plan.integrator).state
         found += [
             Member(state.ctype, "low", f"the lower one{_counts(state)}"),
             Member(state.ctype, "high", f"the upper one{_counts(state)}"),
@@ -178,7 +179,7 @@ def _bytes(plan: Plan) -> list[Member]:
 
 def inner_input(plan: Plan) -> str:
     """The type of what the inner integral takes in: counts of its own where it is in counts."""
-    return plan.inner.state.ctype if plan.floating else plan.inner.rest.total.ctype
+    return present(plan.inner).state.ctype if plan.floating else present(plan.inner).rest.total.ctype
 
 
 def carries(plan: Plan) -> bool:

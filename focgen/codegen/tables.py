@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from focgen.codegen.banks import BankText, bank_texts, inputs
 from focgen.codegen.expressions import bound, shifted
@@ -10,7 +11,9 @@ from focgen.codegen.literals import exponent, quantity, rows, scale, wrapped
 from focgen.codegen.lookahead import LookAhead, Run
 from focgen.codegen.state import plain_bytes, size_of
 from focgen.codegen.texts import comment
-from focgen.plan.model import Block, Plan, Sum
+from focgen.plan.formats import runtime
+from focgen.plan.plan import Block, Plan, Sum
+from focgen.present import present
 
 
 @dataclass(frozen=True)
@@ -105,9 +108,11 @@ def _call(plan: Plan, table: Sum, blocks: list[Block], weights: str, prefix: str
     ring, size = _ring(table)
     history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
     if len(blocks) > 1:
-        return f"{prefix}_sum_{plan.arithmetic}({weights}, {weights}_blocks, {len(blocks)}, {history})"
+        return (
+            f"{prefix}_sum_{runtime(plan.arithmetic)}({weights}, {weights}_blocks, {len(blocks)}, {history})"
+        )
     one = blocks[0]
-    dot = f"{prefix}_dot_{plan.arithmetic}({weights}, {len(one.weights)}, {history}, {one.last})"
+    dot = f"{prefix}_dot_{runtime(plan.arithmetic)}({weights}, {len(one.weights)}, {history}, {one.last})"
     return shifted(dot, one.sum.ctype, one.align)
 
 
@@ -118,15 +123,17 @@ def _ahead_text(plan: Plan, table: Sum, name: str, about: list[str], ahead: Look
     far = f"{member}, {name}_far, {name}_runs, {name}_slices, s->{ring}, {plan.name}_{size}"
     near = ahead.near
     history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
-    nearer = [_weights(plan, near.blocks, f"{name}_near", ["The lags nearer than those."])] if near else []
+    nearer = (
+        [_weights(plan, list(near.blocks), f"{name}_near", ["The lags nearer than those."])] if near else []
+    )
     return SumText(
         [*_far_tables(plan, table, name, about, ahead), *nearer],
         f"{name}_sum",
         table.total.ctype,
         _sum_about(table),
         f"{member}[s->{ring}_now & 3u]",
-        f"foc_ahead_{plan.arithmetic}({far}, s->{ring}_now);",
-        f"foc_rest_{plan.arithmetic}({far});",
+        f"foc_ahead_{runtime(plan.arithmetic)}({far}, s->{ring}_now);",
+        f"foc_rest_{runtime(plan.arithmetic)}({far});",
         _near(plan, near, f"{name}_near", history) if near else None,
     )
 
@@ -138,7 +145,7 @@ def _near(plan: Plan, near: Sum, weights: str, history: str) -> NearText:
         products = [f"{wide}w[{at + i}] * x[{near.last - block.last + i}]" for i in range(len(block.weights))]
         parts += products if plan.floating else [_shifted_sum(products, block)]
         at += len(block.weights)
-    call = f"foc_latest_{plan.arithmetic}(copy, {count}, {history})"
+    call = f"foc_latest_{runtime(plan.arithmetic)}(copy, {count}, {history})"
     return NearText(plan.error.ctype, count, call, weights, parts)
 
 
@@ -207,8 +214,10 @@ def _block_about(plan: Plan, block: Block) -> str:
 
 def _blocks(table: Sum, blocks: list[Block], name: str) -> TableText:
     about = [
-        f"Its blocks, whose sums meet at counts of {scale(table.total.lsb)};"
-        " beside each the most its sum can be."
+        (
+            f"Its blocks, whose sums meet at counts of {scale(table.total.lsb)};"
+            " beside each the most its sum can be."
+        )
     ]
     lines = []
     for block in blocks:
@@ -239,12 +248,12 @@ def schedule_text(plan: Plan) -> ScheduleText:
     ]
     names = ", ".join(table.name for table in made)
     signal = "sched" if plan.floating else "at"
-    call = f"foc_schedule_{plan.arithmetic}({signal}, {names}, {len(plan.schedule.gains)})"
+    call = f"foc_schedule_{runtime(plan.arithmetic)}({signal}, {names}, {len(present(plan.schedule).gains)})"
     return ScheduleText(_schedule_about(plan), made, call, _outside(plan, signal))
 
 
 def _schedule_about(plan: Plan) -> list[str]:
-    schedule = plan.schedule
+    schedule = present(plan.schedule)
     factor = 0.5 * plan.sample_time if plan.integrator else 1.0
     at = [quantity(point * schedule.signal.lsb) for point in schedule.breakpoints]
     gains = [quantity(gain * plan.gain.lsb / factor) for gain in schedule.gains]
@@ -255,9 +264,9 @@ def _schedule_about(plan: Plan) -> list[str]:
     return [head, *(line + "," * (line != pairs[-1]) for line in pairs)]
 
 
-def _columns(plan: Plan) -> list[tuple[str, str, str, tuple]]:
+def _columns(plan: Plan) -> list[tuple[str, str, str, tuple[Any, ...]]]:
     """(comment, type, name, values) of each table; the gains have one more entry than slopes and shifts."""
-    schedule, ctype = plan.schedule, plan.gain.ctype
+    schedule, ctype = present(plan.schedule), plan.gain.ctype
     if plan.tuning and plan.floating:
         return [("", ctype, "points", schedule.breakpoints)]
     if plan.floating:
@@ -277,7 +286,7 @@ def _columns(plan: Plan) -> list[tuple[str, str, str, tuple]]:
 
 def _outside(plan: Plan, signal: str) -> str:
     """The condition of the flag; what the clamp of the signal rules out is left out."""
-    schedule, points = plan.schedule, f"{plan.name}_points"
+    schedule, points = present(plan.schedule), f"{plan.name}_points"
     found = []
     if plan.floating or schedule.signal.low < schedule.breakpoints[0]:
         found.append(f"{signal} < {points}[0]")

@@ -11,8 +11,10 @@ from focgen.codegen.literals import constant, literal, rows, scale
 from focgen.codegen.state import counts_limits
 from focgen.codegen.tables import Group, TableText
 from focgen.plan.counts import taken_in
-from focgen.plan.model import Plan
+from focgen.plan.formats import runtime
+from focgen.plan.plan import Plan
 from focgen.plan.tuning import default_params
+from focgen.present import present
 
 _WITHIN = {
     "int16_t": "foc_within16",
@@ -79,10 +81,10 @@ def limits(plan: Plan) -> Limits:
 
 def integral_ends(plan: Plan) -> tuple[str, str]:
     """The limits in counts of the integral."""
-    state = plan.integrator.state
+    state = present(plan.integrator).state
     if plan.tuning is None:
         return constant(state.low, state.ctype), constant(state.high, state.ctype)
-    up = scaled_up(state.ctype, plan.integrator.to_output)
+    up = scaled_up(state.ctype, present(plan.integrator).to_output)
     ends = limits(plan)
     if counts_limits(plan):
         return "s->low", "s->high"
@@ -99,7 +101,7 @@ def tuned_gain(plan: Plan) -> str:
         shifts = "" if plan.floating else f"{plan.name}_shifts, "
         signal = "sched" if plan.floating else "at"
         tables = f"{plan.name}_points, s->gains, s->slopes, {shifts}{plan.name.upper()}_GAINS"
-        found = f"foc_tuned_{plan.arithmetic}({signal}, {tables})"
+        found = f"foc_tuned_{runtime(plan.arithmetic)}({signal}, {tables})"
     if plan.floating:
         return found
     ends = f"{constant(plan.gain.low, plan.gain.ctype)}, {constant(plan.gain.high, plan.gain.ctype)}"
@@ -129,8 +131,11 @@ def tuned_text(plan: Plan) -> TunedText | None:
 
 
 def _counted_ends(plan: Plan) -> list[CountedEnd]:
-    state, found = plan.integrator.state, []
-    for member, of, box in (("low", "u_min", plan.tuning.low), ("high", "u_max", plan.tuning.high)):
+    state, found = present(plan.integrator).state, []
+    for member, of, box in (
+        ("low", "u_min", present(plan.tuning).low),
+        ("high", "u_max", present(plan.tuning).high),
+    ):
         ends = (constant(int(taken_in(np.float32(end), state)), state.ctype) for end in box)
         found.append(CountedEnd(member, counts(f"p->{of}", state), *ends))
     return found
@@ -154,7 +159,7 @@ def _slope(plan: Plan) -> str:
 
 def _tables(plan: Plan) -> list[TableText]:
     """The gains that the factors are on, and what slopes are made with."""
-    box, ctype = plan.tuning, plan.gain.ctype
+    box, ctype = present(plan.tuning), plan.gain.ctype
     half = " times h/2" if plan.integrator else ""
     held = "" if plan.floating else f", counts of {scale(box.nominal_lsb)}"
     found = [(f"The gains{half} that the factors are on{held}.", ctype, "nominal", box.nominal)]

@@ -76,12 +76,18 @@ class Tunable:
     output_high: tuple[float, float] = (0.0, 0.0)
 
 
+Option = str | int | float | tuple[float, ...]
+"""A value of an option that a controller was designed with."""
+
+
 @dataclass(frozen=True)
 class Source:
-    """What a controller was designed from: file name and SHA-256."""
+    """What a controller was designed from: file name and SHA-256, and the ``options`` that were given, by
+    name."""
 
     file: str
     sha256: str
+    options: tuple[tuple[str, Option], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -128,6 +134,13 @@ class Controller:
     def scheduled(self) -> bool:
         """Whether the gain depends on a scheduling signal."""
         return isinstance(self.gain, GainSchedule)
+
+    @property
+    def schedule(self) -> GainSchedule:
+        """The gain of a scheduled controller. Raises TypeError for a constant one."""
+        if not isinstance(self.gain, GainSchedule):
+            raise TypeError("the gain is constant")
+        return self.gain
 
     @property
     def gains(self) -> tuple[float, ...]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from focgen.control.units import unit_of_role
 from focgen.errors import DesignError
-from focgen.rig.model import UNITY, Actuator, LinearActuator, Ranges, Rig
+from focgen.present import present
+from focgen.rig.rig import UNITY, Actuator, LinearActuator, Ranges, Rig
 
 _COMMAND = (0.0, 10.0)  # V, where the rig does not say
 _GRID = 2001
@@ -110,7 +112,7 @@ def _output_range(rig: Rig, pressure: tuple[float, float]) -> tuple[float, float
     return low, high
 
 
-def static_output(rig: Rig, pressure):
+def static_output(rig: Rig, pressure: Any) -> Any:
     """What the sensor reads at rest at ``pressure``, any shape."""
     actuator = actuator_of(rig)
     curvature = actuator.drive(pressure) * _static_gain(rig, "actuator") + actuator.offset
@@ -118,7 +120,9 @@ def static_output(rig: Rig, pressure):
 
 
 def rest(rig: Rig, command: tuple[float, float]) -> Equilibrium:
-    """Return the rig's rest: no command, or what the ``command`` range has nearest to none."""
+    """Return the rig's rest: no command, or what the ``command`` range has nearest to none. Raises
+    DesignError where the rig goes on moving there.
+    """
     actuator = actuator_of(rig)
     idle = min(max(0.0, command[0]), command[1])
     pressure = idle * rig.regulator.dc_gain if idle else 0.0
@@ -141,9 +145,11 @@ def holding(rig: Rig, output: float, ranges: Ranges) -> Equilibrium:
     level = output / _static_gain(rig, "sensor") - actuator.offset
     pressure = _pressure_for(rig, level / _static_gain(rig, "actuator"), output, ranges)
     command = pressure / _static_gain(rig, "regulator")
-    slack = 1e-9 * (ranges.command[1] - ranges.command[0])
-    if not ranges.command[0] - slack <= command <= ranges.command[1] + slack:
-        raise _unreachable(rig, output, f"needs the command {command:.4g}", f"[{_span(ranges.command)}]")
+    slack = 1e-9 * (present(ranges.command)[1] - present(ranges.command)[0])
+    if not present(ranges.command)[0] - slack <= command <= present(ranges.command)[1] + slack:
+        raise _unreachable(
+            rig, output, f"needs the command {command:.4g}", f"[{_span(present(ranges.command))}]"
+        )
     return Equilibrium(command, pressure, output)
 
 
@@ -168,8 +174,8 @@ def _pressure_for(rig: Rig, drive: float, output: float, ranges: Ranges) -> floa
     actuator = actuator_of(rig)
     if isinstance(actuator, LinearActuator):
         return drive
-    start = rest(rig, ranges.command).pressure
-    reach = _scaled(ranges.command, _static_gain(rig, "regulator"))
+    start = rest(rig, present(ranges.command)).pressure
+    reach = _scaled(present(ranges.command), _static_gain(rig, "regulator"))
     for end in (reach[1], reach[0]):
         pressure = np.linspace(start, end, _GRID)
         off = actuator.drive(pressure) - drive

@@ -40,6 +40,7 @@ schedule = "bar"
 [designed_from]                          # optional
 file = "rig.toml"
 sha256 = "…"
+options = { settling = 1.5, delay = 1 }  # of design
 """
 
 from __future__ import annotations
@@ -47,28 +48,31 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import tomlkit
 
 from focgen.control.controller import (
-    NOTHING,
     ARITHMETICS,
     MEMORIES,
+    NOTHING,
     TOLERANCES,
     Controller,
     ControllerRanges,
     GainSchedule,
+    Option,
     Source,
     Tunable,
     Units,
 )
 from focgen.errors import ControllerError
 from focgen.fractional.continuous import OPERATORS
+from focgen.fractional.terms import read_transfer, terms_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
-from focgen.tomlfile import Table, terms_of
+from focgen.tomlfile import Table
 
 ControllerLike = Controller | str | Path | Mapping[str, Any]
 """A controller, the path of its controller.toml, or a dictionary of the same shape."""
@@ -122,7 +126,7 @@ def controller_of(top: Table, name: str) -> Controller:
 
 def _transfer(top: Table) -> TransferFunction:
     table = top.section("transfer", "give num and den as [coefficient, order of s] terms")
-    transfer = table.transfer()
+    transfer = read_transfer(table)
     table.done()
     return transfer
 
@@ -137,7 +141,7 @@ def _gain(top: Table) -> float | GainSchedule:
         raise table.fail(
             "gains", f"has {len(gains)} values for {len(points)} breakpoints", "give one gain for each"
         )
-    if len(points) < 2 or any(b <= a for a, b in zip(points, points[1:])):
+    if len(points) < 2 or any(b <= a for a, b in pairwise(points)):
         raise table.fail("breakpoints", f"is {list(points)}", "give at least two, rising strictly")
     return GainSchedule(points, gains)
 
@@ -258,9 +262,34 @@ def _source(table: Table | None) -> Source | None:
     if table is None:
         return None
     table.required("file"), table.required("sha256")
-    source = Source(table.text("file", ""), table.text("sha256", ""))
+    source = Source(table.text("file", ""), table.text("sha256", ""), _options(table.table("options")))
     table.done()
     return source
+
+
+def _options(table: Table | None) -> tuple[tuple[str, Option], ...]:
+    """What the controller was designed with: told, and nothing of what it is."""
+    names = () if table is None else tuple(table.values)
+    return tuple((name, _option(table, name)) for name in names if table is not None)
+
+
+def _option(table: Table, name: str) -> Option:
+    value = table.raw(name)
+    if isinstance(value, list):
+        return table.numbers(name)
+    return (
+        table.text(name, "")
+        if isinstance(value, str)
+        else value
+        if isinstance(value, int)
+        else table.number(name)
+    )
+
+
+def source_table(source: Source) -> dict[str, Any]:
+    """As the file has it; without options where none are known."""
+    given = {name: list(value) if isinstance(value, tuple) else value for name, value in source.options}
+    return {"file": source.file, "sha256": source.sha256, **({"options": given} if given else {})}
 
 
 def write_controller(controller: Controller, path: str | Path) -> None:
@@ -308,7 +337,7 @@ def controller_table(controller: Controller) -> dict[str, Any]:
     if units:
         table["units"] = units
     if controller.designed_from:
-        table["designed_from"] = asdict(controller.designed_from)
+        table["designed_from"] = source_table(controller.designed_from)
     return table
 
 

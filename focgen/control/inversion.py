@@ -11,7 +11,7 @@ import numpy as np
 from focgen.errors import DesignError
 from focgen.fractional.poles import first_sheet_zeros
 from focgen.fractional.transfer import Polynomial, Term, TransferFunction, polynomial
-from focgen.rig.model import Actuator, LinearActuator, Rig
+from focgen.rig.rig import Actuator, LinearActuator, Rig
 
 FILTER_RATIO = 10.0  # corner of the roll-off over the crossover: it costs about 6° a filter order there
 _HALF_PLANE = 0.5 * math.pi

@@ -8,10 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.arrays import Array, Bools, Complex
+
 _PER_DECADE = 40
 _STEP = 0.03  # largest turn (rad) and largest change of log|L| between neighbours of the refined grid
 _ROUNDS = 14
-_SMALL = 1e-4  # |L| below which nothing is refined
+SMALL = 1e-4  # |L| below which nothing is refined
 DELAYED = 1e-2  # the same where a nominal delay turns it without end
 
 
@@ -40,17 +42,15 @@ class Curve:
     ``values`` (n,).
     """
 
-    omega: np.ndarray
-    values: np.ndarray
+    omega: Array
+    values: Complex
 
     def times(self, factor: float) -> Curve:
         """The loop with its gain multiplied."""
         return replace(self, values=self.values * factor)
 
 
-def curve(
-    response: Callable[[np.ndarray], np.ndarray], low: float, high: float, small: float = _SMALL
-) -> Curve:
+def curve(response: Callable[[Array], Complex], low: float, high: float, small: float = SMALL) -> Curve:
     """Sample ``response(omega)`` from ``low`` to ``high`` rad/s, refined where it turns or changes fast and
     is not ``small``.
     """
@@ -68,7 +68,7 @@ def curve(
     return Curve(omega, values)
 
 
-def _coarse(values: np.ndarray, least: float) -> np.ndarray:
+def _coarse(values: Complex, least: float) -> Bools:
     """Where neighbours differ by too much to interpolate; what is below ``least`` matters no more."""
     small = np.maximum(np.abs(values[1:]), np.abs(values[:-1])) < least
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -98,18 +98,18 @@ def margins(loop: Curve) -> Margins:
     )
 
 
-def _crossings(values: np.ndarray, level: float) -> np.ndarray:
+def _crossings(values: Array, level: float) -> Array:
     """Return the fractional indices where ``values`` passes ``level``."""
     side = values > level
     index = np.flatnonzero(side[1:] != side[:-1])
     return index + (level - values[index]) / (values[index + 1] - values[index])
 
 
-def _at(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+def _at(values: Array, places: Array) -> Array:
     return np.interp(places, np.arange(len(values)), values)
 
 
-def _gain_margins(level: np.ndarray, phase: np.ndarray) -> tuple[float, float]:
+def _gain_margins(level: Array, phase: Array) -> tuple[float, float]:
     """Return by how many dB the gain may grow, and fall, at the crossings of −180° and its repetitions."""
     turns = range(math.floor(phase.min() / (2 * math.pi)) - 1, math.ceil(phase.max() / (2 * math.pi)) + 1)
     places = [_crossings(phase, math.pi * (2 * turn + 1)) for turn in turns]

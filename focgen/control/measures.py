@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from focgen.arrays import Array
 
 BAND = 0.05
 _TAIL = 0.1  # of the record: what happens there is called steady
@@ -28,7 +31,9 @@ class StepMeasures:
         return math.isfinite(self.settling_s)
 
 
-def measure_step(output, sample_time: float, start: float, target: float, band: float = BAND) -> StepMeasures:
+def measure_step(
+    output: ArrayLike, sample_time: float, start: float, target: float, band: float = BAND
+) -> StepMeasures:
     """Judge the ``output``, shape (n,), after a step of the set point at sample 0 from ``start`` to
     ``target``.
 
@@ -45,7 +50,7 @@ def measure_step(output, sample_time: float, start: float, target: float, band: 
     )
 
 
-def _settling(progress: np.ndarray, band: float) -> float:
+def _settling(progress: Array, band: float) -> float:
     """Return the place, in samples, where ``progress`` enters 1 ± ``band`` for the last time."""
     away = np.abs(progress - 1.0)
     outside = np.flatnonzero(~(away <= band))

@@ -6,9 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array
 from focgen.control.controller import GainSchedule
 
 TOLERANCE = 0.005
@@ -23,7 +27,8 @@ class Line:
     intercept: float
     slope: float
 
-    def __call__(self, pressure):
+    def __call__(self, pressure: ArrayLike) -> Array:
+        """The specified gain K_o, 1/s per output unit, at pressures of any shape."""
         return self.intercept + self.slope * np.asarray(pressure)
 
 
@@ -35,7 +40,7 @@ class Table:
     error: float
 
 
-def gain_table(formula: Callable, low: float, high: float, tolerance: float = TOLERANCE) -> Table:
+def gain_table(formula: Callable[..., Any], low: float, high: float, tolerance: float = TOLERANCE) -> Table:
     """Return breakpoints from ``low`` to ``high``, as few as keep straight lines within ``tolerance`` of
     ``formula``.
 
@@ -47,22 +52,21 @@ def gain_table(formula: Callable, low: float, high: float, tolerance: float = TO
         if len(points) >= _MOST:
             raise ValueError(f"more than {_MOST} breakpoints are needed for an error of {tolerance:g}")
         points.append(_furthest(formula, points[-1], high, 0.9 * tolerance))
-    points = _evened(formula, np.array(points), tolerance)
-    rounded = [float(f"{point:.6g}") for point in points]
+    rounded = [float(f"{point:.6g}") for point in _evened(formula, np.array(points), tolerance)]
     schedule = GainSchedule(
         tuple(rounded), tuple(float(f"{gain:.6g}") for gain in formula(np.array(rounded)))
     )
     return Table(schedule, table_error(schedule, formula))
 
 
-def _chord_error(formula: Callable, start: float, stop: float) -> float:
+def _chord_error(formula: Callable[..., Any], start: float, stop: float) -> float:
     place = np.linspace(start, stop, _PROBES)
     exact = formula(place)
     straight = exact[0] + (exact[-1] - exact[0]) * np.linspace(0.0, 1.0, _PROBES)
     return float(np.max(np.abs(straight / exact - 1.0)))
 
 
-def _furthest(formula: Callable, start: float, stop: float, tolerance: float) -> float:
+def _furthest(formula: Callable[..., Any], start: float, stop: float, tolerance: float) -> float:
     """Return the furthest point to which one straight line from ``start`` stays within ``tolerance``."""
     if _chord_error(formula, start, stop) <= tolerance:
         return stop
@@ -73,7 +77,7 @@ def _furthest(formula: Callable, start: float, stop: float, tolerance: float) ->
     return near
 
 
-def _evened(formula: Callable, points: np.ndarray, tolerance: float) -> np.ndarray:
+def _evened(formula: Callable[..., Any], points: Array, tolerance: float) -> Array:
     """Spread the same number of breakpoints so that no piece is short because it came last."""
     low, high, count = points[0], points[-1], len(points) - 1
     small, large = 0.0, tolerance
@@ -90,10 +94,10 @@ def _evened(formula: Callable, points: np.ndarray, tolerance: float) -> np.ndarr
     return best
 
 
-def table_error(schedule: GainSchedule, formula: Callable) -> float:
+def table_error(schedule: GainSchedule, formula: Callable[..., Any]) -> float:
     """Return the schedule's largest relative error against ``formula`` between its first and last
     breakpoint.
     """
     points = np.array(schedule.breakpoints)
-    place = np.concatenate([np.linspace(a, b, _PROBES) for a, b in zip(points, points[1:])])
+    place = np.concatenate([np.linspace(a, b, _PROBES) for a, b in pairwise(points)])
     return float(np.max(np.abs(schedule(place) / formula(place) - 1.0)))

@@ -3,47 +3,14 @@
 from __future__ import annotations
 
 from focgen.control.controller import Units
-from focgen.rig.model import UNITY, Rig, Signals
-
-_KNOWN = (
-    "V",
-    "mV",
-    "A",
-    "mA",
-    "bar",
-    "mbar",
-    "kPa",
-    "Pa",
-    "MPa",
-    "psi",
-    "mm",
-    "cm",
-    "m",
-    "um",
-    "deg",
-    "rad",
-    "N",
-    "mN",
-    "s",
-    "ms",
-    "K",
-    "C",
-    "pct",
-)
-
-
-def unit_of(column: str | None) -> str:
-    """Return the unit that ends a column's name, "1/mm" for ``kappa_per_mm``, "" where none is recognised."""
-    words = (column or "").split("_")
-    if words[-1] not in _KNOWN or len(words) < 2:
-        return ""
-    return f"1/{words[-1]}" if words[-2] == "per" else words[-1]
+from focgen.logs.units import unit_named
+from focgen.rig.rig import UNITY, Rig, Signals
 
 
 def unit_of_role(signals: Signals, role: str) -> str:
     """The unit of a role's signal: the rig's own, else as its column's name tells it, "" where neither
     does."""
-    return signals.units.get(role) or ("" if role in signals.scales else unit_of(getattr(signals, role)))
+    return signals.units.get(role) or ("" if role in signals.scales else unit_named(getattr(signals, role)))
 
 
 def units_of_rig(rig: Rig) -> dict[str, str]:

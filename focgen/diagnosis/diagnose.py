@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from focgen.control.files import ControllerLike, controller_from
-from focgen.diagnosis import compose, verdict
-from focgen.diagnosis.bootstrap import threshold as bootstrapped
-from focgen.diagnosis.carried import carried
-from focgen.diagnosis.decimate import decimated
-from focgen.diagnosis.drawn import drawn_of
-from focgen.diagnosis.explain import Explanation, clues_for, explain
-from focgen.diagnosis.initial import begun_session, begun_with, loosened
+from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
+from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
+from focgen.diagnosis.hypotheses.explain import Explanation, candidates_for, explain
+from focgen.diagnosis.hypotheses.initial import begun_session, begun_with, loosened
+from focgen.diagnosis.hypotheses.input_covariance import input_covariance
 from focgen.diagnosis.model import Diagnosis
-from focgen.diagnosis.next_experiment import NEXT
-from focgen.diagnosis.running import CONTROLLER_EFFECTS, running
-from focgen.diagnosis.segments import cuts, make
-from focgen.diagnosis.smooth import freed
-from focgen.diagnosis.unexplained import is_unknown
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.decimate import decimated
+from focgen.diagnosis.problem.segments import cuts, make
+from focgen.diagnosis.problem.smooth import freed
+from focgen.diagnosis.proposals.next_experiment import NEXT, propose
+from focgen.diagnosis.verdict import compose, verdict
+from focgen.diagnosis.verdict.evidence import drawn_of
+from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import Logs, each_of
@@ -29,15 +31,12 @@ from focgen.output import check_apart
 from focgen.progress import step
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import library
-from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
 from focgen.rig.replay import experiments
+from focgen.rig.rig import Rig
 
-UNTRUSTED = 0.2  # of a segment's residual foretold by inputs: its output still carries noise into the next,
-# as it carries what the form of an effect found lacks, or a hum
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml")  # beside the pictures
-THRESHOLD = 12.0  # nats; noise of the colour left, over the whole library, stays below it
 
 
 @rig_then_logs
@@ -54,9 +53,9 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between the nominal rig and its logs, one session of one rig.
 
-    ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures;
-    ``controller``: of closed-loop logs, whose own departures are then looked for too; ``from_``, ``to``: s
-    within each experiment; ``bootstrap``: sessions simulated from the nominal rig to set the threshold of
+    ``out``: the folder for ``diagnosis.json``, ``refitted.toml``, ``augmented.toml`` and pictures.
+    ``controller``: of closed-loop logs; its own departures are then looked for, too. ``from_``, ``to``: s
+    within each experiment. ``bootstrap``: sessions simulated from the nominal rig to set the threshold of
     evidence by, at least 2 (0: the built-in one).
     ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how
     strong it is. ``pictures``: whether to draw them.
@@ -70,16 +69,18 @@ def diagnose(
         check_apart((Path(out) / name for name in (*WRITTEN, NEXT)), given)
     nominal = rig_of(rig)
     session = _usable(experiments(nominal, each, from_, to))
-    ran = running(controller_from(controller), session) if controller is not None else None
+    ran = check_controller(controller_from(controller), session) if controller is not None else None
     nominal, session = decimated(nominal, session)
     session = begun_session(nominal, session)
-    explanations = explain_all(nominal, session, THRESHOLD, only, bootstrap)
+    explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
     nominal = explanations[0].told(nominal)
     rigs = compose.compose(nominal, explanations, session)
-    session = begun_with(rigs, session)
+    session = begun_with(rigs.fitted, rigs.placed, session)
     rigs, diagnosis, evidence = verdict.reach(nominal, session, rigs, explanations, ran, only is not None)
+    proposed = propose(nominal, session, explanations, diagnosis.causes)
     diagnosis = replace(
         diagnosis,
+        next_experiment=proposed[0] if proposed else None,
         warnings=doubts(nominal, session),
         refitted=rigs.refitted,
         augmented=rigs.augmented(session, diagnosis.shrink),
@@ -88,7 +89,7 @@ def diagnose(
     if out is not None:
         from focgen.diagnosis.write import write
 
-        write(out, diagnosis, evidence, rigs, session, pictures, given)
+        write(out, diagnosis, proposed[1] if proposed else None, pictures, given)
     return diagnosis
 
 
@@ -122,18 +123,19 @@ def explain_all(
     is explained anew."""
     found: list[Explanation] = []
     roles, x, trusted = cuts(logs), None, True
-    for entry, exit in zip(roles, roles[1:]):
-        segment = loosened(rig, make(logs, entry, exit, x, carried(found[-1]) if found else None))
+    for entry, exit in pairwise(roles):
+        segment = loosened(rig, make(logs, entry, exit, x, input_covariance(found[-1]) if found else None))
         step(f"{entry} to {exit}")
         e = explain(rig, segment, logs, threshold, only, trusted)
         if draws > 1 and e.causes and only is None:
-            clues = [c for c in clues_for(e.segment, rig) if c.form.seen is None]
-            asked = bootstrapped(e, clues, draws, threshold)
+            candidates = [c for c in candidates_for(e.segment, rig) if c.form.seen is None]
+            asked = bootstrapped(e, candidates, draws, threshold)
             if min(c.gain for c in e.causes) < asked:
                 e = explain(rig, segment, logs, asked, only, trusted)
         found.append(e)
         problem, unknown = e.best.problem, is_unknown(e)
-        trusted = e.left.share < UNTRUSTED and not e.causes and not unknown
+        trusted = e.left.share < NUMBERS.much and not e.causes and not unknown
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
         x = freed(segment, made, response, e.left.share, not unknown)
+        x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)

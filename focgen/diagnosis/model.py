@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Any
 
-import numpy as np
-
-from focgen.diagnosis.menu import Choice
+from focgen.diagnosis.drawn import Drawn
 from focgen.jsontext import UNWRITTEN
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 from focgen.shown import Shown
-
-if TYPE_CHECKING:
-    from focgen.diagnosis.drawn import Drawn
-    from focgen.diagnosis.explain import Explanation
 
 Interval = tuple[float, float]
 
@@ -109,21 +103,10 @@ class Diagnosis(Shown):
     refitted_rig: str
     augmented_rig: str
     next_experiment: NextExperiment | None
-    unexplained: dict[str, object]
-    tied: tuple[tuple[str, ...], ...]
+    unexplained: dict[str, Any]
     notes: tuple[str, ...]
     fits: tuple[PlainFit, ...] = ()
     warnings: tuple[str, ...] = ()
     refitted: Rig | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
     augmented: Rig | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
     drawn: Drawn | None = field(default=None, metadata=UNWRITTEN, repr=False, compare=False)
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """What the pictures are drawn from: signals by experiment (as given, refitted, explained), explanations
-    by segment; ``next_input``: the experiment that is proposed."""
-
-    simulated: dict[str, list[dict[str, np.ndarray]]]
-    explanations: tuple[Explanation, ...]
-    next_input: Choice | None = None

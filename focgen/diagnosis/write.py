@@ -3,51 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tomlkit
 
-from focgen.control.units import units_of_rig
-from focgen.diagnosis.compose import Rigs
-from focgen.diagnosis.drawn import FILE, drawn_of, drawn_text
-from focgen.diagnosis.menu import Choice
-from focgen.diagnosis.model import Diagnosis, Evidence
-from focgen.diagnosis.next_experiment import NEXT
+from focgen.diagnosis.drawn import FILE, drawn_text
+from focgen.diagnosis.model import Diagnosis
+from focgen.diagnosis.proposals.menu import Choice
+from focgen.diagnosis.proposals.next_experiment import NEXT
 from focgen.jsontext import to_json
-from focgen.logs.experiment import Experiment
 from focgen.output import write_files
 from focgen.rig.files import rig_table
+from focgen.shown import files_of
 
 
 def write(
     out: str | Path,
     diagnosis: Diagnosis,
-    evidence: Evidence,
-    rigs: Rigs,
-    logs: Sequence[Experiment],
-    drawn: bool = True,
-    inputs: Sequence = (),
+    proposed: Choice | None,
+    pictures: bool = True,
+    inputs: Sequence[Any] = (),
 ) -> None:
-    """Write all files into ``out``, or none; pictures where they are to be ``drawn``. Raises InputError where
-    one of ``inputs`` would be written over.
+    """Write all files of a diagnosis just made into ``out``, or none; with the experiment that is
+    ``proposed``, and ``pictures`` where matplotlib is installed. Raises InputError where one of ``inputs``
+    would be written over.
     """
-    shown = diagnosis.drawn or drawn_of(rigs.refitted, evidence, logs)
-    augmented = diagnosis.augmented or rigs.augmented(logs, diagnosis.shrink)
+    drawn, refitted, augmented = diagnosis.drawn, diagnosis.refitted, diagnosis.augmented
+    assert drawn and refitted and augmented  # None only where it was read from a file
     files: dict[str, str | bytes] = {
         "diagnosis.json": to_json(diagnosis),
-        FILE: drawn_text(shown),
-        diagnosis.refitted_rig: tomlkit.dumps(rig_table(rigs.refitted)),
+        FILE: drawn_text(drawn),
+        diagnosis.refitted_rig: tomlkit.dumps(rig_table(refitted)),
         diagnosis.augmented_rig: tomlkit.dumps(rig_table(augmented)),
     }
-    if evidence.next_input is not None:
-        files[NEXT] = _next(evidence.next_input)
-    if drawn and find_spec("matplotlib"):
-        from focgen.report.diagnosis import pictures
-
-        files |= pictures(diagnosis, evidence, logs, units_of_rig(rigs.refitted))
-    write_files(out, files, inputs)
+    if proposed is not None:
+        files[NEXT] = _next(proposed)
+    write_files(out, files | (files_of(diagnosis) if pictures else {}), inputs)
 
 
 def _next(choice: Choice) -> str:

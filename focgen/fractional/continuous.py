@@ -17,11 +17,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array, Complex
 from focgen.fractional.continuous_certificate import BandCertificate, certify_band
 from focgen.fractional.continuous_fit import Band, best_rates, best_weights
 
-Rounding = Callable[[np.ndarray], np.ndarray]
+Rounding = Callable[[Array], Array]
 OPERATORS = ("gl", "continuous")
 HIGHEST = 0.5 * math.pi  # rad per sample: half of the Nyquist frequency
 RATIOS = (10.0, 1e6)  # of a band's ends
@@ -62,11 +64,12 @@ class ContinuousMemory:
         """The bounds that hold for these poles and weights."""
         return certify_band(self.order, self.band, 1.0 - np.array(self.poles), (self.lead, *self.weights))
 
-    def frequency_response(self, omega) -> np.ndarray:
+    def frequency_response(self, omega: ArrayLike) -> Complex:
         """Complex gain at ``omega`` in rad per sample, 0 … π, shape of ``omega``."""
         delay = np.exp(-1j * np.asarray(omega, dtype=float))
         modes = np.array(self.weights) / (1.0 - np.array(self.poles) * delay[..., None])
-        return (1.0 - delay) ** self.differences * (self.lead + delay * modes.sum(axis=-1))
+        made: Complex = (1.0 - delay) ** self.differences * (self.lead + delay * modes.sum(axis=-1))
+        return made
 
 
 def growth_limit(order: float) -> float:
@@ -74,7 +77,7 @@ def growth_limit(order: float) -> float:
     return 4.0 if order > 1.0 else 2.0
 
 
-def _unrounded(rates: np.ndarray) -> np.ndarray:
+def _unrounded(rates: Array) -> Array:
     return rates
 
 
@@ -140,7 +143,7 @@ def _candidates(band: Band, states: int, rounded: Rounding, goal: float) -> Iter
             yield memory
 
 
-def _held(band: Band, poles: np.ndarray, above: float) -> ContinuousMemory | None:
+def _held(band: Band, poles: Array, above: float) -> ContinuousMemory | None:
     """With the weights that suit the rounded poles best; None where two poles become one."""
     rates = 1.0 - poles
     if not (np.all(np.diff(rates) < 0.0) and rates[-1] > 0.0 and rates[0] < 1.0):

@@ -17,7 +17,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array
 from focgen.fractional import elementary
 from focgen.fractional.continuous_fit import Lines, size, spread
 
@@ -37,7 +39,9 @@ class BandCertificate:
     above: float
 
 
-def certify_band(order: float, band: tuple[float, float], rates, weights) -> BandCertificate:
+def certify_band(
+    order: float, band: tuple[float, float], rates: ArrayLike, weights: ArrayLike
+) -> BandCertificate:
     """Bound the error of (1 − z⁻¹)^m (c₀ + z⁻¹ Σ c_i / (1 − p_i z⁻¹)), m being ``order`` rounded up.
 
     ``band`` in rad per sample, its end at most π/2; ``rates`` 1 − p in (0, 1], shape (n,); ``weights`` c₀ and
@@ -58,7 +62,7 @@ def certify_band(order: float, band: tuple[float, float], rates, weights) -> Ban
 
 
 def _largest(
-    order: float, low: float, high: float, rates: np.ndarray, weights: np.ndarray, step: float, goal: float
+    order: float, low: float, high: float, rates: Array, weights: Array, step: float, goal: float
 ) -> tuple[float, float]:
     """The largest |H/(jθ)^α − goal| at lines at most ``step`` apart, and an eighth of the largest second
     derivative between them."""
@@ -74,15 +78,13 @@ def _largest(
     return seen, 0.125 * bend
 
 
-def _values(
-    order: float, theta: np.ndarray, rates: np.ndarray, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _values(order: float, theta: Array, rates: Array, weights: Array) -> tuple[Array, Array]:
     """H/(jθ)^α, shape (2, points), and the sum of its parts' magnitudes, shape (points,)."""
     parts = weights[:, None, None] * Lines(order, theta).basis(rates)
     return elementary.total(parts), elementary.total(size(parts))
 
 
-def _second(order: float, theta: np.ndarray, step: float) -> np.ndarray:
+def _second(order: float, theta: Array, step: float) -> Array:
     """Bound on |d²B/dt²| / |B at a line| from each line to the next."""
     end = np.minimum(theta * float(elementary.exp(step)), math.pi)
     sine, cosine = elementary.sine_cosine(0.5 * end)
@@ -92,4 +94,5 @@ def _second(order: float, theta: np.ndarray, step: float) -> np.ndarray:
     m = math.ceil(order)
     first = m * kappa + gamma + end + abs(order)
     change = m * (kappa + kappa * kappa) + gamma + gamma * gamma + end
-    return (first * first + change) * elementary.exp(first * step)
+    made: Array = (first * first + change) * elementary.exp(first * step)
+    return made

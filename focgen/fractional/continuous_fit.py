@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.fractional import elementary
 
 _DENSITY, _BEYOND = 14, 32  # points in the band per factor of e; points above it
@@ -48,7 +49,7 @@ class Band:
         return math.ceil(_DENSITY * float(elementary.log(self.high / self.low))) + 1
 
     @functools.cached_property
-    def points(self) -> np.ndarray:
+    def points(self) -> Array:
         """θ, those in the band first, then those above it up to π."""
         return np.concatenate(
             [
@@ -66,7 +67,7 @@ class Band:
 class Lines:
     """1 − z⁻¹, and with it the lead (1 − z⁻¹)^m / (jθ)^α, at the angles ``theta`` in (0, π]."""
 
-    def __init__(self, order: float, theta: np.ndarray):
+    def __init__(self, order: float, theta: Array) -> None:
         sine, cosine = elementary.sine_cosine(0.5 * theta)
         self.departure = np.stack([2.0 * sine * sine, 2.0 * sine * cosine])
         self.delay = np.stack([1.0 - self.departure[0], -self.departure[1]])
@@ -76,53 +77,54 @@ class Lines:
         self.lead = lead
         self.late = _product(lead, self.delay)
 
-    def basis(self, rates: np.ndarray) -> np.ndarray:
+    def basis(self, rates: Array) -> Array:
         """The lead and every mode, over (jθ)^α: shape (1 + n, 2, points)."""
         return np.concatenate([self.lead[None], _over(self.late, self._slow(rates))])
 
-    def by_rate(self, rates: np.ndarray) -> np.ndarray:
+    def by_rate(self, rates: Array) -> Array:
         """The modes' derivatives by their rates, shape (n, 2, points)."""
         slow = self._slow(rates)
         return -_product(self.delay, _over(_over(self.late, slow), slow))
 
-    def _slow(self, rates: np.ndarray) -> np.ndarray:
+    def _slow(self, rates: Array) -> Array:
         """1 − p z⁻¹ without cancellation, shape (n, 2, points)."""
         q = rates[:, None]
         real = q + (1.0 - q) * self.departure[0]
         return np.stack([real, (1.0 - q) * self.departure[1]], axis=1)
 
 
-def spread(low: float, high: float, count: int) -> np.ndarray:
+def spread(low: float, high: float, count: int) -> Array:
     """Return ``count`` numbers from ``low`` to ``high``, evenly on a logarithmic scale, ends included."""
     reach = float(elementary.log(high / low))
     found = low * elementary.exp(np.arange(count) * (reach / (count - 1)))
     found[-1] = high
-    return np.minimum(found, high)
+    made: Array = np.minimum(found, high)
+    return made
 
 
-def size(complex_: np.ndarray) -> np.ndarray:
+def size(complex_: Array) -> Array:
     """Magnitude, of complex numbers on the axis before the last."""
     return np.sqrt(complex_[..., 0, :] * complex_[..., 0, :] + complex_[..., 1, :] * complex_[..., 1, :])
 
 
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _product(a: Array, b: Array) -> Array:
     real = a[..., 0, :] * b[..., 0, :] - a[..., 1, :] * b[..., 1, :]
     return np.stack([real, a[..., 0, :] * b[..., 1, :] + a[..., 1, :] * b[..., 0, :]], axis=-2)
 
 
-def _over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _over(a: Array, b: Array) -> Array:
     square = b[..., 0, :] * b[..., 0, :] + b[..., 1, :] * b[..., 1, :]
     return _product(a, np.stack([b[..., 0, :], -b[..., 1, :]], axis=-2)) / square[..., None, :]
 
 
-def power_of(order: float, omega: np.ndarray) -> np.ndarray:
+def power_of(order: float, omega: Array) -> Array:
     """Return (jω)^``order`` for ω > 0 and orders in (−2, 2): real and imaginary part, shape (2, points)."""
     sine, cosine = elementary.sine_cosine(0.25 * math.pi * order)
     magnitude = elementary.exp(order * elementary.log(omega))
     return np.stack([magnitude * (1.0 - 2.0 * sine * sine), magnitude * (2.0 * sine * cosine)])
 
 
-def rates_of(log_rates: np.ndarray) -> np.ndarray:
+def rates_of(log_rates: Array) -> Array:
     """1 − p of poles p = exp(−e^(log_rates))."""
     return -elementary.expm1(-elementary.exp(log_rates))
 
@@ -130,14 +132,14 @@ def rates_of(log_rates: np.ndarray) -> np.ndarray:
 class _Descent:
     """One step after another towards a smaller largest error."""
 
-    def __init__(self, band: Band, states: int, above: float):
+    def __init__(self, band: Band, states: int, above: float) -> None:
         self.band, self.states = band, states
         self.held_back = np.full(_BEYOND, above / math.sqrt(_BEYOND))
         self.importance = np.full(band.count, 1.0 / band.count)
         start = spread(0.7 * band.low, min(3.0 * band.high, 2.0), max(states, 2))[-states:]
         self.log_rates, self.damping = _apart(elementary.log(start)), 1e-3
 
-    def best(self, rounds: int) -> tuple[np.ndarray, float]:
+    def best(self, rounds: int) -> tuple[Array, float]:
         """The log rates with the smallest largest error in the band, and that error."""
         found, smallest = self.log_rates, math.inf
         for k in range(rounds):
@@ -172,7 +174,7 @@ class _Descent:
                 return
             self.damping *= 5.0
 
-    def _newton(self, columns: np.ndarray, square: float) -> np.ndarray | None:
+    def _newton(self, columns: Array, square: float) -> Array | None:
         """Change of the log rates; damped, in units of the error that is left."""
         n = self.states
         damped = np.zeros((len(columns), n))
@@ -182,7 +184,7 @@ class _Descent:
         found = _scaled_least_squares(rows, right)
         return None if found is None else found[len(columns) - n :]
 
-    def _valued(self, log_rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
+    def _valued(self, log_rates: Array) -> tuple[Array, Array, float] | None:
         """The best weights for these rates, the error they leave, and its weighted square."""
         basis = self.band.lines.basis(rates_of(log_rates))
         weights = _weights(basis, self.root)
@@ -193,7 +195,7 @@ class _Descent:
         return weights, error, elementary.exact_sum(rows * rows)
 
 
-def _apart(log_rates: np.ndarray) -> np.ndarray:
+def _apart(log_rates: Array) -> Array:
     """Rising log rates, pushed apart from their middle outwards and kept below the fastest."""
     found = log_rates.copy()
     middle = len(found) // 2
@@ -205,12 +207,12 @@ def _apart(log_rates: np.ndarray) -> np.ndarray:
     return found
 
 
-def _rows(columns: np.ndarray, root: np.ndarray) -> np.ndarray:
+def _rows(columns: Array, root: Array) -> Array:
     """Complex columns as twice as many weighted real equations: shape (columns, 2 points)."""
     return (columns * root).reshape(len(columns), -1)
 
 
-def _scaled_least_squares(rows: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+def _scaled_least_squares(rows: Array, right: Array) -> Array | None:
     scale = np.abs(rows).max(axis=1)
     if not np.all(scale > 0.0):
         return None
@@ -218,19 +220,19 @@ def _scaled_least_squares(rows: np.ndarray, right: np.ndarray) -> np.ndarray | N
     return None if found is None else found / scale
 
 
-def _weights(basis: np.ndarray, root: np.ndarray) -> np.ndarray | None:
+def _weights(basis: Array, root: Array) -> Array | None:
     goal = np.concatenate([root, np.zeros(len(root))])
     return _scaled_least_squares(_rows(basis, root), goal)
 
 
-def _error(basis: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _error(basis: Array, weights: Array) -> Array:
     """Response over (jθ)^α, less 1: shape (2, points)."""
     found = elementary.total(weights[:, None, None] * basis)
     found[0] -= 1.0
     return found
 
 
-def best_rates(band: Band, states: int, above: float, rounds: int = _ROUNDS) -> tuple[np.ndarray, float]:
+def best_rates(band: Band, states: int, above: float, rounds: int = _ROUNDS) -> tuple[Array, float]:
     """Return rates 1 − p, falling, shape (``states``,), and the largest error at the band's points.
 
     ``above``: what the response above the band weighs, 1e-5 … 1e-1.
@@ -239,7 +241,7 @@ def best_rates(band: Band, states: int, above: float, rounds: int = _ROUNDS) -> 
     return rates_of(log_rates[::-1]), error
 
 
-def best_weights(band: Band, rates: np.ndarray, above: float) -> np.ndarray | None:
+def best_weights(band: Band, rates: Array, above: float) -> Array | None:
     """Return c₀ and the c_i, shape (1 + n,), that make the largest error in the band small for given
     ``rates``; None where two of these are too close to one another for that."""
     basis, held_back = band.lines.basis(rates), np.full(_BEYOND, above / math.sqrt(_BEYOND))

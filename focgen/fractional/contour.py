@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+
+from focgen.arrays import Array, Complex
 
 POINTS = 18
 TOLERATED = 0.2  # rad
@@ -21,7 +24,7 @@ _SCALE = 4.492075287 * POINTS
 _OPENING = 1.172104229
 
 
-def _nodes(first: float) -> tuple[np.ndarray, np.ndarray]:
+def _nodes(first: float) -> tuple[Array, Array]:
     """Return places and factors of the trapezoidal rule at ``first``, first + 1, … steps from the vertex."""
     u = 1j * _STEP * (np.arange(POINTS) + first) - _OPENING
     places = _SCALE * (1.0 + np.sin(u))
@@ -36,7 +39,7 @@ _SHIFTED = _nodes(0.0)  # the places between, for times at which a pole is in th
 _BLOCK = 4096  # times treated at once, so that long arrays stay in the cache
 
 
-def inverse_laplace(image: Callable, t: np.ndarray, removed: np.ndarray | None = None) -> np.ndarray:
+def inverse_laplace(image: Callable[..., Any], t: Array, removed: Array | Complex | None = None) -> Array:
     """Return f(t) for its Laplace transform ``image(s)``, t > 0 of shape (n,), in s; shape (n,).
 
     ``image`` takes complex s of shape (POINTS, n) and must be real on the positive real axis. ``removed``
@@ -48,16 +51,19 @@ def inverse_laplace(image: Callable, t: np.ndarray, removed: np.ndarray | None =
     return np.concatenate(parts) if parts else t
 
 
-def _block(image: Callable, t: np.ndarray, removed: np.ndarray) -> np.ndarray:
+def _block(image: Callable[..., Any], t: Array, removed: Array | Complex) -> Array:
     if not len(removed):
         places, factors = _MIDDLE
-        return (factors @ image(places[:, None] / t)).imag / t
+        straight: Array = (factors @ image(places[:, None] / t)).imag / t
+        return straight
     shifted = _clearance(_SHIFTED[0], t, removed) > _clearance(_MIDDLE[0], t, removed)
     places, factors = (np.where(shifted, b[:, None], m[:, None]) for m, b in zip(_MIDDLE, _SHIFTED))
-    return (factors * image(places / t)).sum(axis=0).imag / t
+    made: Array = (factors * image(places / t)).sum(axis=0).imag / t
+    return made
 
 
-def _clearance(places: np.ndarray, t: np.ndarray, removed: np.ndarray) -> np.ndarray:
+def _clearance(places: Array, t: Array, removed: Array | Complex) -> Array:
     """Return, for each time, the least distance of a place from a scaled pole."""
     upper = removed.real + 1j * np.abs(removed.imag)
-    return np.abs(places[:, None, None] - t[:, None] * upper).min(axis=(0, 2))
+    made: Array = np.abs(places[:, None, None] - t[:, None] * upper).min(axis=(0, 2))
+    return made

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import signal
 
+from focgen.arrays import Array
 from focgen.errors import MissingExtra
 from focgen.fractional.transfer import Polynomial, Term, TransferFunction
 
@@ -92,7 +93,7 @@ def to_frd(transfer: TransferFunction, omega: ArrayLike | None = None, delay: fl
     return _control().FrequencyResponseData(values, places, name="fractional")
 
 
-def corners(transfer: TransferFunction) -> np.ndarray:
+def corners(transfer: TransferFunction) -> Array:
     """Frequencies (400,) in rad/s that show it all: two decades beyond where any two of its terms balance."""
     balances = [
         abs(high.coefficient / low.coefficient) ** (1.0 / (low.order - high.order))
@@ -137,7 +138,7 @@ def _terms(dense: ArrayLike) -> Polynomial:
     return tuple(Term(float(c), float(o)) for o, c in enumerate(reversed(np.atleast_1d(dense))))
 
 
-def _dense(transfer: TransferFunction) -> tuple[np.ndarray, np.ndarray]:
+def _dense(transfer: TransferFunction) -> tuple[Array, Array]:
     """Return numerator and denominator, highest power first; negative orders are multiplied away."""
     for order in transfer.orders:
         if not order.is_integer():
@@ -148,7 +149,7 @@ def _dense(transfer: TransferFunction) -> tuple[np.ndarray, np.ndarray]:
     return _row(transfer.num, lowest), _row(transfer.den, lowest)
 
 
-def _row(terms: Polynomial, lowest: float) -> np.ndarray:
+def _row(terms: Polynomial, lowest: float) -> Array:
     if not terms:
         return np.zeros(1)
     top = terms[0].order

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Complex
 from focgen.fractional.contour import INNERMOST, TOLERATED
 from focgen.fractional.modes import Chain, polar_part
 from focgen.fractional.poles import first_sheet_zeros
@@ -23,13 +25,13 @@ class StepImage:
     """
 
     chains: tuple[Chain, ...]
-    remainder: Callable | None
+    remainder: Callable[..., Any] | None
     feedthrough: float
 
     @property
-    def poles(self) -> np.ndarray:
+    def poles(self) -> Complex:
         """The poles that are in ``chains``, rad/s, one of each conjugate pair."""
-        return np.concatenate([chain.poles for chain in self.chains] or [np.empty(0)])
+        return np.concatenate([chain.poles for chain in self.chains] or [np.empty(0, complex)])
 
 
 def step_image(transfer: TransferFunction, horizon: float) -> StepImage:
@@ -68,7 +70,7 @@ def _shifted(terms: Polynomial, by: float) -> Polynomial:
     return tuple(t._replace(order=t.order + by) for t in terms)
 
 
-def _values(terms: Polynomial, s: np.ndarray) -> np.ndarray:
+def _values(terms: Polynomial, s: Any) -> Any:
     log = np.log(s)
     return sum(t.coefficient * (np.exp(t.order * log) if t.order else 1.0) for t in terms)
 
@@ -81,16 +83,18 @@ def _fractional(num: Polynomial, den: Polynomial, horizon: float, level: float) 
     poles = first_sheet_zeros(den, math.pi - TOLERATED)
     poles = poles[np.abs(poles) * horizon > INNERMOST]
 
-    def image(s):
-        return _values(num, s) / _values(den, s)
+    def image(s: Complex) -> Complex:
+        made: Complex = _values(num, s) / _values(den, s)
+        return made
 
-    def isolated(p, _):
-        return _values(num, p) / _slope(den, p)
+    def isolated(p: complex, _: Complex) -> complex:
+        return complex(_values(num, p) / _slope(den, p))
 
     chains = tuple(polar_part(image, poles, 0.0, isolated, _to_the_cut))
 
-    def remainder(s):
-        return image(s) - sum(chain.image(s) for chain in chains)
+    def remainder(s: Complex) -> Complex:
+        made: Complex = image(s) - sum(chain.image(s) for chain in chains)
+        return made
 
     return StepImage(chains, remainder if chains else image, level)
 
@@ -103,16 +107,18 @@ def _rational(num: Polynomial, den: Polynomial, horizon: float) -> list[Chain]:
     top, bottom = _dense(num), _dense(den)
     poles = np.roots(bottom).astype(complex)  # not polished one by one: near poles are accurate as a set
 
-    def image(s):
-        return np.polyval(top, s) / (bottom[0] * np.prod(s - poles[:, None], axis=0))
+    def image(s: Complex) -> Complex:
+        made: Complex = np.polyval(top, s) / (bottom[0] * np.prod(s - poles[:, None], axis=0))
+        return made
 
-    def isolated(p, others):
-        return np.polyval(top, p) / (bottom[0] * np.prod(p - others))
+    def isolated(p: complex, others: Complex) -> complex:
+        made: complex = np.polyval(top, p) / (bottom[0] * np.prod(p - others))
+        return made
 
     return polar_part(image, poles, 2.0 / horizon, isolated, lambda _: math.inf)
 
 
-def _dense(terms: Polynomial) -> np.ndarray:
+def _dense(terms: Polynomial) -> Array:
     dense = np.zeros(int(terms[0].order) + 1)
     dense[[int(terms[0].order - t.order) for t in terms]] = [t.coefficient for t in terms]
     return dense

@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Complex
 from focgen.fractional.transfer import TransferFunction
 
 _WHOLE = 1e-9  # samples: nearer to a whole number than this is rounding
@@ -27,7 +29,8 @@ class Delayed:
     transfer: TransferFunction
     delay: float = 0.0
 
-    def frequency_response(self, omega) -> np.ndarray:
+    def frequency_response(self, omega: ArrayLike) -> Complex:
         """Complex gain at the angular frequencies ``omega`` > 0 (rad/s), shape of ``omega``."""
         found = self.transfer.frequency_response(omega)
-        return found * np.exp(-1j * np.asarray(omega) * self.delay) if self.delay else found
+        made: Complex = found * np.exp(-1j * np.asarray(omega) * self.delay) if self.delay else found
+        return made

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import fft, signal
 
+from focgen.arrays import Array
 from focgen.fractional.simulation import gl_operator
 from focgen.fractional.transfer import Polynomial, TransferFunction
 
@@ -25,7 +26,7 @@ _SETTLED = 1e-3  # residual at which a longer inverse gains nothing worth having
 class UnstableRecursion(ArithmeticError):
     """The recursion amplifies without bound; ``outside`` of its poles z are outside the unit circle."""
 
-    def __init__(self, outside: int):
+    def __init__(self, outside: int) -> None:
         super().__init__(f"the recursion is unstable: {outside} of its poles are outside the unit circle")
         self.outside = outside
 
@@ -47,7 +48,7 @@ def gl_frequency_response(
     return _response(transfer.num, step, length, delay) / _response(transfer.den, step, length, delay)
 
 
-def _response(terms: Polynomial, step: float, length: int | None, delay: np.ndarray) -> np.ndarray:
+def _response(terms: Polynomial, step: float, length: int | None, delay: Array) -> Array:
     if length is None:
         difference = (1.0 - delay) / step
         return sum((t.coefficient * difference**t.order for t in terms), np.zeros(delay.shape, complex))
@@ -79,14 +80,14 @@ def poles_outside(coefficients: ArrayLike) -> int:
     raise UnprovenStability("a pole of the recursion is too close to the unit circle to tell its side")
 
 
-def _checked(coefficients: ArrayLike) -> np.ndarray:
+def _checked(coefficients: ArrayLike) -> Array:
     a = np.asarray(coefficients, dtype=float)
     if a.ndim != 1 or not len(a) or a[0] == 0.0 or not np.all(np.isfinite(a)):
         raise ValueError("the coefficients of a recursion are finite and start with one that is not zero")
     return a
 
 
-def _on_the_circle(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _on_the_circle(a: Array) -> tuple[Array, Array]:
     size = fft.next_fast_len(max(1024, 4 * len(a)), real=True)
     size += size % 2
     return 2.0 * math.pi * np.arange(size // 2 + 1) / size, fft.rfft(a, size)
@@ -118,7 +119,7 @@ def inverse_l1_bound(coefficients: ArrayLike) -> float:
     return bound
 
 
-def power_series_inverse(a: np.ndarray, count: int) -> np.ndarray:
+def power_series_inverse(a: Array, count: int) -> Array:
     """Return the first ``count`` coefficients of 1/A, about.
 
     By running the recursion; where that would take too long by Newton's iteration H ← H (2 − A H), whose
@@ -137,7 +138,7 @@ def power_series_inverse(a: np.ndarray, count: int) -> np.ndarray:
     return inverse
 
 
-def inverse_residual(a: np.ndarray, inverse: np.ndarray) -> float:
+def inverse_residual(a: Array, inverse: Array) -> float:
     """Return an upper bound of ‖A H − 1‖₁, H being a power series' first coefficients."""
     product = signal.fftconvolve(a, inverse)
     product[0] -= 1.0

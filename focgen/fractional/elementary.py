@@ -13,6 +13,9 @@ from collections.abc import Iterable
 from decimal import Context, Decimal
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from focgen.arrays import Array
 
 _DIGITS = Context(prec=50)  # so many that a double rounded from them is the nearest one
 _PARTS = 1 << 5  # of an octave, each with its power of two in a table
@@ -38,7 +41,7 @@ _STEPS_PER_UNIT = float(_DIGITS.divide(_PARTS, _LN2))
 _SMALLEST = 0.5 * _STEP[0]
 
 
-def _horner(coefficients: Iterable[float], x: np.ndarray) -> np.ndarray:
+def _horner(coefficients: Iterable[float], x: Array) -> Array:
     """Highest power first."""
     found = np.zeros_like(x)
     for c in coefficients:
@@ -47,7 +50,7 @@ def _horner(coefficients: Iterable[float], x: np.ndarray) -> np.ndarray:
     return found
 
 
-def _less_one(r: np.ndarray) -> np.ndarray:
+def _less_one(r: Array) -> Array:
     """e^r − 1 for |r| ≤ ln 2 / 64."""
     found = _horner(_EXP, r)
     found *= r
@@ -55,26 +58,27 @@ def _less_one(r: np.ndarray) -> np.ndarray:
     return found + r
 
 
-def exp(x) -> np.ndarray:
+def exp(x: ArrayLike) -> Array:
     """Return e^x for any numbers but NaN, shape of ``x``; off by less than one unit of the last place."""
-    x = np.clip(np.asarray(x, dtype=float), -_FARTHEST, _FARTHEST)
-    steps = np.rint(x * _STEPS_PER_UNIT)
-    rest = x - steps * _STEP[0]
+    near: Array = np.clip(np.asarray(x, dtype=float), -_FARTHEST, _FARTHEST)
+    steps = np.rint(near * _STEPS_PER_UNIT)
+    rest = near - steps * _STEP[0]
     rest -= steps * _STEP[1]
     steps = steps.astype(np.intc)
     power = _POWERS[steps & (_PARTS - 1)]
     with np.errstate(over="ignore", under="ignore"):
-        return np.ldexp(power + power * _less_one(rest), steps >> 5)
+        made: Array = np.ldexp(power + power * _less_one(rest), steps >> 5)
+        return made
 
 
-def expm1(x) -> np.ndarray:
+def expm1(x: ArrayLike) -> Array:
     """Return e^x − 1, shape of ``x``, to a relative 1e-14 even where ``x`` is small."""
     x = np.asarray(x, dtype=float)
     small = np.abs(x) <= _SMALLEST
     return np.where(small, _less_one(np.where(small, x, 0.0)), exp(x) - 1.0)
 
 
-def log(x) -> np.ndarray:
+def log(x: ArrayLike) -> Array:
     """Return ln x for normal numbers > 0, shape of ``x``; off by about one unit of the last place."""
     part, octave = np.frexp(np.asarray(x, dtype=float))
     below = part < math.sqrt(0.5)
@@ -84,10 +88,11 @@ def log(x) -> np.ndarray:
     s, half = over / (2.0 + over), 0.5 * over * over
     square = s * s
     small = s * (half + square * _horner(_LOG, square)) + octave * _OCTAVE[1]
-    return octave * _OCTAVE[0] + (over - (half - small))
+    made: Array = octave * _OCTAVE[0] + (over - (half - small))
+    return made
 
 
-def sine_cosine(x) -> tuple[np.ndarray, np.ndarray]:
+def sine_cosine(x: ArrayLike) -> tuple[Array, Array]:
     """Return sin x and cos x for |x| ≤ π/2, both of the shape of ``x``; off by less than 1e-15."""
     x = np.asarray(x, dtype=float)
     square = x * x
@@ -99,22 +104,22 @@ def power(base: float, exponent: float) -> float:
     return float(_DIGITS.power(Decimal(base), Decimal(exponent)))
 
 
-def powers(bases: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+def powers(bases: Array, exponents: Array) -> Array:
     """Return every base in [0, 1] to every exponent, 0 or more: shape (bases, exponents)."""
     logs = log(np.maximum(bases, _TINY))
     return exp(logs[:, None] * exponents)
 
 
-def total(parts) -> np.ndarray:
+def total(parts: Iterable[Array]) -> Array:
     """Return the sum over the first axis, added up from its beginning."""
-    parts = np.asarray(parts)
-    found = parts[0].copy()
-    for part in parts[1:]:
+    rows = np.asarray(parts)
+    found: Array = rows[0].copy()
+    for part in rows[1:]:
         found += part
     return found
 
 
-def exact_sum(values) -> float:
+def exact_sum(values: ArrayLike) -> float:
     """Return the sum of all ``values``, any shape, rounded once; infinite where it is beyond a double.
 
     Python's own ``sum`` of floats has more digits from 3.12 on.
@@ -125,7 +130,7 @@ def exact_sum(values) -> float:
         return math.inf
 
 
-def l1(values) -> float:
+def l1(values: ArrayLike) -> float:
     """Return Σ |value|, rounded once."""
     return exact_sum(np.abs(values))
 
@@ -139,7 +144,7 @@ def rounded_up(bound: float, digits: int = 6) -> float:
     return float(near if float(near) >= bound else near.next_plus(short))
 
 
-def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+def solve(matrix: Array, right: Array) -> Array | None:
     """Return x of ``matrix`` x = ``right``, shapes (n, n) and (n,); None where the matrix is singular.
 
     Gaussian elimination, the largest pivot of each column first.
@@ -155,7 +160,7 @@ def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
     return _substituted(rows[:, :n], rows[:, n].copy())
 
 
-def _substituted(upper: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _substituted(upper: Array, right: Array) -> Array:
     """x of ``upper`` x = ``right``; what is below the diagonal is not looked at. ``right`` is used up."""
     for k in range(len(right) - 1, -1, -1):
         right[k] /= upper[k, k]
@@ -163,7 +168,7 @@ def _substituted(upper: np.ndarray, right: np.ndarray) -> np.ndarray:
     return right
 
 
-def least_squares(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+def least_squares(matrix: Array, right: Array) -> Array | None:
     """Return the x that makes |``matrix`` x − ``right``|₂ least, shapes (m, n), m ≥ n, and (m,); None where
     the columns depend on one another.
 
@@ -183,7 +188,7 @@ def least_squares(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
     return _substituted(columns[:n, :n].T, columns[n, :n].copy())
 
 
-def _halved(values: np.ndarray) -> np.ndarray:
+def _halved(values: Array) -> Array:
     """The sum over the last axis: its second half added to its first, until one number is left."""
     while (count := values.shape[-1]) > 1:
         half = (count + 1) // 2

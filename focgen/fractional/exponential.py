@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
+from focgen.arrays import Array
 from focgen.fractional import elementary
 from focgen.fractional.exponential_certificate import Certificate, certify
 from focgen.fractional.exponential_fit import Alternation, eased, ladder
@@ -79,7 +80,7 @@ class ExponentialMemory:
         """The bounds that hold for these poles and weights."""
         return certify(self.beta, self.differences, self.horizon, self.poles, self.weights)
 
-    def kernel(self, lags: ArrayLike) -> np.ndarray:
+    def kernel(self, lags: ArrayLike) -> Array:
         """Return h_j at the whole numbers ``lags`` ≥ 0, shape of ``lags``."""
         lags = np.asarray(lags)
         powers = np.array(self.poles) ** np.maximum(lags[..., None] - 1.0, 0.0)
@@ -92,7 +93,7 @@ class ExponentialMemory:
         modes = np.array(self.weights) / (1.0 - np.array(self.poles) * delay[..., None])
         return (1.0 - delay) ** self.differences * (1.0 + delay * modes.sum(axis=-1))
 
-    def run(self, x: ArrayLike) -> np.ndarray:
+    def run(self, x: ArrayLike) -> Array:
         """Return the output for the samples ``x``, at rest at 0 before them; float64, both (samples,)."""
         v = np.asarray(x, dtype=float)
         for _ in range(self.differences):
@@ -149,7 +150,7 @@ def checked_differences(order: float, horizon: int) -> int:
     return math.ceil(order)
 
 
-def _poles_and_weights(fit: Alternation) -> tuple[np.ndarray, np.ndarray]:
+def _poles_and_weights(fit: Alternation) -> tuple[Array, Array]:
     return elementary.exp(-elementary.exp(fit.log_rates[::-1])), elementary.exp(fit.log_weights[::-1])
 
 
@@ -161,7 +162,7 @@ def _memory(order: float, horizon: int, tolerance: float, fit: Alternation) -> E
 
 
 def memory_of(
-    order: float, horizon: int, poles: Iterable[float], weights: Iterable[float]
+    order: float, horizon: int, poles: Sequence[float] | Array, weights: Sequence[float] | Array
 ) -> ExponentialMemory:
     """Return the memory with these ``poles`` and ``weights``, and the tolerance its certificate proves."""
     differences = math.ceil(order)

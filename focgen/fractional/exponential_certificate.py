@@ -18,7 +18,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array, Ints
 from focgen.fractional import elementary
 from focgen.fractional.weights import gl_weights_at
 
@@ -55,7 +57,7 @@ class Certificate:
         return largest_input * (self.per_unit + (self.beyond if past_horizon else 0.0))
 
 
-def certify(beta: float, differences: int, horizon: int, poles, weights) -> Certificate:
+def certify(beta: float, differences: int, horizon: int, poles: ArrayLike, weights: ArrayLike) -> Certificate:
     """Bound the error of h_0 = 1, h_j = Σ_i weights_i · poles_i^(j−1) as the weights of (1 − z⁻¹)^(−beta).
 
     ``poles`` in [0, 1) and ``weights`` ≥ 0, shape (n,), any: rounded ones, too. ``differences`` is the m of
@@ -84,10 +86,10 @@ class _Error:
     """e and its differences in closed form, at lags from 0 (m = 0) or beyond the first few (m > 0)."""
 
     beta: float
-    poles: np.ndarray
-    weights: np.ndarray
+    poles: Array
+    weights: Array
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (
             np.all(self.poles >= 0.0)
             and np.all(self.poles < 1.0)
@@ -96,11 +98,11 @@ class _Error:
         ):
             raise ValueError("the poles must lie in [0, 1) and the weights must not be negative")
 
-    def exact(self, m: int, lags: np.ndarray) -> np.ndarray:
+    def exact(self, m: int, lags: Ints) -> Array:
         """∇^m g; m = −1 for sums from lag 0."""
         return gl_weights_at(m - self.beta, lags)
 
-    def modelled(self, m: int, lags: np.ndarray) -> np.ndarray:
+    def modelled(self, m: int, lags: Ints) -> Array:
         """∇^m h."""
         parts = self.weights.copy()
         for _ in range(m):
@@ -109,37 +111,37 @@ class _Error:
         values = elementary.total(parts[:, None] * powers)
         return np.where(lags == 0, 1.0, values) if m == 0 else values
 
-    def differences(self, m: int, lags: np.ndarray) -> np.ndarray:
+    def differences(self, m: int, lags: Ints) -> Array:
         """∇^m e."""
         return self.modelled(m, lags) - self.exact(m, lags)
 
-    def off_chord(self, m: int, grid: np.ndarray) -> np.ndarray:
+    def off_chord(self, m: int, grid: Ints) -> Array:
         """How far ∇^m e can depart from its chord between the lags of ``grid``, shape (len(grid) − 1,)."""
         start, length = grid[:-1], np.diff(grid)
         second = np.abs(self.differences(m + 2, start + 2))
         third = np.maximum(np.abs(self.exact(m + 3, start + 3)), np.abs(self.modelled(m + 3, start + 3)))
         return np.where(length > 1, length**2 / 8.0 * (second + length * third), 0.0)
 
-    def sizes(self, m: int, grid: np.ndarray) -> np.ndarray:
+    def sizes(self, m: int, grid: Ints) -> Array:
         """Bound |∇^m e| between the lags of ``grid``, shape (len(grid) − 1,)."""
         ends = np.abs(self.differences(m, grid))
         return np.maximum(ends[:-1], ends[1:]) + self.off_chord(m, grid)
 
-    def total(self, m: int, grid: np.ndarray) -> float:
+    def total(self, m: int, grid: Ints) -> float:
         """Bound Σ |∇^m e_j| over the lags after the first of ``grid`` up to its last."""
         ends, length = np.abs(self.differences(m, grid)), np.diff(grid)
-        ends += _ROUNDING * np.abs(self.exact(m, grid))
+        ends = ends + _ROUNDING * np.abs(self.exact(m, grid))
         chords = 0.5 * length * (ends[:-1] + ends[1:]) + 0.5 * (ends[1:] - ends[:-1])
         return elementary.exact_sum(chords + length * self.off_chord(m, grid))
 
 
-def _differenced(e: np.ndarray, m: int) -> np.ndarray:
+def _differenced(e: Array, m: int) -> Array:
     for _ in range(m):
         e = np.diff(e, prepend=0.0)
     return e
 
 
-def _lags(first: int, last: int, gap: float) -> np.ndarray:
+def _lags(first: int, last: int, gap: float) -> Ints:
     reach = float(elementary.log(last / first))
     count = math.ceil(reach / min(gap, _GAPS[1])) + 1
     between = np.rint(first * elementary.exp(np.arange(count) * (reach / (count - 1)))).astype(np.int64)

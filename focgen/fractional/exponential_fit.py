@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.arrays import Array, Ints
 from focgen.fractional import elementary
 from focgen.fractional.weights import gl_weights_at
 
@@ -43,10 +44,10 @@ class Alternation:
     alternating signs at the lags ``places``, shape (2n + 1,).
     """
 
-    log_rates: np.ndarray
-    log_weights: np.ndarray
+    log_rates: Array
+    log_weights: Array
     error: float
-    places: np.ndarray
+    places: Ints
 
     @property
     def modes(self) -> int:
@@ -61,18 +62,18 @@ class Problem:
     is to be found: lags near the horizon weigh least in the output, the first ones most. ``ease`` in 0 … 5.
     """
 
-    def __init__(self, beta: float, log_horizon: float, ease: float = 0.0):
+    def __init__(self, beta: float, log_horizon: float, ease: float = 0.0) -> None:
         self.beta, self.log_horizon, self.ease = beta, log_horizon, ease
         self.horizon = round(float(elementary.exp(log_horizon)))
 
-    def lags(self, density: int) -> np.ndarray:
+    def lags(self, density: int) -> Ints:
         """Return the lags to look at, ``density`` of them where the lag grows by a factor of e."""
         count = int(self.log_horizon * density) + 2
         spread = np.rint(elementary.exp(np.arange(count) * (self.log_horizon / (count - 1)))).astype(np.int64)
         head = np.arange(1, min(_ALL_LAGS, self.horizon) + 1)
         return np.unique(np.concatenate([head, np.minimum(spread, self.horizon), [self.horizon]]))
 
-    def scaled(self, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def scaled(self, lags: Array | Ints) -> tuple[Array, Array]:
         """Return g_j · profile_j and 1 / profile_j."""
         profile = (1.0 + self.ease * lags / self.horizon) * (1.0 - 0.175 * self.ease / lags)
         return gl_weights_at(-self.beta, lags) * profile, 1.0 / profile
@@ -83,9 +84,10 @@ class Problem:
         scale, target = self.scaled(lags)
         fit = start
         for _ in range(_EXCHANGES):
-            fit = self._levelled(fit)
-            if fit is None:
+            levelled = self._levelled(fit)
+            if levelled is None:
                 return None
+            fit = levelled
             error = elementary.total(_modes(fit, lags)) / scale - target
             extrema = _extrema(error)
             if len(extrema) != len(fit.places):
@@ -123,7 +125,7 @@ class Problem:
 class Ladder:
     """The best fits with 1, 2, … modes on the lags 1 … ``horizon`` until rounding ends them; found once."""
 
-    def __init__(self, beta: float, horizon: int):
+    def __init__(self, beta: float, horizon: int) -> None:
         self._found: list[Alternation] = []
         self._further = _climb(beta, horizon)
 
@@ -162,13 +164,13 @@ def eased(beta: float, horizon: int, fit: Alternation, tolerance: float) -> Alte
     return fit
 
 
-def _modes(fit: Alternation, lags: np.ndarray) -> np.ndarray:
+def _modes(fit: Alternation, lags: Array | Ints) -> Array:
     """Every mode at every lag, shape (n, lags)."""
     rates = elementary.exp(fit.log_rates)
     return elementary.exp(fit.log_weights[:, None] - rates[:, None] * (lags - 1.0))
 
 
-def _newton_step(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray | None:
+def _newton_step(jacobian: Array, residual: Array) -> Array | None:
     scale = np.abs(jacobian).max(axis=0)
     if not (np.all(scale > 0) and np.all(np.isfinite(jacobian))):
         return None
@@ -178,11 +180,11 @@ def _newton_step(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray | Non
     return step if step is not None and np.all(np.isfinite(step)) else None
 
 
-def _extrema(error: np.ndarray) -> np.ndarray:
+def _extrema(error: Array) -> Array:
     """Return where |error| is largest in each run of one sign."""
     edges = np.flatnonzero(np.diff(np.sign(error))) + 1
     bounds = np.concatenate([[0], edges, [len(error)]])
-    return np.array([a + np.argmax(np.abs(error[a:b])) for a, b in zip(bounds[:-1], bounds[1:])])
+    return np.array([a + np.argmax(np.abs(error[a:b])) for a, b in itertools.pairwise(bounds)])
 
 
 def _single(problem: Problem) -> Alternation | None:
@@ -270,7 +272,7 @@ def _stretched(fit: Alternation, here: float, problem: Problem) -> Alternation:
     return Alternation(rates, weights, error, places)
 
 
-def _distinct(log_places: np.ndarray, horizon: int) -> np.ndarray:
+def _distinct(log_places: Array, horizon: int) -> Ints:
     """Return rising lags nearest to e^``log_places``, the last at the horizon."""
     places = np.rint(elementary.exp(log_places)).astype(np.int64)
     for i in range(1, len(places)):
@@ -279,7 +281,7 @@ def _distinct(log_places: np.ndarray, horizon: int) -> np.ndarray:
     return places
 
 
-def best_weights(beta: float, horizon: int, poles: np.ndarray) -> np.ndarray:
+def best_weights(beta: float, horizon: int, poles: Array) -> Array:
     """Return the weights at lag 1 that make the largest relative error small for given ``poles``, shape (n,).
 
     Least squares, reweighted by Lawson's rule until the largest error no longer falls; −∞ where two poles

@@ -8,11 +8,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.fractional import elementary
 from focgen.fractional.exponential import TOLERANCES, ExponentialMemory, checked_differences, memory_of
 from focgen.fractional.exponential_fit import Alternation, best_weights, eased, ladder
 
-Rounding = Callable[[np.ndarray], np.ndarray]
+Rounding = Callable[[Array], Array]
 _SPARED = 0.9  # of the tolerance: what rounding the poles may cost is left over
 
 

@@ -13,6 +13,8 @@ import math
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from focgen.arrays import Array
+
 DIRECT = 16  # the first samples are their own places
 _RATIO = 4.0
 _PLACES = 20
@@ -22,13 +24,13 @@ _CACHED = 1 << 15  # samples up to which the interpolation matrices are kept
 class LogGrid:
     """Places, in samples, from which all samples 1 … ``count`` follow."""
 
-    def __init__(self, count: int):
+    def __init__(self, count: int) -> None:
         self.count = count
         self.head = np.arange(1, min(count, DIRECT) + 1, dtype=float)
         self._panels = _panels(count)
         self.tail = np.concatenate([p.places for p in self._panels]) if self._panels else np.empty(0)
 
-    def spread(self, head: np.ndarray, tail: np.ndarray) -> np.ndarray:
+    def spread(self, head: Array, tail: Array) -> Array:
         """Return the values at 1 … count, shape (count,), from those at ``self.head`` and ``self.tail``."""
         out = np.empty(self.count)
         out[: len(head)] = head
@@ -38,7 +40,7 @@ class LogGrid:
 
 
 class _Panel:
-    def __init__(self, first: int, last: int):
+    def __init__(self, first: int, last: int) -> None:
         self.first, self.last = first, last
         low, high = math.log(first - 1), math.log(last)
         nodes = chebyshev.chebpts1(_PLACES)
@@ -50,7 +52,7 @@ class _Panel:
         if last <= _CACHED:
             self._matrix = chebyshev.chebvander(self._at, _PLACES - 1) @ self._to_coefficients
 
-    def spread(self, values: np.ndarray) -> np.ndarray:
+    def spread(self, values: Array) -> Array:
         if self._matrix is not None:
             return self._matrix @ values
         return chebyshev.chebval(self._at, self._to_coefficients @ values)

@@ -9,9 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Complex, Ints
 from focgen.fractional.triangular import triangular_exponential
 
 _CIRCLE = 128
@@ -25,44 +27,48 @@ class Chain:
     ``poles`` in rad/s, ``gammas`` γ_k, both of shape (m,).
     """
 
-    poles: np.ndarray
-    gammas: np.ndarray
+    poles: Complex
+    gammas: Complex
     weight: float
 
-    def image(self, s: np.ndarray) -> np.ndarray:
+    def image(self, s: Complex) -> Any:
         """Return the Laplace transform at ``s``, the conjugate included."""
         total = _chain_image(self.poles, self.gammas, s)
         if self.weight == 2.0:
             total = total + _chain_image(self.poles.conj(), self.gammas.conj(), s)
         return total
 
-    def samples(self, step: float, count: int, begin: float = 0.0) -> np.ndarray:
+    def samples(self, step: float, count: int, begin: float = 0.0) -> Array:
         """Return the time function at ``begin``, ``begin`` + ``step``, …, shape (count,)."""
         return self._follow(self._later(self._start(), begin), step, count)
 
-    def means(self, step: float, count: int, begin: float = 0.0) -> np.ndarray:
+    def means(self, step: float, count: int, begin: float = 0.0) -> Array:
         """Return its mean over each step that begins at ``begin`` + j ``step``, j = 0 … count − 1, shape
         (count,).
         """
         return self._follow(self._later(self._mean_state(step), begin), step, count)
 
-    def at(self, t: np.ndarray) -> np.ndarray:
+    def at(self, t: Array) -> Array:
         """Return the time function at the times ``t`` ≥ 0 (s), shape of ``t``."""
         if len(self.poles) == 1:
-            return self.weight * (self.gammas[0] * np.exp(self.poles[0] * t)).real
+            made: Array = self.weight * (self.gammas[0] * np.exp(self.poles[0] * t)).real
+            return made
         return self.weight * (self._propagators(t)[:, :, -1] @ self.gammas).real
 
-    def _later(self, state: np.ndarray, time: float) -> np.ndarray:
+    def _later(self, state: Array, time: float) -> Array:
         if time == 0.0:
             return state
         if len(self.poles) == 1:
-            return np.exp(self.poles[0] * time) * state
-        return self._propagators(np.array([time]))[0] @ state
+            made: Array = np.exp(self.poles[0] * time) * state
+        else:
+            made = self._propagators(np.array([time]))[0] @ state
+        return made
 
-    def _start(self) -> np.ndarray:
-        return np.eye(len(self.poles), dtype=complex)[-1]
+    def _start(self) -> Array:
+        made: Array = np.eye(len(self.poles), dtype=complex)[-1]
+        return made
 
-    def _propagators(self, t: np.ndarray) -> np.ndarray:
+    def _propagators(self, t: Array) -> Array:
         """Return e^{At} of the chain's lags (poles on the diagonal, ones above it), shape (n, m, m)."""
         m = len(self.poles)
         spread = np.max(np.abs(self.poles - self.poles[0]))
@@ -70,9 +76,10 @@ class Chain:
         size = np.maximum(spread, 1.0 / np.maximum(t, np.finfo(float).tiny))
         scaled = (np.diag(self.poles) + size[:, None, None] * np.eye(m, k=1)) * t[:, None, None]
         distance = np.arange(m) - np.arange(m)[:, None]
-        return triangular_exponential(scaled) * size[:, None, None] ** -np.maximum(distance, 0.0)
+        made: Array = triangular_exponential(scaled) * size[:, None, None] ** -np.maximum(distance, 0.0)
+        return made
 
-    def _mean_state(self, step: float) -> np.ndarray:
+    def _mean_state(self, step: float) -> Array:
         """Return the mean over the first step of the states that start as ``_start``."""
         if len(self.poles) == 1:
             x = self.poles[0] * step
@@ -81,7 +88,7 @@ class Chain:
         integrating = Chain(np.append(self.poles, 0.0), np.append(self.gammas, 0.0), self.weight)
         return integrating._propagators(np.array([step]))[0, :-1, -1] / step
 
-    def _follow(self, state: np.ndarray, step: float, count: int) -> np.ndarray:
+    def _follow(self, state: Array, step: float, count: int) -> Array:
         """Return the output at ``count`` samples from ``state`` on, doubling them by one propagator each."""
         lengths = step * 2.0 ** np.arange(max(count - 1, 0).bit_length())
         states = state[:, None]
@@ -94,16 +101,22 @@ class Chain:
         return self.weight * (self.gammas @ states[:, :count]).real
 
 
-def _chain_image(poles: np.ndarray, gammas: np.ndarray, s: np.ndarray) -> np.ndarray:
-    total, lags = 0.0, 1.0
+def _chain_image(poles: Complex, gammas: Complex, s: Complex) -> Any:
+    total: Any = 0.0
+    lags: Any = 1.0
     for pole, gamma in zip(poles[::-1], gammas[::-1]):
         lags = lags / (s - pole)
         total = total + gamma * lags
-    return total
+    made: Array = total
+    return made
 
 
 def polar_part(
-    image: Callable, poles: np.ndarray, gap: float, isolated: Callable, obstacle: Callable
+    image: Callable[..., Any],
+    poles: Complex,
+    gap: float,
+    isolated: Callable[..., Any],
+    obstacle: Callable[..., Any],
 ) -> list[Chain]:
     """Return the polar part of ``image`` at ``poles`` (rad/s, closed under conjugation) as chains.
 
@@ -126,7 +139,7 @@ def polar_part(
     return chains
 
 
-def _clusters(poles: np.ndarray, gap: float) -> list[np.ndarray]:
+def _clusters(poles: Complex, gap: float) -> list[Ints]:
     size = np.abs(poles)
     close = np.abs(poles[:, None] - poles) <= np.maximum(gap, _RELATIVE_GAP * np.maximum(size[:, None], size))
     for _ in range(len(poles).bit_length()):  # transitive closure
@@ -135,8 +148,8 @@ def _clusters(poles: np.ndarray, gap: float) -> list[np.ndarray]:
 
 
 def _chain(
-    image: Callable, cluster: np.ndarray, others: np.ndarray, obstacle: Callable, gap: float
-) -> tuple[np.ndarray, np.ndarray]:
+    image: Callable[..., Any], cluster: Complex, others: Complex, obstacle: Callable[..., Any], gap: float
+) -> tuple[Complex, Complex]:
     """Return the cluster's poles and its γ_k = (1/2πi) ∮ image(s) Π_{i > k} (s − p_i) ds."""
     corners = [complex(end(cluster.real), end(cluster.imag)) for end in (np.min, np.max)]
     middle = 0.5 * (corners[0] + corners[1])

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array, Complex
 from focgen.fractional.transfer import Polynomial
 
 _MERGED = 1e-3  # zeros this close, relative to their size, are located together
@@ -18,7 +20,7 @@ _REACH = 600.0  # of an exponent: beyond it a term's size is no number any more
 _MOST_STEPS = 1_000_000  # along an edge; further halving would find nothing new
 
 
-def first_sheet_zeros(terms: Polynomial, sector: float) -> np.ndarray:
+def first_sheet_zeros(terms: Polynomial, sector: float) -> Complex:
     """Return the zeros of Σ aᵢ s^αᵢ with 0 < |s| and |arg s| ≤ ``sector`` < π, each as often as it counts.
 
     Complex zeros come in conjugate pairs. Where a zero lies within 0.02 rad of the sector's edge, it may
@@ -31,19 +33,20 @@ def first_sheet_zeros(terms: Polynomial, sector: float) -> np.ndarray:
     return _Sector(terms, sector).zeros()
 
 
-def _two_terms(terms: Polynomial, sector: float) -> np.ndarray:
+def _two_terms(terms: Polynomial, sector: float) -> Complex:
     (a, high), (b, low) = terms
     order = high - low
     first = 0.0 if b / a < 0 else math.pi
     turns = np.arange(-math.ceil(order), math.ceil(order) + 1)
     angles = (first + 2.0 * math.pi * turns) / order
-    return abs(b / a) ** (1.0 / order) * np.exp(1j * angles[np.abs(angles) <= sector])
+    made: Complex = abs(b / a) ** (1.0 / order) * np.exp(1j * angles[np.abs(angles) <= sector])
+    return made
 
 
 class _Sector:
     """D(e^x) with its lowest power divided out, on |Im x| ≤ ``angle``."""
 
-    def __init__(self, terms: Polynomial, angle: float):
+    def __init__(self, terms: Polynomial, angle: float) -> None:
         self.coefficients = np.array([t.coefficient for t in terms])
         self.orders = np.array([t.order for t in terms]) - terms[-1].order
         # where one term outweighs the sum of the others there is no zero
@@ -53,26 +56,30 @@ class _Sector:
             raise ArithmeticError(f"its time constants are too far apart, 1e{ends} s")
         self.angle = max((angle, angle + 0.01, angle - 0.01), key=self._clearance)
 
-    def parts(self, x) -> np.ndarray:
+    def parts(self, x: ArrayLike) -> Array:
         return self.coefficients * np.exp(np.multiply.outer(x, self.orders))
 
-    def value(self, x) -> np.ndarray:
-        return self.parts(x).sum(axis=-1)
+    def value(self, x: ArrayLike) -> Array:
+        made: Array = self.parts(x).sum(axis=-1)
+        return made
 
-    def relative(self, x) -> np.ndarray:
+    def relative(self, x: ArrayLike) -> Array:
         parts = self.parts(x)
-        return np.abs(parts.sum(axis=-1)) / np.abs(parts).sum(axis=-1)
+        made: Array = np.abs(parts.sum(axis=-1)) / np.abs(parts).sum(axis=-1)
+        return made
 
-    def slope(self, x) -> np.ndarray:
-        return (self.parts(x) * self.orders).sum(axis=-1)
+    def slope(self, x: ArrayLike) -> Array:
+        made: Array = (self.parts(x) * self.orders).sum(axis=-1)
+        return made
 
     def _dominated(self, index: int) -> float:
         """Return a log radius beyond which the highest (0) or lowest (-1) term outweighs the rest twice."""
         way = 1.0 if index == 0 else -1.0
         others = np.delete(np.arange(len(self.orders)), index)
         gaps = np.abs(self.orders[others] - self.orders[index])
-        weights = 2.0 * len(others) * np.abs(self.coefficients[others] / self.coefficients[index])
-        return way * float(np.max(np.log(weights) / gaps))
+        with np.errstate(divide="ignore", over="ignore"):  # of a term of no weight, of one of all
+            weights = 2.0 * len(others) * np.abs(self.coefficients[others] / self.coefficients[index])
+            return way * float(np.max(np.log(weights) / gaps))
 
     def _clearance(self, angle: float) -> float:
         return float(self.relative(np.linspace(self.low, self.high, 256) + 1j * angle).min())
@@ -83,7 +90,8 @@ class _Sector:
         # at the ends one term dominates: the argument along each arc is known in closed form
         low = np.angle(self.value(ends[0]) / self.coefficients[-1])
         high = np.angle(self.value(ends[1]) / (self.parts(ends[1])[0])) + self.orders[0] * self.angle
-        return round((high - low - self._turn()) / math.pi)
+        made: int = round((high - low - self._turn()) / math.pi)
+        return made
 
     def _turn(self) -> float:
         """Return the change of arg D outward along the sector's edge."""
@@ -101,7 +109,7 @@ class _Sector:
                 break
         raise ArithmeticError("a pole lies on the edge of the sector")
 
-    def zeros(self) -> np.ndarray:
+    def zeros(self) -> Complex:
         expected = self.count()
         density = 12.0
         while expected and density < 200.0:
@@ -115,7 +123,7 @@ class _Sector:
             raise ArithmeticError(f"located {len(found)} of {expected} poles")
         return np.empty(0, complex)
 
-    def _starts(self, density: float) -> np.ndarray:
+    def _starts(self, density: float) -> Array:
         """Return the local minima of |D| relative to its terms on a grid of the upper half."""
         radii = np.linspace(self.low, self.high, max(8, math.ceil(density * (self.high - self.low))))
         angles = np.linspace(0.0, self.angle, math.ceil(density * self.angle))
@@ -130,7 +138,7 @@ class _Sector:
         ]
         return grid[np.all([inner <= other for other in around], axis=0)]
 
-    def _newton(self, x: np.ndarray) -> np.ndarray:
+    def _newton(self, x: Array) -> Array:
         for _ in range(80):
             with np.errstate(all="ignore"):
                 step = np.nan_to_num(self.value(x) / self.slope(x))
@@ -140,7 +148,7 @@ class _Sector:
         inside = (np.abs(x.imag) <= self.angle) & (self.relative(x) < 1e-9)
         return x[inside]
 
-    def _distinct(self, x: np.ndarray) -> np.ndarray:
+    def _distinct(self, x: Array) -> Array:
         """Merge what is the same zero, and add the conjugates."""
         x = np.where(np.abs(x.imag) < 1e-9, x.real, x)
         x = np.concatenate([x, x.conj()])
@@ -150,14 +158,14 @@ class _Sector:
                 kept.append(candidate)
         return np.array(kept, complex)
 
-    def _with_multiplicity(self, centres: np.ndarray) -> np.ndarray:
+    def _with_multiplicity(self, centres: Array) -> Array:
         found = []
         for i, centre in enumerate(centres):
             gaps = np.abs(np.delete(centres, i) - centre)
             found.append(self._cluster(centre, min(0.2, 0.4 * gaps.min(initial=1.0))))
         return np.concatenate(found) if found else centres
 
-    def _cluster(self, centre: complex, radius: float) -> np.ndarray:
+    def _cluster(self, centre: complex, radius: float) -> Complex:
         """Return the zeros in a circle, from power sums (1/2πi) ∮ (x − c)^k D'/D dx (Delves and Lyness)."""
         offset = radius * np.exp(2j * math.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE)
         density = self.slope(centre + offset) / self.value(centre + offset) * offset / _CIRCLE

@@ -13,8 +13,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
+from focgen.arrays import Array
 from focgen.fractional.exponential import ExponentialMemory, fit_exponential
 from focgen.fractional.transfer import Polynomial, TransferFunction
 
@@ -28,7 +30,7 @@ class ExponentialRecursion:
     that are not whole, a negative whole order, or where the sum of the leading coefficients vanishes.
     """
 
-    def __init__(self, transfer: TransferFunction, step: float, horizon: int, tolerance: float):
+    def __init__(self, transfer: TransferFunction, step: float, horizon: int, tolerance: float) -> None:
         if not 0.0 < step < np.inf:
             raise ValueError(f"the step is {step} s, it must be positive")
         if not transfer.is_proper:
@@ -44,7 +46,7 @@ class ExponentialRecursion:
         """How many exponentials there are in all."""
         return self._num.states + self._den.states
 
-    def run(self, u) -> np.ndarray:
+    def run(self, u: ArrayLike) -> Array:
         """Return the output for the samples ``u``, from rest at 0; float64, both (samples,)."""
         u = np.asarray(u, dtype=float)
         return self._modes.run(self._num.run(u)) if len(u) else u.copy()
@@ -54,11 +56,11 @@ class ExponentialRecursion:
 class _Modes:
     """y_k = ``through`` f_k + Σ residues · (modes filtered, one sample late); complex modes come in pairs."""
 
-    values: np.ndarray
-    residues: np.ndarray
+    values: Array
+    residues: Array
     through: float
 
-    def run(self, forced: np.ndarray) -> np.ndarray:
+    def run(self, forced: Array) -> Array:
         y = self.through * forced
         for value, residue in zip(self.values, self.residues):
             if value.imag == 0.0:
@@ -74,7 +76,7 @@ class _Terms:
     ``lags``: what multiplies the signal's present and past samples; every memory adds its exponentials.
     """
 
-    def __init__(self, terms: Polynomial, step: float, horizon: int, tolerance: float):
+    def __init__(self, terms: Polynomial, step: float, horizon: int, tolerance: float) -> None:
         highest = max((math.ceil(term.order) for term in terms), default=0)
         self.lags = np.zeros(highest + 1)
         self._memories: list[tuple[float, ExponentialMemory]] = []
@@ -90,8 +92,8 @@ class _Terms:
     def states(self) -> int:
         return sum(memory.states for _, memory in self._memories)
 
-    def run(self, x: np.ndarray) -> np.ndarray:
-        y = lfilter(self.lags, [1.0], x)
+    def run(self, x: Array) -> Array:
+        y: Array = lfilter(self.lags, [1.0], x)
         for factor, memory in self._memories:
             y += factor * (memory.run(x) - lfilter(_binomials(memory.differences), [1.0], x))
         return y
@@ -118,7 +120,7 @@ class _Terms:
         residues = (row @ vectors) * np.linalg.solve(vectors, entry)
         return _Modes(values.astype(complex), residues.astype(complex), 1.0 / lead)
 
-    def _exponentials(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _exponentials(self) -> tuple[Array, Array, Array]:
         """Poles and weights, shape (n,), and the difference of the signal each takes in, shape (n, lags)."""
         poles = [pole for _, memory in self._memories for pole in memory.poles]
         weights = [factor * weight for factor, memory in self._memories for weight in memory.weights]
@@ -130,6 +132,6 @@ class _Terms:
         return np.array(poles), np.array(weights), taken
 
 
-def _binomials(differences: int) -> np.ndarray:
+def _binomials(differences: int) -> Array:
     """The coefficients of (1 − x)^differences."""
     return np.array([(-1.0) ** j * math.comb(differences, j) for j in range(differences + 1)])

@@ -8,12 +8,13 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from focgen.arrays import Array
 from focgen.fractional.contour import INNERMOST, TOLERATED, inverse_laplace
 from focgen.fractional.decomposition import StepImage, step_image
 from focgen.fractional.transfer import TransferFunction
 
 
-def step_response(transfer: TransferFunction, t: ArrayLike) -> np.ndarray:
+def step_response(transfer: TransferFunction, t: ArrayLike) -> Array:
     """Return the response to a unit step at time 0, from rest, at the times ``t`` (s), shape of ``t``.
 
     Exact to about 1e-12 of the largest value: poles as exponentials, the rest by a contour integral. At
@@ -28,20 +29,20 @@ def step_response(transfer: TransferFunction, t: ArrayLike) -> np.ndarray:
     return out
 
 
-def ramp_response(transfer: TransferFunction, t: ArrayLike) -> np.ndarray:
+def ramp_response(transfer: TransferFunction, t: ArrayLike) -> Array:
     """Return the response to the ramp u = t (t in s), shape of ``t``; exact, and raises ValueError, as
     :func:`step_response`."""
     return step_response(transfer * TransferFunction([(1.0, 0.0)], [(1.0, 1.0)]), t)
 
 
-def _values(image: StepImage, t: np.ndarray) -> np.ndarray:
+def _values(image: StepImage, t: Array) -> Array:
     total = np.zeros(t.shape)
     for chain in image.chains:
         total += chain.at(t)
     return total if image.remainder is None else total + inverse_laplace(image.remainder, t, image.poles)
 
 
-def mittag_leffler(alpha: float, beta: float, z: ArrayLike) -> np.ndarray:
+def mittag_leffler(alpha: float, beta: float, z: ArrayLike) -> Array:
     """Return the two-parameter function E_{α,β}(z) = Σ z^k / Γ(αk + β) for real ``z``, shape of ``z``.
 
     Absolute error about 1e-13 for z ≤ 0 and moderate β; for z > 0 the error is relative to the value.
@@ -59,7 +60,7 @@ def _mittag_leffler(alpha: float, beta: float, z: float) -> float:
     poles = [p for p in _mittag_leffler_poles(alpha, z) if abs(p) > INNERMOST]
     residues = [p ** (1.0 - beta) / alpha for p in poles]
 
-    def remainder(s: np.ndarray) -> np.ndarray:
+    def remainder(s: Array) -> Array:
         polar = sum(r / (s - p) for p, r in zip(poles, residues))
         return s ** (alpha - beta) / (s**alpha - z) - polar
 

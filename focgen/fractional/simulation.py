@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import fft, signal
 
+from focgen.arrays import Array
 from focgen.fractional.contour import inverse_laplace
 from focgen.fractional.decomposition import StepImage, step_image
 from focgen.fractional.delay import split_delay
@@ -20,7 +21,7 @@ from focgen.fractional.weights import gl_weights
 class Simulator(Protocol):
     """What turns a sampled input into a sampled output, from rest."""
 
-    def run(self, u: ArrayLike) -> np.ndarray:
+    def run(self, u: ArrayLike) -> Array:
         """Return the output at the instants of the input samples ``u``, shape (n,) -> (n,)."""
 
 
@@ -40,7 +41,7 @@ class Convolution:
         step: float,
         hold: Literal["zero", "linear"] = "zero",
         delay: float = 0.0,
-    ):
+    ) -> None:
         if not 0.0 < step < np.inf:
             raise ValueError(f"the step is {step} s, it must be positive")
         if hold not in ("zero", "linear"):
@@ -48,7 +49,7 @@ class Convolution:
         self.transfer, self.step, self.hold, self.delay = transfer, step, hold, delay
         self._kernel = self._first = np.empty(0)
 
-    def run(self, u: ArrayLike) -> np.ndarray:
+    def run(self, u: ArrayLike) -> Array:
         """Return the output at the instants of the input samples ``u``, shape (n,) -> (n,), from rest.
 
         Raises ValueError where the input is no row of samples.
@@ -78,20 +79,20 @@ class Convolution:
         self._first = steps - means[1:]
 
 
-def _signal(u: ArrayLike) -> np.ndarray:
-    row: np.ndarray = np.asarray(u, dtype=float)
+def _signal(u: ArrayLike) -> Array:
+    row: Array = np.asarray(u, dtype=float)
     if row.ndim != 1:
         raise ValueError(f"the input has {row.ndim} dimensions, it must be one row of samples")
     return row
 
 
-def _later(values: np.ndarray, whole: int) -> np.ndarray:
+def _later(values: Array, whole: int) -> Array:
     """Return ``values`` (n,) moved back by ``whole`` places, zeros before them."""
     whole = min(whole, len(values))
     return np.concatenate([np.zeros(whole), values[: len(values) - whole]])
 
 
-def _steps(image: StepImage, step: float, count: int, begin: float = 0.0) -> np.ndarray:
+def _steps(image: StepImage, step: float, count: int, begin: float = 0.0) -> Array:
     """Return the step response at ``begin``, ``begin`` + h, …, shape (count,)."""
     out = np.zeros(count)
     for chain in image.chains:
@@ -108,7 +109,7 @@ def _steps(image: StepImage, step: float, count: int, begin: float = 0.0) -> np.
     return out
 
 
-def _means(image: StepImage, step: float, count: int, begin: float = 0.0) -> np.ndarray:
+def _means(image: StepImage, step: float, count: int, begin: float = 0.0) -> Array:
     """Return the step response's means over ``begin`` + [(j−1)h, jh], j = 1 … count, shape (count,)."""
     out = np.zeros(count)
     for chain in image.chains:
@@ -126,42 +127,43 @@ def _first_mean(image: StepImage, step: float, end: float) -> float:
     return polar + (0.0 if image.remainder is None else float(_integrals(image, np.array([end]))[0]) / step)
 
 
-def _remainder(image: StepImage) -> Callable[[np.ndarray], np.ndarray]:
+def _remainder(image: StepImage) -> Callable[[Array], Array]:
     """What no pole makes; asked for only where there is something."""
     assert image.remainder is not None
     return image.remainder
 
 
-def _integrals(image: StepImage, t: np.ndarray) -> np.ndarray:
+def _integrals(image: StepImage, t: Array) -> Array:
     """Return the integral of what no pole makes, from 0 to the times ``t`` (s)."""
 
-    def integral(s: np.ndarray) -> np.ndarray:
-        values: np.ndarray = _remainder(image)(s) / s
+    def integral(s: Array) -> Array:
+        values: Array = _remainder(image)(s) / s
         return values
 
     return inverse_laplace(integral, t, image.poles)
 
 
-def _head_means(image: StepImage, step: float, count: int, begin: float) -> np.ndarray:
+def _head_means(image: StepImage, step: float, count: int, begin: float) -> Array:
     ends = step * np.arange(1.0, count + 1.0) + begin
     before = _integrals(image, np.array([begin]))[0] if begin else 0.0
     return np.diff(_integrals(image, ends), prepend=before) / step
 
 
-def _tail_means(image: StepImage, step: float, times: np.ndarray) -> np.ndarray:
+def _tail_means(image: StepImage, step: float, times: Array) -> Array:
     def mean(
-        s: np.ndarray,
-    ) -> np.ndarray:  # (1 − e^{−sh})/(sh): beyond the first samples the contour bears its growth
-        return _remainder(image)(s) * -np.expm1(-s * step) / (s * step)
+        s: Array,
+    ) -> Array:  # (1 − e^{−sh})/(sh): beyond the first samples the contour bears its growth
+        made: Array = _remainder(image)(s) * -np.expm1(-s * step) / (s * step)
+        return made
 
     return inverse_laplace(mean, times, image.poles)
 
 
-def _product(kernel: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _product(kernel: Array, u: Array) -> Array:
     """Return the first len(u) values of their convolution."""
     n = len(u)
     size = fft.next_fast_len(2 * n, real=True)
-    made: np.ndarray = fft.irfft(fft.rfft(kernel, size) * fft.rfft(u, size), size)[:n] if n else u.copy()
+    made: Array = fft.irfft(fft.rfft(kernel, size) * fft.rfft(u, size), size)[:n] if n else u.copy()
     return made
 
 
@@ -177,7 +179,7 @@ class GrunwaldLetnikov:
 
     _PLAIN = 512  # weights up to which the plain recursion is quicker
 
-    def __init__(self, transfer: TransferFunction, step: float, length: int | None = None):
+    def __init__(self, transfer: TransferFunction, step: float, length: int | None = None) -> None:
         if not 0.0 < step < np.inf:
             raise ValueError(f"the step is {step} s, it must be positive")
         if length is not None and length < 1:
@@ -186,7 +188,7 @@ class GrunwaldLetnikov:
             raise ValueError("the transfer function is improper")
         self.transfer, self.step, self.length = transfer, step, length
 
-    def coefficients(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+    def coefficients(self, count: int) -> tuple[Array, Array]:
         """Return Σ B_i w_{j,i+n+1} and Σ A_i w_{j,i} for j = 0 … min(count, length), eq. (10)–(14)."""
         count = count if self.length is None else min(count, self.length)
         num, den = (gl_operator(terms, self.step, count) for terms in (self.transfer.num, self.transfer.den))
@@ -194,7 +196,7 @@ class GrunwaldLetnikov:
             raise ValueError("the sum of the leading coefficients A_i is zero at this step")
         return num, den
 
-    def run(self, u: ArrayLike) -> np.ndarray:
+    def run(self, u: ArrayLike) -> Array:
         """Return the output at the instants of the input samples ``u``, shape (n,) -> (n,), from rest.
 
         Raises ValueError where the input is no row of samples.
@@ -210,7 +212,7 @@ class GrunwaldLetnikov:
         return divided(_product(padded[0], row), padded[1])
 
 
-def gl_operator(terms: Polynomial, step: float, length: int) -> np.ndarray:
+def gl_operator(terms: Polynomial, step: float, length: int) -> Array:
     """Return the coefficients c_0 … c_L of Σ aᵢ s^αᵢ as one Grünwald–Letnikov sum, shape (length + 1,).
 
     ``step`` is h in s. Raises ValueError for orders beyond ±100, as :func:`gl_weights` does.
@@ -221,7 +223,7 @@ def gl_operator(terms: Polynomial, step: float, length: int) -> np.ndarray:
     return total
 
 
-def divided(right: np.ndarray, den: np.ndarray) -> np.ndarray:
+def divided(right: Array, den: Array) -> Array:
     """Solve Σ_j den_j y_{k−j} = right_k, both of shape (n,), the past entering by blocks of doubling size.
 
     Unlike a power series inverse it amplifies rounding no more than the plain recursion does.
@@ -237,11 +239,11 @@ def divided(right: np.ndarray, den: np.ndarray) -> np.ndarray:
     return y
 
 
-def _carried(past: np.ndarray, den: np.ndarray, remaining: int) -> np.ndarray:
+def _carried(past: Array, den: Array, remaining: int) -> Array:
     """Return what the block ``past`` contributes to as many samples after it."""
     reach = len(past)
     ahead = min(reach, remaining)
     size = fft.next_fast_len(2 * reach, real=True)
     kernel = den[: 2 * reach]
-    made: np.ndarray = fft.irfft(fft.rfft(past, size) * fft.rfft(kernel, size), size)
+    made: Array = fft.irfft(fft.rfft(past, size) * fft.rfft(kernel, size), size)
     return made[reach : reach + ahead]

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from focgen.arrays import Array
+
 
 class Term(NamedTuple):
     """One term, ``coefficient * s**order``."""
@@ -140,8 +142,8 @@ def _lifted(value: TransferFunction | float) -> TransferFunction:
     return value if isinstance(value, TransferFunction) else TransferFunction([(float(value), 0.0)])
 
 
-def _evaluate(terms: Polynomial, s: np.ndarray) -> np.ndarray:
-    total: np.ndarray = sum((t.coefficient * s**t.order for t in terms), np.zeros(s.shape, complex))
+def _evaluate(terms: Polynomial, s: Array) -> Array:
+    total: Array = sum((t.coefficient * s**t.order for t in terms), np.zeros(s.shape, complex))
     return total
 
 

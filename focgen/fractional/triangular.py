@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from focgen.arrays import Array
+
 _TERMS = 18  # Σ_{k ≤ 18} x^k/k! is exact to rounding for |x| ≤ 1
 
 
-def triangular_exponential(matrices: np.ndarray) -> np.ndarray:
+def triangular_exponential(matrices: Array) -> Array:
     """Return e^A for each upper triangular A, shape (n, m, m) complex.
 
     The real part of the diagonal may be large; its spread within one matrix should be moderate.
@@ -29,4 +31,5 @@ def triangular_exponential(matrices: np.ndarray) -> np.ndarray:
     for k in range(squarings.max(initial=0)):
         left = squarings > k
         result[left] = result[left] @ result[left]
-    return result * np.exp(shift)[:, None, None]
+    made: Array = result * np.exp(shift)[:, None, None]
+    return made

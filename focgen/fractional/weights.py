@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import rgamma
 
+from focgen.arrays import Array
 from focgen.fractional import elementary
 
 _HEAD = 128  # weights from the recursion: the series is exact to rounding from here on
@@ -29,7 +30,7 @@ _BERNOULLI = {
 }
 
 
-def gl_weights(order: float, count: int) -> np.ndarray:
+def gl_weights(order: float, count: int) -> Array:
     """Return w_0 … w_count of eq. (11)–(12) for any real ``order``, shape (count + 1,).
 
     The relative error stays below 1e-12 however many there are, down to the smallest normal number. Whole
@@ -41,7 +42,7 @@ def gl_weights(order: float, count: int) -> np.ndarray:
     return gl_weights_at(order, np.arange(count + 1))
 
 
-def gl_weights_at(order: float, indices: ArrayLike) -> np.ndarray:
+def gl_weights_at(order: float, indices: ArrayLike) -> Array:
     """Return w_j of eq. (11)–(12) at the whole numbers ``indices`` ≥ 0, shape of ``indices``.
 
     Accurate as :func:`gl_weights`, without computing the weights between. Raises ValueError for orders
@@ -54,32 +55,32 @@ def gl_weights_at(order: float, indices: ArrayLike) -> np.ndarray:
         return _binomials(int(order), places)
     last = max(_HEAD, math.ceil(_HEAD_PER_ORDER * abs(order)))
     head = _recursion(order, min(last, int(places.max(initial=0))))
-    weights: np.ndarray = head[np.minimum(places, len(head) - 1)]
+    weights: Array = head[np.minimum(places, len(head) - 1)]
     tail = places > last
     weights[tail] = head[-1] * _decay(order, places[tail], last)
     return weights
 
 
-def _binomials(order: int, indices: np.ndarray) -> np.ndarray:
-    exact: np.ndarray = np.array([(-1.0) ** j * math.comb(order, j) for j in range(order + 1)] + [0.0])
-    found: np.ndarray = exact[np.minimum(indices, order + 1)]
+def _binomials(order: int, indices: Array) -> Array:
+    exact: Array = np.array([(-1.0) ** j * math.comb(order, j) for j in range(order + 1)] + [0.0])
+    found: Array = exact[np.minimum(indices, order + 1)]
     return found
 
 
-def _recursion(order: float, count: int) -> np.ndarray:
+def _recursion(order: float, count: int) -> Array:
     j = np.arange(1, count + 1)
     # (j − 1 − α)/j, not 1 − (α + 1)/j: the first is exact to rounding where j − 1 is close to α.
     return np.cumprod(np.concatenate([[1.0], ((j - 1) - order) / j]))
 
 
-def _decay(order: float, indices: np.ndarray, start: int) -> np.ndarray:
+def _decay(order: float, indices: Array, start: int) -> Array:
     """Return w_j / w_start."""
     place, place0 = indices - order / 2, start - order / 2
     ratio = elementary.log(place / place0) * -(order + 1.0)
     return elementary.exp(ratio + (_series(order, place) - _series(order, place0)))
 
 
-def _series(order: float, place: np.ndarray | float) -> Any:
+def _series(order: float, place: Array | float) -> Any:
     x = 1.0 + order / 2
     inverse_square = 1.0 / np.square(place)
     total: Any = 0.0

@@ -1,0 +1,1 @@
+"""A rig fitted to experiments: one joint fit, each by itself, and what the logs cannot show."""

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit
-from focgen.identification.model import ExperimentFit
+from focgen.identification.identification import ExperimentFit
 from focgen.identification.single import is_step
 from focgen.identification.sure import misfit_of, relative_halves, times_text
 from focgen.logs.between import noise_level
@@ -49,7 +50,7 @@ def warnings_of(
 
 
 def _model_short(misfit: float, fit: FractionalFit) -> str:
-    late = "" if "delay" in fit.half and fit.half["delay"] else "a dead time (--delay), "
+    late = "" if fit.half.get("delay") else "a dead time (--delay), "
     return (
         f"the model leaves {times_text(misfit)} the noise of the readings: something that it does "
         f"not have, such "
@@ -63,11 +64,11 @@ def _rig_is_worse(fits: Sequence[ExperimentFit], quality: dict[str, dict[str, fl
         return []
     rig, single = (float(np.mean([quality[m][name] for name in own])) for m in ("rig", "fom"))
     return [
-        f"the rig reaches a GOF of {rig:.3f} where every experiment by itself reaches {single:.3f}: "
-        f"what differs "
-        "between them is not in one K(p), T and alpha, such as hysteresis, another speed of "
-        "unloading, or drift; "
-        "`focgen diagnose` names it"
+        (
+            f"the rig reaches a GOF of {rig:.3f} where every experiment by itself reaches {single:.3f}: the "
+            "experiments differ by something that one K(p), T and alpha do not have. That may be hysteresis, "
+            "another speed of unloading, or drift; `focgen diagnose` names it"
+        )
     ]
 
 
@@ -79,13 +80,16 @@ def _astray(excitations: Sequence[Excitation], fit: FractionalFit) -> list[str]:
         return []
     name, worst = max(far, key=lambda one: abs(one[1]))
     return [
-        f"at rest the fits are off, {name} by {abs(worst):.2g}: the offset that each experiment has to "
-        "itself makes up for what the model lacks; the rig has no such offset, so `focgen replay` fits less "
-        "well than this table; `focgen diagnose` names what is lacking, and --to leaves out the releases"
+        (
+            f"at rest the fits are off, {name} by {abs(worst):.2g}: the offset that each experiment has to "
+            "itself makes up for what the model lacks. The rig has no such offset, so `focgen replay` fits "
+            "less well than this table. `focgen diagnose` names what is lacking, and --to leaves out "
+            "the releases"
+        )
     ]
 
 
-def _off_at_rest(x: Excitation, made: np.ndarray) -> float:
+def _off_at_rest(x: Excitation, made: Array) -> float:
     """By how much a fit (n,) misses the output while the input rests, 0 where noise explains it."""
     moved = np.flatnonzero(np.abs(x.pressure - x.before) > _MOVED * abs(x.level - x.before))
     rest = int(moved[0]) // 2 if len(moved) and x.rest_shown and not x.begins_up else 0
@@ -131,4 +135,5 @@ def _releases(x: Excitation) -> bool:
 
 def _half(fit: ExperimentFit, key: str) -> float:
     low, high = fit.ci95[key]
-    return abs((high - low) / 2.0 / getattr(fit, key))
+    made: float = abs((high - low) / 2.0 / getattr(fit, key))
+    return made

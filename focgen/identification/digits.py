@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from focgen.arrays import Array
+
 _FINE = 1e-3  # of half an interval: finer digits say nothing
 _MOST = 9  # digits that hold without any noise: a fit ends at about 1e-11
 
@@ -19,6 +21,6 @@ def told_value(value: float, half: float) -> float:
     return round(float(value), -max(finest, coarse))
 
 
-def told_gain(gain: np.ndarray, half: np.ndarray) -> tuple[float, ...]:
+def told_gain(gain: Array, half: Array) -> tuple[float, ...]:
     """The coefficients of K(p), each rounded as :func:`told_value` does."""
     return tuple(told_value(g, h) for g, h in zip(gain.tolist(), np.asarray(half).tolist()))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from focgen.arrays import Array
 from focgen.identification.noise import half_width
 from focgen.identification.projected import Problem, Solved, mean_square, uncertainty
 from focgen.identification.rational import Discrete, Record, Shape, delay_of, discretise, shifted
@@ -44,16 +45,16 @@ class UpDown:
 class _Switched(Problem):
     """A fitted stage with the logarithms of two factors of time, and its dead time, as parameters."""
 
-    def __init__(self, fitted: Fitted):
+    def __init__(self, fitted: Fitted) -> None:
         super().__init__(fitted.shape, fitted.problem.records)
         self.stage = fitted.solved.x
         self.begins = [_beginning(fitted, i) for i in range(len(self.records))]
         self.owned = [own for own, _ in fitted.solved.rows]  # as free as the one line it is compared with
 
-    def inside(self, x: np.ndarray) -> np.ndarray:
+    def inside(self, x: Array) -> Array:
         return np.concatenate([np.clip(x[:2], -_WIDEST, _WIDEST), np.clip(x[2:], 0.0, self.latest)])
 
-    def rows(self, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    def rows(self, x: Array) -> list[tuple[Array, Array]]:
         x = self.inside(x)
         delay, hold = float(x[2]) if self.shape.delayed else 0.0, self.records[0].hold
         up, down = (discretise(self.shape.poles, self.stage, delay, hold, math.exp(s)) for s in x[:2])
@@ -114,15 +115,15 @@ def _judged(two: _TwoScales, chosen: Fitted, step: float) -> UpDown | None:
     if not np.all(half < 1.0):
         return None
     times = [step * _time(problem, solved, scale) for scale in np.exp(solved.x[:2])]
-    pairs = [(float(t), float(t * h)) for t, h in zip(times, half)]
+    up, down = ((float(t), float(t * h)) for t, h in zip(times, np.atleast_1d(half)))
     if solved.shared[0] < 0.0:  # a negative gain falls while its input rises
-        pairs.reverse()
+        up, down = down, up
     error = math.sqrt(max(spread[0, 0] + spread[1, 1] - 2.0 * spread[0, 1], 0.0))
     apart = abs(float(solved.x[0] - solved.x[1]))
     differ = apart > max(math.log(_MATERIAL), _SURE * error)
     one = mean_square(two.one.problem, two.one.solved)
     better = mean_square(problem, solved) < _SEEN**2 * one and two.bic <= chosen.report.bic + MARGIN
-    return UpDown(problem.shape.name, *pairs, fit_of(problem, solved), not (differ and better))
+    return UpDown(problem.shape.name, up, down, fit_of(problem, solved), not (differ and better))
 
 
 def _time(problem: _Switched, solved: Solved, scale: float) -> float:
@@ -138,7 +139,7 @@ def _time(problem: _Switched, solved: Solved, scale: float) -> float:
     return span * float(np.interp(_DONE, answer, np.arange(len(answer))))
 
 
-def _beginning(fitted: Fitted, index: int) -> np.ndarray:
+def _beginning(fitted: Fitted, index: int) -> Array:
     """The state at a record's first sample, in units of the input: at rest, or as the linear fit has it."""
     record, poles = fitted.problem.records[index], fitted.shape.poles
     if not record.moves:
@@ -148,25 +149,28 @@ def _beginning(fitted: Fitted, index: int) -> np.ndarray:
     move = discretise(poles, fitted.solved.x, 0.0, record.hold).move
     seen = np.pad(fitted.solved.shared, (0, poles - len(fitted.solved.shared)))  # what is measured of a state
     rows = np.vstack([seen @ np.linalg.matrix_power(move, k) for k in range(poles)])
-    return np.linalg.lstsq(rows, free, rcond=None)[0]
+    made: Array = np.linalg.lstsq(rows, free, rcond=None)[0]
+    return made
 
 
-def _run(up: Discrete, down: Discrete, record: Record, begin: np.ndarray) -> np.ndarray:
+def _run(up: Discrete, down: Discrete, record: Record, begin: Array) -> Array:
     """The states (poles, n) of a record that switches between two stages."""
     past = [shifted(record.drive, up.late + i) for i in range(3)]
-    forced = [made.take.T @ np.array(past) for made in (up, down)]
+    forced_up, forced_down = (made.take.T @ np.array(past) for made in (up, down))
     target = _target(record, up)
     loop = _one_state if len(begin) == 1 else _two_states
-    return loop(target.tolist(), up.move, down.move, *forced, begin)
+    return loop(target.tolist(), up.move, down.move, forced_up, forced_down, begin)
 
 
-def _target(record: Record, made: Discrete) -> np.ndarray:
+def _target(record: Record, made: Discrete) -> Array:
     """The input that acts over the sample before each sample, towards its end."""
     late = shifted(record.drive, made.late + 1)
     return late if record.hold == "zero" else 0.5 * (late + shifted(record.drive, made.late))
 
 
-def _one_state(target, up, down, forced_up, forced_down, begin) -> np.ndarray:
+def _one_state(
+    target: list[float], up: Array, down: Array, forced_up: Array, forced_down: Array, begin: Array
+) -> Array:
     a_up, a_down, z = float(up[0, 0]), float(down[0, 0]), float(begin[0])
     made = [z]
     for to, b_up, b_down in zip(target[1:], forced_up[0, 1:].tolist(), forced_down[0, 1:].tolist()):
@@ -175,7 +179,9 @@ def _one_state(target, up, down, forced_up, forced_down, begin) -> np.ndarray:
     return np.array([made])
 
 
-def _two_states(target, up, down, forced_up, forced_down, begin) -> np.ndarray:
+def _two_states(
+    target: list[float], up: Array, down: Array, forced_up: Array, forced_down: Array, begin: Array
+) -> Array:
     (p, q), (r, s) = up.tolist()
     (t, u), (v, w) = down.tolist()
     y, rate = map(float, begin)

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy import fft
 
+from focgen.arrays import Array, Bools
 from focgen.errors import FitError, LogError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.kernel import Kernels
 from focgen.logs.between import Course, course_of, jumps_of, noise_level
 from focgen.logs.experiment import Experiment
-from focgen.rig.model import UNITY, Rig
+from focgen.rig.rig import UNITY, Rig
 
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
 _AWAY = 0.1  # of a step: nearer to one of its ends the input is at it
@@ -45,8 +47,8 @@ class Excitation:
 
     name: str
     step: float
-    pressure: np.ndarray
-    measured: np.ndarray
+    pressure: Array
+    measured: Array
     course: Course
     before: float
     level: float
@@ -55,7 +57,7 @@ class Excitation:
     sensor: TransferFunction
     notes: tuple[str, ...] = ()
     rest_shown: bool = True
-    reference: np.ndarray | None = None
+    reference: Array | None = None
     late: float = 0.0
     begins_up: bool = False
 
@@ -95,7 +97,7 @@ class Excitation:
         """A copy without what was made along the way, to be sent to another process."""
         return replace(self)
 
-    def respond(self, kernels: Kernels, rows: int = 3) -> np.ndarray:
+    def respond(self, kernels: Kernels, rows: int = 3) -> Array:
         """Convolve each power with the first ``rows`` kernels; shape (rows, powers, n)."""
         return self._driven.respond(kernels, rows, len(self))
 
@@ -119,8 +121,8 @@ class Excitation:
         """The first ``count`` samples alone."""
         if count >= len(self):
             return self
-        parts = {"pressure": self.pressure[:count], "measured": self.measured[:count]}
-        return replace(self, **parts, course=self.course.until(count))
+        pressure, measured = self.pressure[:count], self.measured[:count]
+        return replace(self, pressure=pressure, measured=measured, course=self.course.until(count))
 
     @property
     def sensor_gain(self) -> float:
@@ -131,7 +133,7 @@ class Excitation:
 class Driven:
     """A course, transformed once, to be convolved with many kernels."""
 
-    def __init__(self, course: Course):
+    def __init__(self, course: Course) -> None:
         self.course, self.count = course, course.values.shape[1]
         self.size = fft.next_fast_len(2 * self.count, real=True)
         self._parts = {  # the kernel of each part, and how many samples ahead of it the part is made
@@ -141,12 +143,13 @@ class Driven:
             "twists": self._transformed(course.twists, 1),
         }
 
-    def _transformed(self, part: np.ndarray | None, first: int) -> np.ndarray | None:
+    def _transformed(self, part: Array | None, first: int) -> Array | None:
         if part is None or not np.any(part[:, first:]):
             return None
-        return fft.rfft(part[:, first:], self.size)
+        made: Array | None = fft.rfft(part[:, first:], self.size)
+        return made
 
-    def respond(self, kernels: Kernels, rows: int, count: int) -> np.ndarray:
+    def respond(self, kernels: Kernels, rows: int, count: int) -> Array:
         """The response of each power to each of the first ``rows`` kernels; shape (rows, powers, count)."""
         n, late = self.count, kernels.late
         total = np.zeros((rows, len(self.course.values), n))
@@ -158,7 +161,7 @@ class Driven:
             total = np.concatenate([np.zeros_like(total[:, :, :late]), total[:, :, :-late]], axis=2)
         return total[:, :, :count]
 
-    def _convolved(self, kernels: Kernels, row: int) -> np.ndarray | float:
+    def _convolved(self, kernels: Kernels, row: int) -> Array | float:
         """Each power's response to one row of the kernels, from the second sample on."""
         spectrum = 0.0
         for kind, part in self._parts.items():
@@ -214,7 +217,7 @@ def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:
     return (None,) if abs(values[0]) <= _AT_REST * np.abs(values).max() else (None, 0.0)
 
 
-def _varying_reference(experiment: Experiment) -> np.ndarray | None:
+def _varying_reference(experiment: Experiment) -> Array | None:
     if "reference" not in experiment or np.ptp(experiment["reference"]) == 0.0:
         return None
     return experiment["reference"]
@@ -243,14 +246,14 @@ def is_driven(experiment: Experiment) -> bool:
     if "pressure" not in experiment:
         return bool(np.any(experiment["command"]))
     values = experiment["pressure"]
-    commanded = "command" in experiment and np.ptp(experiment["command"]) > 0.0
+    commanded = "command" in experiment and bool(np.ptp(experiment["command"]) > 0.0)
     held_up = abs(float(np.median(values))) > _NOISE * noise_level(values)
     return bool(np.any(values)) and (
         commanded or held_up or float(np.ptp(values)) > _NOISE * noise_level(values)
     )
 
 
-def _input(experiment: Experiment, rig: Rig, before: float | None):
+def _input(experiment: Experiment, rig: Rig, before: float | None) -> tuple[Array, float, Bools, bool, str]:
     """The actuator's input: (samples, value before them, where it jumps, whether it is held, its role)."""
     if "pressure" in experiment:
         values = experiment["pressure"]
@@ -269,7 +272,9 @@ def _input(experiment: Experiment, rig: Rig, before: float | None):
     return gain * rest + moved, gain * rest, np.zeros(len(command), bool), False, "command"
 
 
-def _run(name: str, stage: TransferFunction, step: float, hold: str, signal: np.ndarray) -> np.ndarray:
+def _run(
+    name: str, stage: TransferFunction, step: float, hold: Literal["zero", "linear"], signal: Array
+) -> Array:
     """What a stage makes of its input, from rest."""
     try:
         return Convolution(stage, step, hold).run(signal)
@@ -305,7 +310,7 @@ def _check_rest(sensor: TransferFunction) -> None:
         raise FitError("sensor", "integrates, so it has no rest to start from", "log the curvature")
 
 
-def _rest_of(values: np.ndarray) -> float:
+def _rest_of(values: Array) -> float:
     """The input at the first sample, without its noise.
 
     The mean of the samples before the input moves; where it moves at once, the begin of a line through the
@@ -321,7 +326,7 @@ def _rest_of(values: np.ndarray) -> float:
     return float(np.mean(resting)) if abs(slope) <= steepest else _line_at_first(values)
 
 
-def _line_at_first(values: np.ndarray) -> float:
+def _line_at_first(values: Array) -> float:
     noise, first = noise_level(values), values[:_FOLLOWED]
     if noise == 0.0 or np.any(jumps_of(values)[:_FOLLOWED]):
         return float(values[0])
@@ -330,7 +335,7 @@ def _line_at_first(values: np.ndarray) -> float:
     return float(begin) if np.abs(off).max() <= _DRIFT * noise else float(values[0])
 
 
-def _level(pressure: np.ndarray, before: float) -> float:
+def _level(pressure: Array, before: float) -> float:
     """The median of the input where it is more than half-way to its farthest value."""
     away = np.abs(pressure - before)
     return float(np.median(pressure[away >= 0.5 * away.max()]))

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.noise import ResidualModel, half_width, residual_model, sandwich
@@ -30,6 +32,7 @@ from focgen.identification.past import (
     worth_it,
 )
 from focgen.identification.problem import Point, Problem, shortened, starts
+from focgen.present import present
 
 _ROUNDS = 60  # of Levenberg–Marquardt
 _DAMPED, _STIFF, _FREE = 1e-3, 1e9, 1e-9  # damping: at first, at most, at least
@@ -54,15 +57,15 @@ class FractionalFit:
     ``closed_loop``: whether a loop was closed, so that a noise model was fitted along.
     """
 
-    gain: np.ndarray
+    gain: Array
     T: float
     alpha: float
     delay: float
-    offset: np.ndarray
-    half: dict[str, float | np.ndarray]
-    gain_covariance: np.ndarray
+    offset: Array
+    half: dict[str, float | Array]
+    gain_covariance: Array
     residuals: list[ResidualModel]
-    simulated: list[np.ndarray]
+    simulated: list[Array]
     pasts: tuple[Past | None, ...]
     closed_loop: bool = False
 
@@ -101,7 +104,7 @@ def _with_pasts(
 ) -> tuple[Problem, Point]:
     """The fit with these pasts, new steps begun at the times that explain most, and older ones allowed
     for."""
-    begun = [*point.x[: problem.core]]
+    begun: list[float] = [*point.x[: problem.core]]
     for i, (x, past) in enumerate(zip(problem.experiments, pasts)):
         known = point.x[problem.of_past[i]]
         begun += [*known][: past.steps if past else 0]
@@ -114,7 +117,7 @@ def _with_pasts(
         penalties = _long_run(problem, point)
         problem = Problem(problem.experiments, pasts, problem.delay_free, problem.delay, penalties)
         point = _descended(problem, problem.inside(np.array(begun)), still)
-        pasts, begun = _with_older(problem, point), point.x
+        pasts, begun = _with_older(problem, point), [*point.x]
     return problem, point
 
 
@@ -134,7 +137,7 @@ def _searched(problem: Problem) -> Point:
     return best if few is problem else _descended(problem, best.x)
 
 
-def _descended(problem: Problem, start: np.ndarray, still: float = _STILL, rounds: int = _ROUNDS) -> Point:
+def _descended(problem: Problem, start: Array, still: float = _STILL, rounds: int = _ROUNDS) -> Point:
     """Levenberg–Marquardt on the searched parameters, the linear ones projected out."""
     point, damping = problem.at(start), _DAMPED
     for _ in range(rounds):
@@ -189,14 +192,14 @@ def _most_wanting(problem: Problem, point: Point, refused: set[int]) -> int | No
             continue
         pasts = _pasts_of(problem, point, x)
         wants[i] = suggestion(left[: pasts.shape[1]], pasts, _reach(problem))
-    best = max(wants, key=wants.get, default=None)
+    best = max(wants, key=lambda i: wants[i], default=None)
     return best if best is not None and wants[best] > 0.0 else None
 
 
 def _with_one_more(problem: Problem, point: Point, i: int) -> tuple[Problem, Point]:
     """The fit with a step more in the past of experiment ``i``."""
     pasts = list(problem.pasts)
-    pasts[i] = Past((pasts[i].steps if pasts[i] else 0) + 1, _reach(problem))
+    pasts[i] = Past((present(pasts[i]).steps if pasts[i] else 0) + 1, _reach(problem))
     return _with_pasts(problem, point, pasts, _ROUGHLY)
 
 
@@ -212,10 +215,11 @@ def _reach(problem: Problem) -> float:
     return max(float(np.ptp(x.measured)) for x in problem.experiments)
 
 
-def _pasts_of(problem: Problem, point: Point, x: Excitation) -> np.ndarray:
+def _pasts_of(problem: Problem, point: Point, x: Excitation) -> Array:
     """What steps at a grid of times before an experiment leave of its first samples, (times, n)."""
     start = x.beginning(SHOWS)
-    return columns(start, problem.kernels_for(start, point.x, start.stepped.count), times(start), 1)[0]
+    made: Array = columns(start, problem.kernels_for(start, point.x, start.stepped.count), times(start), 1)[0]
+    return made
 
 
 def _long_run(problem: Problem, point: Point) -> list[float]:
@@ -269,7 +273,9 @@ def _finished(problem: Problem, point: Point) -> FractionalFit:
     return _with_intervals(problem, point, spread, models)
 
 
-def _with_intervals(problem: Problem, point: Point, spread, models) -> FractionalFit:
+def _with_intervals(
+    problem: Problem, point: Point, spread: Array, models: list[ResidualModel]
+) -> FractionalFit:
     log_tau, alpha = point.x[:2]
     T = float(np.exp(alpha * log_tau))
     searched = len(point.x)
@@ -277,7 +283,10 @@ def _with_intervals(problem: Problem, point: Point, spread, models) -> Fractiona
     slope[:2] = T * alpha, T * log_tau  # of T = exp(α log τ)
     effective = sum(m.effective for m in models)
     count = len(spread) + len(models)
-    wide = lambda variance: half_width(variance, effective, count)  # noqa: E731
+
+    def wide(variance: Any) -> Any:
+        return half_width(variance, effective, count)
+
     gains = slice(searched, searched + len(point.gain))
     half = {
         "T": float(wide(slope @ spread @ slope)),
@@ -302,7 +311,7 @@ def _with_intervals(problem: Problem, point: Point, spread, models) -> Fractiona
     )
 
 
-def _offset_variance(problem: Problem, point: Point, models) -> float:
+def _offset_variance(problem: Problem, point: Point, models: list[ResidualModel]) -> float:
     """Of the offset of a single experiment."""
     rows = problem.jacobians(point, offset=True)
     try:

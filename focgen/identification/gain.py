@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
-from focgen.identification.model import ExperimentFit
+from focgen.identification.identification import ExperimentFit
 from focgen.identification.single import is_step
 
 _STEEPEST = 5  # degree of K(p); beyond it a polynomial through a few levels means nothing
@@ -41,7 +42,7 @@ def feasible_degree(excitations: Sequence[Excitation], degree: int) -> tuple[int
     return possible, (f"the levels lie too close together: K(p) of degree {possible}, not {degree}",)
 
 
-def distinct_levels(steps: np.ndarray) -> int:
+def distinct_levels(steps: Array) -> int:
     """How many steps (n, 2), from one pressure to another, lie apart; a release tells what its load did."""
     rising = np.sort(steps.sum(axis=1))
     return int(1 + np.count_nonzero(np.diff(rising) > _APART * np.abs(rising).max()))
@@ -61,7 +62,7 @@ def r2_of_line(excitations: Sequence[Excitation], fits: Sequence[ExperimentFit],
     return 1.0 - float(left @ left) / total if total > 0.0 else 1.0
 
 
-def secants_of(steps: np.ndarray, count: int) -> np.ndarray:
+def secants_of(steps: Array, count: int) -> Array:
     """(q^m − p^m)/(q − p) of each step from p to q, m = 1 … ``count``; shape (n, count)."""
     p, q = steps[:, :1], steps[:, 1:]
     powers = np.arange(count)

@@ -16,8 +16,8 @@ from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
 from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
-from focgen.identification.initial import answer_from_its_past
-from focgen.identification.model import ExperimentFit, Identification, Joint, Unseen
+from focgen.identification.identification import ExperimentFit, Identification, Joint, Unseen
+from focgen.identification.known_actuator import answer_from_its_past
 from focgen.identification.past import worth_it
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.reach import seen_ranges
@@ -32,8 +32,8 @@ from focgen.output import check_apart, write_file
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.engine import STAGES
 from focgen.rig.files import rig_text
-from focgen.rig.model import Actuator, Rig
 from focgen.rig.plausibility import doubts
+from focgen.rig.rig import Actuator, Rig
 
 Quality = dict[str, dict[str, float]]
 _COMPROMISE = (

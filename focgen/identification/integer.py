@@ -14,9 +14,10 @@ from itertools import combinations
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 from scipy.signal import lfilter
 
+from focgen.arrays import Array, Numbers
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 
@@ -38,10 +39,10 @@ class IntegerFit:
 
     poles: int
     zeros: int
-    num: np.ndarray
-    den: np.ndarray
+    num: Array
+    den: Array
     offset: float
-    simulated: np.ndarray
+    simulated: Array
 
     @property
     def name(self) -> str:
@@ -65,7 +66,7 @@ def fit_integer_models(experiment: Excitation, has_offset: bool = True) -> tuple
     Raises FitError where one does not converge from any start.
     """
     made: dict[tuple[int, int], IntegerFit] = {}
-    optima: dict[tuple[int, int], np.ndarray] = {}
+    optima: dict[tuple[int, int], Array] = {}
     for poles, zeros in SHAPES:
         problem = _Projected(experiment, poles, zeros, has_offset)
         optima[poles, zeros] = x = _best(problem, _starts(experiment, poles, zeros, optima))
@@ -73,7 +74,7 @@ def fit_integer_models(experiment: Excitation, has_offset: bool = True) -> tuple
     return tuple(made.values())
 
 
-def _best(problem: _Projected, starts: list[np.ndarray]) -> np.ndarray:
+def _best(problem: _Projected, starts: list[Array]) -> Array:
     """A few rounds from every start, then the best of them to its end."""
     stride = max(1, len(problem.experiment) // _SEARCHED)
     runs = [run for start in starts if (run := _run(problem, start, _FIRST_ROUNDS, stride)) is not None]
@@ -83,10 +84,11 @@ def _best(problem: _Projected, starts: list[np.ndarray]) -> np.ndarray:
     if best is None:
         name = shape_name(problem.poles, problem.zeros)
         raise FitError(problem.experiment.name, f"no {name} model converges", "look at the log")
-    return best.x
+    made: Array = best.x
+    return made
 
 
-def _run(problem: _Projected, start: np.ndarray, rounds: int, stride: int = 1):
+def _run(problem: _Projected, start: Array, rounds: int, stride: int = 1) -> OptimizeResult | None:
     most = rounds * (len(start) + 1)
     try:
         return least_squares(
@@ -96,7 +98,9 @@ def _run(problem: _Projected, start: np.ndarray, rounds: int, stride: int = 1):
         return None
 
 
-def _starts(experiment: Excitation, poles: int, zeros: int, optima: dict) -> list[np.ndarray]:
+def _starts(
+    experiment: Excitation, poles: int, zeros: int, optima: dict[tuple[int, int], Array]
+) -> list[Array]:
     """Choices of distinct time constants, and the smaller shapes' optima with a pole added."""
     rates = [1.0 / (share * len(experiment)) for share in _STARTS[poles]]  # per sample
     starts = [_coefficients(np.array(chosen)) for chosen in combinations(rates, poles)]
@@ -108,16 +112,17 @@ def _starts(experiment: Excitation, poles: int, zeros: int, optima: dict) -> lis
     return starts
 
 
-def _coefficients(rates: np.ndarray) -> np.ndarray:
+def _coefficients(rates: Array) -> Array:
     """Logarithms of (a), (b, c) or (b, c, a) for poles at −rates; a complex pair stands in the quadratic."""
     rates = rates[np.argsort(-np.abs(rates.imag), kind="stable")]
     if len(rates) == 1:
         return np.log(rates.real)
     pair = np.array([(rates[0] + rates[1]).real, (rates[0] * rates[1]).real])
-    return np.log(np.concatenate([pair, rates[2:].real]))
+    made: Array = np.log(np.concatenate([pair, rates[2:].real]))
+    return made
 
 
-def _poles(count: int, x: np.ndarray) -> np.ndarray:
+def _poles(count: int, x: Array) -> Array:
     """The poles, per sample."""
     c = np.exp(x)
     if count == 1:
@@ -130,11 +135,11 @@ def _poles(count: int, x: np.ndarray) -> np.ndarray:
 class _Projected:
     """The residual after the best numerator and offset, as a function of the denominator; time in samples."""
 
-    def __init__(self, experiment: Excitation, poles: int, zeros: int, has_offset: bool):
+    def __init__(self, experiment: Excitation, poles: int, zeros: int, has_offset: bool) -> None:
         self.experiment, self.poles, self.zeros, self.has_offset = experiment, poles, zeros, has_offset
         self.spread = float(np.std(experiment.measured))
         slow, fast = np.log(1.0 / (_SLOWEST * len(experiment))), np.log(_FASTEST)
-        self.edges = np.array(
+        self.edges: Numbers = np.array(
             {
                 1: [(slow, fast)],
                 2: [(slow, fast + 1), (2 * slow, 2 * fast)],
@@ -142,11 +147,12 @@ class _Projected:
             }[poles]
         ).T
 
-    def inside(self, x: np.ndarray) -> np.ndarray:
+    def inside(self, x: Array) -> Array:
         """``x`` with every coefficient within what the record can tell."""
-        return np.clip(x, *self.edges)
+        made: Array = np.clip(x, *self.edges)
+        return made
 
-    def basis(self, x: np.ndarray, stride: int = 1) -> np.ndarray:
+    def basis(self, x: Array, stride: int = 1) -> Array:
         """Responses to the input of s^zeros/den, …, 1/den, and 1 for an offset, at every ``stride``-th
         sample; (samples, zeros + 1 or 2)."""
         poles = _apart(_poles(self.poles, self.inside(x)))
@@ -159,19 +165,19 @@ class _Projected:
         constant = [np.ones(rows.shape[1])] * self.has_offset
         return np.column_stack([*rows, *constant])
 
-    def best(self, x: np.ndarray, stride: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    def best(self, x: Array, stride: int = 1) -> tuple[Array, Array]:
         """Basis and the linear coefficients that fit best."""
         basis = self.basis(x, stride)
         sizes = np.linalg.norm(basis, axis=0)
         q, r = np.linalg.qr(basis / sizes)
         return basis, solve_triangular(r, q.T @ self.experiment.measured[::stride]) / sizes
 
-    def residual(self, x: np.ndarray, stride: int = 1) -> np.ndarray:
+    def residual(self, x: Array, stride: int = 1) -> Array:
         """Model − measured at every ``stride``-th sample, in units of the measured signal's spread."""
         basis, linear = self.best(x, stride)
         return (basis @ linear - self.experiment.measured[::stride]) / self.spread
 
-    def finished(self, x: np.ndarray) -> IntegerFit:
+    def finished(self, x: Array) -> IntegerFit:
         """The fit in units of seconds."""
         basis, linear = self.best(x)
         den = np.poly(_apart(_poles(self.poles, self.inside(x)))).real
@@ -181,7 +187,7 @@ class _Projected:
         return IntegerFit(self.poles, self.zeros, num, den * scale, offset, basis @ linear)
 
 
-def _apart(poles: np.ndarray) -> np.ndarray:
+def _apart(poles: Array) -> Array:
     """Coinciding poles a little apart, so that partial fractions hold."""
     made = poles.copy()
     for i in range(1, len(made)):
@@ -190,14 +196,15 @@ def _apart(poles: np.ndarray) -> np.ndarray:
     return made
 
 
-def _respond(pole: complex, experiment: Excitation) -> np.ndarray:
+def _respond(pole: complex, experiment: Excitation) -> Array:
     """1/(s − pole) at the samples, exactly for jumps and straight lines; time in samples."""
     if pole.imag == 0.0:
         pole = pole.real  # half the work
     course, decay = experiment.course, np.exp(pole)
     mean = np.expm1(pole) / pole  # weight of what is there throughout a sample …
     late = (mean - 1.0) / pole if abs(pole) > 1e-4 else 0.5 + pole / 6.0  # … and of a line that rises to 1
-    held = lfilter([0.0, mean], [1.0, -decay], course.values[0].astype(type(decay)))
+    held: Array = lfilter([0.0, mean], [1.0, -decay], course.values[0].astype(type(decay)))
     if not np.any(course.straight[0]):
         return held
-    return held + lfilter([late], [1.0, -decay], course.straight[0].astype(type(decay)))
+    made: Array = held + lfilter([late], [1.0, -decay], course.straight[0].astype(type(decay)))
+    return made

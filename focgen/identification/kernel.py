@@ -18,15 +18,18 @@ Far from their begin the last two are the first and second derivative of S, over
 from __future__ import annotations
 
 import math
-from functools import cached_property, lru_cache
+from collections.abc import Callable
+from functools import cached_property, lru_cache, partial
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Complex
 from focgen.fractional.contour import TOLERATED, inverse_laplace
 from focgen.fractional.loggrid import DIRECT, log_grid
 
 _GAUSS = np.polynomial.legendre.leggauss(5)
-_WEIGHTS = {  # of S(m − x) over the sample, as functions of x
+_WEIGHTS: dict[str, Callable[[Array], Any]] = {  # of S(m − x) over the sample, as functions of x
     "means": lambda x: 1.0,
     "bends": lambda x: 2.0 * x - 1.0,
     "twists": lambda x: 6.0 * x * x - 6.0 * x + 1.0,
@@ -42,29 +45,33 @@ class Kernels:
     delayed.
     """
 
-    def __init__(self, log_tau: float, alpha: float, step: float, count: int, delay: float = 0.0):
+    def __init__(self, log_tau: float, alpha: float, step: float, count: int, delay: float = 0.0) -> None:
         self._at, self.count = (log_tau, alpha, step), count
         self.late = math.floor(delay / step)
         self._part = delay / step - self.late
 
     @cached_property
-    def steps(self) -> np.ndarray:
+    def steps(self) -> Array:
+        """The response (n,) to a step at every sample."""
         return _steps(*self._at, self.count, self._part)
 
     @cached_property
-    def means(self) -> np.ndarray:
+    def means(self) -> Array:
+        """The response (n,) to a straight line over one sample."""
         return _means(*self._at, self.count, self._part)
 
     @cached_property
-    def bends(self) -> np.ndarray:
+    def bends(self) -> Array:
+        """The response (n,) to what a line's bend adds within one sample."""
         return self._curved[0]
 
     @cached_property
-    def twists(self) -> np.ndarray:
+    def twists(self) -> Array:
+        """The response (n,) to what its twist adds."""
         return self._curved[1]
 
     @cached_property
-    def _curved(self) -> tuple[np.ndarray, np.ndarray]:
+    def _curved(self) -> tuple[Array, Array]:
         return _curved(*self._at, self.means, self._part)
 
 
@@ -74,7 +81,7 @@ def kernels(log_tau: float, alpha: float, step: float, count: int, delay: float 
     return Kernels(log_tau, alpha, step, count, delay)
 
 
-def _steps(log_tau: float, alpha: float, step: float, count: int, part: float) -> np.ndarray:
+def _steps(log_tau: float, alpha: float, step: float, count: int, part: float) -> Array:
     """S at (j − part) h, j = 0 … count − 1; 0 ahead of 0."""
     grid = log_grid(max(count - 1, 1))
     values = _inverted(log_tau, alpha, (np.concatenate([grid.head, grid.tail]) - part) * step, lambda s: 1.0)
@@ -86,7 +93,7 @@ def _steps(log_tau: float, alpha: float, step: float, count: int, part: float) -
     return out
 
 
-def _means(log_tau: float, alpha: float, step: float, count: int, part: float) -> np.ndarray:
+def _means(log_tau: float, alpha: float, step: float, count: int, part: float) -> Array:
     grid = log_grid(count)
     integrals = _inverted(log_tau, alpha, (grid.head - part) * step, lambda s: 1.0 / s)
     heads = np.diff(integrals, prepend=0.0) / step
@@ -98,7 +105,7 @@ def _means(log_tau: float, alpha: float, step: float, count: int, part: float) -
     return out
 
 
-def _curved(log_tau, alpha, step: float, means: np.ndarray, part: float) -> tuple[np.ndarray, np.ndarray]:
+def _curved(log_tau: float, alpha: float, step: float, means: Array, part: float) -> tuple[Array, Array]:
     """Bends and twists: exact for the first samples, by differences of the means beyond."""
     ahead = np.pad(means, ((0, 0), (1, 1)), mode="edge")
     bends = (ahead[:, :-2] - ahead[:, 2:]) / 12.0
@@ -106,7 +113,7 @@ def _curved(log_tau, alpha, step: float, means: np.ndarray, part: float) -> tupl
     first = min(DIRECT, means.shape[1])
     places = (np.arange(1, first + 1) - part) * step
     once, twice, thrice = (
-        np.pad(_inverted(log_tau, alpha, places, lambda s, k=k: s**-k) / step**k, ((0, 0), (1, 0)))
+        np.pad(_inverted(log_tau, alpha, places, partial(_integrated, k)) / step**k, ((0, 0), (1, 0)))
         for k in (1.0, 2.0, 3.0)
     )  # repeated integrals of S, at the ends of each sample
     bends[:, :first] = -_sum(once) + 2.0 * np.diff(twice)
@@ -117,7 +124,7 @@ def _curved(log_tau, alpha, step: float, means: np.ndarray, part: float) -> tupl
     return bends, twists
 
 
-def _sum(values: np.ndarray) -> np.ndarray:
+def _sum(values: Array) -> Array:
     return values[:, 1:] + values[:, :-1]
 
 
@@ -131,16 +138,21 @@ def _pole(log_tau: float, alpha: float) -> tuple[complex, complex, complex]:
     return pole, -pole, pole * (-1j * math.pi / alpha**2)
 
 
-def _inverted(log_tau: float, alpha: float, t: np.ndarray, factor) -> np.ndarray:
+def _integrated(times: float, s: Complex) -> Complex:
+    return s**-times
+
+
+def _inverted(log_tau: float, alpha: float, t: Array, factor: Callable[[Complex], Any]) -> Array:
     """Invert the three transforms times ``factor(s)`` at ``t``, the poles' share taken out; shape (3, n)."""
     removed = np.array([_pole(log_tau, alpha)[0]]) if _pole_counts(alpha) else None
-    known: list[tuple] = []  # the three are inverted on the same places
+    known: list[tuple[Any, ...]] = []  # the three are inverted on the same places
 
-    def image(which: int):
-        def transform(s):
+    def image(which: int) -> Callable[[Complex], Complex]:
+        def transform(s: Complex) -> Complex:
             if not known:
                 known.append(tuple(part * factor(s) for part in _images(s, log_tau, alpha)))
-            return known[0][which]
+            made: Complex = known[0][which]
+            return made
 
         return transform
 
@@ -149,7 +161,7 @@ def _inverted(log_tau: float, alpha: float, t: np.ndarray, factor) -> np.ndarray
     return np.array([inverse_laplace(image(which), t, removed) for which in range(3)])
 
 
-def _images(s: np.ndarray, log_tau: float, alpha: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _images(s: Complex, log_tau: float, alpha: float) -> tuple[Any, Any, Any]:
     log = np.log(s) + log_tau
     power = np.exp(alpha * log)
     response = 1.0 / (s * (1.0 + power))
@@ -157,12 +169,14 @@ def _images(s: np.ndarray, log_tau: float, alpha: float) -> tuple[np.ndarray, np
     images = response, alpha * common, log * common
     if not _pole_counts(alpha):
         return images
-    return tuple(whole - polar for whole, polar in zip(images, _polar_images(s, log_tau, alpha)))
+    found = (whole - polar for whole, polar in zip(images, _polar_images(s, log_tau, alpha)))
+    first, second, third = found
+    return first, second, third
 
 
-def _polar_images(s: np.ndarray, log_tau: float, alpha: float) -> tuple:
+def _polar_images(s: Complex, log_tau: float, alpha: float) -> tuple[Any, ...]:
     """The poles' share −(1/α)/(s − p) + conjugate, and its derivatives."""
-    total = [0.0, 0.0, 0.0]
+    total: list[Any] = [0.0, 0.0, 0.0]
     for pole, by_log_tau, by_alpha in (_pole(log_tau, alpha), np.conj(_pole(log_tau, alpha))):
         single = 1.0 / (s - pole)
         double = single**2
@@ -172,7 +186,7 @@ def _polar_images(s: np.ndarray, log_tau: float, alpha: float) -> tuple:
     return tuple(total)
 
 
-def _swung(log_tau: float, alpha: float, step: float, count: int, part: float, kind: str) -> np.ndarray:
+def _swung(log_tau: float, alpha: float, step: float, count: int, part: float, kind: str) -> Array:
     """The poles' share of a kind of kernel, (3, count): its weighted mean over each sample."""
     ends = np.arange(1, count + 1) - part
     begins = np.maximum(ends - 1.0, 0.0)
@@ -184,7 +198,7 @@ def _swung(log_tau: float, alpha: float, step: float, count: int, part: float, k
     return total
 
 
-def _oscillation(log_tau: float, alpha: float, t: np.ndarray) -> np.ndarray:
+def _oscillation(log_tau: float, alpha: float, t: Array) -> Array:
     """The poles' share at ``t``; shape (3, n)."""
     pole, by_log_tau, by_alpha = _pole(log_tau, alpha)
     single = np.exp(pole * t)

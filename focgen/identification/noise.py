@@ -13,6 +13,8 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import t as student
 
+from focgen.arrays import Array
+
 _HIGHEST = 20  # order
 
 
@@ -22,7 +24,7 @@ class ResidualModel:
     residuals.
     """
 
-    a: np.ndarray
+    a: Array
     variance: float
     count: int
 
@@ -40,7 +42,7 @@ class ResidualModel:
         return self.variance * float(np.sum(lfilter([1.0], self.a, pulse) ** 2))
 
 
-def residual_model(residual: np.ndarray) -> ResidualModel:
+def residual_model(residual: Array) -> ResidualModel:
     """Burg's autoregressive model of a residual (n,), order by BIC, at most a tenth of its length."""
     r = residual - residual.mean()
     count = len(r)
@@ -63,7 +65,7 @@ def residual_model(residual: np.ndarray) -> ResidualModel:
     return best
 
 
-def covariance(jacobian: np.ndarray, models: list[ResidualModel]) -> np.ndarray:
+def covariance(jacobian: Array, models: list[ResidualModel]) -> Array:
     """Covariance (k, k) of the k parameters of a fit; ``jacobian`` (n, k) has the rows of all ``models`` in
     order.
 
@@ -75,10 +77,10 @@ def covariance(jacobian: np.ndarray, models: list[ResidualModel]) -> np.ndarray:
 
 
 def sandwich(
-    jacobians: list[np.ndarray],
+    jacobians: list[Array],
     models: list[ResidualModel],
     priors: list[float],
-) -> np.ndarray:
+) -> Array:
     """The same for experiments that have a prior.
 
     ``jacobians``: of each experiment, (n, k), whose residual ``models`` describe; rows beyond a model's count
@@ -87,17 +89,20 @@ def sandwich(
     bread = np.linalg.inv(sum(j.T @ j for j in jacobians))
     meat = sum(_carried(j, model, prior) for j, model, prior in zip(jacobians, models, priors))
     count = sum(model.count for model in models)
-    return bread @ meat @ bread * count / max(count - bread.shape[0], 1)
+    made: Array = bread @ meat @ bread * count / max(count - bread.shape[0], 1)
+    return made
 
 
-def _carried(rows: np.ndarray, model: ResidualModel, prior: float) -> np.ndarray:
+def _carried(rows: Array, model: ResidualModel, prior: float) -> Array:
     """Jᵀ Γ J, Γ the autocovariance of a residual and of the prior below it."""
     spread = lfilter([1.0], model.a, rows[: model.count][::-1], axis=0)  # Γ = σ² H Hᵀ, H the filter 1/a
     below = rows[model.count :]
-    return model.variance * spread.T @ spread + prior * below.T @ below
+    made: Array = model.variance * spread.T @ spread + prior * below.T @ below
+    return made
 
 
-def half_width(variance: np.ndarray | float, effective: float, parameters: int) -> np.ndarray | float:
+def half_width(variance: Array | float, effective: float, parameters: int) -> Array | float:
     """Half the 95 % interval of an estimate, by Student's t with what ``effective`` samples leave."""
     freedom = max(effective - parameters, 1.0)
-    return np.sqrt(np.where(variance >= 0.0, variance, np.inf)) * student.ppf(0.975, freedom)
+    made: Array | float = np.sqrt(np.where(variance >= 0.0, variance, np.inf)) * student.ppf(0.975, freedom)
+    return made

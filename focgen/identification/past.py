@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from focgen.arrays import Array
 from focgen.identification.excitation import Excitation
 from focgen.identification.kernel import Kernels
 from focgen.identification.noise import residual_model
@@ -44,7 +45,7 @@ class Past:
     older: tuple[float, ...] = ()
 
     @property
-    def reaches(self) -> np.ndarray:
+    def reaches(self) -> Array:
         """Of every step, the older ones last, (steps + older,)."""
         return self.reach * np.repeat([1.0, _OLDER], [self.steps, len(self.older)])
 
@@ -54,19 +55,19 @@ def latest(x: Excitation) -> float:
     return float(x.looked_back - 2)
 
 
-def times(x: Excitation, octave: int = 1) -> np.ndarray:
+def times(x: Excitation, octave: int = 1) -> Array:
     """A grid of times before the first sample, in samples, so many an ``octave``."""
     return np.concatenate([[0.0], 2.0 ** np.arange(0.0, np.log2(latest(x)), 1.0 / octave)])
 
 
-def older_times(x: Excitation, when: np.ndarray) -> tuple[float, ...]:
+def older_times(x: Excitation, when: Array) -> tuple[float, ...]:
     """Octaves before the earliest of the times ``when``, from the first sample on where there is none;
     samples."""
     first = 2.0 * (float(np.max(when)) + 1.0) if len(when) else 1.0
     return tuple(first * 2.0**k for k in range(max(0, int(np.ceil(np.log2(latest(x) / first))))))
 
 
-def columns(x: Excitation, kernels: Kernels, when: np.ndarray, rows: int = 3) -> np.ndarray:
+def columns(x: Excitation, kernels: Kernels, when: Array, rows: int = 3) -> Array:
     """What is left of unit steps made ``when`` (steps,) samples before the first one: (rows + 1, steps, n).
 
     The last row is the derivative by log(when + 1).
@@ -79,14 +80,14 @@ def columns(x: Excitation, kernels: Kernels, when: np.ndarray, rows: int = 3) ->
     return np.concatenate([left, ((later - at)[:1] * (when + 1.0)[:, None])])
 
 
-def best_time(residual: np.ndarray, made: np.ndarray) -> int:
+def best_time(residual: Array, made: Array) -> int:
     """Which of the columns ``made`` (times, n) takes most off a residual (n,), beside an offset."""
     centred = made - made.mean(axis=1, keepdims=True)
     sizes = np.maximum(np.linalg.norm(centred, axis=1), 1e-300)
     return int(np.argmax(np.abs(centred @ (residual - residual.mean())) / sizes))
 
 
-def asks_for_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
+def asks_for_past(residual: Array, made: Array, reach: float) -> bool:
     """Whether what the right model leaves, (n,), asks for a past with columns like ``made`` (times, n).
 
     The χ² that such a past takes off the whitened residual has to tell it from noise, see :func:`suggestion`.
@@ -96,7 +97,7 @@ def asks_for_past(residual: np.ndarray, made: np.ndarray, reach: float) -> bool:
     return suggestion(residual, made, reach) > 0.0 and _explains(residual, made[best_time(residual, made)])
 
 
-def suggestion(residual: np.ndarray, made: np.ndarray, reach: float) -> float:
+def suggestion(residual: Array, made: Array, reach: float) -> float:
     """The χ² that a past takes off the whitened residual, beyond what as many free values as the data really
     determine take off by chance (Akaike's criterion), and a margin."""
     basis = np.vstack([np.ones(len(residual)), made]).T
@@ -106,7 +107,7 @@ def suggestion(residual: np.ndarray, made: np.ndarray, reach: float) -> float:
     return gained - 2.0 * free - _ASKED
 
 
-def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
+def _gain(rows: Array, reach: float) -> tuple[float, float]:
     """χ² that the columns take off and their effective number; ``rows``: residual, offset, columns, in units
     of the noise."""
     mean = rows[:, 1] / np.linalg.norm(rows[:, 1])
@@ -116,13 +117,13 @@ def _gain(rows: np.ndarray, reach: float) -> tuple[float, float]:
     return float(share @ (singular.T @ rows[:, 0]) ** 2), float(np.sum(share))
 
 
-def _explains(residual: np.ndarray, column: np.ndarray) -> bool:
+def _explains(residual: Array, column: Array) -> bool:
     """Whether one column takes enough off a residual, (n,) each."""
     basis = np.column_stack([np.ones(len(residual)), column])
     return worth_it(residual, residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0])
 
 
-def worth_it(before: np.ndarray, after: np.ndarray) -> bool:
+def worth_it(before: Array, after: Array) -> bool:
     """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples; by
     half where what is left is likely a misfit."""
     taken = float(np.var(before)) / max(float(np.var(after)), 1e-300) - 1.0

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.signal import lfilter
 
+from focgen.arrays import Array
 from focgen.identification.excitation import Excitation
 from focgen.identification.kernel import Kernels, kernels
 from focgen.identification.past import Past, columns, latest
+from focgen.present import present
 
 _LONGEST = 60.0  # |log τ|, τ in s
 _DELAYS = 0.25  # of the shortest experiment: dead times are looked for up to here
@@ -30,10 +34,10 @@ class Point:
     sum of squares, scaled.
     """
 
-    x: np.ndarray
-    gain: np.ndarray
+    x: Array
+    gain: Array
     offsets: list[float]
-    amounts: list[np.ndarray]
+    amounts: list[Array]
     cost: float
 
 
@@ -42,16 +46,16 @@ class _Local:
     """What an experiment has for itself, an offset and a past: an orthonormal basis of it, prior rows
     below."""
 
-    basis: np.ndarray
-    triangle: np.ndarray
+    basis: Array
+    triangle: Array
     rows: int
 
-    def without(self, columns: np.ndarray) -> np.ndarray:
+    def without(self, columns: Array) -> Array:
         """Columns (k, n) with the local ones projected out, prior rows appended: (k, n + rows)."""
         padded = np.hstack([columns, np.zeros((len(columns), self.rows))])
         return padded - (padded @ self.basis) @ self.basis.T
 
-    def amounts(self, left: np.ndarray) -> np.ndarray:
+    def amounts(self, left: Array) -> Array:
         """The local coefficients that explain ``left`` (n,) best."""
         padded = np.concatenate([left, np.zeros(self.rows)])
         return np.linalg.solve(self.triangle, self.basis.T @ padded)
@@ -78,8 +82,8 @@ class Problem:
         delay_free: bool,
         delay: float = 0.0,
         penalties: Sequence[float] | None = None,
-        whitening: Sequence[np.ndarray | None] | None = None,
-    ):
+        whitening: Sequence[Array | None] | None = None,
+    ) -> None:
         self.experiments, self.pasts = tuple(experiments), tuple(pasts)
         self.delay_free, self.delay = delay_free, delay
         self.step = experiments[0].step
@@ -88,15 +92,15 @@ class Problem:
         self.whitening = tuple(whitening) if whitening is not None else (None,) * len(experiments)
         self.core = 2 + delay_free
         ends = self.core + np.cumsum([0, *(p.steps if p else 0 for p in self.pasts)])
-        self.of_past = [slice(int(a), int(b)) for a, b in zip(ends, ends[1:])]
+        self.of_past = [slice(int(a), int(b)) for a, b in pairwise(ends)]
         self._low, self._high, self._most = self._edges()
-        self._store: dict = {}
+        self._store: dict[tuple[str, int], tuple[bytes, Any]] = {}
 
-    def with_whitening(self, filters: Sequence[np.ndarray | None], penalties: Sequence[float]) -> Problem:
+    def with_whitening(self, filters: Sequence[Array | None], penalties: Sequence[float]) -> Problem:
         """The same seen through these filters, for residuals of these variances behind them."""
         return Problem(self.experiments, self.pasts, self.delay_free, self.delay, penalties, filters)
 
-    def _edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _edges(self) -> tuple[Array, Array, Array]:
         """The least and the largest ``x`` that make sense, and the longest step in one round."""
         late = delay_reach(self.experiments) / self.step
         rows = [(-_LONGEST, _LONGEST, 2.0), (*self.ALPHAS, 0.3)]
@@ -111,32 +115,32 @@ class Problem:
         """The longest dead time that is looked for, samples."""
         return delay_reach(self.experiments) / self.step
 
-    def inside(self, x: np.ndarray) -> np.ndarray:
+    def inside(self, x: Array) -> Array:
         """``x`` within what makes sense."""
         return np.clip(x, self._low, self._high)
 
-    def short(self, step: np.ndarray) -> np.ndarray:
+    def short(self, step: Array) -> Array:
         """A step no longer than the linear model can be trusted."""
         return step / max(1.0, float(np.max(np.abs(step) / self._most)))
 
-    def delay_at(self, x: np.ndarray) -> float:
+    def delay_at(self, x: Array) -> float:
         """The dead time in s."""
         return float(x[2]) * self.step if self.delay_free else self.delay
 
-    def kernels(self, x: np.ndarray, i: int, nudge: float = 0.0) -> Kernels:
+    def kernels(self, x: Array, i: int, nudge: float = 0.0) -> Kernels:
         """The kernels of experiment ``i``; ``nudge``: samples added to the dead time."""
         run = self.experiments[i]
         count = run.stepped.count if self.pasts[i] is not None else len(run)
         return self.kernels_for(run, x, count, nudge)
 
-    def kernels_for(self, run: Excitation, x: np.ndarray, count: int, nudge: float = 0.0) -> Kernels:
+    def kernels_for(self, run: Excitation, x: Array, count: int, nudge: float = 0.0) -> Kernels:
         """The kernels of so many samples."""
         delay = max(self.delay_at(x) + nudge * self.step, 0.0) + run.late
         return kernels(float(x[0]), float(x[1]), run.step, count, delay)
 
     # -- the value at a trial -------------------------------------------------------------------------------
 
-    def at(self, x: np.ndarray) -> Point:
+    def at(self, x: Array) -> Point:
         """The trial ``x`` with the best gain."""
         parts = [self._value(x, i) for i in range(len(self.experiments))]
         stacked = np.vstack([_triangle(np.vstack([drives, [target]])) for drives, target, _ in parts])
@@ -151,67 +155,74 @@ class Problem:
             amounts.append(found[1:])
         return Point(np.array(x, float), gain, offsets, amounts, cost)
 
-    def _value(self, x: np.ndarray, i: int) -> tuple[np.ndarray, np.ndarray, _Local]:
+    def _value(self, x: Array, i: int) -> tuple[Array, Array, _Local]:
         """Drives and target of an experiment, scaled, its local columns projected out."""
         local, w = self._local(x, i), self.weights[i]
         columns = w * np.vstack([self._responses(x, i)[0], self.experiments[i].measured])
         rows = local.without(self.white(i, columns))
         return rows[:-1], rows[-1], local
 
-    def white(self, i: int, columns: np.ndarray) -> np.ndarray:
+    def white(self, i: int, columns: Array) -> Array:
         """Columns (k, n) through the experiment's whitening filter; nothing counts until that is filled."""
-        if self.whitening[i] is None or not len(columns):
+        whitening = self.whitening[i]
+        if whitening is None or not len(columns):
             return columns
-        white = lfilter(self.whitening[i], [1.0], columns, axis=1)
-        white[:, : len(self.whitening[i]) - 1] = 0.0
+        white: Array = lfilter(whitening, [1.0], columns, axis=1)
+        white[:, : len(whitening) - 1] = 0.0
         return white
 
-    def _responses(self, x: np.ndarray, i: int) -> np.ndarray:
+    def _responses(self, x: Array, i: int) -> Array:
         """Rows × powers × n."""
-        make = lambda: self.experiments[i].respond(self.kernels(x, i))  # noqa: E731
-        return self._kept("responses", i, x[: self.core], make)
+        make = lambda: self.experiments[i].respond(self.kernels(x, i))
+        made: Array = self._kept("responses", i, x[: self.core], make)
+        return made
 
-    def _columns(self, x: np.ndarray, i: int) -> np.ndarray:
+    def _columns(self, x: Array, i: int) -> Array:
         """Rows × steps × n of the past, older ones last, the last row by log(θ + 1)."""
         when = self.when(x, i)
-        make = lambda: columns(self.experiments[i], self.kernels(x, i), when)  # noqa: E731
-        return self._kept("past", i, np.append(x[: self.core], when), make)
+        make = lambda: columns(self.experiments[i], self.kernels(x, i), when)
+        made: Array = self._kept("past", i, np.append(x[: self.core], when), make)
+        return made
 
     def local(self, i: int) -> _Local:
         """The offset of an experiment that begins at rest."""
-        return self._kept("at rest", i, np.empty(0), lambda: self._made_local(np.empty(0), i, True))
+        made: _Local = self._kept("at rest", i, np.empty(0), lambda: self._made_local(np.empty(0), i, True))
+        return made
 
-    def when(self, x: np.ndarray, i: int) -> np.ndarray:
+    def when(self, x: Array, i: int) -> Array:
         """The times of all steps of an experiment's past, samples before its first one."""
-        return np.concatenate([np.exp(x[self.of_past[i]]) - 1.0, self.pasts[i].older])
+        return np.concatenate([np.exp(x[self.of_past[i]]) - 1.0, present(self.pasts[i]).older])
 
-    def _local(self, x: np.ndarray, i: int, offset: bool = True) -> _Local:
-        make = lambda: self._made_local(x, i, offset)  # noqa: E731
-        return self._kept(f"local {offset}", i, np.append(x[: self.core], x[self.of_past[i]]), make)
+    def _local(self, x: Array, i: int, offset: bool = True) -> _Local:
+        make = lambda: self._made_local(x, i, offset)
+        made: _Local = self._kept(f"local {offset}", i, np.append(x[: self.core], x[self.of_past[i]]), make)
+        return made
 
-    def _made_local(self, x: np.ndarray, i: int, offset: bool) -> _Local:
+    def _made_local(self, x: Array, i: int, offset: bool) -> _Local:
         n, w, past = len(self.experiments[i]), self.weights[i], self.pasts[i]
-        made = [np.full(n, w)] if offset else []
+        level = np.full((int(offset), n), w)
         if past is None:
-            basis = self.white(i, np.array(made).reshape(len(made), n)).T
+            basis = self.white(i, level).T
             sizes = np.linalg.norm(basis, axis=0)
             return _Local(basis / sizes, np.diag(sizes), 0)
-        made = np.vstack([*made, w * self._columns(x, i)[0]])
+        made = np.vstack([level, w * self._columns(x, i)[0]])
         prior = np.zeros((len(past.reaches), len(made)))
         prior[:, int(offset) :] = np.diag(np.sqrt(self.penalties[i]) / past.reaches)
         return _Local(*np.linalg.qr(np.vstack([self.white(i, made).T, prior])), len(prior))
 
-    def _kept(self, what: str, i: int, x: np.ndarray, make):
+    def _kept(self, what: str, i: int, x: Array, make: Callable[[], Any]) -> Any:
         """What was made for the last trial."""
         key = x.tobytes()
-        if self._store.get((what, i), (None,))[0] != key:
+        found = self._store.get((what, i))
+        if found is None or found[0] != key:
+            del found
             self._store.pop((what, i), None)  # before the new one takes its memory
-            self._store[what, i] = key, make()
-        return self._store[what, i][1]
+            found = self._store[what, i] = key, make()
+        return found[1]  # whatever its making has left in the store
 
     # -- derivatives ----------------------------------------------------------------------------------------
 
-    def _slopes(self, point: Point, i: int) -> np.ndarray:
+    def _slopes(self, point: Point, i: int) -> Array:
         """Derivatives of an experiment's scaled output by those of ``x`` that it depends on; see
         :meth:`_own`."""
         x, w = point.x, self.weights[i]
@@ -221,16 +232,16 @@ class Problem:
         if self.delay_free:
             slopes = np.vstack([slopes, self._by_delay(point, i)])
         if self.pasts[i] is not None:
-            late, count = self._columns(x, i)[3], self.pasts[i].steps
+            late, count = self._columns(x, i)[3], present(self.pasts[i]).steps
             slopes = np.vstack([slopes, late[:count] * point.amounts[i][:count, None]])
         return self.white(i, w * slopes)
 
-    def _own(self, i: int) -> np.ndarray:
+    def _own(self, i: int) -> Array:
         """Which of ``x`` an experiment depends on."""
         here = self.of_past[i]
         return np.concatenate([np.arange(self.core), np.arange(here.start, here.stop)])
 
-    def _by_delay(self, point: Point, i: int) -> np.ndarray:
+    def _by_delay(self, point: Point, i: int) -> Array:
         """The derivative by the dead time, a sample."""
         run = self.experiments[i]
         low = min(_NUDGE, float(point.x[2]))
@@ -241,9 +252,10 @@ class Problem:
             if self.pasts[i] is not None:
                 value = value + point.amounts[i] @ columns(run, made, self.when(point.x, i), 1)[0]
             ends.append(value)
-        return (ends[0] - ends[1]) / (_NUDGE + low)
+        found: Array = (ends[0] - ends[1]) / (_NUDGE + low)
+        return found
 
-    def jacobians(self, point: Point, offset: bool = False) -> list[np.ndarray]:
+    def jacobians(self, point: Point, offset: bool = False) -> list[Array]:
         """Derivatives of each experiment's scaled output by x and gain, (n + prior rows, parameters), its
         local columns and those of its noise model projected out; ``offset``: the offset is the last column
         instead.
@@ -259,19 +271,20 @@ class Problem:
             found.append(self._without_noise_model(point, i, alone))
         return found
 
-    def _without_noise_model(self, point: Point, i: int, rows: np.ndarray) -> np.ndarray:
+    def _without_noise_model(self, point: Point, i: int, rows: Array) -> Array:
         """Rows without what the whitening filter's own coefficients can make up for: in a closed loop they
         answer the same disturbance as the model."""
-        if self.whitening[i] is None:
+        whitening = self.whitening[i]
+        if whitening is None:
             return rows
         residual, n = self.residuals(point)[i], len(self.experiments[i])
-        order = len(self.whitening[i]) - 1
+        order = len(whitening) - 1
         past = np.zeros((len(rows), order))
         for k in range(1, order + 1):
             past[order:n, k - 1] = residual[order - k : n - k]
         return rows - past @ np.linalg.lstsq(past, rows, rcond=1e-10)[0] if order else rows
 
-    def projected_slope(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
+    def projected_slope(self, point: Point) -> tuple[Array, Array]:
         """The derivative of the projected residual by ``x``, and that residual, compressed to a few rows."""
         parts, powers = [], len(point.gain)
         for i in range(len(self.experiments)):
@@ -288,11 +301,12 @@ class Problem:
 
     # -- results --------------------------------------------------------------------------------------------
 
-    def from_rest(self, point: Point, i: int) -> np.ndarray:
+    def from_rest(self, point: Point, i: int) -> Array:
         """The output of experiment ``i`` without offset and past."""
-        return point.gain @ self._responses(point.x, i)[0]
+        made: Array = point.gain @ self._responses(point.x, i)[0]
+        return made
 
-    def simulated(self, point: Point) -> list[np.ndarray]:
+    def simulated(self, point: Point) -> list[Array]:
         """The model's output in each experiment, offset and past included."""
         found = []
         for i in range(len(self.experiments)):
@@ -302,10 +316,10 @@ class Problem:
             found.append(y)
         return found
 
-    def residuals(self, point: Point, white: bool = False) -> list[np.ndarray]:
+    def residuals(self, point: Point, white: bool = False) -> list[Array]:
         """Model − measured of each experiment, scaled, and ``white`` through its filter."""
         made = self.simulated(point)
-        rows = [w * (y - x.measured) for w, y, x in zip(self.weights, made, self.experiments)]
+        rows: list[Array] = [w * (y - x.measured) for w, y, x in zip(self.weights, made, self.experiments)]
         return [self.white(i, row[None])[0] for i, row in enumerate(rows)] if white else rows
 
 
@@ -314,14 +328,19 @@ def delay_reach(experiments: Sequence[Excitation]) -> float:
     return _DELAYS * min(len(x) * x.step for x in experiments)
 
 
-def _triangle(columns: np.ndarray) -> np.ndarray:
+def _triangle(columns: Array) -> Array:
     """R of the QR decomposition of columns (k, n), a block of rows after the other."""
     n = columns.shape[1]
     parts = [np.linalg.qr(columns[:, i : i + _BLOCK].T, mode="r") for i in range(0, n, _BLOCK)]
-    return parts[0] if len(parts) == 1 else np.linalg.qr(np.vstack(parts), mode="r")
+    if len(parts) == 1:
+        alone: Any = parts[0]
+        return np.asarray(alone)
+    whole: Any = np.linalg.qr(np.vstack(parts), mode="r")
+    made: Array = whole
+    return made
 
 
-def starts(problem: Problem) -> list[np.ndarray]:
+def starts(problem: Problem) -> list[Array]:
     """The best point of a coarse grid, and the best of another order where it comes near."""
     found = sorted((_best_of_order(problem, alpha) for alpha in _GRID_ALPHAS), key=lambda each: each[0])
     return [x for cost, x in found[:2] if cost <= _SECOND * found[0][0]]
@@ -340,17 +359,17 @@ def shortened(problem: Problem) -> Problem:
     return Problem(chosen, none, problem.delay_free, problem.delay, whitening=problem.whitening)
 
 
-def _best_of_order(problem: Problem, alpha: float) -> tuple[float, np.ndarray]:
+def _best_of_order(problem: Problem, alpha: float) -> tuple[float, Array]:
     longest = max(len(x) * x.step for x in problem.experiments)
     taus = np.geomspace(2.0 * problem.step, longest, _GRID_TAUS)
     return min((_best_delay(problem, np.log(tau), alpha) for tau in taus), key=lambda each: each[0])
 
 
-def _best_delay(problem: Problem, log_tau: float, alpha: float) -> tuple[float, np.ndarray]:
+def _best_delay(problem: Problem, log_tau: float, alpha: float) -> tuple[float, Array]:
     """Cost and place of the best dead time on the grid, in whole samples."""
     lags = [0]
     if problem.delay_free:
-        lags += sorted({int(round(k)) for k in np.geomspace(1.0, max(problem.latest, 1.0), 12)})
+        lags += sorted({round(k) for k in np.geomspace(1.0, max(problem.latest, 1.0), 12)})
     x = np.array([log_tau, alpha, 0.0])[: 2 + problem.delay_free]
     made = [run.respond(problem.kernels(x, i), 1)[0] for i, run in enumerate(problem.experiments)]
     costs = [_cost_of(problem, made, lag) for lag in lags]
@@ -360,7 +379,7 @@ def _best_delay(problem: Problem, log_tau: float, alpha: float) -> tuple[float, 
     return costs[best], x
 
 
-def _cost_of(problem: Problem, made: list[np.ndarray], lag: int) -> float:
+def _cost_of(problem: Problem, made: list[Array], lag: int) -> float:
     """The sum of squares where each response comes ``lag`` samples of the first experiment later."""
     parts = []
     for i, (run, response, w) in enumerate(zip(problem.experiments, made, problem.weights)):

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from focgen.arrays import Array
 from focgen.identification.noise import covariance, residual_model
 from focgen.identification.rational import LATEST, Record, Shape, inside, responses
 
@@ -25,44 +27,44 @@ _NONE = 1e-5  # of the measured spread: a residual below it is rounding
 class Problem:
     """The residual of a shape over records, as a function of its nonlinear parameters."""
 
-    def __init__(self, shape: Shape, records: Sequence[Record]):
+    def __init__(self, shape: Shape, records: Sequence[Record]) -> None:
         self.shape, self.records = shape, records
         self.longest = max(map(len, records))
         self.latest = LATEST * min(map(len, records))
         around = [r.measured - r.measured.mean() for r in records]
         self.spread = float(np.sqrt(np.mean(np.concatenate(around) ** 2)))
 
-    def inside(self, x: np.ndarray) -> np.ndarray:
+    def inside(self, x: Array) -> Array:
         """``x`` within what makes sense."""
         return inside(self.shape, x, self.longest, self.latest)
 
-    def rows(self, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    def rows(self, x: Array) -> list[tuple[Array, Array]]:
         """Each record's own rows and its shared ones."""
         return responses(self.shape, self.inside(x), self.records)
 
-    def residual(self, x: np.ndarray) -> np.ndarray:
+    def residual(self, x: Array) -> Array:
         """Measured − model of all records in a row, in units of the measured spread."""
         return self.solved(x).left / self.spread
 
-    def cost(self, x: np.ndarray) -> float:
+    def cost(self, x: Array) -> float:
         """Sum of squares of :meth:`residual`."""
         return float(np.sum(self.residual(x) ** 2))
 
-    def solved(self, x: np.ndarray) -> Solved:
+    def solved(self, x: Array) -> Solved:
         """The best weights at ``x`` and what they leave."""
         rows = self.rows(x)
         stacks = [np.vstack([*pair, r.measured]) for pair, r in zip(rows, self.records)]
         sums = [stack @ stack.T for stack in stacks]
         cuts = [len(own) for own, _ in rows]
         made = [_eliminated(m, cut) for m, cut in zip(sums, cuts)]
-        normal = sum(m[cut:, cut:] for m, cut in zip(made, cuts))
+        normal: Any = sum(m[cut:, cut:] for m, cut in zip(made, cuts))
         shared = _weights(normal[:-1, :-1], normal[:-1, -1:])[:, 0]
         from_shared = np.append(-shared, 1.0)
         own = [-m[:cut, cut:] @ from_shared for m, cut in zip(made, cuts)]
         left = [np.concatenate([o, from_shared]) @ stack for o, stack in zip(own, stacks)]
         return Solved(self.inside(x), shared, [-o for o in own], np.concatenate(left), rows)
 
-    def fit(self, start: np.ndarray, rounds: int, close: float) -> np.ndarray | None:
+    def fit(self, start: Array, rounds: int, close: float) -> Array | None:
         """Levenberg–Marquardt from ``start`` until the cost falls by less than the share ``close``.
 
         None where it breaks down.
@@ -89,23 +91,23 @@ class Solved:
     """Weights at ``x``: ``shared`` by all records and each record's ``own``, what is ``left`` of the measured
     signals (samples,), and the ``rows`` that the weights belong to."""
 
-    x: np.ndarray
-    shared: np.ndarray
-    own: list[np.ndarray]
-    left: np.ndarray
-    rows: list[tuple[np.ndarray, np.ndarray]]
+    x: Array
+    shared: Array
+    own: list[Array]
+    left: Array
+    rows: list[tuple[Array, Array]]
 
-    def models(self, rows: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    def models(self, rows: list[tuple[Array, Array]]) -> list[Array]:
         """These weights times ``rows``: the model of every record."""
         return [w @ own + self.shared @ shared for w, (own, shared) in zip(self.own, rows)]
 
 
 def mean_square(problem: Problem, solved: Solved) -> float:
     """Of the residual; rounding counts as the smallest there is."""
-    return float(max(np.mean(solved.left**2), (_NONE * problem.spread) ** 2))
+    return max(float(np.mean(solved.left**2)), float(_NONE * problem.spread) ** 2)
 
 
-def uncertainty(problem: Problem, solved: Solved, linear_only: bool = False) -> tuple[np.ndarray, float]:
+def uncertainty(problem: Problem, solved: Solved, linear_only: bool = False) -> tuple[Array, float]:
     """Covariance of (nonlinear parameters, shared weights), and the effective number of samples.
 
     ``linear_only`` takes the nonlinear parameters as known: their rows and columns are 0. Raises
@@ -129,9 +131,9 @@ def uncertainty(problem: Problem, solved: Solved, linear_only: bool = False) -> 
     return np.pad(spread * freedom, (known, 0)), sum(max(m.effective, 3.0) for m in models)
 
 
-def _slopes(problem: Problem, solved: Solved) -> list[np.ndarray]:
+def _slopes(problem: Problem, solved: Solved) -> list[Array]:
     """Derivatives of the records' models in every nonlinear parameter, all records in a row."""
-    slopes = []
+    slopes: list[Array] = []
     for step in _NUDGE * np.eye(len(solved.x)):
         ahead, behind = problem.inside(solved.x + step), problem.inside(solved.x - step)
         pair = (solved.models(problem.rows(x)) for x in (ahead, behind))
@@ -139,7 +141,7 @@ def _slopes(problem: Problem, solved: Solved) -> list[np.ndarray]:
     return slopes
 
 
-def _jacobian(problem: Problem, solved: Solved, slopes: list[np.ndarray]) -> np.ndarray:
+def _jacobian(problem: Problem, solved: Solved, slopes: list[Array]) -> Array:
     """Slopes and shared rows as columns (samples, ·), without what each record's own rows explain."""
     ends = np.cumsum([len(r) for r in problem.records])[:-1]
     parts = zip(*(np.split(slope, ends) for slope in slopes)) if slopes else [()] * len(problem.records)
@@ -150,7 +152,7 @@ def _jacobian(problem: Problem, solved: Solved, slopes: list[np.ndarray]) -> np.
     return np.hstack(blocks).T
 
 
-def _eliminated(sums: np.ndarray, cut: int) -> np.ndarray:
+def _eliminated(sums: Array, cut: int) -> Array:
     """Products of rows (k, k) after the first ``cut`` are regressed out of the others.
 
     The upper right block holds the regression's weights, the lower right one the products that are left.
@@ -161,11 +163,12 @@ def _eliminated(sums: np.ndarray, cut: int) -> np.ndarray:
     return made
 
 
-def _weights(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _weights(products: Array, wanted: Array) -> Array:
     """Solve the normal equations, scaled to unit rows; rows that are one share its weight."""
     sizes = np.sqrt(np.diag(products))
     sizes = np.where(sizes > 0.0, sizes, 1.0)
     values, vectors = np.linalg.eigh(products / np.outer(sizes, sizes))
     kept = values > _RANK * max(values[-1], 1e-300)
     vectors = vectors[:, kept]
-    return (vectors / values[kept]) @ (vectors.T @ (wanted / sizes[:, None])) / sizes[:, None]
+    made: Array = (vectors / values[kept]) @ (vectors.T @ (wanted / sizes[:, None])) / sizes[:, None]
+    return made

@@ -17,6 +17,8 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
+from focgen.arrays import Array
+
 _FASTEST = 0.02  # samples: a shorter time constant has no effect between samples
 _SLOWEST = 30.0  # lengths of the longest record: a longer one is an integrator there
 _DAMPING = (0.01, 300.0)
@@ -60,8 +62,8 @@ class Record:
     """
 
     name: str
-    drive: np.ndarray
-    measured: np.ndarray
+    drive: Array
+    measured: Array
     hold: str
     rests: bool = False
     moves: bool = False
@@ -93,47 +95,48 @@ def parts(records: Sequence[Record], limit: int) -> list[Record]:
 class Discrete:
     """x[k] = ``move`` x[k−1] + Σᵢ ``take``[i] u[k − ``late`` − i], i = 0, 1, 2; ``take`` (3, n)."""
 
-    move: np.ndarray
-    take: np.ndarray
+    move: Array
+    take: Array
     late: int
 
     @property
-    def denominator(self) -> np.ndarray:
+    def denominator(self) -> Array:
         """Of the filter from u to every state."""
         if len(self.move) == 1:
             return np.array([1.0, -self.move[0, 0]])
         return np.array([1.0, -np.trace(self.move), np.linalg.det(self.move)])
 
-    def numerator(self, state: int) -> np.ndarray:
+    def numerator(self, state: int) -> Array:
         """Of the filter from u, ``late`` samples back, to one state."""
         now = np.append(self.take[:, state], 0.0)
         if len(self.move) == 1:
             return now
         before = self.take @ (self.move - np.trace(self.move) * np.eye(2)).T
-        return now + np.append(0.0, before[:, state])
+        made: Array = now + np.append(0.0, before[:, state])
+        return made
 
 
-def inside(shape: Shape, x: np.ndarray, longest: int, latest: float) -> np.ndarray:
+def inside(shape: Shape, x: Array, longest: int, latest: float) -> Array:
     """``x`` with every parameter within what ``longest`` samples can tell, the dead time at most ``latest``.
 
     ``x`` is (log T) for one pole, (log wn, log damping) for two, none for a gain; then the dead time.
     """
     slowest = _SLOWEST * longest
-    edges = {
+    edges: list[tuple[float, float]] = {
         0: [],
         1: [(math.log(_FASTEST), math.log(slowest))],
-        2: [(-math.log(slowest), -math.log(_FASTEST)), tuple(map(math.log, _DAMPING))],
+        2: [(-math.log(slowest), -math.log(_FASTEST)), (math.log(_DAMPING[0]), math.log(_DAMPING[1]))],
     }[shape.poles]
     low, high = np.array(edges + [(0.0, latest)] * shape.delayed).reshape(-1, 2).T
     return np.clip(x, low, high)
 
 
-def delay_of(shape: Shape, x: np.ndarray) -> float:
+def delay_of(shape: Shape, x: Array) -> float:
     """The dead time in samples."""
     return float(x[-1]) if shape.delayed else 0.0
 
 
-def discretise(poles: int, x: np.ndarray, delay: float, hold: str, scale: float = 1.0) -> Discrete:
+def discretise(poles: int, x: Array, delay: float, hold: str, scale: float = 1.0) -> Discrete:
     """The stage from sample to sample, every time constant ``scale`` times as long."""
     late = math.floor(delay)
     before, after = delay - late, 1.0 - (delay - late)  # the corner of u lies between the two
@@ -148,7 +151,7 @@ def discretise(poles: int, x: np.ndarray, delay: float, hold: str, scale: float 
     return Discrete(whole, np.array(take), late)
 
 
-def _system(poles: int, x: np.ndarray) -> np.ndarray:
+def _system(poles: int, x: Array) -> Array:
     """[A, B], unit gain."""
     if poles == 1:
         rate = math.exp(-x[0])
@@ -157,7 +160,7 @@ def _system(poles: int, x: np.ndarray) -> np.ndarray:
     return np.array([[0.0, 1.0, 0.0], [-(wn**2), -2.0 * damping * wn, wn**2]])
 
 
-def _integrals(system: np.ndarray, span: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _integrals(system: Array, span: float) -> tuple[Array, Array, Array]:
     """e^{A span}, and the states that a unit step and a unit ramp reach after ``span``."""
     n = len(system)
     block = np.zeros((n + 2, n + 2))
@@ -166,15 +169,15 @@ def _integrals(system: np.ndarray, span: float) -> tuple[np.ndarray, np.ndarray,
     return moved[:n, :n], moved[:n, n], moved[:n, n + 1]
 
 
-def shifted(signal: np.ndarray, late: int) -> np.ndarray:
+def shifted(signal: Array, late: int) -> Array:
     """``signal`` (n,) ``late`` samples later, 0 before it."""
     return np.concatenate([np.zeros(min(late, len(signal))), signal[: max(len(signal) - late, 0)]])
 
 
-Rows = list[tuple[np.ndarray, np.ndarray]]
+Rows = list[tuple[Array, Array]]
 
 
-def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> Rows:
+def responses(shape: Shape, x: Array, records: Sequence[Record]) -> Rows:
     """What every record is a sum of: its own rows (·, n), and those whose weights all records share (·, n).
 
     Shared are the response of unit gain and, with a zero, its derivative per sample. Its own are an offset
@@ -190,31 +193,32 @@ def responses(shape: Shape, x: np.ndarray, records: Sequence[Record]) -> Rows:
     return [(own[:count, : len(r)], _shared(shape, made, r)) for count, r in zip(counts, records)]
 
 
-def _own(shape: Shape, made: Discrete, count: int) -> list[np.ndarray]:
+def _own(shape: Shape, made: Discrete, count: int) -> list[Array]:
     before = [_from_before(made, count)] if shape.delayed else []
     return [np.ones(count), *_free(made, count), *before]
 
 
-def _shared(shape: Shape, made: Discrete, record: Record) -> np.ndarray:
+def _shared(shape: Shape, made: Discrete, record: Record) -> Array:
     drive, den = shifted(record.drive, made.late), made.denominator
     return np.array([lfilter(made.numerator(state), den, drive) for state in range(1 + shape.zeros)])
 
 
-def _own_of_gain(record: Record, delay: float) -> np.ndarray:
+def _own_of_gain(record: Record, delay: float) -> Array:
     """An offset, and another one while the input from before the first sample acts."""
     early = (np.arange(len(record)) < delay).astype(float)
     return np.array([np.ones(len(record)), early][: 2 if record.moves and delay > 0.0 else 1])
 
 
-def _static(record: Record, delay: float) -> np.ndarray:
+def _static(record: Record, delay: float) -> Array:
     """The input itself, late by ``delay``; a held one by whole samples."""
     if record.hold == "zero":
         return shifted(record.drive, math.ceil(delay))
     places = np.arange(len(record))
-    return np.interp(places - delay, places, record.drive)
+    made: Array = np.interp(places - delay, places, record.drive)
+    return made
 
 
-def _free(made: Discrete, count: int) -> list[np.ndarray]:
+def _free(made: Discrete, count: int) -> list[Array]:
     """Two (or one) responses that span every free response of the first state."""
     pulse = np.zeros(count)
     pulse[0] = 1.0
@@ -222,9 +226,10 @@ def _free(made: Discrete, count: int) -> list[np.ndarray]:
     return [shifted(first, i) for i in range(len(made.move))]
 
 
-def _from_before(made: Discrete, count: int) -> np.ndarray:
+def _from_before(made: Discrete, count: int) -> Array:
     """The response to a unit input that ends with the first sample and arrives a dead time later."""
     known = len(made.take) - 1
     past = np.zeros(count + known)
     past[: made.late + known] = 1.0
-    return lfilter(made.numerator(0), made.denominator, past)[known:]
+    found: Array = lfilter(made.numerator(0), made.denominator, past)[known:]
+    return found

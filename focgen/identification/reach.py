@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.logs.experiment import Experiment
-from focgen.rig.model import Ranges
+from focgen.rig.rig import Ranges
 
 _ROOM = 1.25  # beyond what was seen: a controller may have to go a little further than the logs did
 _DIGITS = 2
@@ -25,7 +25,7 @@ def seen_ranges(given: Ranges, experiments: Sequence[Experiment]) -> tuple[Range
     for role in ("pressure", "output"):
         seen = [e.signals[role] for e in experiments if role in e.signals]
         if getattr(given, role) is None and seen:
-            span = _with_room(min(map(np.min, seen)), max(map(np.max, seen)))
+            span = _with_room(float(min(map(np.min, seen))), float(max(map(np.max, seen))))
             given = replace(given, **{role: span})
             notes.append(
                 f"[ranges] {role} is not given: {span[0]:g} … {span[1]:g}, "

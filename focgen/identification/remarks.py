@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from focgen.identification.model import Identification
+from focgen.identification.identification import Identification
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed, notes_of
-from focgen.rig.model import UNITY, LinearActuator, Rig
+from focgen.rig.rig import UNITY, LinearActuator, Rig
 
 
 def remarks_of(experiments: Sequence[Experiment], nominal: Rig, found: Identification) -> tuple[str, ...]:

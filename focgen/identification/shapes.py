@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.identification.input_noise import fair_square
 from focgen.identification.noise import half_width, residual_model
 from focgen.identification.projected import Problem, Solved, uncertainty
@@ -47,7 +48,7 @@ class Fitted:
     shape: Shape
     problem: Problem
     solved: Solved
-    covariance: np.ndarray | None
+    covariance: Array | None
     independent: float
     report: ShapeFit
 
@@ -66,7 +67,7 @@ def fit_shapes(records: Sequence[Record], step: float) -> list[Fitted]:
     """Every shape of ``SHAPES`` that converges; ``step`` is the sample time in s."""
     scans = {0: scan(records, 0), 1: scan(records, 1)}
     few = _few(records, max(float(starts[0][-1]) for starts in scans.values()))
-    optima: dict[Shape, np.ndarray] = {}
+    optima: dict[Shape, Array] = {}
     solved: dict[Shape, Solved] = {}
     for shape in SHAPES:
         rough = Problem(shape, few)
@@ -109,16 +110,15 @@ def clearly_better(one: Fitted, other: Fitted) -> bool:
     return one.report.bic < other.report.bic - MARGIN
 
 
-def _optimum(problem: Problem, starts: list[np.ndarray]) -> np.ndarray | None:
+def _optimum(problem: Problem, starts: list[Array]) -> Array | None:
     """A few rounds from every start, then the best of them further."""
     if _has_no_slope(problem):
         return starts[0]
-    tried = [problem.fit(s, _FIRST_ROUNDS, 1e-3) for s in starts]
-    tried = [x for x in tried if x is not None]
+    tried = [x for s in starts if (x := problem.fit(s, _FIRST_ROUNDS, 1e-3)) is not None]
     return problem.fit(best_of(problem, tried, 1)[0], _ROUNDS, 1e-5) if tried else None
 
 
-def _refined(problem: Problem, x: np.ndarray) -> Solved:
+def _refined(problem: Problem, x: Array) -> Solved:
     found = None if _has_no_slope(problem) else problem.fit(x, _LAST_ROUNDS, 1e-8)
     return problem.solved(x if found is None else found)
 
@@ -161,7 +161,7 @@ def fit_of(problem: Problem, solved: Solved) -> float:
     return 1.0 - float(np.sqrt(np.mean(solved.left**2))) / problem.spread
 
 
-def _uncertainty(problem: Problem, solved: Solved) -> tuple[np.ndarray | None, float]:
+def _uncertainty(problem: Problem, solved: Solved) -> tuple[Array | None, float]:
     try:
         return uncertainty(problem, solved, linear_only=_by_whole_samples(problem))
     except np.linalg.LinAlgError:
@@ -169,7 +169,7 @@ def _uncertainty(problem: Problem, solved: Solved) -> tuple[np.ndarray | None, f
 
 
 def _parameters(
-    problem: Problem, solved: Solved, spread: np.ndarray | None, effective: float, step: float
+    problem: Problem, solved: Solved, spread: Array | None, effective: float, step: float
 ) -> dict[str, tuple[float, float]]:
     """Name → (value, half interval): the gradients of the named values carry the covariance over."""
     shape, x = problem.shape, np.concatenate([solved.x, solved.shared])
@@ -177,27 +177,29 @@ def _parameters(
     if spread is None:
         return {name: (float(v), float("inf")) for name, v in zip(names, values)}
     nudges = np.maximum(1e-6 * np.abs(x), 1e-9)
-    slopes = [
+    rows = [
         (_named(shape, x + d, step, names)[1] - _named(shape, x - d, step, names)[1]) / (2.0 * d.max())
         for d in np.diag(nudges)
     ]
-    slopes = np.array(slopes).T
+    slopes = np.array(rows).T
     variance = np.einsum("ij,jk,ik->i", slopes, spread, slopes)
     half = half_width(np.where(variance >= 0.0, variance, np.inf), effective, len(x))  # rounding below 0
-    made = {name: (float(v), float(h)) for name, v, h in zip(names, values, half)}
+    made = {name: (float(v), float(h)) for name, v, h in zip(names, values, np.atleast_1d(half))}
     if _by_whole_samples(problem):
         made["delay"] = (made["delay"][0], step)  # a held input shows no part of a sample
     return made
 
 
-def _named(shape: Shape, x: np.ndarray, step: float, names=None) -> tuple[tuple[str, ...], np.ndarray]:
+def _named(
+    shape: Shape, x: Array, step: float, names: Sequence[str] | None = None
+) -> tuple[tuple[str, ...], Array]:
     """Names and values in s; ``names`` given keeps two real poles real and a pair a pair."""
     shared = x[len(x) - 1 - shape.zeros :]
     found = {"gain": shared[0]}
     if shape.poles == 1:
         found["T"] = step * np.exp(x[0])
     elif shape.poles == 2:
-        found |= _of_two(*np.exp(x[:2]), step, names)
+        found |= _of_two(float(np.exp(x[0])), float(np.exp(x[1])), step, names)
     if shape.zeros:
         found["zero"] = step * shared[1] / shared[0]
     if shape.delayed:
@@ -205,7 +207,7 @@ def _named(shape: Shape, x: np.ndarray, step: float, names=None) -> tuple[tuple[
     return tuple(found), np.array(list(found.values()))
 
 
-def _of_two(wn: float, damping: float, step: float, names) -> dict[str, float]:
+def _of_two(wn: float, damping: float, step: float, names: Sequence[str] | None) -> dict[str, float]:
     real = damping > 1.0 if names is None else "T1" in names
     if not real:
         return {"wn": wn / step, "damping": damping}

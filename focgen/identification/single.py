@@ -11,8 +11,8 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit, fit_fractional
+from focgen.identification.identification import ExperimentFit
 from focgen.identification.integer import IntegerFit, fit_integer_models
-from focgen.identification.model import ExperimentFit
 from focgen.identification.past import Past
 from focgen.identification.quality import gof
 from focgen.progress import track
@@ -31,7 +31,8 @@ def fit_each(
 
     ``pasts`` and ``delay`` (s) as found from all together; ``integer``: integer-order models, too.
     """
-    fits, failed = [], []
+    fits: list[FractionalFit | None] = []
+    failed: list[str] = []
     singles = [x.with_powers(1) for x in excitations]
     for x, past in track(list(zip(singles, pasts)), "fitting experiment"):
         try:
@@ -51,8 +52,13 @@ def is_step(x: Excitation) -> bool:
     return bool(np.diff(ends).max() - 1 >= _STAY * len(x))
 
 
+def _number(fit: FractionalFit, name: str) -> float:
+    """The half interval of a single parameter."""
+    return float(fit.half[name])
+
+
 def _experiment_fit(x: Excitation, fit: FractionalFit, integer: tuple[IntegerFit, ...]) -> ExperimentFit:
-    half = {"K": float(fit.half["gain"][0]), "T": fit.half["T"], "alpha": fit.half["alpha"]}
+    half = {"K": float(np.ravel(fit.half["gain"])[0]), "T": _number(fit, "T"), "alpha": _number(fit, "alpha")}
     found = {"K": fit.K, "T": fit.T, "alpha": fit.alpha}
     return ExperimentFit(
         name=x.name,

@@ -54,8 +54,10 @@ def _rate(stage: str, chosen: Fitted, step: float) -> list[str]:
         return []
     if chosen.shape.delayed and chosen.report.parameters["delay"][0] <= step * 1.001:
         return [
-            f"the {stage} follows within one sample of {step:g} s; how fast cannot be seen, and a dead time "
-            "of one sample stands for it"
+            (
+                f"the {stage} follows within one sample of {step:g} s; how fast cannot be seen, and a dead "
+                "time of one sample stands for it"
+            )
         ]
     return [f"no dynamics of the {stage} are seen at {step:g} s a sample; sample faster to see them"]
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.digits import told_value
@@ -60,13 +61,13 @@ class StageFit:
     fits: tuple[ShapeFit, ...]
     up_down: UpDown | None
     names: tuple[str, ...]
-    measured: tuple[np.ndarray, ...]
-    simulated: tuple[np.ndarray, ...]
+    measured: tuple[Array, ...]
+    simulated: tuple[Array, ...]
     step: float
     notes: tuple[str, ...]
 
     @property
-    def traces(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def traces(self) -> list[tuple[Array, Array, Array]]:
         """Time (s), measured and simulated signal of each experiment, all (n,)."""
         pairs = zip(self.measured, self.simulated)
         return [(np.arange(len(y)) * self.step, y, made) for y, made in pairs]
@@ -149,7 +150,7 @@ def _record(experiment: Experiment, stage: str) -> Record:
     return Record(experiment.name, drive if rests else drive - drive[0], measured, hold, bool(rests), moves)
 
 
-def _still(drive: np.ndarray, measured: np.ndarray) -> bool:
+def _still(drive: Array, measured: Array) -> bool:
     """Whether a log begins at rest: the measured signal stays where it is until the input first changes.
 
     An input that is not 0 at first may have stepped there just before: then longer than any dead time.
@@ -162,7 +163,7 @@ def _still(drive: np.ndarray, measured: np.ndarray) -> bool:
     return float(np.ptp(before)) <= _MOVES * noise + 1e-3 * float(np.ptp(measured))
 
 
-def _answers(measured: np.ndarray) -> bool:
+def _answers(measured: Array) -> bool:
     """Whether a signal ends elsewhere than it begins: it still answers to a step before its first sample."""
     noise = float(np.median(np.abs(np.diff(measured)))) + 1e-9 * float(np.ptp(measured))
     end = measured[-max(len(measured) // 4, 1) :]

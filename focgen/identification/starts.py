@@ -13,8 +13,10 @@ import numpy as np
 from scipy import fft
 from scipy.signal import lfilter
 
+from focgen.arrays import Array
 from focgen.identification.projected import Problem
 from focgen.identification.rational import LATEST, Record, Shape, discretise
+from focgen.present import present
 
 _RATIO = 2.0  # between neighbouring time constants
 _SHORTEST = 0.3  # samples
@@ -23,7 +25,7 @@ _PAIRS = ((1.0, 0.1), (0.7, 0.4))  # time constants of two real poles, over that
 _SWINGS = tuple(itertools.product((0.6, 1.2, 2.4), (0.25, 0.7)))  # (wn times that time constant, damping)
 
 
-def scan(records: Sequence[Record], poles: int) -> list[np.ndarray]:
+def scan(records: Sequence[Record], poles: int) -> list[Array]:
     """(log T, delay in samples) of the best minima, best first; of a gain (delay,) alone.
 
     The first entry is followed by the best without a dead time, then by further minima over the dead time.
@@ -37,16 +39,16 @@ def scan(records: Sequence[Record], poles: int) -> list[np.ndarray]:
     late = list(dict.fromkeys([int(order[0]), 0, *map(int, order[1:])]))
     if not poles:
         return [np.array([float(m)]) for m in late]
-    return [np.array([np.log(times[np.argmin(costs[:, m])]), float(m)]) for m in late]
+    return [np.array([float(np.log(present(times[int(np.argmin(costs[:, m]))]))), float(m)]) for m in late]
 
 
-def _time_constants(records: Sequence[Record]) -> np.ndarray:
+def _time_constants(records: Sequence[Record]) -> Array:
     longest = 0.5 * max(map(len, records))
     count = int(np.log(longest / _SHORTEST) / np.log(_RATIO)) + 1
     return _SHORTEST * _RATIO ** np.arange(max(count, 2))
 
 
-def _costs(records: Sequence[Record], T: float | None) -> np.ndarray:
+def _costs(records: Sequence[Record], T: float | None) -> Array:
     """Sum of squares left by gain and offsets for 0, 1, 2, … samples of dead time; initial states at rest."""
     count = max(int(LATEST * min(map(len, records))), 2)
     product, power, total = np.zeros(count), np.zeros(count), 0.0
@@ -58,38 +60,38 @@ def _costs(records: Sequence[Record], T: float | None) -> np.ndarray:
         kept = len(record) - 1 - np.arange(count)
         power += np.cumsum(lagged**2)[kept] - np.cumsum(lagged)[kept] ** 2 / len(record)
         total += float(wanted @ wanted)
-    return total - product**2 / np.maximum(power, 1e-300 + 1e-9 * power.max())
+    made: Array = total - product**2 / np.maximum(power, 1e-300 + 1e-9 * power.max())
+    return made
 
 
-def _lagged(record: Record, T: float | None) -> np.ndarray:
+def _lagged(record: Record, T: float | None) -> Array:
     if T is None:
         return record.drive
     made = discretise(1, np.array([np.log(T)]), 0.0, record.hold)
-    return lfilter(made.numerator(0), made.denominator, record.drive)
+    found: Array = lfilter(made.numerator(0), made.denominator, record.drive)
+    return found
 
 
-def second_order(problem: Problem, T: float, delays: Sequence[float]) -> list[np.ndarray]:
+def second_order(problem: Problem, T: float, delays: Sequence[float]) -> list[Array]:
     """The two best of a few pairs of poles around the time constant ``T`` (samples) of one."""
     shapes = [_from_pair(T * slow, T * fast) for slow, fast in _PAIRS]
     shapes += [np.log([swing / T, damping]) for swing, damping in _SWINGS]
-    delays = list(delays) if problem.shape.delayed else [None]
-    starts = [np.append(x, [] if d is None else d) for x in shapes for d in delays]
+    ends = [[float(d)] for d in delays] if problem.shape.delayed else [[]]
+    starts = [np.append(x, end) for x in shapes for end in ends]
     return best_of(problem, starts, 2)
 
 
-def best_of(problem: Problem, starts: Sequence[np.ndarray], count: int) -> list[np.ndarray]:
+def best_of(problem: Problem, starts: Sequence[Array], count: int) -> list[Array]:
     """The ``count`` starts from which least is left."""
     return sorted(starts, key=problem.cost)[:count]
 
 
-def _from_pair(slow: float, fast: float) -> np.ndarray:
+def _from_pair(slow: float, fast: float) -> Array:
     """(log wn, log damping) of two time constants."""
     return np.log([1.0 / np.sqrt(slow * fast), 0.5 * (slow + fast) / np.sqrt(slow * fast)])
 
 
-def starts_of(
-    problem: Problem, found: dict[Shape, np.ndarray], scanned: Sequence[np.ndarray]
-) -> list[np.ndarray]:
+def starts_of(problem: Problem, found: dict[Shape, Array], scanned: Sequence[Array]) -> list[Array]:
     """The starts of a shape, from the scan and from the optima ``found`` of the smaller shapes."""
     shape = problem.shape
     if shape.poles == 0:
@@ -102,7 +104,7 @@ def starts_of(
     return _starts_of_two(problem, found, scanned)
 
 
-def _starts_of_two(problem: Problem, found: dict[Shape, np.ndarray], scanned) -> list[np.ndarray]:
+def _starts_of_two(problem: Problem, found: dict[Shape, Array], scanned: Sequence[Array]) -> list[Array]:
     shape = problem.shape
     one = found.get(Shape(1, 0, shape.delayed), scanned[0])
     late = float(one[-1]) if shape.delayed else 0.0

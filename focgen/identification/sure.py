@@ -12,7 +12,7 @@ from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.stages import StageFit
 from focgen.logs.between import noise_level
-from focgen.rig.model import Relative, Uncertainty
+from focgen.rig.rig import Relative, Uncertainty
 
 _NOTHING = 1.0  # of a parameter: half an interval that says nothing
 _LEAST = 0.01  # of a parameter: no rig is known better from one session
@@ -69,11 +69,11 @@ def times_text(ratio: float) -> str:
 
 def relative_halves(excitations: Sequence[Excitation], fit: FractionalFit) -> dict[str, float]:
     """Half 95 % intervals of T, alpha and K at the largest level, over their values."""
-    level = max((x.loaded for x in excitations), key=abs)
+    level = float(max((x.loaded for x in excitations), key=abs))
     powers = level ** np.arange(len(fit.gain))
     K = float(powers @ fit.gain)
     scale = np.max(np.asarray(fit.half["gain"]) / np.sqrt(np.maximum(np.diag(fit.gain_covariance), 1e-300)))
-    half_K = float(scale * np.sqrt(max(powers @ fit.gain_covariance @ powers, 0.0)))
+    half_K = float(scale * np.sqrt(max(float(powers @ fit.gain_covariance @ powers), 0.0)))
     return {
         "T": float(fit.half["T"]) / abs(fit.T),
         "alpha": float(fit.half["alpha"]) / abs(fit.alpha),

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array
+
 
 @dataclass(frozen=True)
 class Begin:
@@ -24,7 +26,7 @@ class Begin:
         """Whether nothing ever happened before."""
         return self.levels == (0.0,)
 
-    def samples(self, h: float) -> np.ndarray:
+    def samples(self, h: float) -> Array:
         """The signal every ``h`` s up to the sample before the first, from where it was constant for ever; at
         least one.
 

@@ -14,6 +14,8 @@ from functools import cache
 
 import numpy as np
 
+from focgen.arrays import Array, Bools
+
 _FAR = 8.0  # standard deviations of a difference: a jump is larger
 _NEAR = 4.0  # standard deviations: a neighbour of a jump moves less than this …
 _QUIET = 0.1  # … or less than this share of the jump
@@ -46,11 +48,11 @@ class Course:
     coefficients of x (x − 1) and x (x − 1)(2x − 1) beside it, None where there are none.
     """
 
-    values: np.ndarray
-    jumps: np.ndarray
-    straight: np.ndarray
-    bends: np.ndarray | None = None
-    twists: np.ndarray | None = None
+    values: Array
+    jumps: Array
+    straight: Array
+    bends: Array | None = None
+    twists: Array | None = None
 
     @property
     def jumps_at_first(self) -> bool:
@@ -59,27 +61,29 @@ class Course:
 
     def first(self, count: int) -> Course:
         """The first ``count`` powers alone."""
-        return Course(*(None if part is None else part[:count] for part in vars(self).values()))
+        return replace(self, **{name: part[:count] for name, part in vars(self).items() if part is not None})
 
     def until(self, count: int) -> Course:
         """The first ``count`` samples alone."""
-        return Course(*(None if part is None else part[:, :count] for part in vars(self).values()))
+        return replace(
+            self, **{name: part[:, :count] for name, part in vars(self).items() if part is not None}
+        )
 
 
-def noise_level(values: np.ndarray) -> float:
+def noise_level(values: Array) -> float:
     """The standard deviation of a signal's white noise (n,), from its sixth differences; robust to jumps."""
     if len(values) <= _ORDER:
         return 0.0
     return float(np.median(np.abs(np.diff(values, _ORDER)))) / _NORMAL / _OF_SIXTH
 
 
-def white_level(values: np.ndarray) -> float:
+def white_level(values: Array) -> float:
     """The standard deviation of what is white of a signal (n,), n ≥ 3, from its second differences: what is
     slower than a few samples counts little."""
     return float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
 
 
-def jumps_of(values: np.ndarray) -> np.ndarray:
+def jumps_of(values: Array) -> Bools:
     """Where a signal (n,) jumps: (n,) bool, true at the first sample after a jump.
 
     A jump is far above the noise, and stands alone: a pressure on its way up moves in two samples in a row.
@@ -92,7 +96,7 @@ def jumps_of(values: np.ndarray) -> np.ndarray:
     return np.concatenate([[False], large & alone])
 
 
-def course_of(powers: np.ndarray, jumps: np.ndarray, held: bool = False) -> Course:
+def course_of(powers: Array, jumps: Bools, held: bool = False) -> Course:
     """The course of inputs ``powers`` (m, n), 0 before their first sample, with ``jumps`` (n,) by
     :func:`jumps_of`; ``held``: it changes in jumps only.
     """
@@ -109,7 +113,7 @@ def course_of(powers: np.ndarray, jumps: np.ndarray, held: bool = False) -> Cour
     return replace(course, bends=np.array(bends), twists=np.array(twists))
 
 
-def smooth_bends(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def smooth_bends(values: Array) -> tuple[Array, Array]:
     """The coefficients of both bends in the sample that ends at each index, (n,) each, of a signal without
     noise or jumps: of the polynomial through the eight samples around it, near the ends through fewer.
 
@@ -125,7 +129,7 @@ def smooth_bends(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return bends, twists
 
 
-def _bent(values: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _bent(values: Array, jumps: Bools) -> tuple[Array, Array]:
     """The coefficients of both bends in the sample that ends at each index, (n,) each."""
     noise = noise_level(values)
     bends, twists = np.zeros(len(values)), np.zeros(len(values))
@@ -140,7 +144,7 @@ def _bent(values: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return bends, twists
 
 
-def _smoothest(values: np.ndarray, jumps: np.ndarray, points: int, noise: float):
+def _smoothest(values: Array, jumps: Bools, points: int, noise: float) -> tuple[Bools, Array, Array]:
     """Where a polynomial through ``points`` samples crosses no jump, and both bends from the one whose
     highest difference is least; (n,) each."""
     n = len(values)
@@ -168,7 +172,7 @@ def _smoothest(values: np.ndarray, jumps: np.ndarray, points: int, noise: float)
 
 
 @cache
-def _weights(points: int, ahead: int) -> np.ndarray:
+def _weights(points: int, ahead: int) -> Array:
     """What the samples −ahead … points − 1 − ahead weigh in the bend and the twist between 0 and 1; (2,
     points).
 

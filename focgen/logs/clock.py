@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from focgen.arrays import Array, Ints
 from focgen.errors import LogError
 from focgen.logs.notes import Note
 
@@ -21,11 +22,12 @@ _IRREGULAR = 0.95  # quantile of the steps that stands for the pace of an irregu
 _SAME_RATE = 1e-4  # relative
 _PLAUSIBLE = 99.0  # a log is recorded at a rate within this factor of the rig's
 _LONGEST = 5_000_000  # samples
+_COUNTABLE = 2**53  # ticks that float64 tells apart
 
 Line = Callable[[int], str]
 
 
-def check_complete(time: np.ndarray, where: str, line: Line) -> None:
+def check_complete(time: Array, where: str, line: Line) -> None:
     """Raise LogError where a time stamp is missing; ``line`` names a row."""
     if np.isnan(time).any():
         raise LogError(
@@ -33,7 +35,7 @@ def check_complete(time: np.ndarray, where: str, line: Line) -> None:
         )
 
 
-def check_increasing(time: np.ndarray, where: str, line: Line) -> None:
+def check_increasing(time: Array, where: str, line: Line) -> None:
     """Raise LogError where a time stamp is not later than the one before it."""
     steps = np.diff(time)
     if (steps <= 0).any():
@@ -45,7 +47,7 @@ def check_increasing(time: np.ndarray, where: str, line: Line) -> None:
         raise LogError(where, what, remedy)
 
 
-def sittings(time: np.ndarray) -> list[slice]:
+def sittings(time: Array) -> list[slice]:
     """Where the clock starts anew: the rows of each part.
 
     It starts anew where the time falls back by more than a short hole, and then runs on at the log's own
@@ -59,11 +61,11 @@ def sittings(time: np.ndarray) -> list[slice]:
     return [slice(a, b) for a, b in zip([0, *begins], [*begins, len(time)])]
 
 
-def _runs_on(steps: np.ndarray, reach: float) -> bool:
+def _runs_on(steps: Array, reach: float) -> bool:
     return len(steps) > 0 and bool(np.all((steps >= 0) & (steps <= reach)))
 
 
-def counted(time: np.ndarray) -> np.ndarray | None:
+def counted(time: Array) -> Array | None:
     """The stamps (m,) of the uniform clock behind rounded ones, or None where it is not evident.
 
     Stamps rounded to 10 ms repeat when samples are 5 ms apart, and alternate between steps of 10 and 20 ms
@@ -80,22 +82,23 @@ def counted(time: np.ndarray) -> np.ndarray | None:
     whole = np.abs(steps / resolution - np.round(steps / resolution)).max() < 1e-3
     if not whole or resolution < _COARSE * step or np.ptp(off) > 1.01 * resolution:
         return None
-    return time[0] + step * rows
+    made: Array | None = time[0] + step * rows
+    return made
 
 
-def _few_lost(time: np.ndarray) -> bool:
+def _few_lost(time: Array) -> bool:
     ticks, _ = _ticks(time)
     return ticks is not None and ticks[-1] + 1 <= (1.0 + _FEW) * len(ticks)
 
 
-def uniform_step(time: np.ndarray) -> float | None:
+def uniform_step(time: Array) -> float | None:
     """The sample time in s where the stamps are uniform up to rounding, else None."""
     step = (time[-1] - time[0]) / (len(time) - 1)
     off = np.abs(time - time[0] - step * np.arange(len(time))).max()
     return step if off <= _JITTER * step else None
 
 
-def check_unit(time: np.ndarray, sample_time: float, where: str) -> None:
+def check_unit(time: Array, sample_time: float, where: str) -> None:
     """Raise LogError where samples lie so far apart, or so close, that the unit of time must be wrong."""
     ratio = float(np.median(np.diff(time))) / sample_time
     if 1.0 / _PLAUSIBLE < ratio < _PLAUSIBLE:
@@ -107,13 +110,13 @@ def check_unit(time: np.ndarray, sample_time: float, where: str) -> None:
     raise LogError(where, what, "give time in seconds, or correct sample_time")
 
 
-def holes(time: np.ndarray) -> np.ndarray:
+def holes(time: Array) -> Ints:
     """The rows (k,) before which more than ``SHORT`` samples are missing, against the log's own pace."""
     steps = np.diff(time)
     return np.flatnonzero(steps > (SHORT + 1.5) * pace(steps)) + 1
 
 
-def pace(steps: np.ndarray) -> float:
+def pace(steps: Array) -> float:
     """The usual step (s) of a clock that may have holes: the median, or of an irregular one nearly the
     longest."""
     usual = float(np.median(steps))
@@ -122,8 +125,8 @@ def pace(steps: np.ndarray) -> float:
 
 
 def on_grid(
-    time: np.ndarray, signals: Mapping[str, np.ndarray], sample_time: float, where: str
-) -> tuple[float, dict[str, np.ndarray], tuple[str, ...]]:
+    time: Array, signals: Mapping[str, Array], sample_time: float, where: str
+) -> tuple[float, dict[str, Array], tuple[str, ...]]:
     """Return (sample time in s, signals on a uniform grid, notes).
 
     Uniform logs keep their own rate, whatever the rig's, and samples that they lack are bridged; others are
@@ -145,14 +148,15 @@ def on_grid(
     return step, full, (*notes, Note(what, missing, f"at {time[row] + step:g} s"))
 
 
-def between(role: str, grid: np.ndarray, at: np.ndarray, values: np.ndarray) -> np.ndarray:
+def between(role: str, grid: Array | Ints, at: Array | Ints, values: Array) -> Array:
     """A role's signal at ``grid`` (n,), from ``values`` (m,) ``at`` some of it: held or on straight lines."""
     if role not in HELD:
         return np.interp(grid, at, values)
-    return values[np.maximum(np.searchsorted(at, grid + 1e-9 * (at[-1] - at[0]), side="right") - 1, 0)]
+    made: Array = values[np.maximum(np.searchsorted(at, grid + 1e-9 * (at[-1] - at[0]), side="right") - 1, 0)]
+    return made
 
 
-def _ticks(time: np.ndarray) -> tuple[np.ndarray | None, float]:
+def _ticks(time: Array) -> tuple[Ints | None, float]:
     """Which sample of a uniform clock each row (m,) is, and its step in s; None where there is no such
     clock."""
     rows = np.arange(len(time))
@@ -160,9 +164,11 @@ def _ticks(time: np.ndarray) -> tuple[np.ndarray | None, float]:
     if step is not None:
         return rows, step
     steps = np.diff(time)
-    ticks = np.concatenate([[0], np.cumsum(np.round(steps / np.median(steps)).astype(int))])
-    if (np.diff(ticks) < 1).any():
+    with np.errstate(all="ignore"):  # of steps that are no clock's
+        counts = np.round(steps / np.median(steps))
+    if not (counts >= 1).all() or counts.sum() > _COUNTABLE:
         return None, 0.0
+    ticks = np.concatenate([[0], np.cumsum(counts.astype(int))])
     step, begin = np.polyfit(ticks, time, 1)
     if ticks[-1] == rows[-1] or np.abs(time - begin - step * ticks).max() > _JITTER * step:
         return None, 0.0
@@ -178,7 +184,9 @@ def _named_step(step: float, sample_time: float, last: int) -> tuple[float, tupl
     return step, (f"sampled every {step:g} s and kept so, though the rig runs at {sample_time:g} s",)
 
 
-def _resampled(time, signals, sample_time: float, where: str):
+def _resampled(
+    time: Array, signals: Mapping[str, Array], sample_time: float, where: str
+) -> tuple[float, dict[str, Array], tuple[str, ...]]:
     count = int((time[-1] - time[0]) / sample_time + 1e-6) + 1
     _check_length(count, sample_time, where)
     grid = time[0] + sample_time * np.arange(count)

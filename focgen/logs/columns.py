@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from focgen.arrays import Array
 from focgen.errors import LogError
-from focgen.logs.plausibility import unit_of
 from focgen.logs.table import LogTable
+from focgen.logs.units import unit_named, unit_of
 
 SIGNALS = ("command", "pressure", "curvature", "output", "reference")
 _TIME = frozenset("t time zeit timestamp stamp clock sec seconds secs ms tiempo temps x".split())
@@ -36,7 +37,6 @@ _KINDS = {  # points for a unit's kind, by role
     "curvature": {"output": 2.0, "curvature": 1.5, "reference": 0.5},
     "angle": {"output": 2.0, "curvature": 1.5, "reference": 0.5},
 }
-_LENGTHS = ("mm", "cm", "m", "um", "N", "mN", "kN", "Nm", "K", "Hz", "rpm")  # units that end a name
 _NAMED, _LETTER, _MAYBE = 3.0, 2.0, 1.6  # points for a word, for a single letter, for a word of two roles
 _LEAST = 1.5  # points: less is no role's column
 _SURE = 2.0  # points: less is a guess
@@ -50,7 +50,7 @@ class Column:
 
     name: str
     unit: str
-    values: np.ndarray
+    values: Array
 
     @property
     def held(self) -> bool:
@@ -83,15 +83,10 @@ def columns_of(tables: Sequence[LogTable]) -> tuple[Column, ...]:
         except LogError:
             continue  # words, or dates
         if not np.isnan(values).all():
-            found.append(Column(name, _unit(tables[0], name), values))
+            found.append(Column(name, tables[0].unit(name) or unit_named(name), values))
     if not found:
         raise LogError(tables[0].path, "has no column of numbers", "give a log with a header")
     return tuple(found)
-
-
-def _unit(table: LogTable, name: str) -> str:
-    named, last = unit_of(name), name.split("_")[-1]
-    return table.unit(name) or (named[1] if named else last if last != name and last in _LENGTHS else "")
 
 
 def time_of(table: LogTable) -> str | None:
@@ -100,7 +95,8 @@ def time_of(table: LogTable) -> str | None:
     rising = [name for name in table.columns if _rises(table, name)]
     named = [name for name in rising if set(Column(name, "s", np.empty(0)).words) & _TIME]
     dated = [name for name in rising if not isinstance(table.column(name), np.ndarray)]
-    return (named or [n for n in dated if _is_dated(table, n)] or rising or [None])[0]
+    best = named or [n for n in dated if _is_dated(table, n)] or rising
+    return best[0] if best else None
 
 
 def _is_dated(table: LogTable, name: str) -> bool:
@@ -181,7 +177,7 @@ def guessed(columns: Sequence[Column]) -> dict[str, Guess]:
     return {role: _guess(role, j, role in sure, chosen, moving, scores) for role, j in chosen.items()}
 
 
-def _completed(chosen: Mapping[str, int], moving: Sequence[Column], scores: np.ndarray) -> dict[str, int]:
+def _completed(chosen: Mapping[str, int], moving: Sequence[Column], scores: Array) -> dict[str, int]:
     """With an output and an input, from columns that have no role."""
     chosen = dict(chosen)
     if "output" not in chosen and "curvature" in chosen:
@@ -198,7 +194,9 @@ def _completed(chosen: Mapping[str, int], moving: Sequence[Column], scores: np.n
     return {role: chosen[role] for role in SIGNALS if role in chosen}
 
 
-def _guess(role: str, j: int, sure: bool, chosen: Mapping[str, int], moving, scores: np.ndarray) -> Guess:
+def _guess(
+    role: str, j: int, sure: bool, chosen: Mapping[str, int], moving: Sequence[Column], scores: Array
+) -> Guess:
     own = scores[SIGNALS.index(role)]
     near = [
         k for k in range(len(moving)) if k not in chosen.values() and own[k] > max(_LEAST, own[j] - _CLOSE)

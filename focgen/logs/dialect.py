@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-_SAMPLE = 1000  # lines that the dialect is read off
+SAMPLE = 1000
+"""Lines that the dialect is read off."""
 _TAIL = 60  # of them, the last ones: surely data, behind whatever an instrument writes ahead
+_LINE = 2000  # characters of a line that the library looks at: it takes long over many
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
 _COMMENTS = ("#", "%", "//")
@@ -44,28 +46,37 @@ class Dialect:
         return ", ".join(said)
 
 
-def rows_of(text: str, delimiter: str) -> list[list[str]]:
-    """The cells of every line, without blanks around them; none for an empty line or a comment.
+def rows_of(lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:
+    """Yield the cells of every line, without blanks around them; none for an empty line or a comment.
 
     Raises csv.Error where quotes do not close.
     """
     if delimiter == " ":
-        return [[] if _is_comment(line) else line.split() for line in text.splitlines()]
-    lines = ("\n" if _is_comment(line) else line for line in io.StringIO(text, newline=""))
-    rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter != "\t")
-    cells = ([cell.strip() for cell in row] for row in rows)
-    return [row if any(row) else [] for row in cells]
+        yield from ([] if _is_comment(line) else line.split() for line in lines)
+        return
+    plain = ("\n" if _is_comment(line) else line for line in lines)
+    for row in csv.reader(plain, delimiter=delimiter, skipinitialspace=delimiter != "\t"):
+        cells = [cell.strip() for cell in row]
+        yield cells if any(cells) else []
+
+
+def lines_of(text: str) -> Iterator[str]:
+    """The lines of a text, with their ends, however those are written."""
+    return iter(io.StringIO(text, newline=""))
+
+
+def _rows(text: str, delimiter: str) -> list[list[str]]:
+    return list(rows_of(lines_of(text), delimiter))
 
 
 def _is_comment(line: str) -> bool:
     return line.lstrip().startswith(_COMMENTS)
 
 
-def sniffed(text: str) -> Dialect:
-    """The dialect of a file. Raises csv.Error where quotes do not close."""
-    sample = "\n".join(text.split("\n", _SAMPLE)[:_SAMPLE])
+def sniffed(sample: str) -> Dialect:
+    """The dialect of a file that begins with ``sample``. Raises csv.Error where quotes do not close."""
     delimiter = _delimiter(sample)
-    rows = rows_of(sample, delimiter)
+    rows = _rows(sample, delimiter)
     decimal = _decimal(rows, delimiter)
     return Dialect(delimiter, decimal, *_places(rows, decimal))
 
@@ -74,15 +85,23 @@ def _delimiter(sample: str) -> str:
     """Plain CSV is recognised without ado, for it is what most logs are; the rest is put to a library."""
     lines = [line for line in sample.splitlines() if line.strip() and not _is_comment(line)]
     tail = "\n".join(lines[-min(_TAIL, max(1, len(lines) - 1)) :])
-    rows = [row for row in rows_of(tail, ",") if row]
+    rows = [row for row in _rows(tail, ",") if row]
     if len({len(row) for row in rows}) == 1 and len(rows[0]) > 1 and _all_plain(rows):
         return ","
-    import clevercsv  # G. J. J. van den Burg et al., Data Min. Knowl. Disc. 33, 2019
-
-    dialect = clevercsv.Detector().detect(tail, delimiters=list(_DELIMITERS))
-    found = getattr(dialect, "delimiter", None)
+    found = _detected(tail)
     likely = [found, *_DELIMITERS] if found in _DELIMITERS else list(_DELIMITERS)
     return max(likely, key=lambda delimiter: _readable(tail, delimiter))  # the first of the best
+
+
+def _detected(text: str) -> str | None:
+    """What the library takes for the delimiter; None where it finds none, for whatever reason of its own."""
+    import clevercsv  # G. J. J. van den Burg et al., Data Min. Knowl. Disc. 33, 2019
+
+    short = "\n".join(line[:_LINE] for line in text.split("\n"))
+    try:
+        return getattr(clevercsv.Detector().detect(short, delimiters=list(_DELIMITERS)), "delimiter", None)
+    except Exception:  # noqa: BLE001 - it raises whatever its parsers meet
+        return None
 
 
 def _readable(text: str, delimiter: str) -> int:
@@ -90,7 +109,7 @@ def _readable(text: str, delimiter: str) -> int:
 
     The library knows text better than numbers: "0,0 1,5" looks to it like three columns.
     """
-    rows = [row for row in rows_of(text, delimiter) if row]
+    rows = [row for row in _rows(text, delimiter) if row]
     cells = [cell for row in rows for cell in row]
     if not cells or len(rows[0]) < 2 or len({len(row) for row in rows}) > 1:
         return 0
@@ -147,7 +166,9 @@ def _width(rows: Sequence[Sequence[str]]) -> int:
 
 def _same(row: Sequence[str], width: int) -> bool:
     """Whether a row of names fits rows of readings: some instruments end one of them with a delimiter."""
-    return len(row) == width or abs(len(row) - width) == 1 and bool(row) and (not row[-1] or len(row) < width)
+    return len(row) == width or (
+        abs(len(row) - width) == 1 and bool(row) and (not row[-1] or len(row) < width)
+    )
 
 
 def _numeric_columns(rows: Sequence[Sequence[str]], width: int, decimal: str) -> list[int]:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.logs.begin import REST, Begin
 
 ROLES = ("command", "pressure", "curvature", "output", "reference")
@@ -17,21 +18,21 @@ ROLES = ("command", "pressure", "curvature", "output", "reference")
 class Experiment:
     """Uniformly sampled signals of one experiment, by role.
 
-    ``signals`` maps a role of :data:`ROLES` to an array of shape (n,) in the log's own units; sample k
-    was taken ``k * sample_time`` seconds after ``start``. ``start`` is the session's time of sample 0 in s,
-    ``raw_time`` the logged time stamps (m,) in s before any resampling, ``rows`` the signals (m,) at those
-    where they were resampled, ``notes`` what was done to the log. ``continues``: the rig ran just before,
-    in samples that are missing or cut out, so that the state in which it begins is unknown. ``begins``: by
-    role, what a signal was before the first sample; others were at rest at 0.
+    ``signals`` maps a role of :data:`ROLES` to an array of shape (n,) in the log's own units; sample k was
+    taken ``k * sample_time`` seconds after ``start``. ``start`` is the session's time of sample 0 in s.
+    ``raw_time`` has the logged time stamps (m,) in s before any resampling, ``rows`` the signals (m,) at
+    those where they were resampled. ``notes`` says what was done to the log. ``continues``: the rig ran just
+    before, in samples that are missing or cut out, so that the state in which it begins is unknown.
+    ``begins``: by role, what a signal was before the first sample; others were at rest at 0.
     """
 
     name: str
     sample_time: float
-    signals: Mapping[str, np.ndarray]
+    signals: Mapping[str, Array]
     start: float = 0.0
-    raw_time: np.ndarray | None = None
+    raw_time: Array | None = None
     notes: tuple[str, ...] = ()
-    rows: Mapping[str, np.ndarray] | None = None
+    rows: Mapping[str, Array] | None = None
     continues: bool = False
     begins: Mapping[str, Begin] = field(default_factory=dict)
 
@@ -51,7 +52,7 @@ class Experiment:
     def __contains__(self, role: str) -> bool:
         return role in self.signals
 
-    def __getitem__(self, role: str) -> np.ndarray:
+    def __getitem__(self, role: str) -> Array:
         return self.signals[role]
 
     def before(self, role: str) -> Begin:
@@ -59,7 +60,7 @@ class Experiment:
         return self.begins.get(role, REST)
 
     @property
-    def time(self) -> np.ndarray:
+    def time(self) -> Array:
         """Seconds since the first sample, shape (n,)."""
         return np.arange(len(self)) * self.sample_time
 
@@ -75,9 +76,7 @@ class Experiment:
         begins = self.begins if begin == 0 else {}
         return replace(self, signals=cut, start=start, raw_time=time, rows=rows, begins=begins)
 
-    def _rows_between(
-        self, low: float, high: float
-    ) -> tuple[np.ndarray | None, Mapping[str, np.ndarray] | None]:
+    def _rows_between(self, low: float, high: float) -> tuple[Array | None, Mapping[str, Array] | None]:
         """The raw time stamps and rows from ``low`` to ``high`` (s since the first)."""
         if self.raw_time is None:
             return None, None

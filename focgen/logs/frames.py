@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LogTable
@@ -16,7 +17,8 @@ class Frame(Protocol):
     """What pandas and polars frames have in common: columns, by name."""
 
     @property
-    def columns(self) -> Iterable[Any]: ...
+    def columns(self) -> Iterable[Any]:
+        """The columns' names."""
 
     def __getitem__(self, key: Any, /) -> Any: ...
 
@@ -34,7 +36,7 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     """
     columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
     index = getattr(frame, "index", None)
-    clock: np.ndarray | None = None
+    clock: Array | None = None
     if index is not None and not callable(index) and str(index.name) not in columns:
         values = _column(index, name, "index")
         named = {} if index.name is None else {str(index.name): values}
@@ -53,7 +55,7 @@ def _keys(frame: Frame | Mapping[Any, Any]) -> list[Any]:
     return list(frame) if isinstance(frame, Mapping) else list(frame.columns)
 
 
-def _column(values: Any, name: str, key: str) -> np.ndarray | list[Any]:
+def _column(values: Any, name: str, key: str) -> Array | list[Any]:
     """Numbers as float64, times in s, everything else as a list."""
     try:
         array = np.asarray(values)

@@ -12,8 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import LogError
-from focgen.logs.table import LogTable
+from focgen.logs.dialect import lines_of
+from focgen.logs.table import LARGEST, LogTable
 from focgen.logs.text_file import decoded, table_of
 from focgen.textfile import read_log_bytes
 
@@ -37,7 +39,7 @@ def read(path: Path) -> LogTable:
     text, encoding = decoded(read_log_bytes(path), path)
     lines = text.splitlines()
     if not lines or not lines[0].startswith("LabVIEW Measurement"):
-        return table_of(path, text, encoding)
+        return table_of(path, lambda: lines_of(text), encoding)
     settings, separator = _settings(lines)
     segments = [s for s in _segments(lines, separator) if s.lines]
     if not segments:
@@ -108,9 +110,11 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
     )
 
 
-def _clock(path: Path, segment: _Segment) -> np.ndarray:
+def _clock(path: Path, segment: _Segment) -> Array:
     try:
         begin, step = (float(segment.settings[key][0].replace(",", ".")) for key in ("X0", "Delta_X"))
+        if not max(abs(begin), abs(step)) <= LARGEST:
+            raise ValueError(step)
     except (KeyError, IndexError, ValueError):
         raise LogError(str(path), "has neither a column of time nor Delta_X", "log the time") from None
     return begin + step * np.arange(len(segment.lines))

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
+from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
 from focgen.logs.table import LogTable
 
@@ -43,7 +45,7 @@ def read(path: Path) -> LogTable:
     return LogTable(str(path), columns, aliases=aliases)
 
 
-def _version_73(path: Path) -> dict:
+def _version_73(path: Path) -> dict[str, Any]:
     """The content of an HDF5 file as nested dictionaries of arrays, as MATLAB has them."""
     try:
         import h5py
@@ -56,7 +58,7 @@ def _version_73(path: Path) -> dict:
         raise LogError(str(path), "is not a whole MAT file", _REMEDY) from None
 
 
-def _of_hdf5(item):
+def _of_hdf5(item: Any) -> Any:
     """A group as a dictionary; an array, whose axes HDF5 has in reverse, as MATLAB has it; else None."""
     if hasattr(item, "items"):
         return {name: _of_hdf5(part) for name, part in item.items()}
@@ -67,7 +69,7 @@ def _of_hdf5(item):
     return "".join(map(chr, np.ravel(values))) if text else np.squeeze(np.asarray(values).T)
 
 
-def _vectors(content: dict, owner: str = "") -> Iterator[tuple[str, str, np.ndarray]]:
+def _vectors(content: dict[str, Any], owner: str = "") -> Iterator[tuple[str, str, Array]]:
     """Yield (owner, name, column) of all that is inside; scalars (settings, counters) are left out."""
     label = content.get("label")
     for name, value in content.items():
@@ -84,7 +86,7 @@ def _vectors(content: dict, owner: str = "") -> Iterator[tuple[str, str, np.ndar
             yield from ((owner, own + mark, column) for mark, column in _columns(value))
 
 
-def _columns(value: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+def _columns(value: Array) -> Iterator[tuple[str, Array]]:
     """Yield (mark of its name, column (m,)) of a vector or a matrix."""
     if value.dtype.kind not in "fiubU" or value.size < 2:
         return
@@ -95,10 +97,11 @@ def _columns(value: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         yield from ((f"_{k + 1}", value[:, k]) for k in range(value.shape[1]))
 
 
-def _by_name(found: list[tuple[str, str, np.ndarray]]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def _by_name(found: list[tuple[str, str, Array]]) -> tuple[dict[str, Array], dict[str, str]]:
     """Columns by their own name where no other has it, else by "owner.name"; and the aliases."""
     names = [name for _, name, _ in found]
-    columns, aliases = {}, {}
+    columns: dict[str, Array] = {}
+    aliases: dict[str, str] = {}
     for owner, name, column in found:
         whole = f"{owner}.{name}" if owner else name
         own = name if names.count(name) == 1 else whole

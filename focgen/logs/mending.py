@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from focgen.arrays import Array, Ints
 from focgen.logs.clock import HELD, between
 from focgen.logs.notes import Note
 from focgen.logs.outliers import barred_by, outliers, straightened
@@ -14,9 +15,7 @@ from focgen.logs.repeats import fresh_rows, frozen
 _DRIVES = ("command", "pressure")
 
 
-def mended(
-    time: np.ndarray, values: Mapping[str, np.ndarray]
-) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+def mended(time: Array, values: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Return (signals without holes, notes) of signals (m,) by role, NaN where a reading is missing.
 
     Outliers of measured signals go to the straight line between their neighbours, and so do readings that are
@@ -24,7 +23,8 @@ def mended(
     at its fresh readings, with straight lines between: it would seem late by half of what it repeats. An
     output that repeats is left so, for the controller reads it late.
     """
-    found, notes = {}, []
+    found: dict[str, Array] = {}
+    notes: list[str] = []
     for role in sorted(values, key=lambda role: (role not in HELD, role not in _DRIVES)):
         found[role], said = _mended(role, time, values[role], found.get("command", found.get("pressure")))
         notes += said
@@ -32,7 +32,7 @@ def mended(
     return {role: found[role] for role in values}, tuple(notes)
 
 
-def _mended(role: str, time, y, drive) -> tuple[np.ndarray, list[str]]:
+def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Array, list[str]]:
     there = np.flatnonzero(~np.isnan(y))
     rows, notes = there, []
     if role not in HELD:
@@ -56,7 +56,7 @@ def _mended(role: str, time, y, drive) -> tuple[np.ndarray, list[str]]:
     return _filled(role, time, y, rows, there), notes
 
 
-def _filled(role: str, time, y, rows, there) -> np.ndarray:
+def _filled(role: str, time: Array, y: Array, rows: Ints, there: Ints) -> Array:
     """All rows of a signal from its fresh ``rows``, those of an output held where it was logged."""
     if len(rows) == len(y):
         return y
@@ -66,7 +66,7 @@ def _filled(role: str, time, y, rows, there) -> np.ndarray:
     return between(role, time, time[rows], y[rows])
 
 
-def _slow_note(role: str, period: float, time: np.ndarray) -> str:
+def _slow_note(role: str, period: float, time: Array) -> str:
     rate = (len(time) - 1) / (time[-1] - time[0]) / period
     done = "straight lines between"
     if role == "output":
@@ -74,8 +74,8 @@ def _slow_note(role: str, period: float, time: np.ndarray) -> str:
     return f"{role} is fresh in every {period:.3g}. row only ({rate:.3g} Hz): {done}"
 
 
-def _frozen(time: np.ndarray, values: Mapping[str, np.ndarray]) -> list[str]:
-    notes = []
+def _frozen(time: Array, values: Mapping[str, Array]) -> list[str]:
+    notes: list[str] = []
     for role in values:
         others = [y for other, y in values.items() if other != role and not np.isnan(y).any()]
         stretch = None if role in HELD or np.isnan(values[role]).any() else frozen(values[role], others)

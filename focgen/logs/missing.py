@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array, Bools
 from focgen.logs.clock import SHORT
 from focgen.logs.notes import Note
 
@@ -18,11 +19,11 @@ class Kept:
     """``roles``: those kept; ``rows``: a mask (m,) of the rows kept; ``notes``: what was left out."""
 
     roles: tuple[str, ...]
-    rows: np.ndarray
+    rows: Bools
     notes: tuple[str, ...]
 
 
-def keep(values: Mapping[str, np.ndarray], time: np.ndarray) -> Kept:
+def keep(values: Mapping[str, Array], time: Array) -> Kept:
     """What is kept of signals (m,) by role, some with readings missing (NaN).
 
     Short stretches are kept, to be bridged. Rows of a long one are cut out; or its role is, where another can
@@ -47,7 +48,7 @@ def keep(values: Mapping[str, np.ndarray], time: np.ndarray) -> Kept:
     return Kept(tuple(roles), rows, tuple(notes))
 
 
-def long_stretches(y: np.ndarray) -> np.ndarray:
+def long_stretches(y: Array) -> Bools:
     """Which of the missing readings of ``y`` (m,) cannot be bridged, as a mask (m,).
 
     More than ``SHORT`` of its own periods without a reading are long, and so is what has no reading on one
@@ -68,5 +69,5 @@ def _dispensable(role: str, roles: Collection[str]) -> bool:
     return role in ("curvature", "reference") or _INPUTS.get(role) in roles
 
 
-def _stretches(mask: np.ndarray) -> int:
+def _stretches(mask: Bools) -> int:
     return int(np.sum(np.diff(mask.astype(int), prepend=0) == 1))

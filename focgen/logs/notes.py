@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 _NAMED = 4  # experiments named in one line; of more only the first few
 
@@ -12,25 +12,28 @@ class Noted(Protocol):
     """What has a name and notes (an ``Experiment``)."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """What the notes are of."""
 
     @property
-    def notes(self) -> tuple[str, ...]: ...
+    def notes(self) -> tuple[str, ...]:
+        """What there is to say, one sentence each."""
 
 
 class Note(str):
     """A note on what happened at several places: ``what``, how often, and where ``first`` ("at 1.2 s")."""
 
     what: str
-    count: int
+    count: int  # type: ignore[assignment]  # of places; nobody counts a note's letters
     first: str
 
     def __new__(cls, what: str, count: int, first: str) -> Note:
+        """The text, and what it was made of."""
         note = super().__new__(cls, f"{what} ({_places(count, first)})")
         note.what, note.count, note.first = what, count, first
         return note
 
-    def __getnewargs__(self):  # notes cross process boundaries
+    def __getnewargs__(self) -> tuple[Any, ...]:  # notes cross process boundaries
         return self.what, self.count, self.first
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from focgen.arrays import Array, Bools, Ints
+
 WIDEST = 3  # readings in a row
 _SIDE = 3  # readings on either side that have to agree
 _FAR = 5.2  # robust standard deviations of a reading from the line through its neighbours
@@ -17,7 +19,7 @@ _FEWEST = 20  # readings
 _FINE = 1e-3  # of the span: what noise there is at least
 
 
-def outliers(y: np.ndarray, barred: np.ndarray | None = None) -> np.ndarray:
+def outliers(y: Array, barred: Bools | None = None) -> Bools:
     """Which readings of ``y`` (n,) are outliers, as a mask (n,); never one where ``barred`` (n,).
 
     One to three readings in a row count that lie on one side of the line through three neighbours on either
@@ -36,18 +38,18 @@ def outliers(y: np.ndarray, barred: np.ndarray | None = None) -> np.ndarray:
     return found if found.sum() <= max(WIDEST, _RARE * len(y)) else np.zeros(len(y), bool)
 
 
-def barred_by(command: np.ndarray) -> np.ndarray:
+def barred_by(command: Array) -> Bools:
     """Where ``command`` (n,) jumps, and shortly after: a signal may move fast there."""
     jumps = np.abs(np.diff(command, prepend=command[0])) > 0.05 * (float(np.ptp(command)) or np.inf)
     return np.convolve(jumps, np.ones(14), "full")[3 : 3 + len(command)] > 0.5
 
 
-def straightened(time: np.ndarray, y: np.ndarray, wrong: np.ndarray) -> np.ndarray:
+def straightened(time: Array, y: Array, wrong: Bools) -> Array:
     """``y`` (n,) with the readings that are ``wrong`` (n,) on the straight line between their neighbours."""
     return np.where(wrong, np.interp(time, time[~wrong], y[~wrong]), y)
 
 
-def _pulses(y: np.ndarray, barred: np.ndarray, width: int, least: float) -> np.ndarray:
+def _pulses(y: Array, barred: Bools, width: int, least: float) -> Ints:
     """Where outliers of ``width`` readings begin."""
     whole = 2 * _SIDE + width
     if len(y) < whole:
@@ -69,7 +71,7 @@ def _pulses(y: np.ndarray, barred: np.ndarray, width: int, least: float) -> np.n
     return np.flatnonzero(hit) + _SIDE
 
 
-def _noise(off: np.ndarray) -> np.ndarray:
+def _noise(off: Array) -> Array:
     """The robust standard deviation at each place of what is ``off`` (m,): its median over the noisiest of
     the blocks around, or over all."""
     count = max(1, len(off) // _BLOCK)
@@ -77,10 +79,11 @@ def _noise(off: np.ndarray) -> np.ndarray:
     padded = np.concatenate([medians[:1], medians, medians[-1:]])
     near = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
     sizes = [len(part) for part in np.array_split(off, count)]
-    return 1.4826 * np.maximum(np.repeat(near, sizes), np.median(off))
+    made: Array = 1.4826 * np.maximum(np.repeat(near, sizes), np.median(off))
+    return made
 
 
-def _least_noise(y: np.ndarray) -> float:
+def _least_noise(y: Array) -> float:
     """Half a step of a quantised signal, or a little of the span: the median of steps that mostly stay away
     is 0."""
     steps = np.abs(np.diff(y))
@@ -89,7 +92,7 @@ def _least_noise(y: np.ndarray) -> float:
     return max(0.5 * float(moved.min()), _FINE * float(np.ptp(middle)))
 
 
-def _jumps(y: np.ndarray) -> float:
+def _jumps(y: Array) -> float:
     """The largest change from one reading to the next that lasts."""
     if len(y) < 16:
         return np.inf

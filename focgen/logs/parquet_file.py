@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
+from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
 from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LogTable
@@ -28,7 +28,7 @@ def read(path: Path) -> LogTable:
     return LogTable(str(path), {name: _column(table.column(name)) for name in table.column_names})
 
 
-def _column(column) -> np.ndarray | list:
+def _column(column: Any) -> Array | list[Any]:
     """Numbers as an array with NaN for nulls, time stamps in s, everything else as a list."""
     values = of_numpy(column.to_numpy())
     return values if values.dtype.kind in "fiu" else values.tolist()

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.arrays import Array, Bools, Ints
 from focgen.errors import LogError
 from focgen.logs import clock, missing
 from focgen.logs.clock import FEWEST
@@ -25,15 +26,15 @@ class Raw:
     name: str
     where: str
     stamps: str
-    time: np.ndarray
-    values: Mapping[str, np.ndarray]
+    time: Array
+    values: Mapping[str, Array]
     line: clock.Line
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.time)
 
-    def part(self, kept) -> Raw:
+    def part(self, kept: slice | Bools | Ints) -> Raw:
         """The rows ``kept``: a slice, a mask (m,) or row numbers."""
         rows = np.arange(len(self))[kept]
         values = {role: y[rows] for role, y in self.values.items()}
@@ -79,13 +80,13 @@ def _counted(run: Raw) -> Raw:
     even = clock.counted(run.time)
     if even is not None:
         step = even[1] - even[0]
-        note = f"time stamps are rounded, {step:.4g} s between samples by their number"
-        run = replace(run, time=even).with_notes(note)
+        told = f"time stamps are rounded, {step:.4g} s between samples by their number"
+        run = replace(run, time=even).with_notes(told)
     clock.check_increasing(run.time, run.stamps, run.line)
     return run
 
 
-def _repeats(run: Raw) -> np.ndarray:
+def _repeats(run: Raw) -> Array:
     """Which rows (m,) repeat the one before, time stamp and all."""
     same = np.diff(run.time) == 0
     for y in run.values.values():
@@ -125,7 +126,7 @@ def _uncut(run: Raw, sample_time: float) -> Iterator[tuple[Raw, bool]]:
         yield (part.with_notes(*notes) if rows is long[0] else part), bool(unseen)
 
 
-def _hole_notes(time: np.ndarray, holes: np.ndarray) -> list[Note]:
+def _hole_notes(time: Array, holes: Ints) -> list[Note]:
     if not len(holes):
         return []
     before, after = time[holes[0] - 1], time[holes[0]]
@@ -133,7 +134,7 @@ def _hole_notes(time: np.ndarray, holes: np.ndarray) -> list[Note]:
     return [Note(what, len(holes), f"of {after - before:g} s at {before:g} s")]
 
 
-def _short_notes(time: np.ndarray, spans: list[np.ndarray]) -> list[Note]:
+def _short_notes(time: Array, spans: Sequence[Ints]) -> list[Note]:
     short = [rows for rows in spans if len(rows) < FEWEST]
     what = f"parts of fewer than {FEWEST} samples left out"
     return [Note(what, len(short), f"at {time[short[0][0]]:g} s")] if short else []

@@ -5,13 +5,14 @@ A slip is named only where the log as it stands is implausible, and the log with
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.logs.experiment import Experiment
+from focgen.logs.units import SIZES, unit_of
 
 EXCESS = 1.5  # times its range: a signal beyond is implausible
 _GAIN = 2.5  # times the nominal gain, or less than 1/2.5: implausible
@@ -26,18 +27,8 @@ _ATMOSPHERE = 1.01325  # bar
 _WEATHER = (0.9, 1.05)  # of it: hills and weather
 _REST = 0.05  # of the range of the command: at rest
 
-_SIZES = {  # what one of each unit is, in the first of its kind
-    "pressure": {"bar": 1.0, "kPa": 1e-2, "mbar": 1e-3, "psi": 0.0689476, "MPa": 10.0, "Pa": 1e-5},
-    "curvature": {"1/mm": 1.0, "1/cm": 0.1, "1/m": 1e-3},
-    "angle": {"rad": 1.0, "deg": np.pi / 180.0},
-    "voltage": {"V": 1.0, "mV": 1e-3},
-    "current": {"A": 1.0, "mA": 1e-3},
-}
-_SPELLED = {"permm": "1/mm", "percm": "1/cm", "perm": "1/m", "1pm": "1/m", "1pmm": "1/mm", "hpa": "mbar"}
-_ANY_CASE = ("bar", "kPa", "mbar", "psi", "rad", "deg", "1/mm", "1/cm", "1/m")  # a name in v is no voltage
-
 Limits = Mapping[str, tuple[float, float]]
-Signals = dict[str, list[np.ndarray]]
+Signals = dict[str, list[Array]]
 
 
 @dataclass(frozen=True)
@@ -128,22 +119,6 @@ def hint(role: str, column: str, factor: float) -> str:
     return f"{max(slips, key=lambda s: factor / s.factor).words}?" if slips else ""
 
 
-def unit_of(text: str) -> tuple[str, str] | None:
-    """(kind, unit) that a unit or a column's name ends in, or None.
-
-    >>> unit_of("p_kPa"), unit_of("kappa_cam_per_mm"), unit_of("angle")
-    (('pressure', 'kPa'), ('curvature', '1/mm'), None)
-    """
-    words = re.sub(r"_?per_?", "_per", text.replace("1/", "_per")).strip("]) ").split("_")
-    last = re.split(r"[\s\[(]+", words[-1])[-1]
-    last = _SPELLED.get(last.lower(), last)
-    for kind, sizes in _SIZES.items():
-        for unit in sizes:
-            if unit == last or (unit in _ANY_CASE and unit.lower() == last.lower()):
-                return kind, unit
-    return None
-
-
 def _unit_slips(roles: tuple[str, ...], column: str, span: tuple[float, float] | None) -> list[Slip]:
     """Every other unit that ``roles`` may have been logged in; ``column`` names the right one."""
     known, named = unit_of(column), " and ".join(roles)
@@ -154,7 +129,7 @@ def _unit_slips(roles: tuple[str, ...], column: str, span: tuple[float, float] |
     if roles == ("command",) and span and span[1] > 0 and abs(span[1] - 100.0) > 1.0:
         slips.append(Slip(f"command in per cent instead of {unit}", roles, 100.0 / span[1]))
     if known:
-        sizes = _SIZES[known[0]]
+        sizes = SIZES[known[0]]
         others = {other: sizes[unit] / size for other, size in sizes.items() if other != unit}
         return slips + [Slip(f"{named} in {u} instead of {unit}", roles, f) for u, f in others.items()]
     if roles != ("command",):
@@ -166,7 +141,7 @@ def _unit_slips(roles: tuple[str, ...], column: str, span: tuple[float, float] |
 
 def _candidates(signals: Signals, limits: Limits, columns: Mapping[str, str]) -> list[Slip]:
     """Every slip that might have been made: of one signal, of camera and sensor alike, or of two columns."""
-    groups = [(role,) for role in signals]
+    groups: list[tuple[str, ...]] = [(role,) for role in signals]
     if {"curvature", "output"} <= set(signals):
         groups.append(("curvature", "output"))
     slips = []
@@ -231,7 +206,7 @@ def _absolute(signals: Signals, limits: Limits, columns: Mapping[str, str]) -> S
     low, high = limits["pressure"]
     known = unit_of(columns.get("pressure", ""))
     unit = (known or ("pressure", "bar"))[1]
-    air = _ATMOSPHERE / _SIZES["pressure"].get(unit, 1.0)
+    air = _ATMOSPHERE / SIZES["pressure"].get(unit, 1.0)
     rest = _lowest(signals)
     at_rest = rest > EXCESS * high or (
         known and rest > _REST * high and _commanded_rest(signals, limits.get("command"))
@@ -255,7 +230,7 @@ def _lowest(signals: Signals) -> float:
     return float(np.quantile(np.concatenate(signals["pressure"]), 0.01))
 
 
-def _peak(parts: Sequence[np.ndarray]) -> float:
+def _peak(parts: Sequence[Array]) -> float:
     return max(float(np.abs(y).max()) for y in parts)
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol, cast
 
 import numpy as np
 
+from focgen.arrays import Array, Ints
 from focgen.errors import LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.frames import Frame, is_frame, table_of
@@ -31,16 +33,20 @@ class Roles(Protocol):
     """Which column plays which role, and how it becomes its signal (the rig's ``Signals``)."""
 
     @property
-    def time(self) -> str: ...
+    def time(self) -> str:
+        """The column of the time."""
 
     @property
-    def run(self) -> str | None: ...
+    def run(self) -> str | None:
+        """The column that splits a file into experiments, or None."""
 
     @property
-    def scales(self) -> Mapping[str, Scale]: ...
+    def scales(self) -> Mapping[str, Scale]:
+        """What turns a column into its signal, by role."""
 
     @property
-    def units(self) -> Mapping[str, str]: ...
+    def units(self) -> Mapping[str, str]:
+        """The rig's units, by role."""
 
     def columns(self) -> dict[str, str]:
         """Role → column, without time and run."""
@@ -114,7 +120,7 @@ def _experiments(
             yield table.path, experiment
 
 
-def _time(table: LogTable, signals: Roles) -> tuple[np.ndarray, tuple[str, ...]]:
+def _time(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
     """The time stamps (m,) in s, and a note where no column gives them."""
     if signals.time in table:
         return _scaled(table, "time", table.seconds(signals.time), signals), ()
@@ -124,7 +130,7 @@ def _time(table: LogTable, signals: Roles) -> tuple[np.ndarray, tuple[str, ...]]
     return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
 
 
-def _scaled(table: LogTable, role: str, values: np.ndarray, signals: Roles) -> np.ndarray:
+def _scaled(table: LogTable, role: str, values: Array, signals: Roles) -> Array:
     """A column's values (m,) as the role's signal. Raises LogError where its unit cannot be converted."""
     scale = signals.scales.get(role)
     if scale is None:
@@ -137,13 +143,13 @@ def _scaled(table: LogTable, role: str, values: np.ndarray, signals: Roles) -> n
         raise LogError(f"{table.path} [{name}]", f"cannot be converted: {reason}", remedy) from None
 
 
-def _present(table: LogTable, signals: Roles) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+def _present(table: LogTable, signals: Roles) -> tuple[dict[str, Array], tuple[str, ...]]:
     """The signals that are there, by role, and notes on those that are not, or in another unit."""
     wanted = signals.columns()
     taken = {signals.time, signals.run or "", *wanted.values()}
     inputs = [role for role in ("command", "pressure") if role in wanted]
     there = [role for role, name in wanted.items() if name in table]
-    for role in ["output"] + inputs[: 0 if any(role in there for role in inputs) else 1]:
+    for role in ["output", *inputs[: 0 if any(role in there for role in inputs) else 1]]:
         if role not in there:
             raise table.missing(role, wanted[role], taken)
     columns = {role: _scaled(table, role, table.numbers(wanted[role]), signals) for role in there}
@@ -173,7 +179,7 @@ def _absence(table: LogTable, role: str, name: str, taken: set[str]) -> str:
     return f"no column {name!r}: {role} taken as not logged" + (f" (is it {near!r}?)" if near else "")
 
 
-def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, np.ndarray]]:
+def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, Ints]]:
     """Yield (name, row numbers) in the order of appearance."""
     if run is not None and run in table:
         labels = np.array(table.texts(run))
@@ -227,7 +233,7 @@ def in_session_order(experiments: Sequence[Experiment]) -> tuple[Experiment, ...
     as if no time had passed between them. One that continues another keeps its distance from it.
     """
     by_time = sorted(experiments, key=lambda e: e.start)
-    if all(earlier.start + earlier.time[-1] < later.start for earlier, later in zip(by_time, by_time[1:])):
+    if all(earlier.start + earlier.time[-1] < later.start for earlier, later in pairwise(by_time)):
         return tuple(by_time)
     placed, now, before = [], 0.0, None
     for experiment in experiments:

@@ -12,14 +12,15 @@ import os
 import sys
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
-from focgen.logs.table import LogTable
+from focgen.logs.table import FOREIGN, LogTable
 
 MEMORY = 4 << 30  # bytes; a log of 10 million rows and 20 columns takes less than half
-_KINDS = ("focgen.logs.mat_file", "focgen.logs.parquet_file", "focgen.logs.tdms_file")
 
 
 def main(module: str, path: Path) -> None:
@@ -51,9 +52,10 @@ def _kind(reason: Exception) -> str:
 
 
 def _read(module: str, path: Path) -> LogTable:
-    if module not in _KINDS:
+    if module not in FOREIGN.values():
         raise ValueError(module)
-    return import_module(module).read(path)
+    made: LogTable = import_module(module).read(path)
+    return made
 
 
 def _limit() -> None:
@@ -70,9 +72,10 @@ def _limit() -> None:
             continue
 
 
-def _columns(table: LogTable) -> tuple[dict, list[np.ndarray]]:
+def _columns(table: LogTable) -> tuple[dict[str, Any], list[Array]]:
     """The answer's first line, and the columns of numbers."""
-    head, numbers = [], []
+    head: list[list[Any]] = []
+    numbers: list[Array] = []
     for name, column in table.columns.items():
         if isinstance(column, np.ndarray) and column.dtype.kind in "fiub":
             numbers.append(np.ascontiguousarray(column, dtype=np.float64))
@@ -86,7 +89,7 @@ def _columns(table: LogTable) -> tuple[dict, list[np.ndarray]]:
     return {"columns": head, **known, "clock": table.clock is not None}, numbers
 
 
-def _cell(cell) -> str:
+def _cell(cell: object) -> str:
     """As a file of text would have it: nothing where it is empty, 1 and 0 for truth values."""
     if cell is None:
         return ""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from focgen.arrays import Array, Ints
+
 _CHANGES = 20  # fresh readings at least
 _REGULAR = 0.98  # of the gaps between changes agree with one rate
 _SINGLE = 0.8  # of them are one period long: a fresh reading rarely equals the last
@@ -15,7 +17,7 @@ _MOVES = 0.1  # of its span: by as much another signal moves meanwhile
 _INSIDE = 0.02  # of the span: nearer to an end a signal rests or saturates
 
 
-def fresh_rows(y: np.ndarray) -> tuple[float, np.ndarray] | None:
+def fresh_rows(y: Array) -> tuple[float, Array] | None:
     """(rows per reading, the rows with a fresh one) where ``y`` (n,) is updated at a steady lower rate than
     it is logged, or None.
 
@@ -37,12 +39,12 @@ def fresh_rows(y: np.ndarray) -> tuple[float, np.ndarray] | None:
     return period, _slots(changes, periods.astype(int), gaps)
 
 
-def _coarse(sizes: np.ndarray) -> bool:
+def _coarse(sizes: Array) -> bool:
     """Whether most changes are by one count of a converter."""
     return bool(np.mean(sizes < 1.5 * sizes.min()) > _FINE)
 
 
-def _slots(changes: np.ndarray, periods: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+def _slots(changes: Ints, periods: Array, gaps: Array) -> Array:
     """The changes, and in longer gaps the rows where a reading came and equalled the last."""
     between = [
         row + np.round(np.arange(count) * gap / count).astype(int)
@@ -51,7 +53,7 @@ def _slots(changes: np.ndarray, periods: np.ndarray, gaps: np.ndarray) -> np.nda
     return np.unique(np.concatenate([[0], *between, changes[-1:]]))
 
 
-def frozen(y: np.ndarray, others: list[np.ndarray]) -> tuple[int, int] | None:
+def frozen(y: Array, others: list[Array]) -> tuple[int, int] | None:
     """The longest stretch (first row, rows) over which ``y`` (n,) repeats one value, far longer than it
     usually does, while one of ``others`` moves; None where there is none.
 

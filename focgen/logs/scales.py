@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
-import numpy as np
+from focgen.arrays import Array
 
 _SPELLED = {"Nm": "N*m"}  # where the library would read something else
+_LONGEST = 60  # characters of a unit
+_POWER = re.compile(
+    r"\*\*\s*(?:\(\s*[-+]?\d{1,2}(?:\.\d+)?\s*\)|[-+]?\d{1,2}(?:\.\d+)?(?![\d.eE]))(?!\s*\*\*)"
+)
+_FACTOR = re.compile(r"(?<![\w.])[\d.]+(?:[eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -19,7 +26,7 @@ class Scale:
     offset: float = 0.0
     unit: str | None = None
 
-    def applied(self, values: np.ndarray, to: str | None) -> np.ndarray:
+    def applied(self, values: Array, to: str | None) -> Array:
         """The column's values (m,) in the rig's unit ``to``. Raises ValueError where there is no such
         conversion."""
         scale, offset = (self.scale, self.offset) if self.unit is None else between(self.unit, to)
@@ -38,7 +45,7 @@ def between(unit: str, to: str | None) -> tuple[float, float]:
         zero, one = (registry.Quantity(x, _unit(unit)).to(_unit(to)).magnitude for x in (0.0, 1.0))
     except registry.errors.DimensionalityError:
         raise ValueError(f"{unit} cannot be turned into {to}") from None
-    except Exception:  # pint raises whatever its parser meets
+    except Exception:  # noqa: BLE001 - pint raises whatever its parser meets
         raise ValueError(f"{unit if not known(unit) else to} is no unit") from None
     return float(one - zero), float(zero)
 
@@ -61,13 +68,27 @@ def same(unit: str, other: str) -> bool:
 
 
 @cache
-def _registry():
+def _registry() -> Any:
     import pint  # takes a moment, and only conversions need it
 
-    registry = pint.UnitRegistry()
+    registry: Any = pint.UnitRegistry()
     registry.errors = pint
     return registry
 
 
-def _unit(unit: str):
-    return _registry().Unit(_SPELLED.get(unit.strip(), unit.strip()))
+def _unit(unit: str) -> Any:
+    text = _SPELLED.get(unit.strip(), unit.strip())
+    _check_small(text)
+    return _registry().Unit(text)
+
+
+def _check_small(text: str) -> None:
+    """Raise ValueError for what is no unit and would take long to find out: the library computes
+    "9**9**9"."""
+    from pint.util import string_preprocessor
+
+    if len(text) > _LONGEST:
+        raise ValueError(text)
+    without = _POWER.sub(" ", string_preprocessor(text))
+    if "**" in without or any(float(factor) != 1.0 for factor in _FACTOR.findall(without)):
+        raise ValueError(text)

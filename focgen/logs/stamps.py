@@ -7,10 +7,12 @@ from datetime import UTC, datetime, time
 
 import numpy as np
 
+from focgen.arrays import Array
+
 _DAY = 86400.0
 
 
-def seconds(cells: Sequence[str]) -> np.ndarray:
+def seconds(cells: Sequence[str]) -> Array:
     """Seconds (m,): since 1970 of dates (without a zone: UTC), since midnight of times of day.
 
     A time of day that falls back by more than half a day has passed midnight. Empty cells become NaN. Raises
@@ -22,7 +24,7 @@ def seconds(cells: Sequence[str]) -> np.ndarray:
     return found if of is _since_1970 else _past_midnight(found)
 
 
-def of_numpy(values: np.ndarray) -> np.ndarray:
+def of_numpy(values: Array) -> Array:
     """Times of numpy (m,), instants or spans, in s; others as they are."""
     kinds = {"M": "datetime64[ns]", "m": "timedelta64[ns]"}
     kind = kinds.get(values.dtype.kind)
@@ -44,7 +46,7 @@ def _since_midnight(cell: str) -> float:
     return of_day.hour * 3600.0 + of_day.minute * 60.0 + of_day.second + of_day.microsecond * 1e-6
 
 
-def _past_midnight(found: np.ndarray) -> np.ndarray:
+def _past_midnight(found: Array) -> Array:
     known = np.flatnonzero(~np.isnan(found))
     found[known] += _DAY * np.cumsum(np.diff(found[known], prepend=found[known[:1]]) < -0.5 * _DAY)
     return found

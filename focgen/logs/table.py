@@ -3,35 +3,40 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs import stamps
-from focgen.logs.dialect import MISSING, is_stamp
+from focgen.logs.cells import Levels, parsed
+from focgen.logs.dialect import is_stamp
 from focgen.textfile import check_regular
 
 # The reader of each kind of file: a module of this room with ``read(path) -> LogTable``.
-_READERS = {
-    **{
-        f".{kind}{packed}": "focgen.logs.text_file"
-        for kind in ("csv", "txt", "tsv")
-        for packed in ("", ".gz")
-    },
+_TEXT = {
+    ".csv": "focgen.logs.text_file",
+    ".txt": "focgen.logs.text_file",
+    ".tsv": "focgen.logs.text_file",
     ".lvm": "focgen.logs.lvm_file",
-    ".lvm.gz": "focgen.logs.lvm_file",
+}
+FOREIGN = {  # libraries of others, in C: each file in a process of its own
     ".parquet": "focgen.logs.parquet_file",
     ".mat": "focgen.logs.mat_file",
     ".tdms": "focgen.logs.tdms_file",
 }
+_READERS = {**_TEXT, **{f"{ending}.gz": module for ending, module in _TEXT.items()}, **FOREIGN}
+LARGEST = 1e30
+"""The size of a reading: powers and sums of larger ones have no number."""
+Column = Sequence[str] | Array
+"""Texts as they stand in a file, or numbers; (m,)."""
 _LOOK = 100  # cells: by then a column of dates shows that it is one
-_BINARY = (".parquet", ".mat", ".tdms")  # foreign readers, each in a process of its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +50,12 @@ class LogTable:
     """
 
     path: str
-    columns: Mapping[str, Sequence[str] | np.ndarray]
+    columns: Mapping[str, Column]
     line: Callable[[int], str] = "row {}".format
     decimal: str = "."
     units: Mapping[str, str] = field(default_factory=dict)
     aliases: Mapping[str, str] = field(default_factory=dict)
-    clock: np.ndarray | None = None
+    clock: Array | None = None
     runs: Sequence[str] | None = None
     notes: tuple[str, ...] = ()
 
@@ -60,7 +65,7 @@ class LogTable:
     def __contains__(self, name: str) -> bool:
         return name in self.columns or name in self.aliases
 
-    def column(self, name: str) -> Sequence[str] | np.ndarray:
+    def column(self, name: str) -> Column:
         """A column (m,) by its name or another name of it."""
         return self.columns[name if name in self.columns else self.aliases[name]]
 
@@ -94,8 +99,10 @@ class LogTable:
         """A column as text, numbers in their shortest form."""
         return [cell if isinstance(cell, str) else f"{cell:g}" for cell in _plain(self.column(name))]
 
-    def seconds(self, name: str) -> np.ndarray:
-        """A column of time (m,): numbers as they are, ISO dates and times of day in s."""
+    def seconds(self, name: str) -> Array:
+        """A column of time (m,): numbers as they are, ISO dates and times of day in s. Raises LogError for a
+        cell that is none of these.
+        """
         column = self.column(name)
         if not isinstance(column, np.ndarray) and any(is_stamp(cell) for cell in column[:_LOOK]):
             try:
@@ -105,22 +112,22 @@ class LogTable:
                 raise LogError(f"{self.path} [{name}]", what, "write it as 2026-01-31T12:00:00.000") from None
         return self.numbers(name)
 
-    def numbers(self, name: str) -> np.ndarray:
+    def numbers(self, name: str) -> Array:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no
         number.
         """
         column = self.column(name)
         try:
             plain = isinstance(column, np.ndarray) and column.dtype.kind in "fiu"
-            values = column if plain else _parsed(column, self.decimal)
+            values = column if plain else _values(column, self.decimal)
         except (ValueError, TypeError):
             raise self._not_a_number(name) from None
         values = np.asarray(values, dtype=float)
-        if np.isinf(values).any():
-            row = int(np.argmax(np.isinf(values)))
-            raise LogError(
-                f"{self.path} [{name}]", f"is infinite in {self.line(row)}", "remove or correct it"
-            )
+        beyond = np.abs(values) > LARGEST
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            what = "is infinite" if np.isinf(values[row]) else f"is {values[row]:g}"
+            raise LogError(f"{self.path} [{name}]", f"{what} in {self.line(row)}", "remove or correct it")
         return values
 
     def _not_a_number(self, name: str) -> LogError:
@@ -152,17 +159,20 @@ def read_table(path: str | Path) -> LogTable:
         if "\0" not in str(path):
             raise
         raise LogError(str(path), f"is no path ({reason})", "check the path") from None
+    if table.clock is not None and not (np.abs(table.clock) <= LARGEST).all():
+        raise LogError(str(path), "gives a time that is no number", "log the time of each sample")
     if not len(table):
         raise LogError(str(path), "holds no samples", "give a log with a header and one row a sample")
     return table
 
 
 def _reader(kind: str) -> Callable[[Path], LogTable]:
-    if kind in _BINARY:
-        from focgen.logs.apart import read_apart  # which makes tables itself
+    if kind in FOREIGN:
+        from focgen.logs.subprocess_reader import read_in_subprocess  # which makes tables itself
 
-        return partial(read_apart, _READERS[kind])
-    return import_module(_READERS[kind]).read
+        return partial(read_in_subprocess, _READERS[kind])
+    made: Callable[[Path], LogTable] = import_module(_READERS[kind]).read
+    return made
 
 
 def stem(path: str | Path) -> str:
@@ -171,28 +181,16 @@ def stem(path: str | Path) -> str:
     return Path(name[: -len(".gz")] if name.lower().endswith(".gz") else name).stem
 
 
-def _plain(column) -> list:
+def _plain(column: Column) -> list[Any]:
     return column.tolist() if isinstance(column, np.ndarray) else list(column)
 
 
-def _parsed(column, decimal: str = ".") -> list[float]:
-    cells = _plain(column)
-    if any(isinstance(cell, str) and "_" in cell for cell in cells):
-        raise ValueError  # Python reads 1_000 as a number, nobody else does
-    if decimal == ",":
-        cells = [cell.replace(",", ".") if isinstance(cell, str) else cell for cell in cells]
+def _values(column: Column, decimal: str) -> Array | list[float]:
+    return column.numbers(decimal) if isinstance(column, Levels) else parsed(_plain(column), decimal)
+
+
+def _is_number(cell: object, decimal: str) -> bool:
     try:
-        return list(map(float, cells))  # most columns miss nothing
-    except (ValueError, TypeError):
-        return [math.nan if _is_missing(cell) else float(cell) for cell in cells]
-
-
-def _is_missing(cell) -> bool:
-    return cell is None or isinstance(cell, str) and cell.lower() in MISSING
-
-
-def _is_number(cell, decimal: str) -> bool:
-    try:
-        return bool(_parsed([cell], decimal))
+        return bool(parsed([cell], decimal))
     except (ValueError, TypeError):
         return False

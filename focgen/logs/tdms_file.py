@@ -10,12 +10,14 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
 from focgen.logs.stamps import of_numpy
-from focgen.logs.table import LogTable
+from focgen.logs.table import LARGEST, LogTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +25,9 @@ class _Group:
     """``channels`` (m,) by name, their ``units``, and the time in s that their waveforms have, or None."""
 
     name: str
-    channels: Mapping[str, np.ndarray]
+    channels: Mapping[str, Array]
     units: Mapping[str, str]
-    clock: np.ndarray | None
+    clock: Array | None
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
@@ -46,7 +48,7 @@ def read(path: Path) -> LogTable:
         groups = [_group(group) for group in nptdms.TdmsFile.read(path).groups()]
     except MemoryError:
         raise
-    except Exception:  # nptdms has no error of its own for damaged files
+    except Exception:  # noqa: BLE001 - nptdms has no error of its own for damaged files
         raise LogError(str(path), "is not a whole TDMS file", "write it again") from None
     groups = [group for group in groups if group.channels]
     if not groups:
@@ -57,7 +59,7 @@ def read(path: Path) -> LogTable:
     return _one_after_the_other(path, groups) if runs else _side_by_side(path, groups)
 
 
-def _group(group) -> _Group:
+def _group(group: Any) -> _Group:
     found = {c.name: (c, of_numpy(np.asarray(c[:]))) for c in group.channels()}
     channels = {name: values for name, (_, values) in found.items() if len(values)}
     units = {name: str(c.properties.get("unit_string", "")) for name, (c, _) in found.items()}
@@ -67,17 +69,17 @@ def _group(group) -> _Group:
     return _Group(group.name, channels, {n: u for n, u in units.items() if u}, known[0] if same else None)
 
 
-def _clock(properties: Mapping, count: int) -> np.ndarray | None:
+def _clock(properties: Mapping[str, Any], count: int) -> Array | None:
     """The time (m,) in s that a waveform's properties give: from its start, where that is known."""
     step = float(properties.get("wf_increment", 0.0))
-    if step <= 0.0:
+    if not 0.0 < step <= LARGEST:
         return None
     start = properties.get("wf_start_time")
     begin = of_numpy(np.array([start], "datetime64[us]"))[0] if start is not None else 0.0
     return begin + float(properties.get("wf_start_offset", 0.0)) + step * np.arange(count)
 
 
-def _check_lengths(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+def _check_lengths(path: Path, columns: Mapping[str, Array]) -> None:
     if len({len(values) for values in columns.values()}) > 1:
         sizes = ", ".join(f"{name} {len(values)}" for name, values in columns.items())
         raise LogError(str(path), f"holds channels of different lengths ({sizes})", "log them at one rate")
@@ -85,12 +87,12 @@ def _check_lengths(path: Path, columns: Mapping[str, np.ndarray]) -> None:
 
 def _one_after_the_other(path: Path, groups: Sequence[_Group]) -> LogTable:
     columns = {name: np.concatenate([g.channels[name] for g in groups]) for name in groups[0].channels}
-    clocks = [g.clock for g in groups]
+    clocks = [g.clock for g in groups if g.clock is not None]
     return LogTable(
         str(path),
         columns,
         units=groups[0].units,
-        clock=np.concatenate(clocks) if all(c is not None for c in clocks) else None,
+        clock=np.concatenate(clocks) if len(clocks) == len(groups) else None,
         runs=[g.name for g in groups for _ in range(len(g))],
     )
 
@@ -98,7 +100,9 @@ def _one_after_the_other(path: Path, groups: Sequence[_Group]) -> LogTable:
 def _side_by_side(path: Path, groups: Sequence[_Group]) -> LogTable:
     """Channels by their own name where that is told from all others, and by "group/channel" always."""
     names = [name for g in groups for name in g.channels]
-    columns, units, aliases = {}, {}, {}
+    columns: dict[str, Array] = {}
+    units: dict[str, str] = {}
+    aliases: dict[str, str] = {}
     for g in groups:
         for channel, values in g.channels.items():
             whole = f"{g.name}/{channel}"

@@ -9,14 +9,19 @@ from __future__ import annotations
 
 import codecs
 import csv
+import io
 import re
 from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 
+from focgen.arrays import Array
 from focgen.errors import LogError
-from focgen.logs.dialect import Dialect, is_number, rows_of, sniffed
+from focgen.logs.cells import Gathered, Lines
+from focgen.logs.dialect import SAMPLE, Dialect, is_number, lines_of, rows_of, sniffed
 from focgen.logs.table import LogTable
-from focgen.textfile import read_log_bytes
+from focgen.textfile import log_parts, open_log
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 MOST_COLUMNS = 4096
@@ -24,32 +29,40 @@ _IN_BRACKETS = re.compile(r"(.+?)\s*[\[(]([^\[\]()]*)[\])]")
 
 
 def read(path: Path) -> LogTable:
-    """Read a file. Raises LogError naming the line, OSError where it cannot be opened."""
-    text, encoding = decoded(read_log_bytes(path), path)
-    return table_of(path, text, encoding)
+    """Read a file, in parts: it takes the memory of its numbers. Raises LogError naming the line, OSError
+    where it cannot be opened."""
+    codec, guessed = _encoding(path)
+
+    def lines() -> Iterator[str]:
+        with open_log(path) as file, io.TextIOWrapper(file, codec, errors="replace", newline="") as text:
+            yield from text
+
+    return table_of(path, lines, guessed)
 
 
-def table_of(path: Path, text: str, encoding: str = "") -> LogTable:
-    """A text as a table; ``encoding`` is said where it was guessed. Raises LogError naming the line."""
+def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") -> LogTable:
+    """A text as a table; ``lines`` gives its lines anew whenever it is asked, ``guessed`` is the encoding
+    where the text does not say so itself. Raises LogError naming the line."""
     try:
-        dialect = sniffed(text)
-        rows = rows_of(text, dialect.delimiter)
+        sample = "".join(islice(lines(), SAMPLE))
+        dialect = sniffed(sample)
+        if not any(rows_of(lines_of(sample), dialect.delimiter)):
+            raise LogError(str(path), "is empty", "give a log with a header and one row a sample")
+        rows = rows_of(lines(), dialect.delimiter)
+        ahead = list(islice(rows, dialect.data))
+        header = _header(path, ahead, dialect)
+        numbers, cells, header = _body(path, rows, ahead, dialect, header)
     except csv.Error as reason:
         raise LogError(str(path), f"is not CSV ({reason})", "save it as comma-separated text") from None
-    if not any(rows):
-        raise LogError(str(path), "is empty", "give a log with a header and one row a sample")
-    header = _header(path, rows, dialect)
-    numbers = _body(path, rows, dialect, len(header))
-    columns = {name: [rows[i][j] for i in numbers] for j, name in enumerate(header)}
-    units, aliases = _without_units(header, _units(rows, dialect, header))
+    units, aliases = _without_units(header, _units(ahead, dialect, header))
     return LogTable(
         str(path),
-        columns,
-        lambda row: f"line {numbers[row] + 1}",
+        dict(zip(header, cells)),
+        numbers.of,
         decimal=dialect.decimal,
         units=units,
         aliases=aliases,
-        notes=_taken(rows, dialect, encoding),
+        notes=_taken(ahead, dialect, guessed),
     )
 
 
@@ -66,18 +79,44 @@ def _taken(rows: list[list[str]], dialect: Dialect, encoding: str) -> tuple[str,
 
 def decoded(raw: bytes, path: Path) -> tuple[str, str]:
     """The text, and the encoding where it is none that says so itself. Raises LogError for binary files."""
-    marked = next((name for mark, name in _MARKS if raw.startswith(mark)), None)
+    codec, guessed = _encoding_of([raw], path)
+    return raw.decode(codec, errors="replace"), guessed
+
+
+def _encoding(path: Path) -> tuple[str, str]:
+    return _encoding_of(log_parts(path), path)
+
+
+def _encoding_of(parts: Iterable[bytes], path: Path) -> tuple[str, str]:
+    """The codec of a text, and its name where it was guessed. Raises LogError for binary files."""
+    codec = ""
+    decoder: codecs.IncrementalDecoder = codecs.getincrementaldecoder("utf-8")()
+    for part in parts:
+        if not codec:
+            codec = next((name for mark, name in _MARKS if part.startswith(mark)), "utf-8")
+            decoder = codecs.getincrementaldecoder(codec)()
+        text = _decoded_part(decoder, part, False)
+        if text is None and codec == "utf-8":
+            codec, decoder = "cp1252", codecs.getincrementaldecoder("cp1252")(errors="replace")
+            text = decoder.decode(part)
+        if text is None or "\0" in text:
+            raise LogError(str(path), "is not text", "save it as UTF-8")
+    if _decoded_part(decoder, b"", True) is None:  # ends within a character
+        if codec != "utf-8":
+            raise LogError(str(path), "is not text", "save it as UTF-8")
+        codec = "cp1252"
+    return codec or "utf-8", "Windows-1252" if codec == "cp1252" else ""
+
+
+def _decoded_part(decoder: codecs.IncrementalDecoder, part: bytes, final: bool) -> str | None:
     try:
-        if marked or b"\0" not in raw:
-            return raw.decode(marked or "utf-8"), ""
+        return decoder.decode(part, final)
     except UnicodeDecodeError:
-        if not marked:
-            return raw.decode("cp1252", errors="replace"), "Windows-1252"
-    raise LogError(str(path), "is not text", "save it as UTF-8") from None
+        return None
 
 
 def _header(path: Path, rows: list[list[str]], dialect: Dialect) -> list[str]:
-    """The names of the columns. Raises LogError where there are none, or one twice."""
+    """The cells that name the columns, "" where one does not. Raises LogError where there are none."""
     if dialect.header is None or all(is_number(name, dialect.decimal) for name in rows[dialect.header]):
         raise LogError(
             str(path), "starts with numbers instead of a header", "put the columns' names in line 1"
@@ -86,30 +125,46 @@ def _header(path: Path, rows: list[list[str]], dialect: Dialect) -> list[str]:
     if len(names) > MOST_COLUMNS:
         what = f"has {len(names)} columns, of which {MOST_COLUMNS} can be read"
         raise LogError(str(path), what, "leave out those that the rig does not use")
-    body = [row for row in rows[dialect.data :] if row]
-    while names and not names[-1] and not any("".join(row[len(names) - 1 :]) for row in body):
-        names.pop()  # a delimiter at the end of each line
-    names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
-    doubled = next((name for name, count in Counter(names).items() if count > 1), None)
-    if doubled is not None:
-        raise LogError(str(path), f"has the column {doubled!r} twice", "give each column a name of its own")
     return names
 
 
-def _body(path: Path, rows: list[list[str]], dialect: Dialect, width: int) -> list[int]:
-    """The rows of readings; a header that is repeated is none. Raises LogError where one is incomplete."""
-    ahead = [rows[i] for i in (dialect.header, dialect.units) if i is not None]
-    found = [i for i in range(dialect.data, len(rows)) if rows[i] and rows[i] not in ahead]
-    for i in found:
-        cells = len(rows[i])
-        if cells != width and not (cells > width and not any(rows[i][width:])):
-            what = f"line {i + 1} has {cells} cells, the header {width}"
-            raise LogError(
-                str(path),
-                what,
-                "separate columns alike throughout, decimals unlike columns, and complete the line",
-            )
-    return found
+def _body(
+    path: Path, rows: Iterable[list[str]], ahead: list[list[str]], dialect: Dialect, names: list[str]
+) -> tuple[Lines, list[Sequence[str] | Array], list[str]]:
+    """The lines of the readings, their columns, and the names of these; a header that is repeated is none.
+
+    Columns at the end without a name and a reading are delimiters at the end of lines. Raises LogError where
+    a row is incomplete, or two columns have one name.
+    """
+    told = [ahead[i] for i in (dialect.header, dialect.units) if i is not None]
+    width = len(names)
+    named = max((i for i, name in enumerate(names, start=1) if name), default=0)
+    gathered, lines, short, filled = Gathered(width, dialect.decimal), Lines(), None, False
+    for i, row in enumerate(rows, start=dialect.data):
+        if not row or row in told:
+            continue
+        cells = len(row)
+        if cells != width:
+            if cells < named or any(row[width:]):
+                raise _incomplete(path, i, cells, width)
+            short = i if cells < width and short is None else short
+            row = (row + [""] * width)[:width]
+        filled = filled or (named < width and any(row[named:]))
+        gathered.add(row)
+        lines.add(i)
+    if filled and short is not None:
+        raise _incomplete(path, short, named, width)
+    kept = width if filled else named
+    found = [name or f"column {number}" for number, name in enumerate(names[:kept], start=1)]
+    doubled = next((name for name, count in Counter(found).items() if count > 1), None)
+    if doubled is not None:
+        raise LogError(str(path), f"has the column {doubled!r} twice", "give each column a name of its own")
+    return lines, gathered.columns()[:kept], found
+
+
+def _incomplete(path: Path, row: int, cells: int, width: int) -> LogError:
+    remedy = "separate columns alike throughout, decimals unlike columns, and complete the line"
+    return LogError(str(path), f"line {row + 1} has {cells} cells, the header {width}", remedy)
 
 
 def _units(rows: list[list[str]], dialect: Dialect, header: list[str]) -> dict[str, str]:

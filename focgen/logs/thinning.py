@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
+from focgen.arrays import Array, Ints
 
-def thinned(*signals: np.ndarray, most: int) -> np.ndarray:
+
+def thinned(*signals: Array, most: int) -> Ints:
     """Indices (m,) of about ``most`` samples of ``signals``, all (n,): both ends, in every one of equally
     long stretches the smallest and the largest of each signal, and where a signal breaks off (the first NaN
     of a row)."""
@@ -19,6 +23,6 @@ def thinned(*signals: np.ndarray, most: int) -> np.ndarray:
         absent = np.isnan(np.asarray(signal, float))
         kept |= set(np.flatnonzero(absent & ~np.roll(absent, 1)).tolist())
         plain = np.where(absent, 0.0, signal)
-        for a, b in zip(edges[:-1], edges[1:]):
+        for a, b in pairwise(edges):
             kept |= {a + int(plain[a:b].argmin()), a + int(plain[a:b].argmax())}
     return np.array(sorted(kept))

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.controller import ControllerRanges
 from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest
 from focgen.control.inversion import Inversion, invert
 from focgen.control.setpoints import default_setpoints
 from focgen.errors import DesignError
 from focgen.loop.linear_effects import linear_part
-from focgen.rig.model import Ranges, Rig
+from focgen.present import present
+from focgen.rig.rig import Ranges, Rig
 
 _EXTRAPOLATED = 0.5  # of the span of the operating points: how far beyond it the line K_o(p) is used
 
@@ -37,12 +39,12 @@ class Bench:
     pressure_known: bool
 
     @property
-    def references(self) -> np.ndarray:
+    def references(self) -> Array:
         """The set points, shape (points,)."""
         return np.array([point.output for point in self.points])
 
     @property
-    def pressures(self) -> np.ndarray:
+    def pressures(self) -> Array:
         """Their pressures, shape (points,)."""
         return np.array([point.pressure for point in self.points])
 
@@ -55,14 +57,19 @@ def prepare(
     Raises DesignError where the rig cannot be inverted, held at a set point, or scheduled.
     """
     inversion = invert(rig, 1.0)  # for K(p) only, and to refuse early what cannot be inverted
-    ranges, notes = derived_ranges(rig)
-    notes = [*notes, *_said(rig)]
-    start = rest(rig, ranges.command)
-    references = default_setpoints(start.output, ranges.output) if setpoints is None else tuple(setpoints)
+    ranges, derived = derived_ranges(rig)
+    notes = [*derived, *_said(rig)]
+    start = rest(rig, present(ranges.command))
+    references = (
+        default_setpoints(start.output, present(ranges.output)) if setpoints is None else tuple(setpoints)
+    )
     points = _points(rig, references, start, ranges)
     span = _span(rig, inversion, points, ranges, lowest)
     own = ControllerRanges(
-        ranges.output, ranges.output, ranges.command, ranges.pressure if inversion.scheduled else None
+        present(ranges.output),
+        present(ranges.output),
+        present(ranges.command),
+        ranges.pressure if inversion.scheduled else None,
     )
     known = rig.signals.pressure is not None
     if inversion.scheduled and not known:
@@ -84,7 +91,9 @@ def _said(rig: Rig) -> list[str]:
     return notes
 
 
-def _points(rig: Rig, references, start: Equilibrium, ranges: Ranges) -> tuple[Equilibrium, ...]:
+def _points(
+    rig: Rig, references: Sequence[float], start: Equilibrium, ranges: Ranges
+) -> tuple[Equilibrium, ...]:
     if not references or not all(map(math.isfinite, references)):
         raise DesignError("--setpoints", "are not finite numbers", "give outputs in the rig's unit")
     if any(reference == start.output for reference in references):
@@ -96,15 +105,15 @@ def _points(rig: Rig, references, start: Equilibrium, ranges: Ranges) -> tuple[E
 
 
 def _span(
-    rig: Rig, inversion: Inversion, points, ranges: Ranges, lowest: float | None
+    rig: Rig, inversion: Inversion, points: Sequence[Equilibrium], ranges: Ranges, lowest: float | None
 ) -> tuple[float, float]:
     """Return the pressures between which K_o/K is scheduled, after checking K(p) and K(p)p there."""
     near, far = points[0].pressure, points[-1].pressure
     if not inversion.scheduled:
         return min(near, far), max(near, far)
     beyond = far + _EXTRAPOLATED * (far - near)
-    inside = (ranges.pressure[1] - beyond) * (beyond - ranges.pressure[0]) >= 0.0
-    end = beyond if inside else (ranges.pressure[1] if far >= near else ranges.pressure[0])
+    inside = (present(ranges.pressure)[1] - beyond) * (beyond - present(ranges.pressure)[0]) >= 0.0
+    end = beyond if inside else (present(ranges.pressure)[1] if far >= near else present(ranges.pressure)[0])
     begin = near if lowest is None else lowest
     if (far - begin) * (far - near) < 0.0:
         raise DesignError(
@@ -135,7 +144,7 @@ def _check_gain(rig: Rig, inversion: Inversion, begin: float, end: float, near: 
         )
 
 
-def _turning(place: np.ndarray, function) -> float | None:
+def _turning(place: Array, function: Callable[[Array], Array]) -> float | None:
     """Return where ``function`` first loses the sign it begins with, None where it keeps it."""
     sign = np.sign(function(place))
     lost = (sign != sign[0]) | (sign == 0.0)

@@ -15,12 +15,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.equilibrium import actuator_of
 from focgen.errors import RigError
 from focgen.fractional.delay import split_delay
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 
 _TOLERANCE = 1e-5  # of the largest output in a step
 _TRIED = (1, 2, 4, 8, 16, 32)
@@ -41,9 +42,9 @@ class Chain:
     sample_time: float
     samples: int
     substeps: int
-    pressure: np.ndarray
-    output: np.ndarray
-    curvature: np.ndarray
+    pressure: Array
+    output: Array
+    curvature: Array
 
 
 def chain(rig: Rig, sample_time: float, samples: int, parts: int | None = None) -> Chain:
@@ -80,7 +81,7 @@ def _cached_substeps(regulator: TransferFunction, rest: TransferFunction, sample
 
 def substeps(rig: Rig, sample_time: float) -> int:
     """Return how many parts of a sample keep the chain's step response within 1e-5 of the exact one (at most
-    32).
+    32). Raises RigError where that response cannot be computed.
     """
     try:
         return _cached_substeps(rig.regulator, actuator_of(rig).dynamics * rig.sensor, sample_time)
@@ -90,7 +91,7 @@ def substeps(rig: Rig, sample_time: float) -> int:
         ) from None
 
 
-def _held(stage: TransferFunction, sample_time: float, samples: int, parts: int) -> np.ndarray:
+def _held(stage: TransferFunction, sample_time: float, samples: int, parts: int) -> Array:
     """Return the kernel from a command held for a sample to the stage's output at the substeps of every
     sample.
     """
@@ -99,12 +100,11 @@ def _held(stage: TransferFunction, sample_time: float, samples: int, parts: int)
     kernel = fine[places]
     kernel[1:] -= fine[places[1:] - parts]
     # the first sample's end is the left limit, before the next command arrives: nothing to correct
-    return kernel[: _settled(kernel), :, None]
+    made: Array = kernel[: _settled(kernel), :, None]
+    return made
 
 
-def _pressure(
-    stage: TransferFunction, sample_time: float, samples: int, parts: int, delay: float
-) -> np.ndarray:
+def _pressure(stage: TransferFunction, sample_time: float, samples: int, parts: int, delay: float) -> Array:
     """Return :func:`_held`, and with a ``delay`` (s) one more row: the output that much later, at the
     sample's end.
     """
@@ -121,7 +121,7 @@ def _pressure(
     return kernel[: _settled(kernel)]
 
 
-def _settled(kernel: np.ndarray) -> int:
+def _settled(kernel: Array) -> int:
     """Return how many lags say all: what follows adds up to less than rounding."""
     left = np.cumsum(np.abs(kernel).reshape(len(kernel), -1).sum(axis=1)[::-1])[::-1]
     return max(1, int(np.count_nonzero(left > 1e-15 * left[0])))
@@ -129,7 +129,7 @@ def _settled(kernel: np.ndarray) -> int:
 
 def _straight(
     stage: TransferFunction, sample_time: float, samples: int, parts: int, delay: float = 0.0
-) -> np.ndarray:
+) -> Array:
     """Return the kernel from values at the substeps, joined by straight lines, to the output at the sample's
     end, ``delay`` s later.
     """

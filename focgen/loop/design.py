@@ -1,9 +1,9 @@
-"""``design``: from a rig and a wish to a controller, eq. (6), and what it does as it will run."""
+"""``design``: from a rig and a specification to a controller, eq. (6), and what it does as it will run."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -21,20 +21,20 @@ from focgen.custody import sha256_of
 from focgen.errors import DesignError, check_choice
 from focgen.jsontext import UNWRITTEN
 from focgen.loop.bench import Bench, prepare
+from focgen.loop.frequency import PointMargins, margins_at, shapes
 from focgen.loop.memory import MemoryChoice, choose_memory
-from focgen.loop.response import PointMargins, margins_at, shapes
-from focgen.loop.trial import Steps, run_corner, run_steps
-from focgen.loop.tuning import HORIZON, OVERSHOOT, Tuned, Wish, fastest, meeting, tune
+from focgen.loop.side_by_side import Steps, run_corner, run_steps
+from focgen.loop.tuning import HORIZON, OVERSHOOT, Specification, Tuned, fastest, meeting, tune
 from focgen.loop.worst import Worst, worst_case
 from focgen.output import check_apart, write_file
 from focgen.plan.build import build_plan
-from focgen.plan.model import LONGEST, Plan
+from focgen.plan.plan import LONGEST, Plan
 from focgen.rig.arguments import RigLike, file_of, rig_of
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
-SETTLING = 1.5  # s, where nothing is wished and it is feasible
-_SLACK = 1.02  # of the wish, for the controller as it will run
+SETTLING = 1.5  # s, where nothing is specified and it is feasible
+_SLACK = 1.02  # of the specification, for the controller as it will run
 
 
 @dataclass(frozen=True)
@@ -87,16 +87,16 @@ class ScheduleReport:
 
 @dataclass(frozen=True, repr=False)
 class Design(Shown):
-    """A controller, the wish it was designed for, and the proof in simulation.
+    """A controller, the specification it was designed for, and the proof in simulation.
 
-    ``settling_s`` (mean over the operating points) and ``overshoot_pct`` (largest) are of the controller
-    as it will run, on the rig with its effects; ``holds`` says whether they keep the wish and every loop is
-    stable. ``worst``: what becomes of margins and steps within the rig's uncertainty, which the wish is not
-    judged by. ``rig``: what it was designed for.
+    ``settling_s`` (mean over the operating points) and ``overshoot_pct`` (largest) are of the controller as
+    it will run, on the rig with its effects; ``holds`` says whether they keep the specification and every
+    loop is stable. ``worst``: what becomes of margins and steps within the rig's uncertainty, which the
+    specification is not judged by. ``rig``: what it was designed for.
     """
 
     controller: Controller
-    wish: Wish
+    specification: Specification
     schedule: ScheduleReport
     points: tuple[OperatingPoint, ...]
     margins: tuple[PointMargins, ...]
@@ -133,24 +133,31 @@ def design(
     the lowest operating point's). ``delay``: computation delay, 0 or 1 sample. ``tolerance``: relative
     error of the schedule table.
 
-    Raises DesignError where the rig cannot be inverted or the wish is not feasible (naming what is),
-    PlanError where the controller does not fit the arithmetic, RigError where the file cannot be used,
-    InputError where ``out`` is the rig's file.
+    Raises DesignError where the rig cannot be inverted or the specification is not feasible (naming what is),
+    and PlanError where the controller does not fit the arithmetic. RigError: the file cannot be used.
+    InputError: ``out`` is the rig's file.
 
     A rig that carries effects is designed for without them; the margins then hold those that are linear, and
-    the steps that the wish is judged by hold all of them.
+    the steps that the specification is judged by hold all of them.
     """
     _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance)
     if out is not None:
         check_apart([out], [rig])
-    model, source = rig_of(rig), _source(file_of(rig))
+    given: dict[str, Any] = {
+        "settling": settling,
+        "overshoot": overshoot,
+        "arithmetic": arithmetic,
+        "length": length,
+    }
+    given |= {"delay": delay, "setpoints": setpoints, "lowest": lowest, "tolerance": tolerance}
+    model, source = rig_of(rig), _source(file_of(rig), given)
     bench, notes = prepare(model, setpoints, lowest, delay)
-    wish, tuned = _tuned(bench, settling, overshoot, notes)
+    specification, tuned = _tuned(bench, settling, overshoot, notes)
     table, report = _schedule(bench, tuned, tolerance)
     draft = _controller(bench, tuned, table, arithmetic, source)
     memory = choose_memory(draft, _lowest_crossover(bench, tuned), length)
     controller = replace(draft, length=memory.length)
-    result = _judged(bench, tuned, controller, wish, report, memory, notes)
+    result = _judged(bench, tuned, controller, specification, report, memory, notes)
     if out is not None:
         write_file(out, controller_text(controller), [rig])
     return result
@@ -177,28 +184,33 @@ def _check_wishes(
         raise DesignError("tolerance", f"is {tolerance:g}", "give a relative error between 0 and 1")
 
 
-def _source(path: Path | None) -> Source | None:
-    """What the controller says it was designed from; nothing where that is no file."""
-    return None if path is None else Source(path.name, sha256_of(path))
+def _source(path: Path | None, given: Mapping[str, Any]) -> Source | None:
+    """What the controller says it was designed from, and with which options; nothing where that is no
+    file."""
+    if path is None:
+        return None
+    told = ((name, value) for name, value in given.items() if value is not None)
+    options = ((name, tuple(value) if isinstance(value, (list, tuple)) else value) for name, value in told)
+    return Source(path.name, sha256_of(path), tuple(options))
 
 
 def _tuned(
     bench: Bench, settling: float | None, overshoot: float | None, notes: list[str]
-) -> tuple[Wish, Tuned]:
-    wish = Wish(settling, OVERSHOOT if overshoot is None else overshoot)
+) -> tuple[Specification, Tuned]:
+    specification = Specification(settling, OVERSHOOT if overshoot is None else overshoot)
     if settling is not None or overshoot is not None:
-        return wish, tune(bench, wish)
-    wish = replace(wish, settling=SETTLING)
-    found = meeting(bench, wish)
+        return specification, tune(bench, specification)
+    specification = replace(specification, settling=SETTLING)
+    found = meeting(bench, specification)
     if found is not None:
-        return wish, found
-    found = fastest(bench, wish.overshoot)
+        return specification, found
+    found = fastest(bench, specification.overshoot)
     if found.mean_settling > SETTLING:
         notes.append(
             f"{SETTLING:g} s is not feasible here; {found.mean_settling:.3g} s is the fastest with at most "
-            f"{wish.overshoot:g} % overshoot"
+            f"{specification.overshoot:g} % overshoot"
         )
-    return replace(wish, settling=max(found.mean_settling, SETTLING)), found
+    return replace(specification, settling=max(found.mean_settling, SETTLING)), found
 
 
 # --------------------------------------------------------------------------------------------- the controller
@@ -271,13 +283,13 @@ def _judged(
     bench: Bench,
     tuned: Tuned,
     controller: Controller,
-    wish: Wish,
+    specification: Specification,
     schedule: ScheduleReport,
     memory: MemoryChoice,
     notes: list[str],
 ) -> Design:
     plan = build_plan(controller)
-    steps = run_steps(bench, controller, plan, _horizon(tuned, wish))
+    steps = run_steps(bench, controller, plan, _horizon(tuned, specification))
     points = tuple(
         _point(equilibrium, tuned, controller, step) for equilibrium, step in zip(bench.points, steps)
     )
@@ -288,10 +300,10 @@ def _judged(
     settling = float(np.mean([point.proof.settling_s for point in points]))
     over = max(point.proof.overshoot_pct for point in points)
     notes = [*notes, *tuned.inversion.notes, *_remarks(bench, points)]
-    kept = settling <= _SLACK * (wish.settling or math.inf) and over <= wish.overshoot + 0.5
+    kept = settling <= _SLACK * (specification.settling or math.inf) and over <= specification.overshoot + 0.5
     return Design(
         controller,
-        wish,
+        specification,
         schedule,
         points,
         found,
@@ -300,7 +312,7 @@ def _judged(
         settling,
         over,
         kept and all(m.running.stable for m in found),
-        _worst(bench, controller, plan, points, _horizon(tuned, wish)),
+        _worst(bench, controller, plan, points, _horizon(tuned, specification)),
         tuple(notes),
         bench.rig,
     )
@@ -325,8 +337,8 @@ def _worst(
     )
 
 
-def _horizon(tuned: Tuned, wish: Wish) -> float:
-    return HORIZON * max(tuned.mean_settling, wish.settling or 0.0)
+def _horizon(tuned: Tuned, specification: Specification) -> float:
+    return HORIZON * max(tuned.mean_settling, specification.settling or 0.0)
 
 
 def _point(at: Equilibrium, tuned: Tuned, controller: Controller, step: Steps) -> OperatingPoint:
@@ -351,6 +363,8 @@ def _remarks(bench: Bench, points: tuple[OperatingPoint, ...]) -> list[str]:
     if span is None or high <= span[1]:
         return []
     return [
-        f"on the way the pressure reaches {high:.3g}, beyond the rig's range ({span[1]:g}): the model is "
-        "extrapolated there"
+        (
+            f"on the way the pressure reaches {high:.3g}, beyond the rig's range ({span[1]:g}): the model is "
+            "extrapolated there"
+        )
     ]

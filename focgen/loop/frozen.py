@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import actuator_of
-from focgen.control.margins import DELAYED, Margins, curve, margins
+from focgen.control.margins import DELAYED, SMALL, Margins, curve, margins
 from focgen.fractional.delay import Delayed
 from focgen.fractional.responses import step_response
 from focgen.fractional.simulation import Convolution, divided
 from focgen.fractional.transfer import Polynomial, TransferFunction
-from focgen.rig.model import Actuator, Rig
+from focgen.rig.rig import Actuator, Rig
 
 _INTEGRATOR = TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])
 _SAME = 1e-12  # relative difference of coefficients that cancel
@@ -34,7 +36,7 @@ def frozen_loop(rig: Rig, controller: Controller, pressure: float) -> Delayed:
     return Delayed(_series(parts + [_INTEGRATOR] * controller.integrator) * gain, rig.delays.total)
 
 
-def frozen_step(loop: Delayed, t) -> np.ndarray:
+def frozen_step(loop: Delayed, t: ArrayLike) -> Array:
     """Return the closed loop's unit step response at the times ``t`` (s), shape of ``t``: exact without a
     delay, else to about 1e-5.
     """
@@ -45,7 +47,7 @@ def frozen_step(loop: Delayed, t) -> np.ndarray:
     return step_response(closed, t)
 
 
-def _delayed_step(loop: Delayed, t: np.ndarray) -> np.ndarray:
+def _delayed_step(loop: Delayed, t: Array) -> Array:
     """The error as straight between ever more samples, until that no longer shows."""
     last, count, parts = float(t.max()), max(2, t.size - 1), 1
     found = _sampled_step(loop, t, last, count)
@@ -57,7 +59,7 @@ def _delayed_step(loop: Delayed, t: np.ndarray) -> np.ndarray:
     return found
 
 
-def _sampled_step(loop: Delayed, t: np.ndarray, last: float, count: int) -> np.ndarray:
+def _sampled_step(loop: Delayed, t: Array, last: float, count: int) -> Array:
     """y = L e with e = 1 − y straight between ``count`` + 1 samples up to ``last`` s, solved for y."""
     open_loop = Convolution(loop.transfer, last / count, "linear", loop.delay)
     unclosed = open_loop.run(np.ones(count + 1))
@@ -69,8 +71,8 @@ def _sampled_step(loop: Delayed, t: np.ndarray, last: float, count: int) -> np.n
 def frozen_margins(loop: Delayed, sample_time: float) -> Margins:
     """Return the margins of the open loop, looked at from 1e-6 to 1e3 times the sampling frequency."""
     unit = 2.0 * math.pi / sample_time
-    small = {"small": DELAYED} if loop.delay else {}
-    return margins(curve(loop.frequency_response, 1e-6 * unit, 1e3 * unit, **small))
+    small = DELAYED if loop.delay else SMALL
+    return margins(curve(loop.frequency_response, 1e-6 * unit, 1e3 * unit, small))
 
 
 def _series(parts: list[TransferFunction]) -> TransferFunction:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from focgen.errors import RigError
 from focgen.jsontext import fits
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 
 _HIGH = 0.8  # of what can be explained: a promise below it is of a rig known in part
 _SHAPE = {"promise?": float, "learned?": [float]}

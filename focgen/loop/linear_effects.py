@@ -10,11 +10,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from focgen.arrays import Array, Complex
+from focgen.present import present
 from focgen.rig.engine import Placed
-from focgen.rig.model import Rig
 from focgen.rig.replay import placed_in
+from focgen.rig.rig import Rig
 
-Response = Callable[[np.ndarray], np.ndarray]
+Response = Callable[[Array], Complex]
 
 
 def linear_part(rig: Rig) -> tuple[Response | None, tuple[str, ...], tuple[str, ...]]:
@@ -30,11 +32,11 @@ def linear_part(rig: Rig) -> tuple[Response | None, tuple[str, ...], tuple[str, 
 
 
 def _product(placed: list[Placed]) -> Response:
-    def response(omega: np.ndarray) -> np.ndarray:
+    def response(omega: Array) -> Complex:
         s = 1j * np.asarray(omega)
         total = np.ones(s.shape, complex)
         for p in placed:
-            total = total * p.form.response(p.values, s)
+            total = total * present(p.form.response)(p.values, s)
         return total
 
     return response

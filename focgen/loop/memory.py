@@ -8,7 +8,7 @@ import numpy as np
 
 from focgen.control.controller import Controller
 from focgen.errors import DesignError, PlanError
-from focgen.loop.response import sampled_response
+from focgen.loop.frequency import sampled_response
 from focgen.plan.canonical import memory_bias, tables
 from focgen.plan.stability import check_stable
 

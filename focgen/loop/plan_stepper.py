@@ -5,15 +5,18 @@ side.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array, Kind, Numbers
 from focgen.plan.counts import taken_in, values_of
-from focgen.plan.execute import clamp, kind_of, output_of, saturate, scheduled_gain
 from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest
-from focgen.plan.model import Format, Plan, Sum
+from focgen.plan.plan import Format, Plan, Sum
 from focgen.plan.scenario import nearest_raw
 from focgen.plan.setpoint import Aim
 from focgen.plan.slewing import slewed
+from focgen.plan.values import clamp, kind_of, output_of, saturate, scheduled_gain
+from focgen.present import present
 
 
 class PlanStepper:
@@ -24,26 +27,26 @@ class PlanStepper:
     ranges, as a caller of the C does.
     """
 
-    def __init__(self, plan: Plan, columns: int, start: float = 0.0, reference: float = 0.0):
+    def __init__(self, plan: Plan, columns: int, start: float = 0.0, reference: float = 0.0) -> None:
         self.plan = plan
         self.kind = kind_of(plan.error)
         self.direct = _Window(plan.direct, self.kind, columns)
         self.rest = _Window(plan.inner.rest if plan.inner else None, self.kind, columns)
         self.feedback = _Window(plan.feedback.table if plan.feedback else None, self.kind, columns)
-        zero = np.zeros(columns, self.kind)
+        zero: Numbers = np.zeros(columns, self.kind)
         self.carry, self.d = zero, zero.astype(kind_of(plan.increment))
         self.z = self.r = zero.astype(kind_of(plan.inner.state)) if plan.inner else zero
         u0 = np.full(columns, clamp(nearest_raw(start, plan.output), plan.output))
-        self.total = u0.astype(self.kind)
+        self.total: Numbers = u0.astype(self.kind)
         self.aim = Aim(plan, self.kind, columns) if plan.set_point else None
         for lane in range(columns if self.aim else 0):
-            self.aim.settle(lane, self._input(reference, plan.reference)[()])
+            present(self.aim).settle(lane, self._input(reference, plan.reference)[()])
         if plan.integrator and plan.floating:
             self.total = taken_in(self.total, plan.integrator.state)
         elif plan.integrator:
             self.total = self.total << plan.integrator.to_output
 
-    def step(self, reference, measurement, schedule):
+    def step(self, reference: Array, measurement: Array, schedule: Array) -> Array:
         """One sample of all loops: physical values in, the outputs out, each of shape (columns,)."""
         plan = self.plan
         r = self._input(reference, plan.reference)
@@ -56,15 +59,15 @@ class PlanStepper:
         d = self._shift(g * v, plan.gain_shift)
         return self._output(d).astype(float) * plan.output.lsb
 
-    def _input(self, values, form: Format) -> np.ndarray:
-        raw = np.asarray(nearest_raw(values, form), dtype=self.kind)
+    def _input(self, values: ArrayLike, form: Format) -> Numbers:
+        raw: Numbers = np.asarray(nearest_raw(values, form), dtype=self.kind)
         return raw if form.floating else clamp(raw, form)
 
-    def _shift(self, values: np.ndarray, by: int) -> np.ndarray:
+    def _shift(self, values: Numbers, by: int) -> Numbers:
         """Right shift rounding half up; nothing where floating."""
         return values if self.plan.floating else shift(values, by)
 
-    def _filtered(self, e: np.ndarray) -> np.ndarray:
+    def _filtered(self, e: Numbers) -> Numbers:
         """v: the sums over e, the inner integral, the recursion."""
         plan = self.plan
         p = self.direct(e)
@@ -84,16 +87,17 @@ class PlanStepper:
         self.feedback.push(v)
         return v
 
-    def _inner(self, r: np.ndarray) -> np.ndarray:
-        inner = self.plan.inner
+    def _inner(self, r: Numbers) -> Numbers:
+        inner = present(self.plan.inner)
         r = taken_in(r, inner.state)
         self.z = clamp(self.z + (r + self.r), inner.state)
         self.r = r
         if self.plan.floating:
             return self.z if inner.state.floating else values_of(self.z, inner.state)
-        return shift(self.z, inner.to_wide)
+        made: Numbers = shift(self.z, inner.to_wide)
+        return made
 
-    def _output(self, d: np.ndarray) -> np.ndarray:
+    def _output(self, d: Numbers) -> Numbers:
         plan = self.plan
         if plan.integrator is None:
             return clamp(d, plan.output)
@@ -106,42 +110,43 @@ class PlanStepper:
 class _Window:
     """One history sum: the samples it needs, shape (lags, columns), oldest first."""
 
-    def __init__(self, table: Sum | None, kind: type, columns: int):
+    def __init__(self, table: Sum | None, kind: Kind, columns: int) -> None:
         self.table, self.kind, self.columns = table, kind, columns
         if table is None:
             return
-        self.weights = np.array(table.weights[::-1], dtype=kind)[:, None]
-        self.samples = np.zeros((table.last - table.first + 1, columns), kind)
+        self.weights: Numbers = np.array(table.weights[::-1], dtype=kind)[:, None]
+        self.samples: Numbers = np.zeros((table.last - table.first + 1, columns), kind)
         self.memory = [BankRun(bank, kind, columns) for bank in table.banks]
         self.latest = Latest(columns, kind)
         self.blocks = [(table.last - b.last, table.last - b.first + 1, b.align) for b in table.blocks]
 
-    def __call__(self, x: np.ndarray) -> np.ndarray:
+    def __call__(self, x: Numbers) -> Numbers:
         """Take in x_k and return the sum, x_k in it."""
         remembered = self._remembered()
         self.push(x)
         return sum(remembered, self._of_taps())
 
-    def push(self, x: np.ndarray) -> None:
+    def push(self, x: Numbers) -> None:
         """Take in x_k."""
         if self.table is not None:
             self.samples = np.concatenate([self.samples[1:], x[None]])
             self.latest.push(x)
 
-    def past(self) -> np.ndarray:
+    def past(self) -> Numbers:
         """Return the sum over what has been taken in; once a sample."""
         return sum(self._remembered(), self._of_taps())
 
-    def _remembered(self) -> list[np.ndarray]:
+    def _remembered(self) -> list[Numbers]:
         """What each bank adds; its modes take in what is past."""
         return [] if self.table is None else [modes.step(self.latest) for modes in self.memory]
 
-    def _of_taps(self) -> np.ndarray:
+    def _of_taps(self) -> Numbers:
         if self.table is None:
             return np.zeros(self.columns, self.kind)
         products = self.weights * self.samples
         if self.kind is not np.int64:  # accumulate adds in order, as the C does; sum would not
-            return np.add.accumulate(products, axis=0)[-1] + self.kind(0)
+            made: Numbers = np.add.accumulate(products, axis=0)[-1] + self.kind(0)
+            return made
         total = np.zeros(self.columns, np.int64)
         for start, stop, align in self.blocks:
             part = products[start:stop].sum(axis=0)

@@ -12,9 +12,11 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.equilibrium import Equilibrium
 from focgen.fractional.transfer import TransferFunction
 from focgen.loop.chain import substeps
@@ -22,8 +24,8 @@ from focgen.loop.run import LoopRun
 from focgen.loop.stepper import Stepper
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
-from focgen.rig.model import Rig
 from focgen.rig.replay import placed_in, session_end
+from focgen.rig.rig import Rig
 
 _WINDOWS = 24  # that a run is cut into: the fewer, the more passes each
 _PASSES = 40  # after which a window is halved
@@ -54,7 +56,7 @@ class Plant:
         lead = samples if start.command or start.output else 0
         return cls(rig, placed_in(rig), sample_time, parts, session_end(rig), lead)
 
-    def signals(self, command: np.ndarray, idle: float) -> dict[str, np.ndarray]:
+    def signals(self, command: Array, idle: float) -> dict[str, Array]:
         """Pressure, curvature and output, shape (n · parts + 1,), of the held ``command`` (n,): at the
         samples and between, up to the end of the last one; ``idle`` is the command before.
         """
@@ -66,7 +68,7 @@ class Plant:
         x = ahead[np.clip(place // self.parts, 0, len(ahead) - 1)]
         x[0] = x[0] if held else idle
         run = Run.of([count + 1], [self.clock], h)
-        tap: dict[str, np.ndarray] = {}
+        tap: dict[str, Array] = {}
         Chain(self.rig, self.placed).run(x, "regulator", "sensor", run, held, tap)
         names = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
         return {names[stage]: y[self.lead * self.parts :] for stage, y in tap.items()}
@@ -79,7 +81,7 @@ def _delays(regulator: TransferFunction) -> bool:
 def run_with_effects(
     plant: Plant,
     stepper: Stepper,
-    reference: np.ndarray,
+    reference: Array,
     start: Equilibrium,
     delay: int = 1,
     pressure_known: bool = True,
@@ -97,14 +99,16 @@ def run_with_effects(
 class _Loop:
     """Loops side by side, solved window by window."""
 
-    def __init__(self, plant, stepper, reference, start, delay, known):
+    def __init__(
+        self, plant: Plant, stepper: Stepper, reference: Array, start: Equilibrium, delay: int, known: bool
+    ) -> None:
         self.plant, self.stepper, self.reference = plant, stepper, reference
         self.start, self.delay, self.known = start, delay, known
-        self.command = np.full(reference.shape, start.command)
-        self.waiting = self.command[0]
-        self.replayed: list = [None] * reference.shape[1]
+        self.command: Array = np.full(reference.shape, start.command)
+        self.waiting: Array = self.command[0]
+        self.replayed: list[Any] = [None] * reference.shape[1]
 
-    def run(self) -> dict[str, np.ndarray]:
+    def run(self) -> dict[str, Array]:
         """The rig's signals on the fine grid, shape (n · parts + 1, columns); the commands are kept."""
         count = len(self.reference)
         begin, width = 0, max(1, -(-count // _WINDOWS))
@@ -129,7 +133,7 @@ class _Loop:
                 return True
         return False
 
-    def _controlled(self, stepper: Stepper, begin: int, end: int) -> tuple[np.ndarray, np.ndarray]:
+    def _controlled(self, stepper: Stepper, begin: int, end: int) -> tuple[Array, Array]:
         """What the controller commands in the window, seeing what the present commands make of the rig, and
         what it has computed last.
         """
@@ -145,14 +149,15 @@ class _Loop:
             waiting = np.array(computed)
         return found, waiting
 
-    def _signals(self, count: int) -> dict[str, np.ndarray]:
+    def _signals(self, count: int) -> dict[str, Array]:
         columns = [self._replay(i, self.command[:count, i]) for i in range(self.command.shape[1])]
         return {name: np.stack([c[name] for c in columns], axis=1) for name in columns[0]}
 
-    def _replay(self, column: int, command: np.ndarray) -> dict[str, np.ndarray]:
+    def _replay(self, column: int, command: Array) -> dict[str, Array]:
         """The rig's signals for one column's commands; those of the last pass are remembered."""
         last = self.replayed[column]
         if last is None or not np.array_equal(last[0], command):
             last = command.copy(), self.plant.signals(command, self.start.command)
             self.replayed[column] = last
-        return last[1]
+        made: dict[str, Array] = last[1]
+        return made

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import oaconvolve
 
+from focgen.arrays import Array
 from focgen.control.equilibrium import Equilibrium, actuator_of
 from focgen.loop.chain import Chain
 from focgen.loop.online import OnlineConvolution
@@ -24,15 +25,15 @@ class LoopRun:
     """
 
     sample_time: float
-    reference: np.ndarray
-    command: np.ndarray
-    pressure: np.ndarray
-    curvature: np.ndarray | None
-    output: np.ndarray
-    peak_pressure: np.ndarray
+    reference: Array
+    command: Array
+    pressure: Array
+    curvature: Array | None
+    output: Array
+    peak_pressure: Array
 
     @property
-    def time(self) -> np.ndarray:
+    def time(self) -> Array:
         """Seconds, shape (n,)."""
         return np.arange(len(self.output)) * self.sample_time
 
@@ -40,7 +41,7 @@ class LoopRun:
 def run_loop(
     chain: Chain,
     stepper: Stepper,
-    reference: np.ndarray,
+    reference: Array,
     start: Equilibrium,
     delay: int = 1,
     pressure_known: bool = True,
@@ -57,7 +58,9 @@ def run_loop(
 
 
 class _Loop:
-    def __init__(self, chain: Chain, columns: int, samples: int, start: Equilibrium, delay: int, known: bool):
+    def __init__(
+        self, chain: Chain, columns: int, samples: int, start: Equilibrium, delay: int, known: bool
+    ) -> None:
         self.chain, self.start, self.delay, self.known = chain, start, delay, known
         self.actuator = actuator_of(chain.rig)
         self.rest_drive = self.actuator.drive(start.pressure)
@@ -66,7 +69,7 @@ class _Loop:
         self.drive = np.zeros((samples, chain.substeps + 1, columns))
         self.peak = np.full(columns, start.pressure)
 
-    def run(self, stepper: Stepper, reference: np.ndarray, curvature: bool) -> LoopRun:
+    def run(self, stepper: Stepper, reference: Array, curvature: bool) -> LoopRun:
         command = np.full(reference.shape, self.start.command)
         pressure, output = (
             np.full(reference.shape, self.start.pressure),
@@ -84,7 +87,7 @@ class _Loop:
         bent = self._curvature() if curvature else None
         return LoopRun(self.chain.sample_time, reference, command, pressure, bent, output, self.peak)
 
-    def _advance(self, k: int, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _advance(self, k: int, command: Array) -> tuple[Array, Array]:
         """Hold ``command`` over sample k; return pressure and output at its end."""
         pressure = self.start.pressure + self.regulator.step(command[None] - self.start.command)
         self.peak = np.maximum(self.peak, pressure.max(axis=0))
@@ -92,7 +95,7 @@ class _Loop:
         self.drive[k] = self.actuator.drive(inside) - self.rest_drive
         return pressure[-1], self.start.output + self.plant.step(self.drive[k])[0]
 
-    def _curvature(self) -> np.ndarray:
+    def _curvature(self) -> Array:
         kernel = self.chain.curvature[: len(self.drive), 0, :, None]
         moved = oaconvolve(kernel, self.drive, axes=0)[: len(self.drive) - 1].sum(axis=1)
         settled = self.rest_drive * self.actuator.dynamics.dc_gain if self.rest_drive else 0.0

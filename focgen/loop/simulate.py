@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest, within_reach
 from focgen.control.files import ControllerLike, controller_from
@@ -26,9 +27,9 @@ from focgen.loop.run import LoopRun, run_loop
 from focgen.loop.stepper import FloatStepper, Stepper
 from focgen.loop.worst import Worst, worst_case
 from focgen.plan.build import build_plan
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.rig.arguments import RigLike, file_of, rig_of
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
 _SETTLINGS = 8.0  # time constants of the slowest frozen loop that a step is followed for
@@ -85,7 +86,7 @@ class Simulation(Shown):
     setpoints: tuple[SetpointResult, ...]
     running: LoopRun
     ideal: LoopRun
-    frozen: tuple[np.ndarray | None, ...]
+    frozen: tuple[Array | None, ...]
     nominal: LoopRun | None
     effects: tuple[str, ...]
     holds: bool
@@ -271,7 +272,7 @@ class _Trial:
             self.plan.states,
         )
 
-    def _worst(self, count: int, reference: np.ndarray, results: Sequence[SetpointResult]) -> Worst:
+    def _worst(self, count: int, reference: Array, results: Sequence[SetpointResult]) -> Worst:
         return worst_case(
             self.rig,
             self.controller,
@@ -283,7 +284,7 @@ class _Trial:
             lambda rig: self._corner(rig, count, reference),
         )
 
-    def _corner(self, rig: Rig, count: int, reference: np.ndarray) -> list[StepMeasures | None]:
+    def _corner(self, rig: Rig, count: int, reference: Array) -> list[StepMeasures | None]:
         """The steps on another rig; None at a set point that no command holds there."""
         there = copy(self)
         there.rig, there.start = rig, rest(rig, self.controller.ranges.output)
@@ -299,7 +300,7 @@ class _Trial:
     def _planned(self, columns: int) -> PlanStepper:
         return PlanStepper(self.plan, columns, self.start.command, reference=self.start.output)
 
-    def _run(self, stepper: Stepper, reference: np.ndarray) -> LoopRun:
+    def _run(self, stepper: Stepper, reference: Array) -> LoopRun:
         """The loop with the rig as it is, effects included."""
         if not self.rig.effects:
             return self._without_effects(stepper, reference)
@@ -307,26 +308,26 @@ class _Trial:
         known = self.rig.signals.pressure is not None
         return run_with_effects(plant, stepper, reference, self.start, self.delay, known)
 
-    def _without_effects(self, stepper: Stepper, reference: np.ndarray) -> LoopRun:
+    def _without_effects(self, stepper: Stepper, reference: Array) -> LoopRun:
         prepared = chain(self.rig, self.controller.sample_time, len(reference))
         known = self.rig.signals.pressure is not None
         return run_loop(prepared, stepper, reference, self.start, self.delay, known)
 
-    def _reference(self, count: int) -> np.ndarray:
+    def _reference(self, count: int) -> Array:
         targets = np.array([point.output for point in self.points])
         return np.repeat(targets, count)[:, None] if self.consecutive else np.tile(targets, (count, 1))
 
     def _from(self, index: int) -> float:
         return self.points[index - 1].output if self.consecutive and index else self.start.output
 
-    def _frozen(self, index: int, count: int) -> np.ndarray | None:
+    def _frozen(self, index: int, count: int) -> Array | None:
         if not self.margins[index].stable:
             return None
         begin = self._from(index)
         step = frozen_step(self.loops[index], np.arange(count) * self.controller.sample_time)
         return begin + step * (self.points[index].output - begin)
 
-    def _part(self, run: LoopRun, index: int, count: int) -> np.ndarray:
+    def _part(self, run: LoopRun, index: int, count: int) -> Array:
         return (
             run.output[index * count : (index + 1) * count, 0] if self.consecutive else run.output[:, index]
         )
@@ -337,7 +338,7 @@ class _Trial:
         count: int,
         running: LoopRun,
         ideal: LoopRun,
-        frozen: np.ndarray | None,
+        frozen: Array | None,
         nominal: LoopRun | None,
     ) -> SetpointResult:
         begin, target, h = self._from(index), self.points[index].output, self.controller.sample_time
@@ -358,7 +359,7 @@ class _Trial:
         )
 
 
-def _verdict(found: StepMeasures, output: np.ndarray, step: float) -> str:
+def _verdict(found: StepMeasures, output: Array, step: float) -> str:
     quarter = max(1, len(output) // 4)
     late, before = np.ptp(output[-quarter:]), np.ptp(output[-2 * quarter : -quarter])
     if late > _SWING * abs(step) and late > _KEPT * before:

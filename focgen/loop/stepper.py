@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.loop.online import OnlineConvolution
-from focgen.plan.canonical import Tables, inner_limits, tables
+from focgen.plan.canonical import Table, Tables, inner_limits, tables
 from focgen.plan.setpoint import rate_of
 
 
 class Stepper(Protocol):
     """What the loop asks of a controller: one sample of every column, arrays of shape (columns,)."""
 
-    def step(self, reference: np.ndarray, measurement: np.ndarray, schedule: np.ndarray) -> np.ndarray:
+    def step(self, reference: Array, measurement: Array, schedule: Array) -> Array:
         """Return the output u, physical."""
 
 
@@ -37,9 +38,9 @@ class FloatStepper:
         columns: int,
         start: float = 0.0,
         length: int | None = None,
-        gain: Callable | None = None,
+        gain: Callable[..., Any] | None = None,
         reference: float = 0.0,
-    ):
+    ) -> None:
         memory = samples if length is None else min(length, samples)
         self._sums = _Sums(tables(controller, max(1, memory)), columns, samples, inner_limits(controller))
         self._gain = gain or controller.gain_at
@@ -53,11 +54,13 @@ class FloatStepper:
         self._integral = np.full(columns, float(start))
         self._previous = np.zeros(columns)
 
-    def step(self, reference, measurement, schedule):
+    def step(self, reference: Array, measurement: Array, schedule: Array) -> Array:
+        """One sample of all loops: physical signals (columns,) in, the outputs (columns,) out."""
         self._aim = self._aim + self._rate * (reference - self._aim)
         filtered = self._sums.step(self._aim - measurement)
         if self._half is None:
-            return np.clip(self._gain(schedule) * filtered, *self._limits)
+            made: Array = np.clip(self._gain(schedule) * filtered, *self._limits)
+            return made
         increment = self._half * self._gain(schedule) * filtered
         change = np.clip(increment + self._previous, -self._slew, self._slew)
         self._integral = np.clip(self._integral + change, *self._limits)
@@ -68,22 +71,24 @@ class FloatStepper:
 class _Sums:
     """The transfer function: direct and inner sums of the error, and the recursion of the filtered signal."""
 
-    def __init__(self, parts: Tables, columns: int, samples: int, limits: tuple[float, float]):
-        def convolution(table):
+    def __init__(self, parts: Tables, columns: int, samples: int, limits: tuple[float, float]) -> None:
+        def convolution(table: Table | None) -> OnlineConvolution | None:
             return (
                 None if table is None else OnlineConvolution(table.weights[:, None, None], columns, samples)
             )
 
         self._direct, self._rest = convolution(parts.direct), convolution(parts.rest)
         self._feedback = convolution(parts.feedback)
-        self._limits = sorted(limit / parts.normaliser for limit in limits)  # the tables are divided by it
+        self._low, self._high = sorted(
+            limit / parts.normaliser for limit in limits
+        )  # the tables are divided by it
         self._inner, self._previous = np.zeros(columns), np.zeros(columns)
 
-    def step(self, error: np.ndarray) -> np.ndarray:
+    def step(self, error: Array) -> Array:
         total = np.zeros_like(error) if self._direct is None else self._direct.step(error[None])[0]
         if self._rest is not None:
             increment = self._rest.step(error[None])[0]
-            self._inner = np.clip(self._inner + increment + self._previous, *self._limits)
+            self._inner = np.clip(self._inner + increment + self._previous, self._low, self._high)
             self._previous = increment
             total = total + self._inner
         if self._feedback is not None:

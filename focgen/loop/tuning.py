@@ -1,8 +1,9 @@
-"""K_o(p) found in simulation: the line with which steps from rest to the operating points meet the wish.
+"""K_o(p) found in simulation: the line with which steps from rest to the operating points meet the
+specification.
 
 A step to a high set point passes through all lower pressures, so its response depends on the whole line,
 and the line is sought as a whole: its level c and its ratio ρ = K_o(highest)/K_o(lowest operating point).
-Of all lines that meet the wish the one is taken whose operating points settle most alike.
+Of all lines that meet the specification the one is taken whose operating points settle most alike.
 """
 
 from __future__ import annotations
@@ -11,20 +12,23 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.control.inversion import Inversion, invert
 from focgen.control.measures import StepMeasures, measure_step
 from focgen.control.schedule import Line
 from focgen.errors import DesignError
 from focgen.loop.bench import Bench
-from focgen.loop.chain import chain, substeps
+from focgen.loop.chain import Chain, chain, substeps
 from focgen.loop.run import run_loop
 from focgen.loop.stepper import FloatStepper
+from focgen.present import present
 
-OVERSHOOT = 5.0  # %, where nothing is wished
-HORIZON = 5.0  # wished settling times that a step is followed for
-_SAMPLES = 150  # samples in a wished settling time: finer sampling is searched at this
+OVERSHOOT = 5.0  # %, where nothing is specified
+HORIZON = 5.0  # specified settling times that a step is followed for
+_SAMPLES = 150  # samples in a specified settling time: finer sampling is searched at this
 # levels of K_o: 1 is where the loop with frozen gain settles in the time aimed at
 _LEVELS = np.geomspace(0.05, 6.0, 18)
 _COARSE_RATIOS = (0.6, 1.0, 1.7)
@@ -33,11 +37,11 @@ _CLOSE = 1.1
 _ATTEMPTS = 9
 _PARTS = 2  # substeps during the search; what it finds is checked with as many as the chain needs
 _MOST_SAMPLES = 60_000
-_MARGIN = 0.98  # of the wish that is aimed at, so that the fitted line keeps it
+_MARGIN = 0.98  # of the specification that is aimed at, so that the fitted line keeps it
 
 
 @dataclass(frozen=True)
-class Wish:
+class Specification:
     """What the loop shall do: ``settling`` the mean settling time (5 %) over the operating points in s, None
     for as fast as possible; ``overshoot`` the largest overshoot at any of them, %.
     """
@@ -70,10 +74,10 @@ class Tuned:
 class _Trials:
     """Results of many lines, arrays of shape (lines,) but ``lines`` (lines, 2): level and ratio."""
 
-    lines: np.ndarray
-    mean: np.ndarray
-    spread: np.ndarray
-    overshoot: np.ndarray
+    lines: Array
+    mean: Array
+    spread: Array
+    overshoot: Array
 
 
 class _Search:
@@ -81,7 +85,7 @@ class _Search:
     substeps; where ``step`` (s) is given, that is the interval, with as many substeps as the chain needs.
     """
 
-    def __init__(self, bench: Bench, scale: float, step: float | None = None):
+    def __init__(self, bench: Bench, scale: float, step: float | None = None) -> None:
         own = bench.rig.sample_time
         self.bench, self.scale = bench, scale
         self.step = step or max(own, scale / _SAMPLES)
@@ -90,7 +94,7 @@ class _Search:
             raise DesignError(
                 bench.rig.name,
                 f"a settling time of {scale:.3g} s is {scale / own:.0f} samples",
-                f"wish for a faster loop, or raise the rig's sample_time ({own:g} s)",
+                f"ask for a faster loop, or raise the rig's sample_time ({own:g} s)",
             )
         exact = substeps(bench.rig, self.step)
         self.chain = chain(bench.rig, self.step, self.samples, exact if step else min(exact, _PARTS))
@@ -98,7 +102,7 @@ class _Search:
         static = bench.rig.regulator.dc_gain * bench.rig.sensor.dc_gain
         self.unit = 3.0 / (scale * static)
 
-    def ratios(self, wanted) -> np.ndarray:
+    def ratios(self, wanted: ArrayLike) -> Array:
         """The ratios worth trying: 1 where nothing is scheduled or there is one operating point."""
         several = self.inversion.scheduled and np.ptp(self.bench.pressures) > 0.0
         return np.asarray(wanted) if several else np.ones(1)
@@ -117,7 +121,7 @@ class _Search:
         """Return what each line makes of each operating point."""
         return simulate_lines(self.bench, self.inversion, lines, self.chain)
 
-    def trials(self, levels, ratios) -> _Trials:
+    def trials(self, levels: Array, ratios: Array) -> _Trials:
         pairs = np.array([(level, ratio) for ratio in ratios for level in levels])
         found = self.measures([self.line(*pair) for pair in pairs])
         times = np.array([[m.settling_s for m in each] for each in found])
@@ -135,16 +139,17 @@ def _certain(found: float) -> float:
 
 
 def simulate_lines(
-    bench: Bench, inversion: Inversion, lines: list[Line], prepared
+    bench: Bench, inversion: Inversion, lines: list[Line], prepared: Chain
 ) -> list[tuple[StepMeasures, ...]]:
     """Step the loop from rest to every operating point with every line, all at once."""
     count, samples, h = len(bench.points), prepared.samples, prepared.sample_time
     level = np.repeat([line.intercept for line in lines], count)
     slope = np.repeat([line.slope for line in lines], count)
 
-    def gain(pressure):
+    def gain(pressure: Array) -> Array:
         held = np.clip(pressure, *bench.span)
-        return (level + slope * held) / inversion.K(held)
+        made: Array = (level + slope * held) / inversion.K(held)
+        return made
 
     controller = Controller("search", h, inversion.transfer, 1.0, inversion.integrator, bench.ranges)
     stepper = FloatStepper(controller, samples, count * len(lines), bench.start.command, gain=gain)
@@ -159,26 +164,26 @@ def simulate_lines(
     return [tuple(found[i : i + count]) for i in range(0, len(found), count)]
 
 
-def tune(bench: Bench, wish: Wish) -> Tuned:
-    """Return the line that meets ``wish``. Raises DesignError naming what is feasible."""
-    if wish.settling is None:
-        return fastest(bench, wish.overshoot)
-    found = meeting(bench, wish) or fastest(bench, wish.overshoot)
-    if found.mean_settling > wish.settling:
+def tune(bench: Bench, specification: Specification) -> Tuned:
+    """Return the line that meets ``specification``. Raises DesignError naming what is feasible."""
+    if specification.settling is None:
+        return fastest(bench, specification.overshoot)
+    found = meeting(bench, specification) or fastest(bench, specification.overshoot)
+    if found.mean_settling > specification.settling:
         raise DesignError(
             bench.rig.name,
-            f"no K_o(p) settles in {wish.settling:g} s on average with at most {wish.overshoot:g} % "
-            f"overshoot; feasible is {found.mean_settling:.3g} s",
-            f"wish for --settling {_upward(found.mean_settling):g} or more, or allow more --overshoot",
+            f"no K_o(p) settles in {specification.settling:g} s on average with at most "
+            f"{specification.overshoot:g} % overshoot; feasible is {found.mean_settling:.3g} s",
+            f"ask for --settling {_upward(found.mean_settling):g} or more, or allow more --overshoot",
         )
     return found
 
 
-def meeting(bench: Bench, wish: Wish) -> Tuned | None:
-    """Return the line whose mean settling time is the wish's, None where none was found."""
-    search = _Search(bench, wish.settling)
-    pair = _matching(search, wish)
-    return None if pair is None else _at_own_rate(bench, search, pair, wish)
+def meeting(bench: Bench, specification: Specification) -> Tuned | None:
+    """Return the line whose mean settling time is the specified one, None where none was found."""
+    search = _Search(bench, present(specification.settling))
+    pair = _matching(search, specification)
+    return None if pair is None else _at_own_rate(bench, search, pair, specification)
 
 
 def _upward(value: float) -> float:
@@ -187,7 +192,9 @@ def _upward(value: float) -> float:
     return math.ceil(value / unit) * unit
 
 
-def _at_own_rate(bench: Bench, search: _Search, pair: tuple[float, float, float], wish: Wish) -> Tuned | None:
+def _at_own_rate(
+    bench: Bench, search: _Search, pair: tuple[float, float, float], specification: Specification
+) -> Tuned | None:
     """Return the line at the rig's own sample time, its level corrected where the search ran at a coarser
     one.
     """
@@ -198,7 +205,10 @@ def _at_own_rate(bench: Bench, search: _Search, pair: tuple[float, float, float]
     lines = [own.line(each, ratio) for each in levels]
     for line, measures in zip(lines, own.measures(lines)):
         tuned = Tuned(line, own.inversion, measures)
-        if tuned.mean_settling <= (wish.settling or math.inf) and tuned.overshoot <= wish.overshoot:
+        if (
+            tuned.mean_settling <= (specification.settling or math.inf)
+            and tuned.overshoot <= specification.overshoot
+        ):
             return tuned
     return None
 
@@ -238,14 +248,15 @@ def _refined(
         ratios = search.ratios(best[2] * np.exp(0.4 * width * np.linspace(-1.0, 1.0, 7)))
         best = min(best, _quickest(search.trials(levels, ratios), overshoot) or best)
     _, level, ratio = best
-    return _at_own_rate(bench, search, (level, ratio, level), Wish(None, overshoot))
+    return _at_own_rate(bench, search, (level, ratio, level), Specification(None, overshoot))
 
 
 def _quickest(trials: _Trials, overshoot: float) -> tuple[float, float, float] | None:
     """Return mean settling time, level and ratio of the quickest line that keeps the overshoot."""
     mean = np.where(trials.overshoot <= _MARGIN * overshoot, trials.mean, np.inf)
     best = int(mean.argmin())
-    return None if math.isinf(mean[best]) else (float(mean[best]), *map(float, trials.lines[best]))
+    level, ratio = map(float, trials.lines[best])
+    return None if math.isinf(mean[best]) else (float(mean[best]), level, ratio)
 
 
 def _guess(bench: Bench) -> float:
@@ -263,28 +274,30 @@ def _guess(bench: Bench) -> float:
     return 3.0 / float(omega[late[0] if len(late) else -1])
 
 
-def _matching(search: _Search, wish: Wish) -> tuple[float, float, float] | None:
-    """Return level and ratio whose mean settling time is the wish's, with the smallest spread, and a level
-    tried nearby.
+def _matching(search: _Search, specification: Specification) -> tuple[float, float, float] | None:
+    """Return level and ratio whose mean settling time is the specified one, with the smallest spread, and a
+    level tried nearby.
 
     None where there is none.
     """
-    levels = _promising(search.trials(_LEVELS, search.ratios(_COARSE_RATIOS)), wish)
+    levels = _promising(search.trials(_LEVELS, search.ratios(_COARSE_RATIOS)), specification)
     if levels is None:
         return None
     ratios = search.ratios(_RATIOS)
-    pairs = _crossings(search.trials(levels, ratios), wish, len(levels))
+    pairs = _crossings(search.trials(levels, ratios), specification, len(levels))
     if not pairs or len(ratios) == 1:
         return pairs[0] if pairs else None
     level, ratio, _ = pairs[0]
     near = ratio * np.linspace(0.88, 1.12, 7)
     fine = search.trials(level * np.geomspace(0.85, 1.2, 10), near)
-    return (_crossings(fine, wish, 10) or pairs)[0]
+    return (_crossings(fine, specification, 10) or pairs)[0]
 
 
-def _promising(trials: _Trials, wish: Wish) -> np.ndarray | None:
-    """Return levels to look at closely: around those that come near to the wish."""
-    near = (trials.mean <= 1.6 * wish.settling) & (trials.overshoot <= 3.0 * wish.overshoot + 5.0)
+def _promising(trials: _Trials, specification: Specification) -> Array | None:
+    """Return levels to look at closely: around those that come near to the specification."""
+    near = (trials.mean <= 1.6 * present(specification.settling)) & (
+        trials.overshoot <= 3.0 * specification.overshoot + 5.0
+    )
     if not near.any():
         return None
     step = _LEVELS[1] / _LEVELS[0]
@@ -292,16 +305,18 @@ def _promising(trials: _Trials, wish: Wish) -> np.ndarray | None:
     return np.geomspace(low, high, max(8, math.ceil(math.log(high / low) / math.log(_CLOSE))))
 
 
-def _crossings(trials: _Trials, wish: Wish, levels: int) -> list[tuple[float, float, float]]:
-    """Return, for each ratio, the lowest level at which the mean settling time falls to the wish, best
-    spread first.
+def _crossings(
+    trials: _Trials, specification: Specification, levels: int
+) -> list[tuple[float, float, float]]:
+    """Return, for each ratio, the lowest level at which the mean settling time falls to the specification,
+    best spread first.
 
-    Level between those tried, ratio, and the tried level that meets the wish.
+    Level between those tried, ratio, and the tried level that meets the specification.
     """
-    target, found = _MARGIN * wish.settling, []
+    target, found = _MARGIN * present(specification.settling), []
     for start in range(0, len(trials.mean), levels):
         mean = trials.mean[start : start + levels]
-        fits = (mean <= target) & (trials.overshoot[start : start + levels] <= wish.overshoot)
+        fits = (mean <= target) & (trials.overshoot[start : start + levels] <= specification.overshoot)
         if not fits.any():
             continue
         i = start + int(fits.argmax())

@@ -10,22 +10,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Complex
 from focgen.control.controller import Controller
 from focgen.control.margins import Curve, Margins, curve, margins
 from focgen.control.measures import StepMeasures
 from focgen.fractional.transfer import TransferFunction
+from focgen.loop.frequency import LOW, any_schedule, chain_transfer, held_response, side_bands, slope_at
 from focgen.loop.linear_effects import linear_part
-from focgen.loop.response import LOW, any_schedule, chain_transfer, held_response, side_bands, slope_at
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.response import running_gain, running_response
 from focgen.rig.corners import EXACT, STAGES, corners, moved, transfer_of, without_gain
-from focgen.rig.model import Rig, Uncertainty
+from focgen.rig.rig import Rig, Uncertainty
 
 Simulated = Callable[[Rig], Sequence[StepMeasures | None]]
 """The steps to the set points on a rig, None for those that are left out."""
+
+_Measured = tuple[Uncertainty, float, StepMeasures | None]
+"""Corner, set point, and what the step to it measures; None beyond reach."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,9 @@ def worst_case(
     )
 
 
-def _margins(rig: Rig, controller: Controller, plan: Plan, delay: int, pressures) -> list[_Seen]:
+def _margins(
+    rig: Rig, controller: Controller, plan: Plan, delay: int, pressures: Sequence[float]
+) -> list[_Seen]:
     """The margins of the running loop in every corner, at every pressure."""
     loops = _Loops(rig, controller, plan, delay)
     seen = []
@@ -117,23 +124,24 @@ def _margins(rig: Rig, controller: Controller, plan: Plan, delay: int, pressures
 class _Loops:
     """The running loop but for its gain, in any corner, on the grid that the rig as given asks for."""
 
-    def __init__(self, rig: Rig, controller: Controller, plan: Plan, delay: int):
+    def __init__(self, rig: Rig, controller: Controller, plan: Plan, delay: int) -> None:
         self.rig, self.h = rig, controller.sample_time
         at = any_schedule(controller)
         unit = running_gain(plan, at)
         self.effects, _, _ = linear_part(rig)
 
-        def ahead(omega):
-            return running_response(plan, omega, at) / unit * np.exp(-1j * omega * self.h * delay)
+        def ahead(omega: Array) -> Complex:
+            made: Complex = running_response(plan, omega, at) / unit * np.exp(-1j * omega * self.h * delay)
+            return made
 
-        def nominal(omega):
+        def nominal(omega: Array) -> Complex:
             held = held_response(chain_transfer(rig), self.h, omega, self.effects, rig.delays.total)
             return ahead(omega) * held
 
         given = curve(nominal, LOW * 2.0 * math.pi / self.h, math.pi / self.h)
         self.omega, self.ahead = given.omega, ahead(given.omega)
         self.bands = side_bands(self.h, self.omega)
-        self.stages: dict[TransferFunction, np.ndarray] = {}
+        self.stages: dict[TransferFunction, Array] = {}
         self.found = {EXACT: given}
 
     def in_corner(self, dynamics: Uncertainty) -> Curve:
@@ -141,13 +149,13 @@ class _Loops:
         if dynamics not in self.found:
             one = moved(self.rig, dynamics)
             parts = [transfer_of(one, stage) for stage in STAGES]
-            known = math.prod(self._at_bands(part) for part in parts if part is not None)
+            known: Any = math.prod(self._at_bands(part) for part in parts if part is not None)
             transfer, late = chain_transfer(one), one.delays.total
             held = held_response(transfer, self.h, self.omega, self.effects, late, known)
             self.found[dynamics] = Curve(self.omega, self.ahead * held)
         return self.found[dynamics]
 
-    def _at_bands(self, part: TransferFunction) -> np.ndarray:
+    def _at_bands(self, part: TransferFunction) -> Array:
         if part not in self.stages:
             self.stages[part] = part.frequency_response(self.bands)
         return self.stages[part]
@@ -170,7 +178,8 @@ def _order(seen: _Seen, name: str) -> float:
     """What a margin counts: where the loop is unstable its gain may not grow at all, but has to fall."""
     if name == "gain_db" and not seen.margins.stable:
         return -seen.margins.gain_reduction_db
-    return getattr(seen.margins, name)
+    made: float = getattr(seen.margins, name)
+    return made
 
 
 def _smallest(seen: list[_Seen], name: str) -> Extreme:
@@ -179,10 +188,10 @@ def _smallest(seen: list[_Seen], name: str) -> Extreme:
     return Extreme(_order(worst, name), nominal, worst.off, worst.pressure)
 
 
-def _largest(flat, name: str) -> Extreme:
+def _largest(flat: Sequence[_Measured], name: str) -> Extreme:
     """The largest of all steps; one that does not settle is beyond all others."""
 
-    def size(found) -> float:
+    def size(found: _Measured) -> float:
         value = getattr(found[2], name)
         return math.inf if math.isnan(value) else value
 

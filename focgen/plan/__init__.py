@@ -3,7 +3,7 @@
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.response import designed_response, running_response
 from focgen.plan.scenario import Reset, Scenario, Trace, Track, physical_trace, to_physical, to_raw
 from focgen.plan.worst import worst_case_input

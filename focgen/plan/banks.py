@@ -8,18 +8,19 @@ shift of a·D, if there is one, adds half a count of L a sample, which the rate 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.fractional.elementary import exact_sum
 from focgen.plan.blocks import SPARE, finest_exponent
-from focgen.plan.formats import Interval, Word, integer, limit, weighted
+from focgen.plan.formats import RUNTIME, Interval, Word, integer, limit, weighted
 from focgen.plan.memory import Speed, by_speed
-from focgen.plan.model import Bank, Format, Sum
-from focgen.plan.modes import Modes
-
-_ARITHMETIC = {16: "q15", 32: "q31"}
+from focgen.plan.mode_sums import Modes
+from focgen.plan.plan import Bank, Format, Sum
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class BankDraft:
     order: float
     speed: Speed
     rates: tuple[int, ...]
-    real: np.ndarray
+    real: Array
     exponent: int
     guard: int
     state: Interval
@@ -76,7 +77,7 @@ def _format(bits: int, exponent: int, reach: Interval) -> Format:
     return Format(integer(bits), 2.0**exponent, reach.low, reach.high)
 
 
-def _span(counts) -> Interval:
+def _span(counts: Iterable[int]) -> Interval:
     return Interval(min(counts), max(counts))
 
 
@@ -101,11 +102,10 @@ def departure(u: Interval, mean: Interval, up: int) -> Interval:
 def bank_drafts(modes: tuple[Modes, ...], each: Interval, word: Word, where: str) -> list[BankDraft]:
     """One draft for each fractional term and speed; ``each`` is the range of the history's counts. Raises
     PlanError, naming ``where``, where no format covers the weights."""
-    arithmetic = _ARITHMETIC[word.bits]
     return [
         _draft(Modes(m.order, m.rates[place], m.weights[place]), speed, each, word, where)
         for m in modes
-        for speed, place in by_speed(arithmetic, m.rates)
+        for speed, place in by_speed(RUNTIME[word.bits], m.rates)
     ]
 
 
@@ -142,7 +142,7 @@ def _each_error(bank: Bank) -> float:
 # ------------------------------------------------------------------------------------------------ floating
 
 
-def floating_banks(modes: tuple[Modes, ...], kind: type[np.floating], real: Format) -> tuple[Bank, ...]:
+def floating_banks(modes: tuple[Modes, ...], kind: type[np.floating[Any]], real: Format) -> tuple[Bank, ...]:
     """The banks of one history in float or double."""
     arithmetic, found = "f32" if kind is np.float32 else "f64", []
     for m in modes:

@@ -8,13 +8,15 @@ costs anyway. A block in which a weight would be lost is halved, too.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.fractional.elementary import l1
 from focgen.plan.formats import Interval, Word, exponent_for, integer, limit, weighted
-from focgen.plan.model import Block, Format
+from focgen.plan.plan import Block, Format
 
 SPARE = 4  # bits between a sum's width and the widest alignment, so that its rounding fits too
 
@@ -25,13 +27,14 @@ class Draft:
     2^``exponent``."""
 
     first: int
-    real: np.ndarray
+    real: Array
     exponent: int
 
     @property
-    def counts(self) -> np.ndarray:
+    def counts(self) -> Array:
         """The weights, int64."""
-        return np.rint(self.real * 2.0**-self.exponent).astype(np.int64)
+        made: Array = np.rint(self.real * 2.0**-self.exponent).astype(np.int64)
+        return made
 
     @property
     def error(self) -> float:
@@ -52,13 +55,11 @@ class _Cut:
     allowed: float
     where: str
 
-    def exponent(self, weights: np.ndarray) -> int:
+    def exponent(self, weights: Array) -> int:
         return finest_exponent(weights, self.largest, self.word, self.where)
 
 
-def split(
-    weights: np.ndarray, first: int, largest: int, word: Word, where: str = "[transfer]"
-) -> list[Draft]:
+def split(weights: Array, first: int, largest: int, word: Word, where: str = "[transfer]") -> list[Draft]:
     """Cut weights, by rising lag from ``first`` on, into blocks, newest first.
 
     ``largest`` is the largest magnitude of a sample in counts. Raises PlanError, naming ``where``, where no
@@ -71,7 +72,7 @@ def split(
     return drafts
 
 
-def _octaves(first: int, stop: int):
+def _octaves(first: int, stop: int) -> Iterator[tuple[int, int]]:
     """(start, stop) of the blocks 0, 1, 2–3, 4–7, …"""
     start = first
     while start < stop:
@@ -80,7 +81,7 @@ def _octaves(first: int, stop: int):
         start = end
 
 
-def _halved(weights: np.ndarray, first: int, cut: _Cut) -> list[Draft]:
+def _halved(weights: Array, first: int, cut: _Cut) -> list[Draft]:
     if not weights.any():
         return [Draft(first, weights, 0)]
     draft = Draft(first, weights, cut.exponent(weights))
@@ -91,7 +92,7 @@ def _halved(weights: np.ndarray, first: int, cut: _Cut) -> list[Draft]:
     return _halved(weights[:half], first, cut) + _halved(weights[half:], first + half, cut)
 
 
-def finest_exponent(weights: np.ndarray, largest: int, word: Word, where: str) -> int:
+def finest_exponent(weights: Array, largest: int, word: Word, where: str) -> int:
     """The finest scale at which every weight and the block's sum fit. Raises PlanError, naming ``where``,
     where it is out of reach."""
     magnitude = np.abs(weights)

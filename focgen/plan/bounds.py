@@ -22,21 +22,24 @@ a distance, add nothing but the rounding of their own limits; likewise the integ
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array, Ints
 from focgen.errors import PlanError
 from focgen.fractional.elementary import exact_sum, l1
 from focgen.plan.banks import drive_error
 from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.gains import largest_gain, longest_segment, steepest, table_error, tuned_error
-from focgen.plan.model import Bank, ErrorBound, Plan, Sum
+from focgen.plan.plan import Bank, ErrorBound, Plan, Sum
 from focgen.plan.proofs import at_rest, reset_error
 from focgen.plan.setpoint import set_point_error
 from focgen.plan.stability import inverse_of
 from focgen.plan.truncation import largest_error, truncation
 from focgen.plan.truncation_band import band_truncation
+from focgen.present import present
 
 _UNIT = {"f64": 2.0**-53, "f32": 2.0**-24}
 _DOUBLE = 2.0**-53
@@ -98,11 +101,28 @@ class FilteredError:
         return exact_sum([*self.static.values()]) + self.ceiling
 
 
-class _Account:
+class _Account(ABC):
     """What the fixed and the floating account share. ``M``, ``N`` and ``reach`` (V) as in the module's
     notation."""
 
-    def __init__(self, plan: Plan, tables: Tables):
+    @property
+    @abstractmethod
+    def input_error(self) -> float:
+        """Of e, beyond its inputs' own rounding."""
+
+    @abstractmethod
+    def sum_error(self, made: Sum | None, table: Table | None, largest: float) -> float:
+        """The rounding in a sum over a history of up to ``largest``."""
+
+    @abstractmethod
+    def inner_edge(self) -> float:
+        """Of a limit of the inner integral."""
+
+    @abstractmethod
+    def inner_rounding(self) -> float:
+        """Of the inner integral in one sample."""
+
+    def __init__(self, plan: Plan, tables: Tables) -> None:
         self.plan, self.tables, controller = plan, tables, plan.controller
         self.half_step = 0.5 * plan.sample_time if plan.integrator else 1.0
         self.largest_gain = largest_gain(controller)
@@ -127,13 +147,13 @@ class _Account:
         """
         if made is None:
             return 0.0
-        exact, size = table.weights[first:], table.size[first:]
+        exact, size = present(table).weights[first:], present(table).size[first:]
         lags = np.arange(first, first + len(exact))
         taps = l1(np.array(made.values) - exact) + exact_sum(self.recursion(lags) * size)
-        held, exact = np.array(_mode_weights(made)), np.array(_exact_weights(table))
+        held, exact = np.array(_mode_weights(made)), np.array(_exact_weights(present(table)))
         return taps + 2.0 * exact_sum(np.abs(held - exact) + 16.0 * _DOUBLE * np.abs(exact))
 
-    def recursion(self, lags: np.ndarray) -> np.ndarray:
+    def recursion(self, lags: Ints) -> Array:
         """Relative error of a double's weights by the recursion of eq. (11), the reference's, in 4 roundings
         a lag."""
         return (4.0 * lags + 20.0) * _DOUBLE
@@ -144,7 +164,8 @@ class _Account:
         if made is None:
             return FilteredError({})
         each = (
-            self.tables.rest.l1 * self.input_error + self.weight_error(made.rest, self.tables.rest) * self.E
+            present(self.tables.rest).l1 * self.input_error
+            + self.weight_error(made.rest, self.tables.rest) * self.E
         )
         each += self.sum_error(made.rest, self.tables.rest, self.E)
         edge = self.inner_edge()
@@ -164,11 +185,11 @@ class _Fixed(_Account):
         """The alignments' rounding, and that of the modes' drives."""
         if made is None:
             return 0.0
-        aligned = sum(1 for b in (*made.blocks, *made.banks) if b.align)
+        aligned = sum(bool(b.align) for b in made.blocks) + sum(bool(b.align) for b in made.banks)
         return (0.5 * aligned + drive_error(made)) * made.total.lsb
 
     def inner_edge(self) -> float:
-        return 0.5 * self.plan.inner.state.lsb
+        return 0.5 * present(self.plan.inner).state.lsb
 
     def inner_rounding(self) -> float:
         return 0.0
@@ -196,7 +217,7 @@ class _Fixed(_Account):
     def carried(self) -> float:
         """The rounding of v, which meets (1 − 1/z)/A, and that of a reset."""
         lsb = self.plan.filtered.lsb
-        rounding = 0.5 * self.own.norm_after(np.array([1.0, -1.0])) * bool(self.plan.narrow)
+        rounding = 0.5 * present(self.own).norm_after(np.array([1.0, -1.0])) * bool(self.plan.narrow)
         return lsb * (rounding + reset_error(self.plan) * max(1.0, self.M * at_rest(self.plan)))
 
     def gain_error(self) -> float:
@@ -206,7 +227,7 @@ class _Fixed(_Account):
             moved = 0.5 * plan.schedule.signal.lsb * steepest(plan.controller) if plan.schedule else 0.0
             return tuned_error(plan, lsb) + 0.5 * lsb + moved
         if plan.schedule is None:
-            return abs(plan.constant_gain * lsb - plan.controller.gain)
+            return abs(plan.constant_gain * lsb - plan.controller.gains[0])
         inputs = 0.5 * plan.schedule.signal.lsb * steepest(plan.controller)
         return table_error(plan, lsb) + 0.5 * lsb + inputs
 
@@ -234,7 +255,7 @@ def plan_reach(plan: Plan) -> float:
     return next(p.worst for p in plan.proofs if p.node == "v")
 
 
-def _drive_error(rates: np.ndarray, m: float, u: float, tiny: float, compensated: bool) -> np.ndarray:
+def _drive_error(rates: Array, m: float, u: float, tiny: float, compensated: bool) -> Array:
     """How far a mode's D can be off for |u| ≤ m, shape of ``rates``.
 
     u_{k−1} itself is rounded where m = 2: u m, once, and as much in L. Each sample adds to L's error η ≤ q (2
@@ -253,7 +274,7 @@ def _drive_error(rates: np.ndarray, m: float, u: float, tiny: float, compensated
 class _Floating(_Account):
     """The account in float or double, and of the double reference it is compared with."""
 
-    def __init__(self, plan: Plan, tables: Tables):
+    def __init__(self, plan: Plan, tables: Tables) -> None:
         self.u, self.tiny = _UNIT[plan.arithmetic], _TINY[plan.arithmetic]
         super().__init__(plan, tables)
 
@@ -273,7 +294,7 @@ class _Floating(_Account):
             return 0.0
         count, partial = made.taps + 2, np.cumsum(np.abs(made.weights)[::-1])
         here = self.u * (1.0 + gamma(count, self.u)) * (exact_sum(partial) + float(partial[-1]))
-        there = gamma(count, _DOUBLE) * l1(table.weights)
+        there = gamma(count, _DOUBLE) * l1(present(table).weights)
         taps = 1.01 * (here + there) * largest + count * self.tiny * (1.0 + largest)
         banks = [self.bank_error(bank, float(partial[-1])) for bank in made.banks]
         return taps + exact_sum(banks) * largest
@@ -293,15 +314,16 @@ class _Floating(_Account):
 
     def inner_edge(self) -> float:
         """Of its clamp; in counts also of what it gives."""
-        state = self.plan.inner.state
+        state = present(self.plan.inner).state
         given = 0.0 if state.floating else self.u * self.Z * 1.01 + state.lsb
         return (self.u + _DOUBLE) * self.Z + given
 
     def inner_rounding(self) -> float:
         """r + r_prev, z + that, each rounded, here and in the reference; in counts r alone."""
-        r, state = 2.0 * self.tables.rest.l1 * self.E, self.plan.inner.state
+        r, state = 2.0 * present(self.tables.rest).l1 * self.E, present(self.plan.inner).state
         each = _DOUBLE * (self.Z + 2.0 * r) * 1.01 + 2.0 * self.tiny
-        return each + (self.u * (self.Z + 2.0 * r) * 1.01 if state.floating else state.lsb)
+        made: float = each + (self.u * (self.Z + 2.0 * r) * 1.01 if state.floating else state.lsb)
+        return made
 
     def filtered(self) -> FilteredError:
         plan, tables = self.plan, self.tables
@@ -322,24 +344,25 @@ class _Floating(_Account):
         """With feedback the errors scale with the machine's own v: solved for it. A reset's v is rounded as
         well."""
         plan, tables = self.plan, self.tables
-        back = self.weight_error(plan.feedback.table, tables.feedback, 1)
-        back += self.sum_error(plan.feedback.table, tables.feedback, 1.0) + (self.u + _DOUBLE) * 4.0
+        back = self.weight_error(present(plan.feedback).table, tables.feedback, 1)
+        back += self.sum_error(present(plan.feedback).table, tables.feedback, 1.0) + (self.u + _DOUBLE) * 4.0
         if self.M * back >= 0.5:
             return FilteredError({"rounding": np.inf})
         reach = (self.reach + self.M * rounding) / (1.0 - self.M * back)
-        rest = max(1.0, self.M * abs(tables.feedback.total))
+        rest = max(1.0, self.M * abs(present(tables.feedback).total))
         static["rounding"] = self.M * (rounding + back * reach) + rest * self.reset_rounding()
         return FilteredError(static, inner.growth, inner.ceiling)
 
     def reset_rounding(self) -> float:
         """Of v = e · B(1)/A(1): two roundings, those of the sums in double, and the reference's."""
-        direct, back = self.tables.direct, self.tables.feedback
+        direct, back = self.tables.direct, present(self.tables.feedback)
         if direct is None:
             return 0.0
         count = len(direct.weights) + len(back.weights) + 8
         sums = direct.l1 / abs(back.total) * (1.0 + back.l1 / abs(back.total))
         ratio = abs(direct.total / back.total)
-        return self.E * (2.0 * (self.u + _DOUBLE) * ratio + 2.0 * gamma(count, _DOUBLE) * sums) * 1.01
+        made: float = self.E * (2.0 * (self.u + _DOUBLE) * ratio + 2.0 * gamma(count, _DOUBLE) * sums) * 1.01
+        return made
 
     def gain_error(self) -> float:
         plan, g = self.plan, self.largest_gain
@@ -347,7 +370,7 @@ class _Floating(_Account):
             return tuned_error(plan, 1.0 / self.half_step) * (1.0 + _DOUBLE / self.u)
         if plan.schedule is None:
             return 2.0 * (self.u + _DOUBLE) * g
-        slope, reach = steepest(plan.controller), max(map(abs, plan.controller.ranges.schedule))
+        slope, reach = steepest(plan.controller), max(map(abs, present(plan.controller.ranges.schedule)))
         inputs = (2.0 * self.u + 2.0 * _DOUBLE) * slope * reach
         slopes = slope * longest_segment(plan.controller)
         return table_error(plan, 1.0 / self.half_step) + inputs + 4.0 * (self.u + _DOUBLE) * (g + slopes)
@@ -367,6 +390,7 @@ class _Floating(_Account):
         state, each = plan.integrator.state, _DOUBLE * 1.01 * (largest + 2.0 * d)
         each += here * (largest + 2.0 * d) if state.floating else here * largest + 3.0 * state.lsb
         if plan.integrator.slew is not None:  # rounded, here and in the reference
-            most = plan.controller.slew_limit * plan.sample_time
+            most = present(plan.controller.slew_limit) * plan.sample_time
             each += (here * most if state.floating else 0.5 * state.lsb) + _DOUBLE * 1.01 * most
-        return plan.sample_time * operator + each + 2.0 * edge + 4.0 * self.tiny
+        made: float = plan.sample_time * operator + each + 2.0 * edge + 4.0 * self.tiny
+        return made

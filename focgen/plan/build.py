@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,15 +14,17 @@ from focgen.plan import fixed, floating
 from focgen.plan.bounds import error_bound
 from focgen.plan.canonical import Tables, realise, tables
 from focgen.plan.formats import WORDS
+from focgen.plan.gains import within_range
 from focgen.plan.integrals import counted
 from focgen.plan.memory import Memory, band_memories_of, checked_band, exponential_tables, memories_of
-from focgen.plan.model import ErrorBound, Format, Plan
+from focgen.plan.plan import ErrorBound, Format, Plan
 from focgen.plan.proofs import prove
 from focgen.plan.setpoint import with_set_point
 from focgen.plan.slewing import with_slew
 from focgen.plan.stability import check_stable
 from focgen.plan.tuning import with_limits
 from focgen.plan.usable import check_room
+from focgen.present import present
 
 _LONGEST = 1_000_000
 
@@ -53,10 +56,14 @@ def build_plan(
     range cannot be represented, or a node cannot be proved; the remedy says what would work.
     """
     controller = _tunable(controller, tunable)
-    given = dict(arithmetic=arithmetic, length=length, memory=memory, tolerance=tolerance, horizon=horizon)
+    given: dict[str, Any] = dict(
+        arithmetic=arithmetic, length=length, memory=memory, tolerance=tolerance, horizon=horizon
+    )
     wanted = replace(controller, **{key: value for key, value in given.items() if value is not None})
     wanted = _operated(wanted, operator, band, tolerance)
     _check(wanted)
+    if wanted.tunable and wanted.scheduled and wanted.arithmetic in WORDS:
+        controller, wanted = within_range(controller), within_range(wanted)
     operator, band = wanted.operator, checked_band(wanted, wanted.operator, wanted.band)
     folded, memories = _tables(wanted, band)
     check_stable(controller, folded, wanted.length)
@@ -64,8 +71,10 @@ def build_plan(
     with np.errstate(over="ignore"):  # a number beyond the type has no room, and is refused for that below
         plan = draft(controller, wanted.arithmetic, wanted.length, name or controller.name, folded)
     if wanted.memory == "exponential":
-        asked = {"tolerance": wanted.tolerance, "horizon": None if band else wanted.horizon}
-        asked.update(operator=operator, band=band)
+        horizon = None if band else wanted.horizon
+        asked: dict[str, Any] = dict(
+            operator=operator, band=band, tolerance=wanted.tolerance, horizon=horizon
+        )
         plan = replace(plan, memory="exponential", memories=memories, **asked)
         plan = replace(plan, length=max(plan.error_lags, plan.filtered_lags))
     _check_at_rest(plan, folded)
@@ -133,10 +142,10 @@ def _check(controller: Controller) -> None:
 
 
 def _numbers(controller: Controller) -> list[float]:
-    ranges, gain = controller.ranges, controller.gain
+    ranges = controller.ranges
     spans = [s for s in (ranges.reference, ranges.measurement, ranges.output, ranges.schedule) if s]
-    gains = [*gain.breakpoints, *gain.gains] if controller.scheduled else [gain]
-    return [controller.sample_time, *gains, *(x for span in spans for x in span)]
+    points = controller.schedule.breakpoints if controller.scheduled else ()
+    return [controller.sample_time, *points, *controller.gains, *(x for span in spans for x in span)]
 
 
 def _check_at_rest(plan: Plan, folded: Tables) -> None:
@@ -144,11 +153,11 @@ def _check_at_rest(plan: Plan, folded: Tables) -> None:
     form, half_step = realise(plan.controller), 0.5 * plan.sample_time
     for made, table, terms, factor in (
         (plan.direct, folded.direct, form.direct, 1.0),
-        (plan.inner and plan.inner.rest, folded.rest, form.rest, half_step),
+        (plan.inner.rest if plan.inner else None, folded.rest, form.rest, half_step),
     ):
         constants = [abs(t.coefficient) for t in terms if t.order == 0.0]
         meant = math.fsum(constants) * factor / abs(folded.normaliser)
-        if made is not None and abs(math.fsum(made.values) - table.total) > 0.5 * meant > 0.0:
+        if made is not None and abs(math.fsum(made.values) - present(table).total) > 0.5 * meant > 0.0:
             what = f"the weights of {plan.arithmetic} lose the gain at rest: the highest order outweighs it"
             raise PlanError(plan.name, what, "choose q31, f32 or f64, or a longer sample_time")
 
@@ -180,7 +189,13 @@ def _floating(controller: Controller, arithmetic: str, length: int, name: str, f
 
 
 def _assembled(
-    controller, arithmetic, length, name, signals, made: fixed.Filter, out: fixed.Actuation
+    controller: Controller,
+    arithmetic: str,
+    length: int,
+    name: str,
+    signals: tuple[Format, Format, Format, Format],
+    made: fixed.Filter,
+    out: fixed.Actuation,
 ) -> Plan:
     reference, measurement, error, output = signals
     return Plan(

@@ -26,17 +26,18 @@ integrator it is clamped to what would take the output across its whole range in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.fractional.elementary import exact_sum, l1, power, total
 from focgen.fractional.transfer import Polynomial, polynomial
 from focgen.fractional.weights import gl_weights, short_memory_bias
-from focgen.plan.modes import Modes, Response
+from focgen.plan.mode_sums import Modes, Response
 
 _WHOLE = 1e-9
 _HIGHEST = 8.0  # of any order: beyond, h^−β leaves no digits
@@ -74,8 +75,8 @@ class Table:
     all.
     """
 
-    weights: np.ndarray
-    size: np.ndarray
+    weights: Array
+    size: Array
     modes: tuple[Modes, ...] = ()
     whole: Response | None = None
 
@@ -99,7 +100,7 @@ class Table:
 class Tables:
     """The folded weight tables of a controller at its sample time; ``None`` where there is nothing to sum.
 
-    ``direct`` and ``rest`` make p and r of :mod:`focgen.plan.model` (h/2 inside ``rest``), ``feedback`` is
+    ``direct`` and ``rest`` make p and r of :mod:`focgen.plan.plan` (h/2 inside ``rest``), ``feedback`` is
     the normalised denominator, 1 at lag 0.
     """
 
@@ -243,8 +244,8 @@ def inner_limits(controller: Controller) -> tuple[float, float]:
         low, high = -reach, reach
     constant = realise(controller).constant
     largest = [x * constant / (g * smallest) for x in (low, high) for g in _signs(gains)]
-    return min(largest + [0.0]), max(largest + [0.0])
+    return min([*largest, 0.0]), max([*largest, 0.0])
 
 
-def _signs(gains) -> set[float]:
+def _signs(gains: Iterable[float]) -> set[float]:
     return {float(np.sign(g)) for g in gains if g != 0.0} or {1.0}

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from focgen.plan.model import Format
+from focgen.arrays import Numbers
+from focgen.plan.plan import Format
 
 MOST = 1 << 61
 """Counts of an integral's ends, and of what it takes in."""
@@ -19,7 +22,7 @@ def up_of(state: Format) -> int:
     return 1 - math.frexp(state.lsb)[1]
 
 
-def counts_of(values, up: int) -> np.ndarray:
+def counts_of(values: ArrayLike, up: int) -> Numbers:
     """Floats in counts of 2^−``up``, any shape: the nearest, halves away from zero, at most ``MOST``;
     ``NOTHING`` for NaN and infinity."""
     wide = np.ldexp(np.asarray(values, dtype=np.float64), up)  # exact
@@ -30,12 +33,12 @@ def counts_of(values, up: int) -> np.ndarray:
     return np.where(finite, found, NOTHING)
 
 
-def values_of(counts, state: Format) -> np.ndarray:
+def values_of(counts: ArrayLike, state: Format) -> Numbers:
     """The float32 nearest to so many counts, halves to even, any shape."""
     return np.asarray(counts, dtype=np.int64).astype(np.float32) * np.float32(state.lsb)
 
 
-def taken_in(values, state: Format):
+def taken_in(values: ArrayLike, state: Format) -> Any:
     """What an integral takes in, in its own type: counts where it is counted and the values are not."""
     if state.floating or np.asarray(values).dtype.kind != "f":
         return values

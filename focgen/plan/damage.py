@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Damage, Reset, Scenario, Trace, Tune
+from focgen.plan.sums import Count
 from focgen.plan.tuning import courses, default_params
 from focgen.plan.usable import standing
 
@@ -30,7 +32,9 @@ def mended(plan: Plan, scenario: Scenario, execute: Callable[[Plan, Scenario], T
     return scenario
 
 
-def _mended(plan: Plan, scenario: Scenario, damages: tuple[Damage, ...], execute) -> Scenario:
+def _mended(
+    plan: Plan, scenario: Scenario, damages: tuple[Damage, ...], execute: Callable[[Plan, Scenario], Trace]
+) -> Scenario:
     """The same of at most one damage a lane."""
     left_out = scenario.ref.copy()
     for d in damages:
@@ -45,7 +49,7 @@ def _mended(plan: Plan, scenario: Scenario, damages: tuple[Damage, ...], execute
     return replace(without, resets=(*scenario.resets, *resets), tracks=tracks, tunes=(*scenario.tunes, *lost))
 
 
-def _stands(plan: Plan, scenario: Scenario, damage: Damage, u: np.floating) -> float:
+def _stands(plan: Plan, scenario: Scenario, damage: Damage, u: np.floating) -> Any:
     """The output at a damage, where ``u`` stood before."""
     if damage.what in ("integral", "all"):
         return _start(plan, scenario, damage)
@@ -66,6 +70,6 @@ def _start(plan: Plan, scenario: Scenario, damage: Damage) -> float:
     return min(max(0.0, low), high)
 
 
-def _begun(scenario: Scenario, damage: Damage, u0) -> Reset:
+def _begun(scenario: Scenario, damage: Damage, u0: Count) -> Reset:
     at = damage.lane, damage.sample
     return Reset(*at, scenario.ref[at], scenario.meas[at], u0, keeps=True)

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.plan.counts import taken_in
 from focgen.plan.damage import mended
 from focgen.plan.execute import Run, execute
-from focgen.plan.model import Plan
-from focgen.plan.scenario import Reset, Scenario, Trace, Track
+from focgen.plan.plan import Plan
+from focgen.plan.scenario import Reset, Scenario, Trace, Track, Tune
 from focgen.plan.setpoint import begun
 from focgen.plan.tuning import Applied, applied, refused
 from focgen.plan.usable import good_samples, invalid_samples, usable
+from focgen.present import present
+
+Event = TypeVar("Event", Reset, Track, Tune)
 
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """Raw values after a lane's last sample, by what :mod:`focgen.plan.model` calls them.
+    """Raw values after a lane's last sample, by what :mod:`focgen.plan.plan` calls them.
 
     ``error`` and ``filtered``: the samples since init or the latest reset, oldest first; before them each was
     ``error_rest`` and ``filtered_rest`` for ever. ``r``: the inner integral's latest addend. ``starting``:
@@ -27,22 +33,22 @@ class Ending:
     filter, by the names of its members. What a plan does not have is 0.
     """
 
-    error: np.ndarray
-    filtered: np.ndarray
-    error_rest: np.generic
-    filtered_rest: np.generic
-    carry: np.generic
-    inner: np.generic
-    r: np.generic
-    integral: np.generic
-    increment: np.generic
+    error: Numbers
+    filtered: Numbers
+    error_rest: Any
+    filtered_rest: Any
+    carry: Any
+    inner: Any
+    r: Any
+    integral: Any
+    increment: Any
     starting: bool
-    means: dict[tuple[str, int], np.ndarray]
-    rests: dict[tuple[str, int], np.ndarray]
-    output: np.generic
+    means: dict[tuple[str, int], Numbers]
+    rests: dict[tuple[str, int], Numbers]
+    output: Any
     flags: int
     applied: Applied | None = None
-    aim: dict[str, np.generic] = field(default_factory=dict)
+    aim: dict[str, Any] = field(default_factory=dict)
 
 
 def endings(plan: Plan, scenario: Scenario) -> tuple[Trace, tuple[Ending, ...]]:
@@ -60,8 +66,9 @@ def endings(plan: Plan, scenario: Scenario) -> tuple[Trace, tuple[Ending, ...]]:
 def _lane(plan: Plan, packed: Scenario, lane: int, count: int, trace: Trace) -> Ending:
     """A lane that ends after ``count`` good samples, and what has been called after the last of them."""
     resets, tracks, tunes = (
-        [replace(event, lane=0) for event in of if event.lane == lane and event.sample <= count]
-        for of in (packed.resets, packed.tracks, packed.tunes)
+        _of_lane(packed.resets, lane, count),
+        _of_lane(packed.tracks, lane, count),
+        _of_lane(packed.tunes, lane, count),
     )
     reset = any(r.sample == count for r in resets)
     last = count + 1 if reset or not count else count  # a sample to begin with: only its beginning counts
@@ -77,28 +84,37 @@ def _lane(plan: Plan, packed: Scenario, lane: int, count: int, trace: Trace) -> 
     return found
 
 
+def _of_lane(events: Sequence[Event], lane: int, last: int) -> list[Event]:
+    """Those of a lane up to a sample, as events of the only lane."""
+    return [replace(event, lane=0) for event in events if event.lane == lane and event.sample <= last]
+
+
 def _taken(plan: Plan, found: Ending, now: Applied) -> Ending:
     """With other parameters."""
     found = replace(found, applied=now)
     return replace(found, integral=_within(plan, found, found.integral)) if plan.integrator else found
 
 
-def _within(plan: Plan, found: Ending, u) -> np.generic:
+def _within(plan: Plan, found: Ending, u: Any) -> Any:
     """A floating output, or integral in counts, as an integral within the limits that hold; in integers no
     sample is ever left out."""
     low, high = (
-        (found.applied.low, found.applied.high) if plan.tuning else (plan.output.low, plan.output.high)
+        (present(found.applied).low, present(found.applied).high)
+        if plan.tuning
+        else (plan.output.low, plan.output.high)
     )
-    state = plan.integrator.state
+    state = present(plan.integrator).state
     if not state.floating:
         u, low, high = (taken_in(value, state) for value in (u, np.float32(low), np.float32(high)))
     return np.asarray(min(max(u, low), high)).astype(np.asarray(u).dtype)[()]
 
 
 def _part(packed: Scenario, lane: int, samples: int, resets: list[Reset], tracks: list[Track]) -> Scenario:
-    signals = [None if x is None else x[lane : lane + 1] for x in (packed.ref, packed.meas, packed.sched)]
-    signals = [None if x is None else np.pad(x, ((0, 0), (0, 1)))[:, :samples] for x in signals]
-    return Scenario(*signals, tuple(resets), tuple(tracks))
+    def cut(x: Numbers) -> Numbers:
+        return np.pad(x[lane : lane + 1], ((0, 0), (0, 1)))[:, :samples]
+
+    sched = None if packed.sched is None else cut(packed.sched)
+    return Scenario(cut(packed.ref), cut(packed.meas), sched, tuple(resets), tuple(tracks))
 
 
 def _ended(run: Run, lane: int, trace: Trace, of: int) -> Ending:
@@ -119,7 +135,7 @@ def _ended(run: Run, lane: int, trace: Trace, of: int) -> Ending:
         means={key: one.mean[lane] for key, one in banks.items()},
         rests={key: one.rest[lane] for key, one in banks.items()},
         output=trace.u[of, -1],
-        flags=int(trace.flags[of, -1]),
+        flags=int(present(trace.flags)[of, -1]),
         applied=run.tuned[lane][-1][1] if run.tuned else None,
         aim={name: values[lane] for name, values in run.aim.items()},
     )

@@ -1,6 +1,6 @@
 """The bit-true reference: runs a plan sample for sample, in Python's own arithmetic.
 
-Written from the description in :mod:`focgen.plan.model`, not from the C: histories are whole signals, not
+Written from the description in :mod:`focgen.plan.plan`, not from the C: histories are whole signals, not
 rings; sums over e are taken tap by tap for all samples at once. Integers are int64, which the plan's proofs
 show to suffice; floating values are numpy's float32 and float64, whose every operation rounds once, in the
 plan's order.
@@ -11,21 +11,23 @@ Several lanes run side by side, so that the steps that have to follow each other
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Numbers
 from focgen.plan.counts import taken_in, values_of
 from focgen.plan.damage import mended
 from focgen.plan.formats import shift
 from focgen.plan.histories import BankRun, Latest, Recursion
-from focgen.plan.model import (
+from focgen.plan.plan import (
     FLAG_HIGH,
     FLAG_INPUT,
     FLAG_LOW,
     FLAG_SCHEDULE,
     Format,
     Plan,
-    Schedule,
     Sum,
 )
 from focgen.plan.scenario import Reset, Scenario, Trace
@@ -33,6 +35,11 @@ from focgen.plan.setpoint import error_of
 from focgen.plan.slewing import slewed
 from focgen.plan.tuning import Applied, courses, tuned
 from focgen.plan.usable import holding, invalid_samples, usable
+from focgen.plan.values import clamp, interpolated, kind_of, output_of, saturate
+from focgen.present import present
+
+_AtRest = dict[tuple[int, int], Any]
+"""What a signal was before each segment, by lane and first sample."""
 
 
 def execute(plan: Plan, scenario: Scenario) -> Trace:
@@ -47,22 +54,6 @@ def _executed(plan: Plan, scenario: Scenario) -> Trace:
     return Run(plan, scenario).trace
 
 
-def kind_of(format_: Format) -> type:
-    """The numpy type that values of a format are computed in."""
-    return {"float": np.float32, "double": np.float64}.get(format_.ctype, np.int64)
-
-
-def clamp(values: np.ndarray, format_: Format) -> np.ndarray:
-    """Within the limits of a format, in the values' own type."""
-    kind = np.asarray(values).dtype.type
-    return np.minimum(np.maximum(values, kind(format_.low)), kind(format_.high))
-
-
-def saturate(values: np.ndarray, bits: int) -> np.ndarray:
-    """Within the two's complement of so many bits."""
-    return np.minimum(np.maximum(values, -(1 << (bits - 1))), (1 << (bits - 1)) - 1)
-
-
 @dataclass(frozen=True)
 class _Segment:
     """Samples ``start`` to ``stop`` of a lane, before which e was ``constant`` for ever."""
@@ -70,8 +61,8 @@ class _Segment:
     lane: int
     start: int
     stop: int
-    constant: np.generic
-    u0: np.generic
+    constant: Any
+    u0: Any
     begun: bool  # by a reset, not by init
 
 
@@ -80,7 +71,7 @@ class Run:
     ``carry``, ``inner``, ``integral`` and those in ``aim`` (lanes,), and the modes in ``memory``.
     """
 
-    def __init__(self, plan: Plan, scenario: Scenario):
+    def __init__(self, plan: Plan, scenario: Scenario) -> None:
         self.plan, self.scenario = plan, scenario
         self.kind = kind_of(plan.error)
         self.shape = scenario.ref.shape
@@ -102,7 +93,7 @@ class Run:
         u, self.d = self.output()
         self.trace = Trace(u, self.d, self.flags(u))
 
-    def _input(self, values, format_: Format) -> np.ndarray:
+    def _input(self, values: ArrayLike, format_: Format) -> Numbers:
         values = np.asarray(values, dtype=self.kind)
         return values if format_.floating else clamp(values, format_)
 
@@ -115,14 +106,14 @@ class Run:
         for r in self.scenario.resets:
             starts[r.lane, r.sample] = *self._start(r), True
         order, found = sorted(starts), []
-        for (lane, start), after in zip(order, order[1:] + [(-1, 0)]):
+        for (lane, start), after in zip(order, [*order[1:], (-1, 0)]):
             constant, u0, begun = starts[lane, start]
             stop = after[1] if after[0] == lane else samples
             u0 = self.limited(lane, start, u0) if begun else clamp(u0, self.plan.output)
             found.append(_Segment(lane, start, stop, constant, u0, begun))
         return found
 
-    def _limits(self) -> tuple[np.ndarray, np.ndarray]:
+    def _limits(self) -> tuple[Numbers, Numbers]:
         """The output's limits at every sample."""
         ends = (self.plan.output.low, self.plan.output.high)
         low, high = (np.full(self.shape, end, self.kind) for end in ends)
@@ -131,13 +122,18 @@ class Run:
                 low[lane, max(sample, 0) :], high[lane, max(sample, 0) :] = parameters.low, parameters.high
         return low, high
 
-    def limited(self, lane: int, sample: int, u) -> np.generic:
+    def limited(self, lane: int, sample: int, u: Any) -> np.generic:
         """Within the output's limits at a sample."""
-        return np.minimum(np.maximum(self.kind(u), self.low[lane, sample]), self.high[lane, sample])
+        made: np.generic = np.minimum(
+            np.maximum(self.kind(u), self.low[lane, sample]), self.high[lane, sample]
+        )
+        return made
 
     def _start(self, reset: Reset) -> tuple[np.generic, np.generic]:
         """The error and the output that a reset starts from; 0 for what cannot be used."""
-        plan, e, u0 = self.plan, 0, 0
+        plan = self.plan
+        e: Any = 0
+        u0: Any = 0
         if usable(reset.ref, plan.reference) and usable(reset.meas, plan.measurement):
             e = self._input(reset.ref, plan.reference) - self._input(reset.meas, plan.measurement)
         if usable(reset.u0, plan.output):
@@ -153,7 +149,7 @@ class Run:
         if plan.inner:
             self.r, self.r_rest = self._over_error(plan.inner.rest)
 
-    def _over_error(self, table: Sum | None) -> tuple[np.ndarray, dict]:
+    def _over_error(self, table: Sum | None) -> tuple[Numbers, _AtRest]:
         """The sum at every sample, and at rest before each segment (key: lane, start)."""
         if table is None:
             zero = self.kind(0)
@@ -162,7 +158,7 @@ class Run:
             return self._remembered(table)
         return self._by_taps(table)
 
-    def _remembered(self, table: Sum) -> tuple[np.ndarray, dict]:
+    def _remembered(self, table: Sum) -> tuple[Numbers, _AtRest]:
         """Taps, and modes sample by sample; at rest modes add nothing."""
         total, rest = self._by_taps(table)
         memory = self.memory[table.name] = [BankRun(bank, self.kind, self.shape[0]) for bank in table.banks]
@@ -177,22 +173,24 @@ class Run:
             past.push(self.e[:, k])
         return total, rest
 
-    def _by_taps(self, table: Sum) -> tuple[np.ndarray, dict]:
+    def _by_taps(self, table: Sum) -> tuple[Numbers, _AtRest]:
         """The sums of the taps alone."""
-        lags, long, places = table.last, [], []
+        lags, places = table.last, []
+        long: list[Numbers] = []
         for s in self.segments:
             places.append(sum(map(len, long)))
             long.append(
                 np.concatenate([np.full(lags + 1, s.constant, self.kind), self.e[s.lane, s.start : s.stop]])
             )
         whole = self._filtered(table, np.concatenate(long))
-        total, rest = np.empty(self.shape, self.kind), {}
+        total: Numbers = np.empty(self.shape, self.kind)
+        rest: _AtRest = {}
         for s, place in zip(self.segments, places):
             rest[s.lane, s.start] = whole[place + lags]
             total[s.lane, s.start : s.stop] = whole[place + lags + 1 : place + lags + 1 + s.stop - s.start]
         return total, rest
 
-    def _filtered(self, table: Sum, signal: np.ndarray) -> np.ndarray:
+    def _filtered(self, table: Sum, signal: Numbers) -> Numbers:
         """Σ_j w_j x_{k−j} at every k ≥ ``table.last``; what stands before is not used."""
         total = np.zeros_like(signal)
         for block in table.blocks:
@@ -217,7 +215,7 @@ class Run:
         else:
             self.v = self._fed_back(p)
 
-    def _rest(self) -> dict:
+    def _rest(self) -> _AtRest:
         """v of the constant past; the inner integral is 0 then."""
         plan = self.plan
         if plan.feedback is None:
@@ -231,13 +229,13 @@ class Run:
         by, bits = plan.feedback.steady_shift, plan.filtered.bits
         return {k: saturate(shift(steady * s.constant, by), bits) for k, s in self.starts.items()}
 
-    def _inner(self) -> np.ndarray:
+    def _inner(self) -> Numbers:
         """z, aligned to p."""
-        inner, kind = self.plan.inner, kind_of(self.plan.inner.state)
+        inner, kind = present(self.plan.inner), kind_of(present(self.plan.inner).state)
         self.r = taken_in(self.r, inner.state)
         self.r_rest = {place: taken_in(r, inner.state) for place, r in self.r_rest.items()}
         z, before = np.zeros(self.shape[0], kind), np.zeros(self.shape[0], kind)
-        out = np.empty(self.shape, kind)
+        out: Numbers = np.empty(self.shape, kind)
         for k in range(self.shape[1]):
             for lane in self.starting.get(k, ()):
                 z[lane], before[lane] = 0, self.r_rest[lane, k]
@@ -249,15 +247,15 @@ class Run:
             return out
         return values_of(out, inner.state) if self.plan.floating else shift(out, inner.to_wide)
 
-    def _fed_back(self, p: np.ndarray) -> np.ndarray:
+    def _fed_back(self, p: Numbers) -> Numbers:
         """v_k from p_k and the past of v, whose columns are samples, ``lags`` of them ahead of the first."""
         plan, (lanes, samples) = self.plan, self.shape
-        lags = plan.feedback.table.last
+        lags = present(plan.feedback).table.last
         past = np.zeros((lanes, lags + samples), self.kind)
         carry, out = np.zeros(lanes, self.kind), np.empty(self.shape, self.kind)
-        table = Recursion(plan.feedback.table, self.kind)
-        memory = [BankRun(bank, self.kind, lanes) for bank in plan.feedback.table.banks]
-        self.memory[plan.feedback.table.name] = memory
+        table = Recursion(present(plan.feedback).table, self.kind)
+        memory = [BankRun(bank, self.kind, lanes) for bank in present(plan.feedback).table.banks]
+        self.memory[present(plan.feedback).table.name] = memory
         latest = Latest(lanes, self.kind)
         for k in range(samples):
             for lane in self.starting.get(k, ()):
@@ -286,19 +284,19 @@ class Run:
         """g at every sample."""
         plan = self.plan
         if plan.schedule:
-            self.s = self._input(self.scenario.sched, plan.schedule.signal)
-            self.g = _scheduled(plan.schedule, self.s, self.kind)
+            self.s = self._input(present(self.scenario.sched), plan.schedule.signal)
+            self.g = interpolated(plan.schedule, self.s, self.kind)
         else:
             self.g = np.full(self.shape, plan.constant_gain, self.kind)
         for lane, course in self.tuned.items():
             for start, parameters in course[1:]:
                 if plan.schedule:
                     own = tuned(plan.schedule, parameters)
-                    self.g[lane, start:] = _scheduled(own, self.s[lane, start:], self.kind)
+                    self.g[lane, start:] = interpolated(own, self.s[lane, start:], self.kind)
                 else:
                     self.g[lane, start:] = self.kind(parameters.gains[0])
 
-    def output(self) -> tuple[np.ndarray, np.ndarray]:
+    def output(self) -> tuple[Numbers, Numbers]:
         """u and d."""
         plan = self.plan
         d = self.increment(self.g * self.v)
@@ -306,18 +304,20 @@ class Run:
             return np.minimum(np.maximum(d, self.low), self.high), d
         return self._integrated(d), d
 
-    def increment(self, product: np.ndarray) -> np.ndarray:
+    def increment(self, product: Numbers) -> Numbers:
         """d of g·v."""
         if self.plan.floating:
-            return taken_in(product, self.plan.increment)
-        return shift(product, self.plan.gain_shift)
+            made: Numbers = taken_in(product, self.plan.increment)
+        else:
+            made = shift(product, self.plan.gain_shift)
+        return made
 
-    def _integrated(self, d: np.ndarray) -> np.ndarray:
+    def _integrated(self, d: Numbers) -> Numbers:
         plan, lanes = self.plan, self.shape[0]
-        kind = kind_of(plan.integrator.state)
+        kind = kind_of(present(plan.integrator).state)
         total, before, out = np.zeros(lanes, kind), np.zeros(lanes, kind), np.empty(self.shape, kind)
         low, high = self.wide(self.low), self.wide(self.high)
-        tracks: dict[int, list] = {}
+        tracks: dict[int, list[Any]] = {}
         for t in self.scenario.tracks:
             if usable(t.u, plan.output):
                 tracks.setdefault(t.sample, []).append(t)
@@ -340,7 +340,7 @@ class Run:
         self.integral = total
         if plan.floating:
             return np.minimum(np.maximum(output_of(plan, out), self.low), self.high)
-        return saturate(shift(out, plan.integrator.to_output), plan.output.bits)
+        return saturate(shift(out, present(plan.integrator).to_output), plan.output.bits)
 
     def _tunes(self) -> dict[int, list[tuple[int, Applied]]]:
         """By sample, the lanes whose parameters change ahead of it, in their order."""
@@ -350,18 +350,19 @@ class Run:
                 found.setdefault(sample, []).append((lane, parameters))
         return found
 
-    def tracked(self, lane: int, sample: int, u) -> np.generic:
+    def tracked(self, lane: int, sample: int, u: Any) -> np.generic:
         """The integral that follows the output ``u`` ahead of a sample."""
-        return self.wide(self.limited(lane, sample, u))
+        made: np.generic = self.wide(self.limited(lane, sample, u))
+        return made
 
-    def wide(self, u):
+    def wide(self, u: Any) -> Any:
         """Output counts as what the integrator holds; as they are without one."""
         integrator = self.plan.integrator
         if integrator is None:
             return u
         return taken_in(u, integrator.state) if self.plan.floating else u << integrator.to_output
 
-    def flags(self, u: np.ndarray) -> np.ndarray:
+    def flags(self, u: Numbers) -> Numbers:
         """The flags after each step."""
         plan, scenario = self.plan, self.scenario
         found = FLAG_HIGH * (u >= self.high) + FLAG_LOW * (u <= self.low)
@@ -372,29 +373,5 @@ class Run:
             first, last = (self.kind(plan.schedule.breakpoints[i]) for i in (0, -1))
             found = found + FLAG_SCHEDULE * ((self.s < first) | (self.s > last))
             outside |= False if plan.floating else np.asarray(scenario.sched) != self.s
-        return (found + FLAG_INPUT * outside).astype(np.uint8)
-
-
-def output_of(plan: Plan, integral: np.ndarray) -> np.ndarray:
-    """u of a floating plan's integral, any shape; an end that is no whole number of counts counts still."""
-    state = plan.integrator.state
-    return integral if state.floating else clamp(values_of(integral, state), plan.output)
-
-
-def scheduled_gain(plan: Plan, s: np.ndarray) -> np.ndarray:
-    """g in counts at raw values of the scheduling signal, any shape; ``plan`` has a schedule."""
-    kind = kind_of(plan.error)
-    s = np.asarray(s, dtype=kind)
-    return _scheduled(plan.schedule, s if plan.floating else clamp(s, plan.schedule.signal), kind)
-
-
-def _scheduled(schedule: Schedule, s: np.ndarray, kind: type) -> np.ndarray:
-    points = np.array(schedule.breakpoints, dtype=kind)
-    gains, slopes = np.array(schedule.gains, dtype=kind), np.array(schedule.slopes, dtype=kind)
-    segment = np.searchsorted(points, s, side="right") - 1
-    inside = np.clip(segment, 0, len(slopes) - 1)
-    run = slopes[inside] * (s - points[inside])
-    if kind is np.int64:
-        by = np.array(schedule.slope_shifts, dtype=kind)[inside]
-        run = np.where(by > 0, (run + ((1 << by) >> 1)) >> by, run)
-    return np.where(segment < 0, gains[0], np.where(segment >= len(slopes), gains[-1], gains[inside] + run))
+        made: Numbers = (found + FLAG_INPUT * outside).astype(np.uint8)
+        return made

@@ -15,9 +15,10 @@ from focgen.plan.blocks import Draft, coarsest, finished, split
 from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.formats import Interval, Word, exponent_for, integer, limit, nearest, span
 from focgen.plan.gains import Gain, fixed_gain, span_of
-from focgen.plan.model import Feedback, Format, InnerIntegrator, Integrator, Sum
-from focgen.plan.modes import Response, response_of
+from focgen.plan.mode_sums import Response, response_of
+from focgen.plan.plan import Bank, Block, Feedback, Format, InnerIntegrator, Integrator, Sum
 from focgen.plan.stability import Inverse, inverse
+from focgen.present import present
 
 _FEWEST_COUNTS = 16  # of the integrator that the smallest steady error must add
 
@@ -75,9 +76,9 @@ def signals(controller: Controller, word: Word) -> Signals:
         exponent += 1
     low, high = ranges.output
     output = exponent_for(max(abs(low), abs(high)), word.limit, where, "the output")
-    made = [_format(word.bits, exponent, x, unit) for x in (ref, meas, error)]
+    r, y, e = (_format(word.bits, exponent, x, unit) for x in (ref, meas, error))
     u = _format(word.bits, output, span_of(low, high, output, where, "output"), controller.units.output)
-    return Signals(*made, exponent, u, output)
+    return Signals(r, y, e, exponent, u, output)
 
 
 def _format(bits: int, exponent: int, reach: Interval, unit: str = "") -> Format:
@@ -118,7 +119,8 @@ class _Sample:
         blocks = finished(parts.taps, self.exponent, total, self.each, self.word, unit)
         banks = tuple(b.finished(self.exponent, total) for b in parts.banks)
         reach = Interval(0, 0)
-        for part in (*blocks, *banks):
+        parts_of: tuple[Block | Bank, ...] = (*blocks, *banks)
+        for part in parts_of:
             reach = reach + span(part.sum).shifted(part.align)
         return Sum(name, history, blocks, _format(self.word.sum_bits, total, reach, unit), banks)
 
@@ -144,7 +146,7 @@ class _Parts:
 
 def _inner(controller: Controller, tables: Tables, sample: _Sample) -> InnerIntegrator:
     """The clamped integral; ``to_wide`` is filled in once the wide format is known."""
-    parts = sample.parts(tables.rest, 0)
+    parts = sample.parts(present(tables.rest), 0)
     low, high = (x / tables.normaliser for x in inner_limits(controller))
     low, high = min(low, high), max(low, high)
     exponent = sample.exponent + parts.coarsest
@@ -170,7 +172,7 @@ def _log2(lsb: float) -> int:
 
 
 def _combined(
-    direct, inner, sample: _Sample, exponent: int
+    direct: _Parts | None, inner: InnerIntegrator | None, sample: _Sample, exponent: int
 ) -> tuple[Sum | None, InnerIntegrator | None, Interval]:
     """Both parts of p aligned to 2^``exponent``, and the range of p."""
     made = sample.sum("direct", "error", direct, exponent) if direct else None
@@ -181,7 +183,7 @@ def _combined(
     return made, inner, reach
 
 
-def _without_feedback(direct, inner, sample: _Sample) -> Filter:
+def _without_feedback(direct: _Parts | None, inner: InnerIntegrator | None, sample: _Sample) -> Filter:
     """v is p, narrowed to 32 bits."""
     word, exponent = sample.word, _floor(direct, inner, sample)
     while True:
@@ -197,10 +199,16 @@ def _without_feedback(direct, inner, sample: _Sample) -> Filter:
     return Filter(made, placed, wide, narrow, None, v, exponent + narrow)
 
 
-def _with_feedback(direct, inner, sample: _Sample, controller: Controller, tables: Tables) -> Filter:
+def _with_feedback(
+    direct: _Parts | None,
+    inner: InnerIntegrator | None,
+    sample: _Sample,
+    controller: Controller,
+    tables: Tables,
+) -> Filter:
     word = sample.word
     whole = Interval(-word.limit - 1, word.limit)
-    back = _Sample(0, whole, word, sample.where).parts(tables.feedback, 1)
+    back = _Sample(0, whole, word, sample.where).parts(present(tables.feedback), 1)
     own = _quantised_inverse(back, controller, word)
     b = direct.response if direct else Response(np.zeros(1))
     reach = own.norm_after(b.weights, b.left_out) * sample.each.worst * 2.0**sample.exponent
@@ -227,15 +235,17 @@ def _quantised_inverse(back: _Parts, controller: Controller, word: Word) -> Inve
 
 def _noise(made: Filter, own: Inverse) -> float:
     """What rounding can add to v, in counts of v."""
-    sums = [made.feedback.table] + ([made.direct] if made.direct else [])
+    sums = [present(made.feedback).table] + ([made.direct] if made.direct else [])
     aligned = sum(len(s.blocks) + len(s.banks) for s in sums) + 1
     drives = math.fsum(drive_error(s) for s in sums) * 2.0**-made.narrow
     carried = own.norm_after(np.array([1.0, -1.0]))
-    at_reset = 2.0 * max(1.0, own.norm * (1.0 + math.fsum(made.feedback.table.values)))
+    at_reset = 2.0 * max(1.0, own.norm * (1.0 + math.fsum(present(made.feedback).table.values)))
     return 0.5 * carried + own.norm * (0.5 * aligned * 2.0**-made.narrow + drives) + at_reset
 
 
-def _recursion(direct, inner, sample: _Sample, back: _Parts, exponent: int) -> Filter | None:
+def _recursion(
+    direct: _Parts | None, inner: InnerIntegrator | None, sample: _Sample, back: _Parts, exponent: int
+) -> Filter | None:
     """The filter with v in counts of 2^``exponent``; None where the wide format cannot be finer than v."""
     word = sample.word
     whole = Interval(-word.limit - 1, word.limit)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from focgen.control.controller import Controller
@@ -10,12 +12,16 @@ from focgen.plan.banks import floating_banks
 from focgen.plan.canonical import Table, Tables, inner_limits
 from focgen.plan.fixed import Actuation, Filter
 from focgen.plan.gains import floating_gain
-from focgen.plan.model import Block, Feedback, Format, InnerIntegrator, Integrator, Sum
+from focgen.plan.plan import Block, Feedback, Format, InnerIntegrator, Integrator, Sum
+from focgen.present import present
 
-KINDS = {"f64": (np.float64, "double"), "f32": (np.float32, "float")}
+KINDS: dict[str, tuple[type[np.floating[Any]], str]] = {
+    "f64": (np.float64, "double"),
+    "f32": (np.float32, "float"),
+}
 
 
-def filter_of(controller: Controller, tables: Tables, kind: type[np.floating], ctype: str) -> Filter:
+def filter_of(controller: Controller, tables: Tables, kind: type[np.floating[Any]], ctype: str) -> Filter:
     """The parts from e to v. Raises PlanError where a weight is beyond the type."""
     real = Format(ctype, 1.0, -np.inf, np.inf)
     direct = _sum("direct", "error", tables.direct, 0, controller, kind, real) if tables.direct else None
@@ -28,14 +34,22 @@ def filter_of(controller: Controller, tables: Tables, kind: type[np.floating], c
     return Filter(direct, inner, real, 0, feedback, real, 0)
 
 
-def _rounded(value: float, controller: Controller, kind: type[np.floating]) -> float:
+def _rounded(value: float, controller: Controller, kind: type[np.floating[Any]]) -> float:
     if abs(value) > float(np.finfo(kind).max) / 1e6:
         remedy = "give [ranges] in units that are nearer to 1, or choose f64"
         raise PlanError(controller.name, f"the weight {value:.3g} is beyond {np.dtype(kind).name}", remedy)
     return float(kind(value))
 
 
-def _sum(name: str, history: str, table: Table, first: int, controller, kind, real: Format) -> Sum:
+def _sum(
+    name: str,
+    history: str,
+    table: Table,
+    first: int,
+    controller: Controller,
+    kind: type[np.floating[Any]],
+    real: Format,
+) -> Sum:
     weights = tuple(_rounded(w, controller, kind) for w in table.weights[first:].tolist())
     block = Block(first, first + len(weights) - 1, weights, 1.0, real, 0)
     for m in table.modes:
@@ -43,13 +57,15 @@ def _sum(name: str, history: str, table: Table, first: int, controller, kind, re
     return Sum(name, history, (block,), real, floating_banks(table.modes, kind, real))
 
 
-def _inner(controller: Controller, tables: Tables, kind, real: Format) -> InnerIntegrator:
+def _inner(
+    controller: Controller, tables: Tables, kind: type[np.floating[Any]], real: Format
+) -> InnerIntegrator:
     ends = [_rounded(x / tables.normaliser, controller, kind) for x in inner_limits(controller)]
-    rest = _sum("rest", "error", tables.rest, 0, controller, kind, real)
+    rest = _sum("rest", "error", present(tables.rest), 0, controller, kind, real)
     return InnerIntegrator(rest, Format(real.ctype, 1.0, min(ends), max(ends)), 0)
 
 
-def actuation(controller: Controller, output: Format, kind: type[np.floating], ctype: str) -> Actuation:
+def actuation(controller: Controller, output: Format, kind: type[np.floating[Any]], ctype: str) -> Actuation:
     """Gain and integrator."""
     factor = 0.5 * controller.sample_time if controller.integrator else 1.0
     gain = floating_gain(controller, factor, kind, ctype)
@@ -57,6 +73,6 @@ def actuation(controller: Controller, output: Format, kind: type[np.floating], c
     return Actuation(gain, real, 0, real, Integrator(output, 0) if controller.integrator else None)
 
 
-def signal(ends: tuple[float, float], kind: type[np.floating], ctype: str, unit: str) -> Format:
+def signal(ends: tuple[float, float], kind: type[np.floating[Any]], ctype: str, unit: str) -> Format:
     """The format of an input or the output with the given physical range."""
     return Format(ctype, 1.0, float(kind(ends[0])), float(kind(ends[1])), unit)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from focgen.errors import PlanError
-from focgen.plan.model import Format
+from focgen.plan.plan import Format
+from focgen.plan.sums import Count
 
 _FARTHEST = 150  # |log2| of any lsb: what a C double and this module's arithmetic take without a thought
 
@@ -25,6 +28,15 @@ class Word:
 
 
 WORDS = {"q15": Word(16, 32), "q31": Word(32, 64)}
+"""Every arithmetic in integers."""
+RUNTIME = {16: "q15", 32: "q31"}
+
+
+def runtime(arithmetic: str) -> str:
+    """The ending that names an arithmetic's functions in the C runtime, and its speeds of modes: one for all
+    integers of a width.
+    """
+    return RUNTIME[WORDS[arithmetic].bits] if arithmetic in WORDS else arithmetic
 
 
 def limit(bits: int) -> int:
@@ -92,7 +104,7 @@ class Interval:
         return max(abs(self.low), abs(self.high))
 
 
-def shift(count, by: int):
+def shift(count: Any, by: int) -> Any:
     """Right shift rounding half up, on Python integers and int64 arrays."""
     return (count + (1 << (by - 1))) >> by if by else count
 
@@ -102,7 +114,7 @@ def span(format_: Format) -> Interval:
     return Interval(int(format_.low), int(format_.high))
 
 
-def weighted(weights, each: Interval) -> Interval:
+def weighted(weights: Iterable[Count], each: Interval) -> Interval:
     """The range of Σ w x with every x anywhere in ``each``."""
     positive = sum(int(w) for w in weights if w > 0)
     negative = sum(int(w) for w in weights if w < 0)

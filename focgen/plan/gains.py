@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
+from typing import Any, Literal
 
 import numpy as np
 
-from focgen.control.controller import Controller
+from focgen.arrays import Array
+from focgen.control.controller import Controller, GainSchedule
 from focgen.errors import PlanError
 from focgen.plan.formats import Interval, Word, exponent_for, integer, nearest
-from focgen.plan.model import Count, Format, Plan, Schedule, Tuning
+from focgen.plan.plan import Count, Format, Plan, Schedule, Tuning
 from focgen.plan.tuning import fixed_tuning, floating_reach, gain_intervals, overshoot, segment
+from focgen.present import present
 
 _MARGIN = 3  # counts a rounded slope may overshoot the gains it connects
 _FEWEST = 16  # counts that a range must cover to be worth the name
+
+_SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -46,11 +53,8 @@ def fixed_gain(controller: Controller, factor: float, word: Word) -> Gain:
     """The gain times ``factor`` (h/2 ahead of an integrator) in integers. Raises PlanError where it cannot be
     held."""
     where = f"{controller.name} [gain]"
-    if not controller.scheduled:
-        points, gains = (), (controller.gain * factor,)
-    else:
-        points, gains = _clipped(controller)
-        gains = tuple(g * factor for g in gains)
+    points, bare = _clipped(controller) if controller.scheduled else ((), controller.gains)
+    gains = tuple(g * factor for g in bare)
     largest = max(abs(g) for g in gains)
     if largest == 0.0:
         raise PlanError(where, "is zero: the output would never move", "give a gain")
@@ -64,19 +68,28 @@ def fixed_gain(controller: Controller, factor: float, word: Word) -> Gain:
     return Gain(form, 0, _schedule(controller, points, counts, word, where))
 
 
+def within_range(controller: Controller) -> Controller:
+    """A scheduled controller whose breakpoints lie in the schedule's range, as integers hold them: where its
+    gains have factors, there is one factor to each of these.
+    """
+    return replace(controller, gain=GainSchedule(*_clipped(controller)))
+
+
 def _clipped(controller: Controller) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Breakpoints and gains within the schedule's range: beyond it no value can come."""
-    low, high = controller.ranges.schedule
-    given = controller.gain.breakpoints
+    low, high = present(controller.ranges.schedule)
+    given = controller.schedule.breakpoints
     points = [b for b in given if low < b < high]
     if given[0] <= low or not points:
         points.insert(0, low)
     if given[-1] >= high or len(points) == 1:
         points.append(high)
-    return tuple(points), tuple(float(controller.gain(p)) for p in points)
+    return tuple(points), tuple(float(controller.schedule(p)) for p in points)
 
 
-def _schedule(controller: Controller, points, gains: tuple[int, ...], word: Word, where: str) -> Schedule:
+def _schedule(
+    controller: Controller, points: Sequence[float], gains: tuple[int, ...], word: Word, where: str
+) -> Schedule:
     signal, counts = _points(controller, points, word)
     segments = []
     for i, run in enumerate(np.diff(counts).tolist()):
@@ -87,9 +100,9 @@ def _schedule(controller: Controller, points, gains: tuple[int, ...], word: Word
     return Schedule(signal, counts, gains, tuple(s for s, _ in segments), tuple(n for _, n in segments))
 
 
-def _points(controller: Controller, points, word: Word) -> tuple[Format, tuple[int, ...]]:
+def _points(controller: Controller, points: Sequence[float], word: Word) -> tuple[Format, tuple[int, ...]]:
     """The scheduling signal's format, and the breakpoints in its counts."""
-    low, high = controller.ranges.schedule
+    low, high = present(controller.ranges.schedule)
     place = f"{controller.name} [ranges]"
     exponent = exponent_for(max(abs(low), abs(high), high - low), word.limit - 1, place, "the schedule")
     reach = span_of(low, high, exponent, place, "schedule")
@@ -102,7 +115,9 @@ def _too_steep(where: str, before: float, after: float, word: Word) -> PlanError
     return PlanError(where, what, "move the breakpoints apart")
 
 
-def _tunable_gain(controller: Controller, points, gains: tuple[float, ...], word: Word, where: str) -> Gain:
+def _tunable_gain(
+    controller: Controller, points: Sequence[float], gains: tuple[float, ...], word: Word, where: str
+) -> Gain:
     """Gains with factors on them; as the default parameters have them."""
     box, exponent = fixed_tuning(controller, gains, word)
     reach = gain_intervals(box)
@@ -121,7 +136,7 @@ def _tunable_gain(controller: Controller, points, gains: tuple[float, ...], word
         spare = max(spare, overshoot(rise, run, *one_segment))
         made.append(one_segment)
     per, to_slope, by = zip(*made)
-    rises = (after - before for before, after in zip(default, default[1:]))
+    rises = (after - before for before, after in pairwise(default))
     slopes = tuple(Interval(r * p, r * p).shifted(n).low for r, p, n in zip(rises, per, to_slope))
     form = Format(integer(word.bits), 2.0**exponent, low - spare, high + spare)
     box = replace(box, reciprocals=per, to_slopes=to_slope)
@@ -145,21 +160,21 @@ def nearest_fraction(value: Fraction) -> int:
     return (2 * value.numerator + value.denominator) // (2 * value.denominator)
 
 
-def floating_gain(controller: Controller, factor: float, kind: type[np.floating], ctype: str) -> Gain:
-    """The gain times ``factor`` in float or double."""
+def floating_gain(controller: Controller, factor: float, kind: type[np.floating[Any]], ctype: str) -> Gain:
+    """The gain times ``factor`` in float or double. Raises PlanError where its breakpoints coincide there."""
     if not controller.scheduled:
-        constant = float(kind(controller.gain * factor))
+        constant = float(kind(controller.gains[0] * factor))
         made = Gain(Format(ctype, 1.0, constant, constant), constant, None)
         return _with_factors(made, (constant,), controller, kind) if controller.tunable else made
-    points = tuple(float(kind(b)) for b in controller.gain.breakpoints)
-    gains = tuple(float(kind(g * factor)) for g in controller.gain.gains)
-    if any(b <= a for a, b in zip(points, points[1:])):
+    points = tuple(float(kind(b)) for b in controller.schedule.breakpoints)
+    gains = tuple(float(kind(g * factor)) for g in controller.gains)
+    if any(b <= a for a, b in pairwise(points)):
         remedy = "move the breakpoints apart"
         raise PlanError(f"{controller.name} [gain]", f"breakpoints coincide as {ctype}", remedy)
     slopes = tuple(
         float(kind((g1 - g0) / (b1 - b0))) for g0, g1, b0, b1 in zip(gains, gains[1:], points, points[1:])
     )
-    low, high = (float(kind(x)) for x in controller.ranges.schedule)
+    low, high = (float(kind(x)) for x in present(controller.ranges.schedule))
     signal = Format(ctype, 1.0, low, high, controller.units.schedule)
     schedule = Schedule(signal, points, gains, slopes, (0,) * len(slopes))
     made = Gain(Format(ctype, 1.0, min(gains), max(gains)), 0.0, schedule)
@@ -167,18 +182,18 @@ def floating_gain(controller: Controller, factor: float, kind: type[np.floating]
 
 
 def _with_factors(
-    made: Gain, gains: tuple[float, ...], controller: Controller, kind: type[np.floating]
+    made: Gain, gains: tuple[float, ...], controller: Controller, kind: type[np.floating[Any]]
 ) -> Gain:
     """A floating gain with factors on it; its default slopes are products with reciprocals, too."""
-    ends = tuple(float(kind(end)) for end in controller.factors)
+    least, most = (float(kind(end)) for end in controller.factors)
     ctype, schedule = made.format.ctype, made.schedule
     points = schedule.breakpoints if schedule else ()
-    per = tuple(float(kind(1.0 / (b - a))) for a, b in zip(points, points[1:]))
-    box = Tuning(Format(ctype, 1.0, *ends), gains, 1.0, 0, per, (0,) * len(per))
+    per = tuple(float(kind(1.0 / (b - a))) for a, b in pairwise(points))
+    box = Tuning(Format(ctype, 1.0, least, most), gains, 1.0, 0, per, (0,) * len(per))
     if schedule:
-        rises = [kind(b) - kind(a) for a, b in zip(gains, gains[1:])]
+        rises = [kind(b) - kind(a) for a, b in pairwise(gains)]
         schedule = replace(schedule, slopes=tuple(float(r * kind(p)) for r, p in zip(rises, per)))
-    reach = floating_reach([end * gain for end in ends for gain in gains], ctype)
+    reach = floating_reach([end * gain for end in (least, most) for gain in gains], ctype)
     return Gain(Format(ctype, 1.0, *reach), made.constant, schedule, box)
 
 
@@ -192,7 +207,7 @@ def largest_gain(controller: Controller) -> float:
 
 def steepest(controller: Controller) -> float:
     """Largest slope of the gain over the scheduling signal, whatever the factors."""
-    gains, runs = np.array(controller.gains), np.diff(controller.gain.breakpoints)
+    gains, runs = np.array(controller.gains), np.diff(controller.schedule.breakpoints)
     ends = np.outer(controller.factors, gains)
     rises = [np.abs(after[1:] - before[:-1]) for before in ends for after in ends]
     return float(np.max(np.max(rises, axis=0) / runs))
@@ -200,7 +215,7 @@ def steepest(controller: Controller) -> float:
 
 def longest_segment(controller: Controller) -> float:
     """Largest distance of two breakpoints."""
-    return float(np.max(np.diff(controller.gain.breakpoints)))
+    return float(np.max(np.diff(controller.schedule.breakpoints)))
 
 
 def table_error(plan: Plan, lsb: float) -> float:
@@ -209,12 +224,12 @@ def table_error(plan: Plan, lsb: float) -> float:
     Both are straight between the breakpoints of either, so it is there. ``lsb`` is the physical size of a
     gain count.
     """
-    schedule, (low, high) = plan.schedule, plan.controller.ranges.schedule
+    schedule, (low, high) = present(plan.schedule), present(plan.controller.ranges.schedule)
     points = np.array(schedule.breakpoints) * schedule.signal.lsb
-    places = np.concatenate([points, plan.controller.gain.breakpoints, [low, high]])
-    ideal = plan.controller.gain(np.clip(places, low, high))
+    places = np.concatenate([points, plan.controller.schedule.breakpoints, [low, high]])
+    ideal = plan.controller.schedule(np.clip(places, low, high))
     inside = (places >= min(low, points[0])) & (places <= max(high, points[-1]))
-    sides = [_machine_gain(schedule, points, places, side) * lsb - ideal for side in ("left", "right")]
+    sides = [_machine_gain(schedule, points, places, side) * lsb - ideal for side in _SIDES]
     return float(np.max(np.abs(sides)[:, inside]))
 
 
@@ -226,9 +241,9 @@ def tuned_error(plan: Plan, lsb: float) -> float:
     leave the gains by, and breakpoints that are half a count off. Floating: the relative error of every
     operation between.
     """
-    box, controller = plan.tuning, plan.controller
+    box, controller = present(plan.tuning), plan.controller
     largest, slope = largest_gain(controller), steepest(controller) if controller.scheduled else 0.0
-    reach = max(map(abs, controller.ranges.schedule)) if controller.scheduled else 0.0
+    reach = max(map(abs, present(controller.ranges.schedule))) if controller.scheduled else 0.0
     if plan.floating:
         unit = float(np.finfo(np.float32 if plan.arithmetic == "f32" else np.float64).eps)
         longest = longest_segment(controller) if controller.scheduled else 0.0
@@ -240,11 +255,12 @@ def tuned_error(plan: Plan, lsb: float) -> float:
     return factor + nominal + (0.5 + spare) * lsb + moved
 
 
-def _machine_gain(schedule: Schedule, points: np.ndarray, places: np.ndarray, side: str) -> np.ndarray:
+def _machine_gain(schedule: Schedule, points: Array, places: Array, side: Literal["left", "right"]) -> Array:
     """The table's gain in counts at physical ``places``; at a breakpoint that of the segment on one side."""
     segment = np.searchsorted(points, places, side=side) - 1
     inside = np.clip(segment, 0, len(points) - 2)
     gains = np.array(schedule.gains, dtype=float)
     slopes = np.ldexp(np.array(schedule.slopes, dtype=float), -np.array(schedule.slope_shifts, dtype=np.intc))
     linear = gains[inside] + slopes[inside] * (places - points[inside]) / schedule.signal.lsb
-    return np.where(segment < 0, gains[0], np.where(segment >= len(points) - 1, gains[-1], linear))
+    made: Array = np.where(segment < 0, gains[0], np.where(segment >= len(points) - 1, gains[-1], linear))
+    return made

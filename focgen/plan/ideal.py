@@ -12,15 +12,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.signal import fftconvolve, lfilter
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller, GainSchedule
 from focgen.fractional.transfer import Polynomial
 from focgen.plan.canonical import Realisation, inner_limits, realise
 from focgen.plan.memory import Memory
-from focgen.plan.scenario import Reset, Scenario, Trace
+from focgen.plan.scenario import Reset, Scenario, Trace, Track
+from focgen.present import present
 
 _DIRECT = 4096  # taps up to which sums are taken one by one, not by transforms
 
@@ -40,7 +43,7 @@ def ideal(
     count = scenario.samples if length is None else length
     operator = _Operator(realise(controller), controller, count, {m.order: m for m in memories})
     v, rest = operator.run(scenario, endless=length is None)
-    gain = controller.gain_at(scenario.sched) if controller.scheduled else controller.gain
+    gain: Any = controller.gain_at(scenario.sched)
     low, high = (np.full(scenario.ref.shape, end) for end in controller.ranges.output)
     if scenario.tunes:
         gain = np.broadcast_to(gain, scenario.ref.shape).copy()
@@ -52,7 +55,7 @@ def ideal(
     return Trace(_integrated(controller, scenario, d, first, low, high), d)
 
 
-def _tuned(controller: Controller, scenario: Scenario, gain, low, high) -> None:
+def _tuned(controller: Controller, scenario: Scenario, gain: Array, low: Array, high: Array) -> None:
     """Write what physical parameters, none of which is refused, make of gain and limits, shape (lanes,
     samples), in place.
     """
@@ -60,17 +63,17 @@ def _tuned(controller: Controller, scenario: Scenario, gain, low, high) -> None:
         at = tune.lane, slice(tune.sample, None)
         gains = tuple(factor * g for factor, g in zip(tune.params.gain, controller.gains))
         if controller.scheduled:
-            gain[at] = GainSchedule(controller.gain.breakpoints, gains)(scenario.sched[at])
+            gain[at] = GainSchedule(controller.schedule.breakpoints, gains)(present(scenario.sched)[at])
         else:
             gain[at] = gains[0]
         low[at], high[at] = tune.params.u_min, tune.params.u_max
 
 
-def _gain_there(gain, lane: int, sample: int) -> float:
+def _gain_there(gain: Any, lane: int, sample: int) -> float:
     return float(gain[lane, sample]) if np.ndim(gain) else float(gain)
 
 
-def _weights(order: float, count: int) -> np.ndarray:
+def _weights(order: float, count: int) -> Array:
     """Eq. (11)."""
     j = np.arange(1, count + 1)
     return np.concatenate([[1.0], np.cumprod(1.0 - (order + 1.0) / j)])
@@ -81,7 +84,7 @@ class _Sum:
     memory stands for an order: c h^−β ∇^m (w_0 + Σ_i w_i / (z − p_i)).
     """
 
-    def __init__(self, terms: Polynomial, step: float, count: int, memories: dict[float, Memory]):
+    def __init__(self, terms: Polynomial, step: float, count: int, memories: dict[float, Memory]) -> None:
         total = np.zeros(max(count, 2) + 1)
         self.modes: list[tuple[float, float, int]] = []
         for t in terms:
@@ -89,16 +92,17 @@ class _Sum:
             order = t.order if memory is None else float(memory.differences)
             lead = 1.0 if memory is None else memory.lead
             total[: count + 1] += factor * lead * _weights(order, count)
-            for pole, weight in zip(memory.poles, memory.weights) if memory else ():
-                self.modes.append((pole, factor * weight, memory.differences))
-        self.taps = np.trim_zeros(total, "b") if total.any() else total[:1]
+            if memory is not None:
+                modes = zip(memory.poles, memory.weights)
+                self.modes.extend((pole, factor * weight, memory.differences) for pole, weight in modes)
+        self.taps: Array = np.trim_zeros(total, "b") if total.any() else total[:1]
 
     @property
     def still(self) -> float:
         """The gain for a constant; a mode's is 0."""
         return float(self.taps.sum())
 
-    def __call__(self, signal: np.ndarray) -> np.ndarray:
+    def __call__(self, signal: Array) -> Array:
         """Applied to a signal that starts from zero."""
         total = _convolved(self.taps, signal)
         for pole, weight, m in self.modes:
@@ -106,13 +110,15 @@ class _Sum:
             total = total + lfilter(rise, [1.0, -pole], signal)
         return total
 
-    def solved(self, forced: np.ndarray) -> np.ndarray:
+    def solved(self, forced: Array) -> Array:
         """v of (this) v = forced, from zero."""
         if self.modes:
             return self._recursion(forced)
-        return lfilter([1.0], self.taps, forced) if len(self.taps) > 1 else forced / self.taps[0]
+        alone = len(self.taps) == 1
+        solved: Array = forced / self.taps[0] if alone else lfilter([1.0], self.taps, forced)
+        return solved
 
-    def _recursion(self, forced: np.ndarray) -> np.ndarray:
+    def _recursion(self, forced: Array) -> Array:
         """Sample by sample: a mode's part at k is S_{k−1}, where S_k = p S_{k−1} + ∇^m v_k."""
         pole, weight, m = (np.array(x) for x in zip(*self.modes))
         state, back = np.zeros(len(pole)), self.taps[1:]
@@ -151,13 +157,15 @@ def _segments(scenario: Scenario) -> list[_Segment]:
 class _Operator:
     """The transfer function, from e to v."""
 
-    def __init__(self, form: Realisation, controller: Controller, count: int, memories: dict[float, Memory]):
+    def __init__(
+        self, form: Realisation, controller: Controller, count: int, memories: dict[float, Memory]
+    ) -> None:
         h, parts = controller.sample_time, (form.direct, form.rest, form.den)
         self.form, self.limits, self.half_step = form, inner_limits(controller), 0.5 * h
         self.setpoint_filter, self.span = controller.setpoint_filter, controller.ranges.reference
         self.direct, self.rest, self.den = (_Sum(terms, h, count, memories) for terms in parts)
 
-    def run(self, scenario: Scenario, endless: bool) -> tuple[np.ndarray, dict]:
+    def run(self, scenario: Scenario, endless: bool) -> tuple[Array, dict[tuple[int, int], float]]:
         """v of every sample, and what it was before each segment (key: lane, start)."""
         e, out, before = self.aimed(scenario) - scenario.meas, np.empty(scenario.ref.shape), {}
         for s in _segments(scenario):
@@ -167,7 +175,7 @@ class _Operator:
             before[s.lane, s.start] = still
         return out, before
 
-    def aimed(self, scenario: Scenario) -> np.ndarray:
+    def aimed(self, scenario: Scenario) -> Array:
         """The set point, through its filter where there is one: y = p y z^−1 + (1 − p) ref, p = exp(−h/T).
 
         It starts from the reset's ref; after init from what is nearest to 0 in the range.
@@ -188,14 +196,14 @@ class _Operator:
             return self.form.steady_gain
         return self.direct.still / self.den.still
 
-    def moved(self, part: np.ndarray, constant: float, endless: bool) -> np.ndarray:
+    def moved(self, part: Array, constant: float, endless: bool) -> Array:
         """What a change of the error from its constant adds to v."""
         forced = self.direct(part)
         if self.form.rest:
             forced = forced + self.integral(part, constant, endless)
         return self.den.solved(forced)
 
-    def integral(self, part: np.ndarray, constant: float, endless: bool) -> np.ndarray:
+    def integral(self, part: Array, constant: float, endless: bool) -> Array:
         """The clamped trapezoid, from 0."""
         still = sum(t.coefficient for t in self.form.rest if t.order == 0.0) if endless else self.rest.still
         r = np.concatenate([[0.0], self.rest(part)]) + still * constant
@@ -207,26 +215,39 @@ class _Operator:
         return np.array(out)
 
 
-def _convolved(table: np.ndarray, signal: np.ndarray) -> np.ndarray:
+def _convolved(table: Array, signal: Array) -> Array:
     if len(table) <= _DIRECT:
-        return lfilter(table, [1.0], signal)
-    return fftconvolve(table, signal)[: len(signal)]
+        made: Array = lfilter(table, [1.0], signal)
+    else:
+        made = fftconvolve(table, signal)[: len(signal)]
+    return made
 
 
 def _integrated(
-    controller: Controller, scenario: Scenario, d: np.ndarray, first: dict, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
+    controller: Controller,
+    scenario: Scenario,
+    d: Array,
+    first: dict[tuple[int, int], float],
+    low: Array,
+    high: Array,
+) -> Array:
     """The trapezoidal integral of d, clamped to the output limits of every sample; what is set ahead of one,
     and what stands where they change, likewise.
     """
-    within = lambda u, lane, k: min(max(u, low[lane, k]), high[lane, k])  # noqa: E731
+
+    def within(u: float, lane: int, k: int) -> float:
+        return min(max(u, float(low[lane, k])), float(high[lane, k]))
+
     most = np.inf if controller.slew_limit is None else controller.slew_limit * controller.sample_time
-    starts, tracks = {}, {}
+    starts: dict[int, list[Any]] = {}
+    tracks: dict[int, list[Track]] = {}
     for s in _segments(scenario):
         starts.setdefault(s.start, []).append(s)
     for t in scenario.tracks:
         tracks.setdefault(t.sample, []).append(t)
-    total, before, out = np.zeros(scenario.lanes), np.zeros(scenario.lanes), np.empty(d.shape)
+    total: Array = np.zeros(scenario.lanes)
+    before: Array = np.zeros(scenario.lanes)
+    out = np.empty(d.shape)
     for k in range(scenario.samples):
         total = np.minimum(np.maximum(total, low[:, k]), high[:, k])
         for s in starts.get(k, ()):

@@ -24,10 +24,11 @@ import numpy as np
 
 from focgen.plan.counts import MOST, counts_of
 from focgen.plan.formats import shift
-from focgen.plan.model import Format, Plan, Sum
+from focgen.plan.plan import Format, Plan, Sum
 from focgen.plan.truncation import largest_error
 from focgen.plan.tuning import gain_intervals
 from focgen.plan.usable import filtered_reach, l1_of
+from focgen.present import present
 
 STEPS = 10**8
 _DIGITS = 2.0**-24  # of the largest input: what a measurement has at most
@@ -91,7 +92,7 @@ def coarse(plan: Plan) -> bool:
 def _gains(plan: Plan) -> list[float]:
     """Every gain, in counts, that is not 0; of a tunable one at both ends of its factor."""
     if plan.tuning is None:
-        found = plan.schedule.gains if plan.schedule else (plan.constant_gain,)
+        found = list(plan.schedule.gains) if plan.schedule else [plan.constant_gain]
     elif plan.floating:
         found = [g * plan.tuning.factor.low for g in plan.tuning.nominal]
     else:
@@ -125,9 +126,9 @@ def _fixed_least(plan: Plan) -> float | None:
     """By bisection: what a step makes of a constant grows with it."""
     moving: list[Callable[[int], bool]] = []
     if plan.integrator:
-        moving.append(lambda e: all(_increment(plan, g, s * e) for g in _gains(plan) for s in (1, -1)))
+        moving.append(lambda e: all(_increment(plan, int(g), s * e) for g in _gains(plan) for s in (1, -1)))
     if plan.inner:
-        moving.append(lambda e: all(_still(plan.inner.rest, s * e) for s in (1, -1)))
+        moving.append(lambda e: all(_still(present(plan.inner).rest, s * e) for s in (1, -1)))
     largest = max(abs(int(plan.error.low)), abs(int(plan.error.high)))
     found = [_first(moves, largest) for moves in moving]
     return min((n * plan.error.lsb for n in found if n is not None), default=None)
@@ -154,4 +155,5 @@ def _increment(plan: Plan, gain: int, e: int) -> int:
         v = shift(int(plan.feedback.steady) * e, plan.feedback.steady_shift)
     else:
         v = shift(_still(plan.direct, e), plan.narrow)
-    return shift(int(gain) * v, plan.gain_shift)
+    made: int = shift(int(gain) * v, plan.gain_shift)
+    return made

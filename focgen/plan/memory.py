@@ -8,13 +8,15 @@ digits, stand in a bank of their own with more bits. Floating point: rates are n
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from focgen.control.controller import Controller
+from focgen.arrays import Array, Ints
+from focgen.control.controller import ARITHMETICS, Controller
 from focgen.errors import PlanError
-from focgen.fractional.elementary import power, total
 from focgen.fractional.continuous import (
     DEFAULT_BAND,
     OPERATORS,
@@ -22,12 +24,14 @@ from focgen.fractional.continuous import (
     check_band,
     fit_band,
 )
+from focgen.fractional.elementary import power, total
 from focgen.fractional.exponential import ExponentialMemory
 from focgen.fractional.exponential_rounded import fit_rounded
 from focgen.fractional.transfer import Polynomial, Term
 from focgen.fractional.weights import gl_weights
 from focgen.plan.canonical import Realisation, Table, Tables, realise, tables_by
-from focgen.plan.modes import Modes, response_of
+from focgen.plan.formats import runtime
+from focgen.plan.mode_sums import Modes, response_of
 
 _LARGEST_ORDER = 2.0
 
@@ -36,7 +40,7 @@ Memory = ExponentialMemory | ContinuousMemory
 
 @dataclass(frozen=True)
 class Speed:
-    """How modes with rates below ``below`` are held, as :class:`~focgen.plan.model.Bank` has it.
+    """How modes with rates below ``below`` are held, as :class:`~focgen.plan.plan.Bank` has it.
 
     Fixed: ``rate_bits`` of a, which counts 2^−(``to_drive`` + ``rate_shift``), and ``state_bits`` of L.
     Floating: only ``compensated``.
@@ -49,10 +53,11 @@ class Speed:
     state_bits: int = 0
     compensated: bool = False
 
-    def nearest(self, rates: np.ndarray) -> np.ndarray:
+    def nearest(self, rates: Array) -> Array:
         """The nearest rates, as counts."""
         counts = np.rint(rates * 2.0 ** (self.to_drive + self.rate_shift))
-        return np.clip(counts, 1.0, 2.0 ** (self.rate_bits - 1) - 1.0)
+        made: Array = np.clip(counts, 1.0, 2.0 ** (self.rate_bits - 1) - 1.0)
+        return made
 
 
 SPEEDS = {
@@ -64,20 +69,20 @@ SPEEDS = {
 """How each arithmetic holds modes, the fastest first."""
 
 
-def by_speed(arithmetic: str, rates: np.ndarray) -> list[tuple[Speed, np.ndarray]]:
+def by_speed(arithmetic: str, rates: Array) -> list[tuple[Speed, Ints]]:
     """Which of ``rates`` (falling) are held in which way; ways without any are left out."""
-    speeds = SPEEDS[arithmetic]
+    speeds = SPEEDS[runtime(arithmetic)]
     slower = [np.searchsorted(-rates, -s.below, side="right") for s in speeds] + [len(rates)]
-    places = [np.arange(a, b) for a, b in zip(slower, slower[1:])]
+    places = [np.arange(a, b) for a, b in pairwise(slower)]
     return [(speed, place) for speed, place in zip(speeds, places) if len(place)]
 
 
-def _rounded(arithmetic: str):
+def _rounded(arithmetic: str) -> Callable[[Array], Array]:
     """The function that takes rates to those the arithmetic holds; one object for each, so that fits are
     kept."""
     kind = {"f64": np.float64, "f32": np.float32}.get(arithmetic)
 
-    def held(rates: np.ndarray) -> np.ndarray:
+    def held(rates: Array) -> Array:
         if kind is not None:
             return rates.astype(kind).astype(float)
         found = np.empty(len(rates))
@@ -88,7 +93,7 @@ def _rounded(arithmetic: str):
     return held
 
 
-ROUNDED = {arithmetic: _rounded(arithmetic) for arithmetic in SPEEDS}
+ROUNDED = {arithmetic: _rounded(runtime(arithmetic)) for arithmetic in ARITHMETICS}
 """By arithmetic, what takes rates, falling, to those it holds."""
 
 
@@ -190,7 +195,7 @@ def _lead(order: float, memories: dict[float, Memory]) -> float:
     return memories[order].lead if order in memories else 1.0
 
 
-def _differences(m: int, count: int) -> np.ndarray:
+def _differences(m: int, count: int) -> Array:
     """The weights of ∇^m at the lags 0 … ``count``."""
     return gl_weights(float(m), count)
 

@@ -16,9 +16,11 @@ from focgen.errors import PlanError
 from focgen.plan.banks import departure, drive_error, driven_by, mean_of
 from focgen.plan.counts import MOST
 from focgen.plan.formats import Interval, limit, span, weighted
-from focgen.plan.model import Bank, Plan, Proof, Schedule, Sum, Tuning
-from focgen.plan.modes import LAGS, Modes, Response, response_of
+from focgen.plan.mode_sums import LAGS, Modes, Response, response_of
+from focgen.plan.plan import Bank, Plan, Proof, Schedule, Sum, Tuning
 from focgen.plan.stability import Inverse, inverse
+from focgen.plan.sums import Count
+from focgen.present import present
 
 
 def prove(plan: Plan) -> tuple[Proof, ...]:
@@ -41,7 +43,7 @@ def prove(plan: Plan) -> tuple[Proof, ...]:
 class _Ledger:
     """Collects the proofs of one plan."""
 
-    def __init__(self, plan: Plan):
+    def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.proofs: list[Proof] = []
 
@@ -82,7 +84,7 @@ class _Ledger:
         far = departure(u, mean, bank.up)
         self.add(f"{name} departure", far, bank.state.ctype, "mean of its inputs", half)
         drive = self.add(f"{name} drive", far.shifted(bank.to_drive), bank.drive.ctype, "mean of its inputs")
-        rate = Interval(min(bank.rates), max(bank.rates))
+        rate = _exactly(min(bank.rates)).hull(int(max(bank.rates)))
         half = (1 << bank.rate_shift) >> 1
         self.add(f"{name} rate product", drive * rate, bank.state.ctype, "mean of its inputs", half)
         half = (1 << bank.align) >> 1
@@ -162,16 +164,21 @@ class _Ledger:
 
     def slopes(self, box: Tuning, ends: list[Interval]) -> list[Interval]:
         """Of every segment: the reciprocal's product, the slope, its product in a step; what g can be."""
-        schedule, products, slopes, steps, reach = self.plan.schedule, [], [], [], []
+        schedule, products, slopes, steps, reach = present(self.plan.schedule), [], [], [], []
         spare, by_slope = 0, 0
-        segments = zip(box.reciprocals, box.to_slopes, schedule.slope_shifts, np.diff(schedule.breakpoints))
+        segments = zip(
+            box.reciprocals,
+            box.to_slopes,
+            schedule.slope_shifts,
+            np.diff(schedule.breakpoints),
+        )
         for i, (per, to_slope, by, run) in enumerate(segments):
             rise = ends[i + 1] - ends[i]
             products.append(rise * _exactly(per))
             slopes.append(products[-1].shifted(to_slope))
             steps.append(slopes[-1] * Interval(0, int(run) - 1))
             spare, by_slope = max(spare, (1 << to_slope) >> 1), max(by_slope, (1 << by) >> 1)
-            beyond = _beyond(rise, per, to_slope, by, int(run))
+            beyond = _beyond(rise, to_slope, by, int(run))
             reach.append(_hull([ends[i], ends[i + 1]]) + Interval(-beyond, beyond))
         how = "box of the parameters"
         self.add("tuned slope product", _hull(products), "int64_t", how, spare)
@@ -192,7 +199,7 @@ class _Ledger:
         self.add("output", span(plan.output), plan.output.ctype, "clamp")
 
 
-def _exactly(count) -> Interval:
+def _exactly(count: Count) -> Interval:
     return Interval(int(count), int(count))
 
 
@@ -200,7 +207,7 @@ def _hull(parts: list[Interval]) -> Interval:
     return Interval(min(part.low for part in parts), max(part.high for part in parts))
 
 
-def _beyond(rise: Interval, per: int, to_slope: int, by: int, run: int) -> int:
+def _beyond(rise: Interval, to_slope: int, by: int, run: int) -> int:
     """By how many counts a segment's line can leave its ends: slope · n / 2^by is rise · n / run, but for the
     reciprocal, which is off by less than half a count, the slope's rounding and the last one.
     """
@@ -208,7 +215,7 @@ def _beyond(rise: Interval, per: int, to_slope: int, by: int, run: int) -> int:
     return math.ceil(off + Fraction(1, 2))
 
 
-def _both(count) -> Interval:
+def _both(count: Count) -> Interval:
     return Interval(-abs(int(count)), abs(int(count)))
 
 
@@ -219,18 +226,20 @@ def _double(plan: Plan) -> str:
 
 def _schedule(schedule: Schedule) -> tuple[Interval, Interval, int]:
     """The ranges of g and of the slope product, and the largest rounding of the latter."""
-    reach, product, spare = Interval(min(schedule.gains), max(schedule.gains)), Interval(0, 0), 0
-    points = schedule.breakpoints
+    gains, points = [int(g) for g in schedule.gains], [int(p) for p in schedule.breakpoints]
+    reach, product, spare = Interval(min(gains), max(gains)), Interval(0, 0), 0
     for i, (slope, by) in enumerate(zip(schedule.slopes, schedule.slope_shifts)):
-        last = slope * (points[i + 1] - 1 - points[i])
+        last = int(slope) * (points[i + 1] - 1 - points[i])
         product = product.hull(last)
         spare = max(spare, (1 << by) >> 1)
-        reach = reach.hull(schedule.gains[i] + Interval(last, last).shifted(by).low)
+        reach = reach.hull(gains[i] + Interval(last, last).shifted(by).low)
     return reach, product, spare
 
 
 def filtered_reach(plan: Plan) -> float:
-    """Bound on |v| in counts: ‖B/A‖₁ of the integer weights times the range of e, and what rounding adds."""
+    """Bound on |v| in counts: ‖B/A‖₁ of the integer weights times the range of e, and what rounding adds.
+    Raises PlanError where the recursion's integer weights cannot be proved stable.
+    """
     own = inverse_of_recursion(plan)
     if own is None:
         raise PlanError(plan.name, "the integer recursion cannot be proved stable", "choose q31, f32 or f64")
@@ -246,7 +255,7 @@ def filtered_reach(plan: Plan) -> float:
 
 def inverse_of_recursion(plan: Plan) -> Inverse | None:
     """The integer recursion, inverted."""
-    response = sum_response(plan.feedback.table)
+    response = sum_response(present(plan.feedback).table)
     return inverse(np.concatenate([[1.0], response.weights[1:]]), response.left_out)
 
 
@@ -256,19 +265,21 @@ def sum_response(made: Sum, lags: int = LAGS) -> Response:
     return response_of(made.values, made.first, modes, lags)
 
 
-def rounding_reach(plan: Plan, own) -> float:
+def rounding_reach(plan: Plan, own: Inverse) -> float:
     """What alignments, the drives of modes, the carried rounding and the reset's can add to v, in counts."""
     unit = plan.wide.lsb / plan.filtered.lsb
-    sums = [s for s in (plan.direct, plan.feedback.table) if s]
-    rounded = [b for s in sums for b in (*s.blocks, *s.banks) if b.align]
-    each = 0.5 * unit * (len(rounded) + bool(plan.inner)) + unit * math.fsum(map(drive_error, sums))
+    sums = [s for s in (plan.direct, present(plan.feedback).table) if s]
+    rounded = sum(bool(b.align) for s in sums for b in s.blocks) + sum(
+        bool(b.align) for s in sums for b in s.banks
+    )
+    each = 0.5 * unit * (rounded + bool(plan.inner)) + unit * math.fsum(map(drive_error, sums))
     carried = 0.5 * own.norm_after(np.array([1.0, -1.0]))
     return own.norm * each + carried + reset_error(plan) * max(1.0, own.norm * at_rest(plan))
 
 
 def reset_error(plan: Plan) -> float:
     """How far a reset's v can be from the integer recursion's own rest, in counts."""
-    feedback = plan.feedback
+    feedback = present(plan.feedback)
     direct = math.fsum(plan.direct.values) if plan.direct else 0.0
     exact = direct / at_rest(plan) * plan.error.lsb / plan.filtered.lsb
     return 0.5 + abs(exact - feedback.steady * 2.0**-feedback.steady_shift) * span(plan.error).worst
@@ -276,4 +287,4 @@ def reset_error(plan: Plan) -> float:
 
 def at_rest(plan: Plan) -> float:
     """A(1): positive for a stable recursion."""
-    return 1.0 + math.fsum(plan.feedback.table.values)
+    return 1.0 + math.fsum(present(plan.feedback).table.values)

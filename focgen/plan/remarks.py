@@ -7,7 +7,7 @@ import math
 from focgen.fractional.weights import short_memory_bias
 from focgen.plan.canonical import realise
 from focgen.plan.integrals import STEPS, added_up, coarse, smallest_error
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 
 _SHARE = 0.01  # of what an integral can be off by in the end
 _SAID = 1e-3  # of the trapezoid's error from here on

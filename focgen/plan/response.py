@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Complex
 from focgen.control.controller import Controller
-from focgen.plan.execute import scheduled_gain
-from focgen.plan.model import Bank, Plan, Sum
+from focgen.plan.plan import Bank, Plan, Sum
 from focgen.plan.scenario import nearest_raw
+from focgen.plan.values import scheduled_gain
+from focgen.present import present
 
 
-def designed_response(controller: Controller, omega, schedule_value: float | None = None) -> np.ndarray:
+def designed_response(
+    controller: Controller, omega: ArrayLike, schedule_value: float | None = None
+) -> Complex:
     """C(jω) from error to output, continuous and exact; ``omega`` > 0 in rad/s, any shape."""
     omega = np.asarray(omega, dtype=float)
     response = controller.transfer.frequency_response(omega) * controller.gain_at(schedule_value)
-    return response / (1j * omega) if controller.integrator else response
+    made: Complex = response / (1j * omega) if controller.integrator else response
+    return made
 
 
-def running_response(plan: Plan, omega, schedule_value: float | None = None) -> np.ndarray:
+def running_response(plan: Plan, omega: ArrayLike, schedule_value: float | None = None) -> Complex:
     """C(e^jωh) from error to output as the plan runs it: sampled, truncated, with its quantised weights and
     gain.
 
@@ -29,7 +35,7 @@ def running_response(plan: Plan, omega, schedule_value: float | None = None) -> 
     return total * _trapezoid(_back(plan, omega)) if plan.integrator else total
 
 
-def filtered_response(plan: Plan, omega) -> np.ndarray:
+def filtered_response(plan: Plan, omega: ArrayLike) -> Complex:
     """From the error to the filtered error v alone, likewise: the transfer function as the plan runs it."""
     back = _back(plan, omega)
     total = np.zeros(back.shape, complex)
@@ -42,12 +48,12 @@ def filtered_response(plan: Plan, omega) -> np.ndarray:
     return total
 
 
-def _back(plan: Plan, omega) -> np.ndarray:
+def _back(plan: Plan, omega: ArrayLike) -> Complex:
     """z⁻¹."""
     return np.exp(-1j * np.asarray(omega, dtype=float) * plan.sample_time)
 
 
-def _trapezoid(back: np.ndarray) -> np.ndarray:
+def _trapezoid(back: Complex) -> Complex:
     return (1.0 + back) / (1.0 - back)
 
 
@@ -55,11 +61,11 @@ def running_gain(plan: Plan, schedule_value: float | None = None) -> float:
     """g at a value of the scheduling signal (physical), with h/2 inside where an integrator follows."""
     if plan.schedule is None:
         return plan.constant_gain * plan.gain.lsb
-    count = nearest_raw(schedule_value, plan.schedule.signal)
+    count = nearest_raw(present(schedule_value), plan.schedule.signal)
     return float(scheduled_gain(plan, np.asarray(count))) * plan.gain.lsb
 
 
-def _response(table: Sum, back: np.ndarray) -> np.ndarray:
+def _response(table: Sum, back: Complex) -> Complex:
     """Σ w_j z^−j by Horner's rule from the oldest weight on."""
     total = np.zeros(back.shape, complex)
     for weight in reversed(table.values):
@@ -67,7 +73,7 @@ def _response(table: Sum, back: np.ndarray) -> np.ndarray:
     return total * back**table.first + sum(_bank_response(bank, back) for bank in table.banks)
 
 
-def _bank_response(bank: Bank, back: np.ndarray) -> np.ndarray:
+def _bank_response(bank: Bank, back: Complex) -> Complex:
     """Σ c_i z^−1 ∇^m / (1 − p_i z^−1)."""
     modes = sum(c / (1.0 - (1.0 - q) * back) for c, q in zip(bank.values, bank.real_rates))
     return modes * back * (1.0 - back) ** bank.differences

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from focgen.plan.model import Format, Plan
+from focgen.arrays import Numbers
+from focgen.plan.plan import Format, Plan
+from focgen.present import present
 
 
 @dataclass(frozen=True)
@@ -75,9 +79,9 @@ class Scenario:
     at most one damage, without a reset.
     """
 
-    ref: np.ndarray
-    meas: np.ndarray
-    sched: np.ndarray | None = None
+    ref: Numbers
+    meas: Numbers
+    sched: Numbers | None = None
     resets: tuple[Reset, ...] = ()
     tracks: tuple[Track, ...] = ()
     damages: tuple[Damage, ...] = ()
@@ -86,12 +90,14 @@ class Scenario:
     @property
     def lanes(self) -> int:
         """How many runs there are."""
-        return self.ref.shape[0]
+        made: int = self.ref.shape[0]
+        return made
 
     @property
     def samples(self) -> int:
         """How many samples each has."""
-        return self.ref.shape[1]
+        made: int = self.ref.shape[1]
+        return made
 
 
 @dataclass(frozen=True)
@@ -102,12 +108,12 @@ class Trace:
     from the ideal). Physical ``d`` is the signal ahead of the integrator: h/2 taken out.
     """
 
-    u: np.ndarray
-    d: np.ndarray
-    flags: np.ndarray | None = None
+    u: Numbers
+    d: Numbers
+    flags: Numbers | None = None
 
 
-def nearest_raw(values, form: Format) -> np.ndarray:
+def nearest_raw(values: ArrayLike, form: Format) -> Numbers:
     """Physical values as raw ones, any shape: the nearest count of the type, halves away from zero, or the
     floating value.
     """
@@ -117,17 +123,22 @@ def nearest_raw(values, form: Format) -> np.ndarray:
     scaled = np.clip(np.asarray(values, dtype=float) / form.lsb, -top, top)
     whole = np.floor(np.abs(scaled))
     nearest = np.copysign(whole + (np.abs(scaled) - whole >= 0.5), scaled)
-    return np.clip(nearest, -top, top - 1).astype(np.int64)
+    made: Numbers = np.clip(nearest, -top, top - 1).astype(np.int64)
+    return made
+
+
+def _nearest_one(value: float, form: Format) -> Any:
+    """The nearest raw value of one physical value, of the type's own kind."""
+    return nearest_raw(value, form)[()]
 
 
 def to_raw(plan: Plan, physical: Scenario) -> Scenario:
     """The raw inputs nearest to physical ones."""
-    e, u = plan.error, plan.output
-    one = lambda value, form: nearest_raw(value, form)[()]  # noqa: E731
+    e, u, one = plan.error, plan.output, _nearest_one
     return Scenario(
         nearest_raw(physical.ref, e),
         nearest_raw(physical.meas, e),
-        None if plan.schedule is None else nearest_raw(physical.sched, plan.schedule.signal),
+        None if plan.schedule is None else nearest_raw(present(physical.sched), plan.schedule.signal),
         tuple(Reset(r.lane, r.sample, one(r.ref, e), one(r.meas, e), one(r.u0, u)) for r in physical.resets),
         tuple(Track(t.lane, t.sample, one(t.u, u)) for t in physical.tracks),
         tunes=tuple(replace(t, params=raw_params(plan, t.params)) for t in physical.tunes),
@@ -152,14 +163,14 @@ def to_physical(plan: Plan, raw: Scenario) -> Scenario:
 
 def raw_params(plan: Plan, params: Params) -> Params:
     """The raw parameters nearest to physical ones."""
-    one = lambda value, form: nearest_raw(value, form)[()].item()  # noqa: E731
-    gain = tuple(one(factor, plan.tuning.factor) for factor in params.gain)
-    return Params(gain, one(params.u_min, plan.output), one(params.u_max, plan.output))
+    gain = tuple(_nearest_one(factor, plan.box.factor).item() for factor in params.gain)
+    low, high = (_nearest_one(end, plan.output).item() for end in (params.u_min, params.u_max))
+    return Params(gain, low, high)
 
 
 def physical_params(plan: Plan, params: Params) -> Params:
     """The physical parameters that raw ones stand for, exactly."""
-    factor, u = plan.tuning.factor.lsb, plan.output.lsb
+    factor, u = present(plan.tuning).factor.lsb, plan.output.lsb
     gain = tuple(float(count) * factor for count in params.gain)
     return Params(gain, float(params.u_min) * u, float(params.u_max) * u)
 

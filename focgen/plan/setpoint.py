@@ -25,14 +25,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Kind, Numbers
 from focgen.errors import PlanError
 from focgen.plan.formats import nearest, shift
-from focgen.plan.model import Plan, SetPoint
+from focgen.plan.plan import Plan, SetPoint
 from focgen.plan.scenario import Scenario
 from focgen.plan.usable import usable
+from focgen.present import present
 
 _UP = 30
 _LONGEST = 65_536  # samples of a time constant: a rate has 14 bits then, and a float's lag still shrinks
@@ -70,7 +73,7 @@ def set_point_error(plan: Plan) -> float:
     if plan.set_point is None:
         return 0.0
     q, (low, high) = (
-        rate_of(plan.controller.setpoint_filter, plan.sample_time),
+        rate_of(present(plan.controller.setpoint_filter), plan.sample_time),
         plan.controller.ranges.reference,
     )
     largest, reach = max(abs(low), abs(high)), max(high, 0.0) - min(low, 0.0)
@@ -93,39 +96,41 @@ class Aim:
     each of shape (lanes,). Values are raw, of the numpy type ``kind``.
     """
 
-    def __init__(self, plan: Plan, kind: type, lanes: int):
+    def __init__(self, plan: Plan, kind: Kind, lanes: int) -> None:
         self.plan, self.kind = plan, kind
         names = ("lag", "latest") if plan.floating else ("set_point",)
-        self.state = {name: np.zeros(lanes, kind) for name in names}
+        self.state: dict[str, Numbers] = {name: np.zeros(lanes, kind) for name in names}
         for lane in range(lanes):
             self.settle(lane, start_of(plan))
 
-    def settle(self, lane: int, ref) -> None:
+    def settle(self, lane: int, ref: Any) -> None:
         """As if the reference had been ``ref`` for ever."""
         if self.plan.floating:
             self.state["lag"][lane], self.state["latest"][lane] = 0, ref
         else:
-            self.state["set_point"][lane] = int(ref) << self.plan.set_point.up
+            self.state["set_point"][lane] = int(ref) << present(self.plan.set_point).up
 
-    def step(self, r: np.ndarray) -> np.ndarray:
+    def step(self, r: Numbers) -> Numbers:
         """y of this sample, shape (lanes,)."""
-        made, state = self.plan.set_point, self.state
+        made, state = present(self.plan.set_point), self.state
         rate = self.kind(made.rate)
         if not self.plan.floating:
             before = state["set_point"]
             now = before + rate * (r - shift(before, made.up))
             self.state = {"set_point": now}
-            return shift(now, made.up)
+            y: Numbers = shift(now, made.up)
+            return y
         x = state["lag"] + (r - state["latest"])
         lag = x - rate * x
         lag = np.where(np.abs(lag) <= self.kind(made.drop), self.kind(0), lag)
         self.state = {"lag": lag, "latest": r.copy()}
-        return r - lag
+        found: Numbers = r - lag
+        return found
 
 
 def error_of(
-    plan: Plan, scenario: Scenario, ref: np.ndarray, meas: np.ndarray
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    plan: Plan, scenario: Scenario, ref: Numbers, meas: Numbers
+) -> tuple[Numbers, dict[str, Numbers]]:
     """e, shape (lanes, samples), and what the last sample leaves of the filter's state.
 
     ``ref`` and ``meas`` are those of the scenario as they are taken in, clamped.
@@ -133,7 +138,7 @@ def error_of(
     if plan.set_point is None:
         return ref - meas, {}
     aim, out = Aim(plan, ref.dtype.type, len(ref)), np.empty_like(ref)
-    starts: dict[int, list] = {}
+    starts: dict[int, list[Any]] = {}
     for lane, sample, value in set_points(plan, scenario):
         starts.setdefault(sample, []).append((lane, value))
     for k in range(ref.shape[1]):
@@ -153,7 +158,7 @@ def set_points(plan: Plan, scenario: Scenario) -> Iterator[tuple[int, int, objec
         yield r.lane, r.sample, value
 
 
-def begun(plan: Plan, scenario: Scenario, kind: type, lane: int, sample: int) -> dict[str, np.generic]:
+def begun(plan: Plan, scenario: Scenario, kind: Kind, lane: int, sample: int) -> dict[str, np.generic]:
     """The state ahead of a sample at which a lane begins anew, after a reset or init."""
     aim = Aim(plan, kind, 1)
     for at, k, value in set_points(plan, scenario):

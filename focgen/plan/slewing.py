@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from focgen.errors import PlanError
 from focgen.plan.formats import nearest
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
+from focgen.present import present
 
 _FEWEST = 16  # counts that a sample must at least be allowed, so that the limit is what was asked for
 
@@ -36,9 +38,9 @@ def with_slew(plan: Plan) -> Plan:
     return replace(plan, integrator=replace(integrator, slew=slew))
 
 
-def slewed(plan: Plan, change):
+def slewed(plan: Plan, change: Any) -> Any:
     """What of a change of the integral is let through, any shape; in the change's own type."""
-    slew = plan.integrator.slew
+    slew = present(plan.integrator).slew
     if slew is None:
         return change
     kind = np.asarray(change).dtype.type

@@ -18,6 +18,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.signal import fftconvolve
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.fractional.discrete import (
@@ -44,11 +45,11 @@ _BITS = 20
 class Inverse:
     """A finite inverse of a stable recursion. ``response`` is g; ``residual`` is ρ; ``norm`` ≥ ‖1/A‖₁."""
 
-    response: np.ndarray
+    response: Array
     residual: float
     norm: float
 
-    def norm_after(self, numerator: np.ndarray, left_out: float = 0.0) -> float:
+    def norm_after(self, numerator: Array, left_out: float = 0.0) -> float:
         """Bound on ‖B/A‖₁ for the numerator's weights, shape (taps,), and ``left_out``, Σ|weights| of
         more."""
         own = l1(fftconvolve(numerator, self.response))
@@ -56,7 +57,7 @@ class Inverse:
         return _outward((own + rest * self.norm) * _SLACK)
 
 
-def inverse(coefficients: np.ndarray, left_out: float = 0.0) -> Inverse | None:
+def inverse(coefficients: Array, left_out: float = 0.0) -> Inverse | None:
     """Invert 1 + Σ a_j z^−j, given as (1, a_1, …); None where it is not, or not provably, stable.
 
     ``left_out``: Σ |a_j| of the coefficients that are not given.
@@ -80,7 +81,7 @@ def _inverse(data: bytes, left_out: float) -> Inverse | None:
     return best
 
 
-def _attempt(coefficients: np.ndarray, count: int, left_out: float) -> Inverse | None:
+def _attempt(coefficients: Array, count: int, left_out: float) -> Inverse | None:
     with np.errstate(over="ignore", invalid="ignore"):
         response = power_series_inverse(coefficients, count)
     if not np.abs(response).max() < _GROWN:

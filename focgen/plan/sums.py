@@ -1,6 +1,6 @@
 """History sums in machine terms: taps in blocks, and the banks of an exponential memory.
 
-How they are computed is part of :mod:`focgen.plan.model`.
+How they are computed is part of :mod:`focgen.plan.plan`.
 """
 
 from __future__ import annotations

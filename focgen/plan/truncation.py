@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from focgen.control.controller import Controller
 from focgen.fractional.elementary import exact_sum, power
+from focgen.fractional.exponential import ExponentialMemory
 from focgen.fractional.transfer import Polynomial
 from focgen.plan.canonical import Realisation, Tables, folded, inner_limits, realise, tail_l1
 from focgen.plan.gains import largest_gain
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.stability import inverse, inverse_of
+from focgen.present import present
 
 _SLACK = 1.0 + 1e-9
 
@@ -48,7 +50,7 @@ def _left_out(plan: Plan, terms: Polynomial, past_horizon: bool) -> float:
     """Bound on Σ |w − w∞| of Σ c s^β."""
     if not plan.exponential:
         return tail_l1(terms, plan.sample_time, plan.length)
-    proved = {memory.order: memory.certificate for memory in plan.memories}
+    proved = {m.order: m.certificate for m in plan.memories if isinstance(m, ExponentialMemory)}
     h, own = plan.sample_time, [t for t in terms if t.order in proved]
     errors = [proved[t.order].output_error(1.0, past_horizon) for t in own]
     return exact_sum([abs(t.coefficient) * power(h, -t.order) * error for t, error in zip(own, errors)])
@@ -59,7 +61,7 @@ def _recursive_truncation(
 ) -> float | None:
     """``missed``: what numerator and denominator leave out."""
     scale, (direct, back) = abs(tables.normaliser), missed
-    own = inverse_of(tables.feedback)
+    own = inverse_of(present(tables.feedback))
     endless = _endless_norm(plan, form, scale)
     if own is None or endless is None:
         return None

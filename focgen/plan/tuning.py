@@ -1,6 +1,6 @@
 """Parameters of a tunable plan: their box in machine terms, and what the state holds of them.
 
-How they are taken over is part of :mod:`focgen.plan.model`.
+How they are taken over is part of :mod:`focgen.plan.plan`.
 """
 
 from __future__ import annotations
@@ -8,14 +8,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Kind
 from focgen.control.controller import Controller
 from focgen.errors import PlanError
 from focgen.plan.formats import Interval, Word, exponent_for, integer, nearest, shift
-from focgen.plan.model import Count, Format, Plan, Schedule, Tuning
+from focgen.plan.plan import Count, Format, Plan, Schedule, Tuning
 from focgen.plan.scenario import Params, Scenario
+from focgen.present import present
 
 REFUSED_GAIN, REFUSED_LOW, REFUSED_HIGH = 1, 2, 4
 _RECIPROCAL = 1 << 30  # the largest, so that a difference of two gains times it fits 64 bits
@@ -36,13 +40,13 @@ class Applied:
 
 def default_params(plan: Plan) -> Params:
     """Factors of 1, and the limits of ``ranges.output``; raw."""
-    one = 1.0 if plan.floating else round(1.0 / plan.tuning.factor.lsb)
-    return Params((one,) * len(plan.tuning.nominal), plan.output.low, plan.output.high)
+    one = 1.0 if plan.floating else round(1.0 / present(plan.tuning).factor.lsb)
+    return Params((one,) * len(present(plan.tuning).nominal), plan.output.low, plan.output.high)
 
 
 def refused(plan: Plan, params: Params) -> int:
     """What NAME_check says of raw parameters: 0, or the bits of what is outside the box."""
-    box, found = plan.tuning, 0
+    box, found = present(plan.tuning), 0
     if len(params.gain) != len(box.nominal) or not all(
         box.factor.low <= factor <= box.factor.high for factor in params.gain
     ):
@@ -56,20 +60,21 @@ def refused(plan: Plan, params: Params) -> int:
 
 def applied(plan: Plan, params: Params) -> Applied:
     """What a state takes over of raw parameters within the box."""
-    box, kind = plan.tuning, {"float": np.float32, "double": np.float64}.get(plan.gain.ctype, int)
-    take = _floating if plan.floating else _whole
-    gains, slopes = take(box, [kind(factor) for factor in params.gain], kind)
-    low, high = (kind(end).item() if plan.floating else int(end) for end in (params.u_min, params.u_max))
-    return Applied(gains, slopes, low, high)
+    box, ends = plan.box, (params.u_min, params.u_max)
+    if not plan.floating:
+        return Applied(*_whole(box, [int(factor) for factor in params.gain]), *map(int, ends))
+    kind = np.float32 if plan.gain.ctype == "float" else np.float64
+    low, high = (float(kind(end)) for end in ends)
+    return Applied(*_floating(box, [kind(factor) for factor in params.gain], kind), low, high)
 
 
-def _whole(box: Tuning, factors: list[int], _) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _whole(box: Tuning, factors: list[int]) -> tuple[tuple[int, ...], tuple[int, ...]]:
     gains = tuple(shift(factor * nominal, box.to_gain) for factor, nominal in zip(factors, box.nominal))
-    rises = (after - before for before, after in zip(gains, gains[1:]))
+    rises = (after - before for before, after in pairwise(gains))
     return gains, tuple(shift(rise * per, by) for rise, per, by in zip(rises, box.reciprocals, box.to_slopes))
 
 
-def _floating(box: Tuning, factors: list, kind: type) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _floating(box: Tuning, factors: list[Any], kind: Kind) -> tuple[tuple[float, ...], tuple[float, ...]]:
     gains = [factor * kind(nominal) for factor, nominal in zip(factors, box.nominal)]
     pairs = zip(gains, gains[1:], box.reciprocals)
     slopes = tuple(float((after - before) * kind(per)) for before, after, per in pairs)
@@ -106,11 +111,11 @@ def fixed_tuning(controller: Controller, gains: tuple[float, ...], word: Word) -
     fine = exponent_for(largest, word.limit, where, "the gain")
     finer = exponent_for(high, word.limit, where, "the factor")
     coarse = exponent_for(largest * high, word.limit - margin(word), where, "the tuned gain")
-    ends = [nearest(end * 2.0**-finer) for end in (low, high)]
-    if ends[0] < 1:
+    least, most = (nearest(end * 2.0**-finer) for end in (low, high))
+    if least < 1:
         what = f"spans factors of {low:g} to {high:g}, more than {word.bits} bits can hold"
         raise PlanError(where, what, "narrow gain, or choose q31, f32 or f64")
-    factor = Format(integer(word.bits), 2.0**finer, *ends)
+    factor = Format(integer(word.bits), 2.0**finer, least, most)
     nominal = tuple(nearest(gain * 2.0**-fine) for gain in gains)
     return Tuning(factor, nominal, 2.0**fine, coarse - fine - finer), coarse
 
@@ -172,13 +177,14 @@ def with_limits(plan: Plan) -> Plan:
     """
     if plan.tuning is None:
         return plan
-    box, out = plan.controller.tunable, plan.output
+    box, out = present(plan.controller.tunable), plan.output
+    inner = box.output_low[1], box.output_high[0]
     if out.floating:
         kind = np.float32 if out.ctype == "float" else np.float64
-        to = lambda value: float(kind(value))  # noqa: E731
+        top, bottom = (float(kind(end)) for end in inner)
     else:
-        to = lambda value: nearest(value / out.lsb)  # noqa: E731
-    low, high = (out.low, to(box.output_low[1])), (to(box.output_high[0]), out.high)
+        top, bottom = (nearest(end / out.lsb) for end in inner)
+    low, high = (out.low, top), (bottom, out.high)
     if low[1] >= high[0]:
         what = f"lets the limits meet in {plan.arithmetic}"
         raise PlanError(f"{plan.name} [tunable]", what, "keep output_low and output_high further apart")

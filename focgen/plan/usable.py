@@ -3,33 +3,40 @@
 NaN and infinity would poison a history for as long as its memory lasts, and an absurdly large input would
 become infinite on its way. An input is usable where its magnitude is below 2^48 (float) or 2^512 (double);
 :func:`check_room` proves that no usable input overflows anywhere in a plan. What a step does with any other
-is told in :mod:`focgen.plan.model`.
+is told in :mod:`focgen.plan.plan`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Numbers
 from focgen.errors import PlanError
 from focgen.fractional.elementary import l1
 from focgen.plan.counts import taken_in, values_of
-from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
+from focgen.plan.plan import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, Format, Plan, Sum
 from focgen.plan.proofs import inverse_of_recursion
 from focgen.plan.scenario import Reset, Scenario, Trace, Track, Tune
 from focgen.plan.tuning import applied, courses, refused
+from focgen.present import present
+
+Held = TypeVar("Held", Reset, Track)
 
 EXPONENT = {"float": 48, "double": 512}
 """log2 of the magnitude from which on an input is not used, by type."""
 
 
-def usable(values, form: Format) -> np.ndarray:
+def usable(values: ArrayLike, form: Format) -> Numbers:
     """Whether raw values can be computed with, any shape; integers always can."""
     if not form.floating:
         return np.ones(np.shape(values), bool)
-    return np.abs(np.asarray(values)) < 2.0 ** EXPONENT[form.ctype]
+    made: Numbers = np.abs(np.asarray(values)) < 2.0 ** EXPONENT[form.ctype]
+    return made
 
 
 # ------------------------------------------------------------------------------------------------ the proof
@@ -98,16 +105,16 @@ def _signal(plan: Plan) -> Format | None:
 # -------------------------------------------------------------------------------------------- the reference
 
 
-def invalid_samples(plan: Plan, scenario: Scenario) -> np.ndarray:
+def invalid_samples(plan: Plan, scenario: Scenario) -> Numbers:
     """Which steps have an input that cannot be used; shape (lanes, samples)."""
     good = usable(scenario.ref, plan.reference) & usable(scenario.meas, plan.measurement)
     if plan.schedule:
-        good = good & usable(scenario.sched, plan.schedule.signal)
+        good = good & usable(present(scenario.sched), plan.schedule.signal)
     return ~good
 
 
 def holding(
-    plan: Plan, scenario: Scenario, invalid: np.ndarray, execute: Callable[[Plan, Scenario], Trace]
+    plan: Plan, scenario: Scenario, invalid: Numbers, execute: Callable[[Plan, Scenario], Trace]
 ) -> Trace:
     """Run a scenario whose ``invalid`` samples are left out, and hold the output there.
 
@@ -118,7 +125,7 @@ def holding(
     low, high = _limits(plan, scenario)
     u, d, flags = (np.zeros_like(part) for part in (ran.u, ran.d, ran.flags))
     for whole, part in ((u, ran.u), (d, ran.d), (flags, ran.flags)):
-        np.put_along_axis(whole, order, part, axis=1)
+        np.put_along_axis(whole, order, present(part), axis=1)
     for lane in np.flatnonzero(invalid.any(axis=1)):
         _hold(plan, scenario, int(lane), invalid[lane], u[lane])
     ends = FLAG_HIGH * (u >= high) + FLAG_LOW * (u <= low)
@@ -126,7 +133,7 @@ def holding(
     return Trace(u, np.where(invalid, d.dtype.type(0), d), flags)
 
 
-def _limits(plan: Plan, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+def _limits(plan: Plan, scenario: Scenario) -> tuple[Numbers, Numbers]:
     """The output's limits at every sample, shape (lanes, samples)."""
     low, high = (np.full(scenario.ref.shape, end, scenario.ref.dtype.type) for end in _ends(plan))
     for lane, course in (courses(plan, scenario) if plan.tuning else {}).items():
@@ -139,19 +146,19 @@ def _ends(plan: Plan) -> tuple[float, float]:
     return plan.output.low, plan.output.high
 
 
-def _good_first(invalid: np.ndarray) -> np.ndarray:
+def _good_first(invalid: Numbers) -> Numbers:
     """The order of samples in which the good ones come first, as they stand."""
     return np.argsort(invalid, axis=1, kind="stable")
 
 
-def good_samples(plan: Plan, scenario: Scenario, invalid: np.ndarray) -> Scenario:
+def good_samples(plan: Plan, scenario: Scenario, invalid: Numbers) -> Scenario:
     """The good samples of each lane, then zeros; an event comes before the next good sample.
 
     Parameters are taken ahead of a reset and a track there, so where these came first the values that they
     set are limited as the parameters would have.
     """
     order = _good_first(invalid)
-    signals = {
+    signals: dict[str, Any] = {
         name: np.take_along_axis(np.where(invalid, values.dtype.type(0), values), order, axis=1)
         for name in ("ref", "meas", "sched")
         if (values := getattr(scenario, name)) is not None
@@ -167,18 +174,17 @@ def good_samples(plan: Plan, scenario: Scenario, invalid: np.ndarray) -> Scenari
             continue  # and must not displace one that is usable
         if isinstance(event, Reset):
             tracks.pop(at, None)  # what was tracked before is forgotten
-        moved = replace(event, sample=at[1])
         if isinstance(event, Tune):
-            tunes.append(moved)
+            tunes.append(replace(event, sample=at[1]))
             ends[event.lane] = _taken(plan, event, ends[event.lane])
             if at in resets:
                 resets[at] = _limited(plan, resets[at], "u0", ends[event.lane])
             if at in tracks:
                 tracks[at] = _limited(plan, tracks[at], "u", ends[event.lane])
         elif isinstance(event, Reset):
-            resets[at] = _limited(plan, moved, "u0", ends[event.lane])
+            resets[at] = _limited(plan, replace(event, sample=at[1]), "u0", ends[event.lane])
         else:
-            tracks[at] = _limited(plan, moved, "u", ends[event.lane])
+            tracks[at] = _limited(plan, replace(event, sample=at[1]), "u", ends[event.lane])
     return Scenario(
         **signals, resets=tuple(resets.values()), tracks=tuple(tracks.values()), tunes=tuple(tunes)
     )
@@ -192,18 +198,23 @@ def _taken(plan: Plan, event: Tune, ends: tuple[float, float]) -> tuple[float, f
     return now.low, now.high
 
 
-def _limited(plan: Plan, event: Reset | Track, name: str, ends: tuple[float, float]) -> Reset | Track:
+def _limited(plan: Plan, event: Held, name: str, ends: tuple[float, float]) -> Held:
     """An event whose output is within limits; one that cannot be used stands for 0."""
     value = getattr(event, name)
     if plan.tuning is None:
         return event
     value = value if usable(value, plan.output) else type(value)(0)
-    return replace(event, **{name: type(value)(min(max(value, ends[0]), ends[1]))})
+    kept: dict[str, Any] = {name: type(value)(min(max(value, ends[0]), ends[1]))}
+    return replace(event, **kept)
 
 
 def events(scenario: Scenario) -> list[Reset | Track | Tune]:
     """Tunes, resets and tracks in the order in which they happen."""
-    found = [*scenario.tunes, *scenario.resets, *scenario.tracks]  # the sort keeps it within a sample
+    found: list[Reset | Track | Tune] = [
+        *scenario.tunes,
+        *scenario.resets,
+        *scenario.tracks,
+    ]  # the sort keeps it within a sample
     return sorted(found, key=lambda event: event.sample)
 
 
@@ -218,11 +229,14 @@ def standing(plan: Plan, u: np.floating, ends: tuple[float, float]) -> np.floati
     return min(max(kept, kind(ends[0])), kind(ends[1]))
 
 
-def _hold(plan: Plan, scenario: Scenario, lane: int, invalid: np.ndarray, u: np.ndarray) -> None:
+def _hold(plan: Plan, scenario: Scenario, lane: int, invalid: Numbers, u: Numbers) -> None:
     """Fill in the outputs of steps that were left out, in place."""
     kind, ends = u.dtype.type, _ends(plan)
-    limited = lambda value: standing(plan, kind(value), ends)  # noqa: E731
-    happening: dict[int, list] = {}
+
+    def limited(value: Any) -> Any:
+        return standing(plan, kind(value), ends)
+
+    happening: dict[int, list[Any]] = {}
     for event in events(scenario):
         if event.lane == lane:
             happening.setdefault(event.sample, []).append(event)
@@ -246,7 +260,7 @@ def _hold(plan: Plan, scenario: Scenario, lane: int, invalid: np.ndarray, u: np.
             now = u[k]
 
 
-def refused_events(plan: Plan, scenario: Scenario, flags: np.ndarray) -> np.ndarray:
+def refused_events(plan: Plan, scenario: Scenario, flags: Numbers) -> Numbers:
     """Ahead of which samples a reset or a track has left INPUT or INVALID raised; ``flags`` of every step and
     the result have the shape (lanes, samples).
 
@@ -254,6 +268,7 @@ def refused_events(plan: Plan, scenario: Scenario, flags: np.ndarray) -> np.ndar
     """
     raised, found = FLAG_INVALID | FLAG_INPUT, np.zeros(flags.shape, bool)
     ends = dict.fromkeys(range(scenario.lanes), _ends(plan))
+    begun = {(r.lane, r.sample) for r in scenario.resets}
     for event in events(scenario):
         at = event.lane, event.sample
         if isinstance(event, Tune):
@@ -264,8 +279,9 @@ def refused_events(plan: Plan, scenario: Scenario, flags: np.ndarray) -> np.ndar
             found[at] = _refused(plan, (event.ref, plan.reference), (event.meas, plan.measurement))
             given = event.u0
         else:
-            reset = any((r.lane, r.sample) == at for r in scenario.resets)
-            found[at] |= not reset and event.sample > 0 and bool(flags[event.lane, event.sample - 1] & raised)
+            found[at] |= (
+                at not in begun and event.sample > 0 and bool(flags[event.lane, event.sample - 1] & raised)
+            )
             given = event.u
         found[at] |= plan.integrator is not None and _refused(plan, (given, output))
     return found

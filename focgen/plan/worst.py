@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
+from focgen.arrays import Array
 from focgen.errors import PlanError
-from focgen.plan.execute import scheduled_gain
-from focgen.plan.model import Plan, Sum
-from focgen.plan.modes import Modes
+from focgen.plan.mode_sums import Modes
+from focgen.plan.plan import Plan, Sum
 from focgen.plan.proofs import sum_response
 from focgen.plan.scenario import Reset, Scenario, Tune
 from focgen.plan.tuning import default_params
+from focgen.plan.values import scheduled_gain
+from focgen.present import present
 
 _LONGEST = 400  # samples of an exponential memory's response
 _SETTLED = 8  # memory lengths after which a recursion's response is taken to have died away
@@ -46,38 +48,38 @@ def _largest(plan: Plan) -> tuple[Tune, ...]:
     return tuple(Tune(lane, 0, replace(default_params(plan), gain=most)) for lane in range(2))
 
 
-def _response(plan: Plan, node: str) -> np.ndarray:
+def _response(plan: Plan, node: str) -> Array:
     """How the node answers a unit error, sample by sample; an exponential memory for ``_LONGEST`` samples."""
     if " bank " in node and not node.startswith("feedback"):
         return _bank(plan, node)
     if node.startswith("rest") or node == "inner sum":
-        return _part(plan.inner.rest, node)
+        return _part(present(plan.inner).rest, node)
     if node.startswith("direct"):
-        return _part(plan.direct, node)
+        return _part(present(plan.direct), node)
     v = _filtered(plan, node)
     return np.convolve(v, [1.0, 1.0]) if node == "integrator sum" else v
 
 
-def _bank(plan: Plan, node: str) -> np.ndarray:
+def _bank(plan: Plan, node: str) -> Array:
     """Of a bank's sum, or of its slowest mode."""
     name, _, index, *what = node.split()
-    table = plan.direct if name == "direct" else plan.inner.rest
-    bank = table.banks[int(index)]
+    table = plan.direct if name == "direct" else present(plan.inner).rest
+    bank = present(table).banks[int(index)]
     weights = np.array(bank.values) if what == ["sum"] else np.eye(bank.modes)[-1]
     return Modes(bank.order, np.array(bank.real_rates), weights).response(_LONGEST)
 
 
-def _part(table: Sum, node: str) -> np.ndarray:
+def _part(table: Sum, node: str) -> Array:
     """The weights by lag, those of other blocks 0."""
     return _only(table, node, sum_response(table, _LONGEST).weights, 0)
 
 
-def _part_of_past(table: Sum, node: str) -> np.ndarray:
+def _part_of_past(table: Sum, node: str) -> Array:
     """The same of a sum that begins at lag 1."""
     return _only(table, node, np.array(table.values), 1)
 
 
-def _only(table: Sum, node: str, weights: np.ndarray, start: int) -> np.ndarray:
+def _only(table: Sum, node: str, weights: Array, start: int) -> Array:
     """``weights`` from lag ``start`` on, without those outside the block that ``node`` names, if it names
     one.
     """
@@ -88,7 +90,7 @@ def _only(table: Sum, node: str, weights: np.ndarray, start: int) -> np.ndarray:
     return weights
 
 
-def _filtered(plan: Plan, node: str) -> np.ndarray:
+def _filtered(plan: Plan, node: str) -> Array:
     """e to v, or to a sum of past v."""
     count = plan.error_lags + 1 + (_SETTLED * plan.filtered_lags if plan.feedback else 0)
     count = _LONGEST if plan.states else count
@@ -104,19 +106,20 @@ def _filtered(plan: Plan, node: str) -> np.ndarray:
     table = plan.feedback.table
     den = sum_response(table, count).weights.copy()
     den[0] = 1.0
-    v = lfilter([1.0], den, p)
+    v: Array = lfilter([1.0], den, p)
     if not node.startswith("feedback") or " bank " in node:
         return v
-    return lfilter(np.concatenate([[0.0], _part_of_past(table, node)]), [1.0], v)
+    made: Array = lfilter(np.concatenate([[0.0], _part_of_past(table, node)]), [1.0], v)
+    return made
 
 
-def _answer(table: Sum, unit: np.ndarray) -> np.ndarray:
+def _answer(table: Sum, unit: Array) -> Array:
     """To a unit sample, as long as ``unit``."""
     found = sum_response(table, len(unit)).weights[: len(unit)]
     return np.pad(found, (0, len(unit) - len(found)))
 
 
-def _schedule(plan: Plan, node: str, shape: tuple[int, int]) -> np.ndarray | None:
+def _schedule(plan: Plan, node: str, shape: tuple[int, int]) -> Array | None:
     """The schedule at its largest gain, or where its slope's product is largest."""
     if plan.schedule is None:
         return None

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.measures import BAND
 from focgen.loop.design import Design
-from focgen.loop.response import shapes
+from focgen.loop.frequency import shapes
 from focgen.loop.simulate import Simulation
 from focgen.plan.build import build_plan
+from focgen.present import present
 from focgen.report.style import COLOURS, CYCLE, GREY, figure, png, with_unit
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def simulation_pictures(simulation: Simulation) -> dict[str, bytes]:
@@ -34,12 +41,12 @@ def simulation_pictures(simulation: Simulation) -> dict[str, bytes]:
         return {"setpoints.png": png(fig)}
 
 
-def _reached(limit: float, command: np.ndarray) -> bool:
+def _reached(limit: float, command: Array) -> bool:
     """Whether the command stays at the limit for more than the moment it starts from."""
     return bool(np.count_nonzero(np.isclose(command, limit, rtol=0.0, atol=1e-9)) > 0.01 * command.size)
 
 
-def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
+def _draw_from_rest(top: Axes, bottom: Axes, simulation: Simulation) -> None:
     run = simulation.running
     for i, result in enumerate(simulation.setpoints):
         colour = CYCLE[i % len(CYCLE)]
@@ -57,7 +64,7 @@ def _draw_from_rest(top, bottom, simulation: Simulation) -> None:
     bottom.legend(title=with_unit("set point", simulation.controller.units.measurement), ncols=4, loc="best")
 
 
-def _other_loop(axes, simulation: Simulation, index: int, colour) -> None:
+def _other_loop(axes: Axes, simulation: Simulation, index: int, colour: str) -> None:
     """What to compare with, dotted: the loop without the rig's effects, or without any, the frozen one."""
     time, frozen = simulation.running.time, simulation.frozen[index]
     other = frozen if simulation.nominal is None else simulation.nominal.output[:, index]
@@ -72,7 +79,7 @@ def _interesting(simulation: Simulation) -> float:
     )
 
 
-def _draw_consecutive(top, bottom, simulation: Simulation) -> None:
+def _draw_consecutive(top: Axes, bottom: Axes, simulation: Simulation) -> None:
     run, colour = simulation.running, COLOURS["output"]
     for i, result in enumerate(simulation.setpoints):
         begin, end = i * simulation.duration, (i + 1) * simulation.duration
@@ -85,14 +92,16 @@ def _draw_consecutive(top, bottom, simulation: Simulation) -> None:
     bottom.step(run.time, run.command[:, 0], where="post", color=COLOURS["command"])
 
 
-def _reference(axes, span, start: float, reference: float, colour) -> None:
+def _reference(
+    axes: Axes, span: Sequence[float] | Array, start: float, reference: float, colour: str
+) -> None:
     """The set point, dashed, in its ±5 % band."""
     half = BAND * abs(reference - start)
     axes.fill_between(span, reference - half, reference + half, color=colour, alpha=0.15, lw=0)
     axes.plot(span, [reference] * 2, color=colour, ls="--", lw=0.8)
 
 
-def _settling(axes, time, output, settling: float, colour) -> None:
+def _settling(axes: Axes, time: Array, output: Array, settling: float, colour: str) -> None:
     if math.isfinite(settling):
         axes.plot(
             settling, np.interp(settling, time, output), "o", color=colour, mec="white", mew=0.8, zorder=5
@@ -118,17 +127,18 @@ def _schedule_picture(design: Design, rig: Rig) -> bytes:
         return png(fig)
 
 
-def _draw_gain(axes, design: Design, rig: Rig) -> None:
+def _draw_gain(axes: Axes, design: Design, rig: Rig) -> None:
     """The table that runs, held beyond its ends, and the formula it stands for."""
     schedule = design.schedule
     first, last = schedule.breakpoints[0], schedule.breakpoints[-1]
     p = np.linspace(first, last, 400)
     beyond = np.linspace(first - 0.3 * (last - first), last + 0.1 * (last - first), 400)
-    table, formula = design.controller.gain_at(beyond), _K_o(design, p) / rig.actuator.K(p)
+    actuator: Any = rig.actuator  # a fractional one: others are not scheduled
+    table, formula = design.controller.gain_at(beyond), _K_o(design, p) / actuator.K(p)
     axes.plot(beyond, table, color=COLOURS["running"], lw=2.2, label="schedule table")
     axes.plot(p, formula, color=COLOURS["ideal"], lw=0.7, zorder=3, label="$K_o(p)/K(p)$")
     axes.plot(schedule.breakpoints, schedule.gains, "o", color=COLOURS["running"])
-    axes.axvline(schedule.lower_limit, color=GREY, lw=0.8, ls=":")
+    axes.axvline(present(schedule.lower_limit), color=GREY, lw=0.8, ls=":")
     axes.annotate(
         "held below",
         (schedule.lower_limit, 0.05),
@@ -143,7 +153,7 @@ def _draw_gain(axes, design: Design, rig: Rig) -> None:
     axes.legend()
 
 
-def _draw_K_o(axes, design: Design) -> None:
+def _draw_K_o(axes: Axes, design: Design) -> None:
     """The line K_o(p), and the operating points it goes through."""
     ends = np.array([design.schedule.breakpoints[0], design.schedule.breakpoints[-1]])
     places, values = [p.pressure for p in design.points], [p.K_o for p in design.points]
@@ -155,7 +165,7 @@ def _draw_K_o(axes, design: Design) -> None:
     axes.legend(loc="lower right")
 
 
-def _K_o(design: Design, pressure: np.ndarray) -> np.ndarray:
+def _K_o(design: Design, pressure: Array) -> Array:
     return design.schedule.intercept + design.schedule.slope * pressure
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from typing import Any
 
+from focgen.control.files import source_table
 from focgen.control.margins import Margins
 from focgen.loop.design import Design, ScheduleReport
-from focgen.loop.response import PointMargins
+from focgen.loop.frequency import PointMargins
 from focgen.loop.simulate import SetpointResult, Simulation
 from focgen.report.page import TableOf, text_table
 from focgen.report.worst_summary import worst_payload, worst_text
@@ -18,13 +20,17 @@ _LOOPS = ("frozen", "ideal", "sampled", "truncated", "running")
 # ---------------------------------------------------------------------------------------------------- design
 
 
-def design_payload(design: Design) -> dict:
+def design_payload(design: Design) -> dict[str, Any]:
     """What ``focgen design --json`` carries."""
     labels = point_labels(design)
+    source = design.controller.designed_from
     return {
         "name": design.controller.name,
         "arithmetic": design.controller.arithmetic,
-        "wish": {"settling_s": design.wish.settling, "overshoot_pct": design.wish.overshoot},
+        "specification": {
+            "settling_s": design.specification.settling,
+            "overshoot_pct": design.specification.overshoot,
+        },
         "holds": design.holds,
         "K_o": {"intercept": design.schedule.intercept, "slope": design.schedule.slope},
         "schedule": asdict(design.schedule),
@@ -39,7 +45,7 @@ def design_payload(design: Design) -> dict:
         "delay_samples": design.delay,
         "transfer": str(design.controller.transfer),
         "ranges": asdict(design.controller.ranges),
-        "designed_from": asdict(design.controller.designed_from) if design.controller.designed_from else None,
+        "designed_from": source and source_table(source),
         "notes": list(design.notes),
     }
 
@@ -54,7 +60,7 @@ def point_labels(design: Design) -> list[str]:
     )
 
 
-def _worst(points: tuple[PointMargins, ...], loop: str) -> dict:
+def _worst(points: tuple[PointMargins, ...], loop: str) -> dict[str, Any]:
     """The operating point with the smallest phase margin, and all of them."""
     worst = min(points, key=lambda point: getattr(point, loop).phase_deg)
     rows = [{"pressure": point.pressure, **asdict(getattr(point, loop))} for point in points]
@@ -72,7 +78,7 @@ def design_text(design: Design) -> str:
     """The design for people."""
     tables = text_table(points_table(design)), text_table(margins_table(design)), worst_text(design.worst)
     notes = "\n".join([memory_line(design), *(f"note: {note}" for note in design.notes)])
-    return "\n\n".join(["\n".join(schedule_lines(design)), *tables, notes, wish_line(design)])
+    return "\n\n".join(["\n".join(schedule_lines(design)), *tables, notes, specification_line(design)])
 
 
 def schedule_lines(design: Design) -> list[str]:
@@ -93,9 +99,11 @@ def _gain_text(design: Design) -> str:
 def _table_lines(design: Design) -> list[str]:
     schedule = design.schedule
     lines = [
-        f"schedule: {len(schedule.breakpoints)} breakpoints from {schedule.breakpoints[0]:.4g} to "
-        f"{schedule.breakpoints[-1]:.4g}, within {100 * schedule.error:.2g} % of K_o/K "
-        f"(wanted: {100 * schedule.tolerance:g} %), held beyond"
+        (
+            f"schedule: {len(schedule.breakpoints)} breakpoints from {schedule.breakpoints[0]:.4g} to "
+            f"{schedule.breakpoints[-1]:.4g}, within {100 * schedule.error:.2g} % of K_o/K "
+            f"(wanted: {100 * schedule.tolerance:g} %), held beyond"
+        )
     ]
     if schedule.formula_at_rest is not None:
         zero = "" if schedule.K_zero is None else f"; K(p) vanishes at p = {schedule.K_zero:.3g}"
@@ -119,13 +127,14 @@ def memory_line(design: Design) -> str:
     return text
 
 
-def wish_line(design: Design) -> str:
-    """What was wished, and whether it is kept."""
-    wish = "" if design.wish.settling is None else f" of at most {design.wish.settling:.3g} s"
+def specification_line(design: Design) -> str:
+    """What was specified, and whether it is met."""
+    asked = design.specification
+    settling = "" if asked.settling is None else f" of at most {asked.settling:.3g} s"
     where = " with the rig's effects" if design.points[0].effects else ""
     verdict = f"kept{where}" if design.holds else f"NOT kept by the controller as it will run{where}"
     return (
-        f"wish: mean settling time{wish}, overshoot of at most {design.wish.overshoot:g} %: {verdict} "
+        f"specification: mean settling time{settling}, overshoot of at most {asked.overshoot:g} %: {verdict} "
         f"({_seconds(design.settling_s)}, {design.overshoot_pct:.2g} %)"
     )
 
@@ -205,7 +214,7 @@ def _margin_cells(m: Margins) -> tuple[str, ...]:
 # ------------------------------------------------------------------------------------------------ simulation
 
 
-def simulation_payload(simulation: Simulation) -> dict:
+def simulation_payload(simulation: Simulation) -> dict[str, Any]:
     """What ``focgen simulate --json`` carries."""
     return {
         "setpoints": [asdict(result) for result in simulation.setpoints],

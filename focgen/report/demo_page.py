@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from focgen.codegen.generate import Generated
 from focgen.diagnosis.drawn import Drawn
 from focgen.diagnosis.model import Diagnosis
-from focgen.identification.model import Identification
+from focgen.identification.identification import Identification
 from focgen.loop.design import Design
 from focgen.loop.simulate import Simulation
+from focgen.present import present
 from focgen.report.control_summary import (
     margins_table,
     memory_line,
@@ -25,8 +26,8 @@ from focgen.report.pages.identification import identification_sections
 from focgen.report.pages.parts import figures_of
 from focgen.report.pages.study import study_sections
 from focgen.report.study_summary import rows_table
-from focgen.rig.model import Rig
-from focgen.studies.model import Study
+from focgen.rig.rig import Rig
+from focgen.studies.results import Study
 from focgen.verification.verify import Verification
 
 
@@ -61,7 +62,7 @@ def demo_page(
 
 def demo_lead(identification: Identification, design: Design, verified: dict[str, Verification]) -> str:
     """The whole result in a few sentences."""
-    gof, joint = identification.gof, identification.joint
+    gof, joint = identification.gof, present(identification.joint)
     samples = sum(v.targets["host"].samples for v in verified.values())
     wrong = sum(v.targets["host"].mismatches for v in verified.values())
     return (
@@ -155,8 +156,10 @@ def _firmware(generated: dict[str, Generated], verified: dict[str, Verification]
     return Section(
         "C",
         (
-            "Every sample of the C is compared with a reference that shares no code with it: output, "
-            "increment and flags, in every bit. The error is against the same controller in float64.",
+            (
+                "Every sample of the C is compared with a reference that shares no code with it: output, "
+                "increment and flags, in every bit. The error is against the same controller in float64."
+            ),
         ),
         (table,),
         (),
@@ -209,8 +212,8 @@ def firmware_table(generated: dict[str, Generated], verified: dict[str, Verifica
                 f"{sizes['state_bytes']} B",
                 f"{sizes['table_bytes']} B",
                 f"{result.samples - result.mismatches} of {result.samples}",
-                f"{result.max_error.operator:.2g}",
-                f"{result.error_bound['operator']:.2g}",
+                f"{present(result.max_error).operator:.2g}",
+                f"{present(result.error_bound)['operator']:.2g}",
                 "yes" if verified[arithmetic].holds else "NO",
             )
         )

@@ -2,113 +2,108 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from focgen.diagnosis.drawn import entry_of, means, rate_of, segment_errors, steady, sweeps, way_of, worst_of
-from focgen.diagnosis.explain import Explanation
-from focgen.diagnosis.fit import problem_residual
-from focgen.diagnosis.model import Diagnosis, Evidence
-from focgen.logs.experiment import Experiment
+from focgen.diagnosis.belief.standing import tied_within
+from focgen.diagnosis.drawn import Drawn, Residual, Trace, sweeps
+from focgen.diagnosis.model import Diagnosis
 from focgen.report.style import COLOURS, figure, png, with_unit
+from focgen.report.texts import pictured
 
-_POINTS = 4000
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
-def pictures(
-    diagnosis: Diagnosis, evidence: Evidence, logs: Sequence[Experiment], units: Mapping[str, str]
-) -> dict[str, bytes]:
-    """Every picture, PNG bytes by file name; ``units`` by role."""
-    worst = worst_of(evidence)
-    found = {
-        "ladder.png": ladder(evidence),
-        "residual.png": residual(worst, units),
-        "loops.png": loops(evidence, logs, units),
-        "waterfall.png": waterfall(diagnosis),
+def diagnosis_pictures(found: Diagnosis) -> dict[str, bytes]:
+    """Every picture of a diagnosis just made, PNG bytes by file name.
+
+    Raises MissingExtra where matplotlib is not installed.
+    """
+    drawn = found.drawn
+    assert drawn and drawn.residual  # None only where it was read from a file
+    pictures = {
+        "ladder.png": ladder(drawn),
+        "residual.png": residual(drawn.residual, drawn),
+        "loops.png": loops(drawn),
+        "waterfall.png": waterfall(found),
     }
-    return found | (
-        {"candidates.png": candidates(evidence)} if any(e.causes for e in evidence.explanations) else {}
-    )
+    return pictures | ({"candidates.png": candidates(drawn)} if drawn.rivals else {})
 
 
-def ladder(evidence: Evidence) -> bytes:
+def ladder(drawn: Drawn) -> bytes:
     """Root-mean-square residual of every segment on its measured input: as given, refitted, with the
     effects.
     """
+    kinds: tuple[tuple[str, str, str], ...] = (
+        ("as_given", "as given", "measured"),
+        ("refitted", "refitted", "bad"),
+        ("explained", "with effects", "good"),
+    )
+    at = np.arange(len(drawn.segments))
     with figure(1, 1) as (fig, axis):
-        for i, e in enumerate(evidence.explanations):
-            for j, (height, colour) in enumerate(zip(segment_errors(e), ("measured", "bad", "good"))):
-                label = ("as given", "refitted", "with effects")[j] if i == 0 else None
-                axis.bar(i + (j - 1) * 0.27, height, 0.25, color=COLOURS[colour], label=label)
-        axis.set_xticks(
-            range(len(evidence.explanations)),
-            [f"{e.segment.entry} → {e.segment.exit}" for e in evidence.explanations],
-        )
+        for aside, (key, label, colour) in zip((-0.27, 0.0, 0.27), kinds):
+            heights = [getattr(segment, key) for segment in drawn.segments]
+            axis.bar(at + aside, heights, 0.25, color=COLOURS[colour], label=label)
+        axis.set_xticks(at, [f"{segment.entry} → {segment.exit}" for segment in drawn.segments])
         axis.set_ylabel("RMS error, % of the signal's range")
         axis.set_title("Where: each segment on its measured input")
         axis.legend()
         return png(fig)
 
 
-def _thin(*signals: np.ndarray) -> list[np.ndarray]:
-    step = max(1, len(signals[0]) // _POINTS)
-    return [s[::step] for s in signals]
-
-
-def residual(e: Explanation, units: Mapping[str, str]) -> bytes:
+def residual(left: Residual, drawn: Drawn) -> bytes:
     """The worst segment's residual against level, rate, direction and time, before and after the effects.
 
     Lines are means: over bins of level and of rate, and of time; those over the level are drawn apart for
     rising and falling input, so that a gap between them is a loop.
     """
-    run, before, after = e.segment.run, problem_residual(e.nominal), problem_residual(e.best)
-    level = steady(e.segment.x, run)
-    rate = rate_of(level, run)
-    way = way_of(rate)
+    entry, exit = drawn.worst
+    unit = drawn.units[entry]
+    kinds = (("refitted", "refitted", "bad"), ("explained", "with effects", "good"))
     with figure(2, 2) as (fig, axes):
         (by_level, by_rate), (by_way, by_time) = axes
-        for values, colour, label in ((before, "bad", "refitted"), (after, "good", "with effects")):
-            for axis, place in ((by_level, level), (by_rate, rate), (by_time, run.clock)):
+        over = {"level": by_level, "rate": by_rate, "time": by_time}
+        for key, label, colour in kinds:
+            for axis, place in ((by_level, left.level), (by_rate, left.rate), (by_time, left.clock)):
                 axis.plot(
-                    *_thin(place, values), ".", ms=1.2, alpha=0.35, color=COLOURS[colour], rasterized=True
+                    place, getattr(left, key), ".", ms=1.2, alpha=0.35, color=COLOURS[colour], rasterized=True
                 )
-            for sign, style in ((1, "-"), (-1, "--")):
-                by_level.plot(
-                    *means(level[way == sign], values[way == sign]), style, color=_DARK[colour], lw=1.3
-                )
-            by_rate.plot(*means(rate, values), color=_DARK[colour], lw=1.3)
-            by_time.plot(*means(run.clock, values, 60), color=_DARK[colour], lw=1.3, label=label)
-        _by_direction(by_way, before, after, way)
+            for mean in (mean for mean in drawn.means if mean.of == key):
+                style = "--" if mean.way == "falling" else "-"
+                named = label if mean.over == "time" else None
+                over[mean.over].plot(mean.place, mean.mean, style, color=_DARK[colour], lw=1.3, label=named)
+        _by_direction(by_way, left)
         by_level.plot([], [], "-", color="black", label="mean, rising")
         by_level.plot([], [], "--", color="black", label="mean, falling")
         by_level.legend(fontsize=7)
         by_time.legend(fontsize=7)
         for axis, label in (
-            (by_level, with_unit(e.segment.entry, units[e.segment.entry])),
-            (by_rate, f"rate of {e.segment.entry} ({units[e.segment.entry] or 1}/s)"),
+            (by_level, with_unit(entry, unit)),
+            (by_rate, f"rate of {entry} ({unit or 1}/s)"),
             (by_time, "session's time (s)"),
         ):
             axis.set_xlabel(label)
         by_rate.locator_params(axis="x", nbins=5)
-        by_rate.set_xlim(*(1.5 * np.quantile(rate, q) for q in (0.005, 0.995)))
-        widest = 1.05 * np.quantile(np.abs(before), 0.999)
+        by_rate.set_xlim(*(1.5 * np.quantile(left.rate, q) for q in (0.005, 0.995)))
+        widest = 1.05 * np.quantile(np.abs(left.refitted), 0.999)
         for axis in axes.ravel():
             if axis is not by_way:
                 axis.set_ylim(-widest, widest)
-            axis.set_ylabel(with_unit(f"error of {e.segment.exit}", units[e.segment.exit]))
-        fig.suptitle(f"What {e.segment.entry} → {e.segment.exit} leaves")
+            axis.set_ylabel(with_unit(f"error of {exit}", drawn.units[exit]))
+        fig.suptitle(f"What {entry} → {exit} leaves")
         return png(fig)
 
 
 _DARK = {"bad": "#7A3500", "good": "#00513B"}  # of the means, on the points of their colour
 
 
-def _by_direction(axis, before: np.ndarray, after: np.ndarray, way: np.ndarray) -> None:
+def _by_direction(axis: Axes, left: Residual) -> None:
     """Where half and nine tenths of the residual lie while the input rises, holds, and falls."""
-    for values, colour, aside in ((before, "bad", -0.16), (after, "good", 0.16)):
+    for values, colour, aside in ((left.refitted, "bad", -0.16), (left.explained, "good", 0.16)):
         for place, sign in enumerate((1, 0, -1)):
-            here = values[way == sign]
+            here = values[left.way == sign]
             if len(here) < 5:
                 continue
             low, quarter, middle, upper, high = np.quantile(here, (0.05, 0.25, 0.5, 0.75, 0.95))
@@ -120,37 +115,30 @@ def _by_direction(axis, before: np.ndarray, after: np.ndarray, way: np.ndarray) 
     axis.set_xlim(-0.6, 2.6)
 
 
-def loops(evidence: Evidence, logs: Sequence[Experiment], units: Mapping[str, str]) -> bytes:
+def loops(drawn: Drawn) -> bytes:
     """Output against input, measured and simulated, before and after, for the two experiments that tell most;
     against time where the input only steps.
     """
-    chosen = _telling(evidence, logs)
+    chosen = sorted(drawn.traces, key=_telling)[-2:]
+    swept = with_unit(drawn.entry, drawn.units[drawn.entry])
     with figure(len(chosen), 2, squeeze=False, sharex="row", sharey="row") as (fig, axes):
-        for row, i in zip(axes, chosen):
-            x = logs[i][entry_of(logs)]
-            swept = with_unit(entry_of(logs), units[entry_of(logs)])
-            place, label = (x, swept) if sweeps(x) else (logs[i].time, "time (s)")
-            for axis, name in zip(row, ("refitted", "explained")):
-                where, y, made = _thin(place, logs[i]["output"], evidence.simulated[name][i]["output"])
-                axis.plot(where, y, color=COLOURS["measured"], lw=0.7, label="measured")
-                axis.plot(where, made, color=COLOURS["bad" if name == "refitted" else "good"], lw=1.0)
-                axis.set_title(f"{logs[i].name}, {'refitted' if name == 'refitted' else 'with the effects'}")
+        for row, trace in zip(axes, chosen):
+            place, label = (trace.input, swept) if sweeps(trace.input) else (trace.time, "time (s)")
+            kinds = ((trace.refitted, "refitted", "bad"), (trace.explained, "with the effects", "good"))
+            for axis, (made, what, colour) in zip(row, kinds):
+                axis.plot(place, trace.measured, color=COLOURS["measured"], lw=0.7, label="measured")
+                axis.plot(place, made, color=COLOURS[colour], lw=1.0)
+                axis.set_title(f"{pictured(trace.name)}, {what}")
                 axis.set_xlabel(label)
-            row[0].set_ylabel(with_unit("output", units["output"]))
+            row[0].set_ylabel(with_unit("output", drawn.units["output"]))
         axes[0, 0].legend(loc="best")
         return png(fig)
 
 
-def _telling(evidence: Evidence, logs: Sequence[Experiment]) -> list[int]:
-    """Up to two experiments where the effects changed the simulated output most, those that sweep first."""
-    before, after = evidence.simulated["refitted"], evidence.simulated["explained"]
-
-    def telling(i: int) -> float:
-        changed = np.sqrt(np.mean((before[i]["output"] - after[i]["output"]) ** 2))
-        weight = 3.0 if sweeps(logs[i][entry_of(logs)]) else 1.0
-        return float(changed) * weight + 1e-12 * len(logs[i])
-
-    return sorted(sorted(range(len(logs)), key=telling)[-2:])
+def _telling(trace: Trace) -> float:
+    """How much the effects change of an experiment, one that sweeps three times."""
+    changed = float(np.sqrt(np.mean((trace.refitted - trace.explained) ** 2)))
+    return changed * (3.0 if sweeps(trace.input) else 1.0) + 1e-12 * len(trace.time)
 
 
 def waterfall(diagnosis: Diagnosis) -> bytes:
@@ -172,26 +160,22 @@ def waterfall(diagnosis: Diagnosis) -> bytes:
         return png(fig)
 
 
-def candidates(evidence: Evidence) -> bytes:
+def candidates(drawn: Drawn) -> bytes:
     """For each cause, how many standard deviations every other family is behind."""
-    causes = [c for e in evidence.explanations for c in e.causes]
-    with figure(1, len(causes), size=(max(7.0, 3.2 * len(causes)), 3.4), squeeze=False) as (fig, axes):
-        for axis, cause in zip(axes[0], causes):
-            shown = cause.rivals[:8][::-1]
-            colours = [COLOURS["good" if r.separation < 2 else "measured"] for r in shown]
-            axis.barh([r.effect for r in shown], [r.separation for r in shown], color=colours)
-            axis.axvline(2.0, color=COLOURS["limit"], lw=0.8)
-            axis.set_xlim(0.0, max(4.0, 1.08 * max(r.separation for r in shown)))
-            for place, r in enumerate(shown):
-                text = "found" if r is cause.rivals[0] else f"{r.separation:.1f}"
+    count = len(drawn.rivals)
+    with figure(1, count, size=(max(7.0, 3.2 * count), 3.4), squeeze=False) as (fig, axes):
+        for axis, rivals in zip(axes[0], drawn.rivals):
+            shown = list(zip(rivals.effects, rivals.separations))[:8][::-1]
+            names, behind = zip(*shown)
+            colours = [COLOURS["good" if value < tied_within() else "measured"] for value in behind]
+            axis.barh(names, behind, color=colours)
+            axis.axvline(tied_within(), color=COLOURS["limit"], lw=0.8)
+            axis.set_xlim(0.0, max(4.0, 1.08 * max(behind)))
+            for place, (name, value) in enumerate(shown):
+                text = "found" if name == rivals.effects[0] else f"{value:.1f}"
                 axis.annotate(
-                    text,
-                    (r.separation, place),
-                    xytext=(3, 0),
-                    textcoords="offset points",
-                    va="center",
-                    fontsize=7,
+                    text, (value, place), xytext=(3, 0), textcoords="offset points", va="center", fontsize=7
                 )
-            axis.set_xlabel("σ behind (below 2: tied)")
-            axis.set_title(cause.rivals[0].effect)
+            axis.set_xlabel(f"σ behind (below {tied_within():.1f}: tied)")
+            axis.set_title(rivals.found)
         return png(fig)

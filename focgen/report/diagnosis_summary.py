@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found
 
@@ -82,13 +83,19 @@ def _value(name: str, estimate: Estimate) -> str:
     return f"{name} {estimate.value:.3g} ± {half:.1g} {estimate.unit}".rstrip()
 
 
-def _unexplained(place: str, what: Mapping) -> str:
+_DISTURBED = {
+    ("low_frequency", "slow_swings"): "slow swings that no input predicts",
+    ("pushed",): "something that pushes the rig at its own pace, predicted by no input",
+    ("tonal", "hums"): "a tone that no input predicts",
+    ("bursts",): "bursts that no input predicts",
+}
+"""By its names in diagnosis.json, of today and of before, what is said of a disturbance."""
+
+
+def _unexplained(place: str, what: Mapping[str, Any]) -> str:
     """What is left, and what it goes with."""
     parts = [part for part in what.get("depends_on", ()) if part != "nothing"]
-    parts += ["slow swings that no input foretells"] * bool(what.get("slow_swings"))
-    parts += ["something that pushes the rig at its own pace, foretold by no input"] * bool(
-        what.get("pushed")
-    )
+    parts += [words for names, words in _DISTURBED.items() if any(what.get(name) for name in names)]
     on = f"; it goes with {', '.join(parts)}" if parts else ""
     return f"something from {place} that no effect of the library explains{on}."
 
@@ -105,10 +112,9 @@ def _how_far(found: Diagnosis, units: Mapping[str, str]) -> str:
     gap, unit = found.gap, units.get("output") or found.gap.unit
     text = (
         f"How far: the output is off by {gap.as_given:.3g} {unit} as given, {gap.refitted:.3g} with "
-        f"its own numbers "
-        f"refitted, {gap.explained:.3g} with what was found; the noise is {gap.floor:.3g}."
+        f"its own numbers refitted, {gap.explained:.3g} with what was found; the noise is {gap.floor:.3g}."
     )
-    if found.shrink is None:
+    if found.shrink is None or found.shrink_interval is None:
         return text
     low, high = found.shrink_interval
     share = f"{found.shrink:.0%} ({low:.0%} to {high:.0%})"

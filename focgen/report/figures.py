@@ -7,12 +7,13 @@ user's text in no form yet, which the page gives one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from focgen.arrays import Array
 from focgen.logs.thinning import thinned
 
 if TYPE_CHECKING:
@@ -42,8 +43,8 @@ class Line:
     sample to sample; ``dots``: a dot at every point, and no line where ``dash`` is "none"."""
 
     label: str
-    x: np.ndarray
-    y: np.ndarray
+    x: Array
+    y: Array
     colour: str
     dash: str = "solid"
     width: float = 1.6
@@ -58,10 +59,10 @@ class Bars:
     hovering; ``across``: to the right, not upwards."""
 
     label: str
-    places: np.ndarray
-    tops: np.ndarray
+    places: Array
+    tops: Array
     colour: str
-    bottoms: np.ndarray | None = None
+    bottoms: Array | None = None
     width: float = 0.8
     names: tuple[str, ...] = ()
     across: bool = False
@@ -73,9 +74,9 @@ class Area:
     """What lies between ``low`` and ``high`` over ``x``, (n,) all: an interval or a tolerance."""
 
     label: str
-    x: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
+    x: Array
+    low: Array
+    high: Array
     colour: str
     group: str | None = None
 
@@ -117,8 +118,8 @@ class Figure:
     linked: bool = True
 
 
-def curve(label: str, x: Sequence[float], y: Sequence[float], colour: str, **how) -> Line:
+def curve(label: str, x: ArrayLike, y: ArrayLike, colour: str, **how: Any) -> Line:
     """A :class:`Line` of at most :data:`MOST` points."""
-    x, y = np.asarray(x, float), np.asarray(y, float)
-    kept = thinned(y, most=MOST)
-    return Line(label, x[kept], y[kept], colour, **how)
+    places, values = np.asarray(x, float), np.asarray(y, float)
+    kept = thinned(values, most=MOST)
+    return Line(label, places[kept], values[kept], colour, **how)

@@ -6,8 +6,8 @@ from typing import Any
 
 from focgen.report.page import TableOf
 from focgen.report.pages.parts import number
-from focgen.targets.asked import entry_of
 from focgen.targets.cost import Cost
+from focgen.targets.selection import entry_of
 from focgen.verification.costs import ControllerCost, Costs
 from focgen.verification.verify import Verification
 

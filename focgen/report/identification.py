@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.units import unit_of_role
-from focgen.identification.model import ExperimentFit, Identification, Joint
+from focgen.identification.identification import ExperimentFit, Identification, Joint
 from focgen.identification.stages import StageFit
+from focgen.present import present
 from focgen.report.identification_summary import driving_role, gain_unit, model_label
 from focgen.report.style import COLOURS, CYCLE, GREY, figure, png, with_unit
+from focgen.report.texts import pictured
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _RUNS = tuple(colour for colour in CYCLE if colour != COLOURS["ideal"])  # of runs: models are drawn over them
 _COMPARED = ("iom_1p", "iom_2p1z", "iom_3p2z")
@@ -62,7 +69,7 @@ def _gof(found: Identification) -> bytes:
                 color=GREY if model == "rig" else CYCLE[i % len(CYCLE)],
             )
         crowded = sum(map(len, names)) > _LETTERS
-        axes.set_xticks(range(len(names)), names, rotation=90 if crowded else 0)
+        axes.set_xticks(range(len(names)), list(map(pictured, names)), rotation=90 if crowded else 0)
         axes.set_ylabel("goodness of fit")
         axes.set_ylim(0.0, 1.0)
         axes.set_title("Fractional and integer-order models (Table I)")
@@ -73,9 +80,9 @@ def _gof(found: Identification) -> bytes:
 def _fits(found: Identification) -> bytes:
     with figure(1, 1, size=(7.0, 3.6)) as (fig, axes):
         for i, fit in enumerate(found.experiments):
-            axes.plot(fit.time, fit.measured, color=_RUNS[i % len(_RUNS)], lw=0.8, label=fit.name)
+            axes.plot(fit.time, fit.measured, color=_RUNS[i % len(_RUNS)], lw=0.8, label=pictured(fit.name))
             axes.plot(fit.time, fit.simulated, color=COLOURS["ideal"], lw=0.9, ls=":")
-            axes.plot(fit.time, found.joint.simulated[fit.name], color=COLOURS["ideal"], lw=1.0)
+            axes.plot(fit.time, present(found.joint).simulated[fit.name], color=COLOURS["ideal"], lw=1.0)
         axes.set_xlabel("time (s)")
         axes.set_ylabel(named(found, found.experiments[0].fitted))
         axes.set_title("Measured (colour), the rig (black), each experiment's own model (dotted)")
@@ -83,7 +90,7 @@ def _fits(found: Identification) -> bytes:
         return png(fig)
 
 
-def _legend_beside(axes, ends) -> None:
+def _legend_beside(axes: Axes, ends: Any) -> None:
     """The experiments to the right of the curves, in the order in which these end."""
     handles, labels = axes.get_legend_handles_labels()
     order = np.argsort(ends)[::-1]
@@ -111,14 +118,15 @@ def _models(found: Identification) -> bytes:
             top.plot(fit.time, simulated, color=colour, label=label)
             bottom.plot(fit.time, fit.measured - simulated, color=colour, lw=0.8)
         top.set_ylabel(named(found, fit.fitted))
-        top.set_title(f"Experiment {fit.name}: models of different kind")
+        top.set_title(f"Experiment {pictured(fit.name)}: models of different kind")
         bottom.set_ylabel("residual")
         bottom.set_xlabel("time (s)")
         top.legend(ncols=2)
         return png(fig)
 
 
-def candidates(fit: ExperimentFit):
+def candidates(fit: ExperimentFit) -> Any:
+    """Yield label, simulated output (n,) and colour of every model of an experiment."""
     yield "FOM", fit.simulated, COLOURS["ideal"]
     for i, model in enumerate(f for f in fit.integer if f"iom_{f.name}" in _COMPARED):
         yield model_label(f"iom_{model.name}"), model.simulated, CYCLE[i]
@@ -131,7 +139,7 @@ def _parameters(found: Identification) -> bytes:
     with figure(3, 1, size=(7.0, 6.6), sharex=True) as (fig, axes):
         for ax, key in zip(axes, ("K", "T", "alpha")):
             _draw_each(ax, steps, key)
-        _draw_joint(axes, found.joint, [fit.level for fit in steps])
+        _draw_joint(axes, present(found.joint), [fit.level for fit in steps])
         for ax, label in zip(axes, labels):
             low, high = ax.get_ylim()
             ax.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
@@ -142,7 +150,7 @@ def _parameters(found: Identification) -> bytes:
         return png(fig)
 
 
-def _draw_each(axes, steps: Sequence[ExperimentFit], key: str) -> None:
+def _draw_each(axes: Any, steps: Sequence[ExperimentFit], key: str) -> None:
     """A parameter of each experiment with its interval."""
     values = np.array([getattr(fit, key) for fit in steps])
     half = np.array([(fit.ci95[key][1] - fit.ci95[key][0]) / 2.0 for fit in steps])
@@ -150,7 +158,7 @@ def _draw_each(axes, steps: Sequence[ExperimentFit], key: str) -> None:
     axes.errorbar(levels, values, half, fmt="o", color=COLOURS["model"], capsize=3, label=label)
 
 
-def _draw_joint(axes, joint: Joint, levels: Sequence[float]) -> None:
+def _draw_joint(axes: Any, joint: Joint, levels: Sequence[float]) -> None:
     """K(p), and T and α of all experiments together."""
     reach = np.linspace(min(levels), max(levels), 50)
     line = np.polynomial.polynomial.polyval(reach, joint.gain)
@@ -163,18 +171,18 @@ def _draw_joint(axes, joint: Joint, levels: Sequence[float]) -> None:
         ax.axhline(value, color=COLOURS["ideal"], label=f"all together: {value:.4g}, 95 % interval", zorder=1)
 
 
-def swings(found: Identification) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+def swings(found: Identification) -> list[tuple[str, Array, Array, Array]]:
     """Name, input, measured and simulated output of what swings; an input that jumps draws no loops."""
     swings = [(u.name, u.pressure, u.measured, u.simulated) for u in found.unseen if u.swings]
     swings += [
-        (f.name, f.pressure, f.measured, found.joint.simulated[f.name])
+        (f.name, f.pressure, f.measured, present(found.joint).simulated[f.name])
         for f in found.experiments
         if not f.step
     ]
     return [each for each in swings if np.abs(np.diff(each[1])).max() < _JUMP * np.ptp(each[1])]
 
 
-def _loops(found: Identification, swings: list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]) -> bytes:
+def _loops(found: Identification, swings: list[tuple[str, Array, Array, Array]]) -> bytes:
     """Fig. 8: output over input, logged and as the identified rig has it."""
     columns = min(4, len(swings))
     rows = -(-len(swings) // columns)
@@ -185,7 +193,7 @@ def _loops(found: Identification, swings: list[tuple[str, np.ndarray, np.ndarray
             late = slice(int(len(pressure) * (1.0 - LAST)), None)
             ax.plot(pressure[late], measured[late], color=GREY, lw=0.7, label="log")
             ax.plot(pressure[late], simulated[late], color=COLOURS["model"], lw=0.9, label="identified rig")
-            ax.set_title(name)
+            ax.set_title(pictured(name))
         for ax in axes[-1]:
             ax.set_xlabel(named(found, driving_role(found)))
         axes[0, 0].set_ylabel(named(found, found.experiments[0].fitted))

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from focgen.control.units import unit_of_role
-from focgen.identification.model import ExperimentFit, Identification, Joint
+from focgen.fractional.terms import terms_of
+from focgen.identification.identification import ExperimentFit, Identification, Joint
 from focgen.identification.stages import StageFit
+from focgen.present import present
 from focgen.report.page import TableOf, text_table
 from focgen.report.style import with_unit
-from focgen.rig.model import UNITY
-from focgen.tomlfile import terms_of
+from focgen.rig.rig import UNITY
 
 _DECIMALS = 7  # more are written with an exponent
 
 
-def identification_payload(found: Identification) -> dict:
+def identification_payload(found: Identification) -> dict[str, Any]:
     """What ``focgen identify --json`` carries."""
     return {
         "name": found.rig.name,
@@ -30,7 +32,7 @@ def identification_payload(found: Identification) -> dict:
     }
 
 
-def _joint(joint: Joint | None) -> dict | None:
+def _joint(joint: Joint | None) -> dict[str, Any] | None:
     if joint is None:
         return None
     keys = ("T", "alpha", "delay", "gain_r2", "ci95", "closed_loop")
@@ -38,7 +40,7 @@ def _joint(joint: Joint | None) -> dict | None:
     return {key: getattr(joint, key) for key in keys} | {"gain": list(joint.gain), "initial_steps": begun}
 
 
-def _stage(fit: StageFit) -> dict:
+def _stage(fit: StageFit) -> dict[str, Any]:
     up_down = None
     if fit.up_down is not None:
         up_down = {key: getattr(fit.up_down, key) for key in ("rising", "falling", "one_line_will_do", "gof")}
@@ -54,7 +56,7 @@ def _stage(fit: StageFit) -> dict:
     }
 
 
-def _experiment(fit: ExperimentFit) -> dict:
+def _experiment(fit: ExperimentFit) -> dict[str, Any]:
     keys = (
         "name",
         "K",
@@ -112,7 +114,7 @@ def parameter_table(found: Identification) -> TableOf:
         )
         for fit in found.experiments
     ]
-    joint = found.joint
+    joint = present(found.joint)
     rows.append(
         ("all together", "", "", _pm(joint.T, joint.ci95["T"]), _pm(joint.alpha, joint.ci95["alpha"]))
     )
@@ -140,7 +142,7 @@ def gain_unit(found: Identification) -> str:
     return f"1/({above[2:]} {below})" if above.startswith("1/") else f"{above}/{below}"
 
 
-def _pm(value: float, span: tuple[float, float]) -> str:
+def _pm(value: float, span: Any) -> str:
     """A value to the digits that its interval leaves it, and half the interval to two digits."""
     half = (span[1] - span[0]) / 2.0
     digits = 1 - math.floor(math.log10(half)) if 0.0 < half < math.inf else -1
@@ -151,14 +153,15 @@ def _pm(value: float, span: tuple[float, float]) -> str:
 
 def gain_text(found: Identification) -> str:
     """K(p) with its intervals, R² where it is more than a constant, and the dead time where there is one."""
-    powers = ("", " p", *(f" p^{i}" for i in range(2, len(found.joint.gain))))
-    each = [_pm(g, span) for g, span in zip(found.joint.gain, found.joint.ci95["gain"])]
+    joint = present(found.joint)
+    powers = ("", " p", *(f" p^{i}" for i in range(2, len(joint.gain))))
+    each = [_pm(g, span) for g, span in zip(joint.gain, joint.ci95["gain"])]
     terms = " + ".join(f"({text}){power}" for text, power in zip(each, powers)) if len(each) > 1 else each[0]
     steps = sum(fit.step for fit in found.experiments)
-    known = found.joint.gain_r2 is not None and 1 < len(each) < steps
-    r2 = f",  R² of the single fits = {found.joint.gain_r2:.4f}" if known else ""
-    span = found.joint.ci95.get("delay")
-    late = f"\ndead time = {_pm(found.joint.delay, span)} s" if span else ""
+    known = joint.gain_r2 is not None and 1 < len(each) < steps
+    r2 = f",  R² of the single fits = {joint.gain_r2:.4f}" if known else ""
+    span = joint.ci95.get("delay")
+    late = f"\ndead time = {_pm(joint.delay, span)} s" if span else ""
     return f"K(p) = {terms}{r2}{late}"
 
 

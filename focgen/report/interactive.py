@@ -6,10 +6,11 @@ for) is never asked for.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,11 +20,14 @@ from focgen.report.figures import MOST, Area, Axis, Bars, Figure, Line, Mark, Pa
 from focgen.report.style import COLOURS
 from focgen.report.texts import drawn
 
+if TYPE_CHECKING:
+    pass
+
 _TOOLS = ("pan", "box_zoom", "wheel_zoom", "reset", "save")
 _SPARE = 0.06  # of the range, beyond what is drawn
 
 
-def _bokeh():
+def _bokeh() -> ModuleType:
     try:
         import bokeh
     except ImportError:
@@ -33,7 +37,7 @@ def _bokeh():
 
 def library() -> str:
     """The script that draws. Raises MissingExtra where Bokeh is not installed."""
-    path = Path(_bokeh().__file__).parent / "server" / "static" / "js" / "bokeh.min.js"
+    path = Path(str(_bokeh().__file__)).parent / "server" / "static" / "js" / "bokeh.min.js"
     return path.read_text(encoding="utf-8").replace("</script", "<\\/script")
 
 
@@ -49,7 +53,8 @@ def document(figure: Figure, most: int = MOST, name: str = "figure") -> dict[str
     plots = _plots(figure, most)
     made = Document()
     made.add_root(column(*plots, sizing_mode="stretch_width", spacing=4))
-    return _numbered(made.to_json(deferred=False), name)
+    found: dict[str, Any] = _numbered(made.to_json(deferred=False), name)
+    return found
 
 
 def legend(figure: Figure) -> list[dict[str, str]]:
@@ -76,8 +81,9 @@ def _group(mark: Line | Bars | Area) -> str:
 # ------------------------------------------------------------------------------------------------ plots
 
 
-def _plots(figure: Figure, most: int) -> list:
-    from bokeh.models import CrosshairTool, Span
+def _plots(figure: Figure, most: int) -> list[Any]:
+    from bokeh.models import CrosshairTool
+    from bokeh.models.annotations import Span
 
     groups = [entry["name"] for entry in legend(figure)]
     cross, shared, plots = Span(dimension="height", line_width=1, line_dash="dotted"), None, []
@@ -94,7 +100,7 @@ def _plots(figure: Figure, most: int) -> list:
     return plots
 
 
-def _plot(panel: Panel, shared, groups: Sequence[str], most: int):
+def _plot(panel: Panel, shared: Any, groups: Sequence[str], most: int) -> Any:
     from bokeh.models import HoverTool, PlainText
     from bokeh.plotting import figure as plain
 
@@ -125,14 +131,15 @@ def _plot(panel: Panel, shared, groups: Sequence[str], most: int):
     return plot
 
 
-def drawn_title(text: str):
+def drawn_title(text: str) -> Any:
     """A panel's title, as it is."""
-    from bokeh.models import PlainText, Title
+    from bokeh.models import PlainText
+    from bokeh.models.annotations import Title
 
     return Title(text=PlainText(text=drawn(text)), text_font_size="13px", text_font_style="bold")
 
 
-def _hovered(plot) -> list:
+def _hovered(plot: Any) -> list[Any]:
     return [one for one in plot.renderers if one.name]
 
 
@@ -144,7 +151,7 @@ def _tips(panel: Panel) -> list[tuple[str, str]]:
     return [*tips, (drawn(panel.x.label), "@x"), (drawn(panel.y.label), "@y")]
 
 
-def _places(axis, places: Sequence[str]) -> None:
+def _places(axis: Any, places: Sequence[str]) -> None:
     """Names instead of numbers; turned where they are long."""
     from bokeh.models import FixedTicker, PlainText
 
@@ -155,7 +162,7 @@ def _places(axis, places: Sequence[str]) -> None:
     axis.tags = ["places"]
 
 
-def _range(axis: Axis, reach: tuple[float, float], places: Sequence[str]):
+def _range(axis: Axis, reach: tuple[float, float], places: Sequence[str]) -> Any:
     from bokeh.models import Range1d
 
     low, high = (-0.6, len(places) - 0.4) if places else reach
@@ -163,7 +170,7 @@ def _range(axis: Axis, reach: tuple[float, float], places: Sequence[str]):
         low, high = _spread(low, high, axis)
     low = low if axis.low is None else axis.low
     high = high if axis.high is None else axis.high
-    return Range1d(low, high)
+    return Range1d(start=low, end=high)
 
 
 def _spread(low: float, high: float, axis: Axis) -> tuple[float, float]:
@@ -187,7 +194,7 @@ def _reach(panel: Panel, way: str) -> tuple[float, float]:
     return (float(values.min()), float(values.max())) if len(values) else (0.1, 1.0)
 
 
-def _numbers(mark: Mark, way: str) -> list:
+def _numbers(mark: Mark, way: str) -> list[Any]:
     if isinstance(mark, Rule):
         return [[mark.value]] if mark.upright == (way == "x") else []
     if isinstance(mark, Bars):
@@ -201,16 +208,17 @@ def _numbers(mark: Mark, way: str) -> list:
 # ------------------------------------------------------------------------------------------------ marks
 
 
-def _draw(plot, mark: Mark, groups: Sequence[str]) -> None:
-    from bokeh.models import Span
+def _draw(plot: Any, mark: Mark, groups: Sequence[str]) -> None:
+    from bokeh.models.annotations import Span
 
     if isinstance(mark, Rule):
-        dimension = "height" if mark.upright else "width"
+        dimension: Literal["height", "width"] = "height" if mark.upright else "width"
         span = Span(location=mark.value, dimension=dimension, line_color=colour_of(mark.colour))
         span.update(line_dash=mark.dash, line_width=1)
         plot.add_layout(span)
         return
-    draw = {Line: _line, Bars: _bars, Area: _area}[type(mark)]
+    drawers: dict[type, Callable[[Any, Any], Any]] = {Line: _line, Bars: _bars, Area: _area}
+    draw = drawers[type(mark)]
     name = _group(mark)
     for renderer, named in draw(plot, mark):
         renderer.name = drawn(mark.label) if named else None
@@ -227,7 +235,7 @@ def _thin(mark: Mark, most: int) -> Mark:
     return replace(mark, x=mark.x[kept], y=mark.y[kept])
 
 
-def _line(plot, mark: Line):
+def _line(plot: Any, mark: Line) -> Any:
     source, colour = _source(x=mark.x, y=mark.y), colour_of(mark.colour)
     if mark.dash != "none":
         how = dict(line_color=colour, line_width=mark.width, line_dash=mark.dash, source=source)
@@ -237,7 +245,7 @@ def _line(plot, mark: Line):
         yield dots, mark.dash == "none"
 
 
-def _bars(plot, mark: Bars):
+def _bars(plot: Any, mark: Bars) -> Any:
     bottoms = np.zeros_like(mark.tops) if mark.bottoms is None else mark.bottoms
     names = [drawn(name) for name in mark.names] or [""] * len(mark.tops)
     source = _source(at=mark.places, low=bottoms, high=mark.tops, size=mark.tops - bottoms)
@@ -249,7 +257,7 @@ def _bars(plot, mark: Bars):
         yield plot.vbar(x="at", bottom="low", top="high", width=mark.width, **how), True
 
 
-def _area(plot, mark: Area):
+def _area(plot: Any, mark: Area) -> Any:
     source = _source(x=mark.x, low=mark.low, high=mark.high)
     yield (
         plot.varea("x", "low", "high", source=source, fill_color=colour_of(mark.colour), fill_alpha=0.25),
@@ -257,7 +265,7 @@ def _area(plot, mark: Area):
     )
 
 
-def _source(**columns):
+def _source(**columns: Any) -> Any:
     """The data, in single precision: more than a screen shows, at half the size."""
     from bokeh.models import ColumnDataSource
 

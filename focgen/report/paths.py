@@ -15,7 +15,8 @@ from focgen.control.files import read_controller
 from focgen.diagnosis.drawn import FILE as SIGNALS
 from focgen.diagnosis.drawn import read_drawn
 from focgen.errors import InputError
-from focgen.identification.model import Identification
+from focgen.identification.identification import Identification
+from focgen.journal import finish
 from focgen.jsontext import fits, read_json
 from focgen.logs.experiment import Experiment
 from focgen.loop.design import Design
@@ -35,9 +36,9 @@ from focgen.report.pages.diagnosis import diagnosis_page
 from focgen.report.pages.files import read_diagnosis
 from focgen.report.pages.study import study_page
 from focgen.rig.files import read_rig
-from focgen.rig.model import Actuator, Rig
 from focgen.rig.proposal import Proposal
 from focgen.rig.replay import experiments, replay
+from focgen.rig.rig import Actuator, Rig
 from focgen.studies.kept import FILE as CURVES
 from focgen.studies.kept import read_study
 from focgen.textfile import LARGEST_SETTING, read_regular
@@ -158,6 +159,7 @@ def _take(path: Path, chain: _Chain) -> None:
 
 
 def _take_folder(folder: Path, chain: _Chain) -> None:
+    finish(folder)
     if (folder / "diagnosis.json").is_file():
         chain.found.append(_diagnosis(folder))
     elif (folder / "study.json").is_file():

@@ -11,7 +11,7 @@ from focgen.report.figures import Area, Axis, Bars, Figure, Line, Mark, Panel, R
 from focgen.report.interactive import colour_of
 from focgen.report.style import figure as styled
 from focgen.report.style import sparse_ticks
-from focgen.report.texts import drawn
+from focgen.report.texts import pictured
 
 _PER_INCH = 100.0  # of the pixels that a panel's height is given in
 _WIDE = 7.0  # inches
@@ -31,9 +31,9 @@ def still(figure: Figure) -> Any:
         for panel, axes in zip(figure.panels, grid[:, 0]):
             _panel(axes, panel, named)
             if not shared or panel is figure.panels[-1]:
-                axes.set_xlabel(_plain(panel.x.label))
+                axes.set_xlabel(pictured(panel.x.label))
         _legend(fig, grid[:, 0])
-        fig.suptitle(_plain(figure.title), fontsize=10, fontweight="bold", x=0.02, ha="left")
+        fig.suptitle(pictured(figure.title), fontsize=10, fontweight="bold", x=0.02, ha="left")
     return fig
 
 
@@ -45,9 +45,9 @@ def _panel(axes: Any, panel: Panel, named: set[str]) -> None:
         _draw(axes, mark, _entry(mark, named))
     for axis, which in ((panel.x, "x"), (panel.y, "y")):
         _reach(axes, axis, which)
-    axes.set_ylabel(_plain(panel.y.label))
+    axes.set_ylabel(pictured(panel.y.label))
     if panel.title:
-        axes.set_title(_plain(panel.title), fontsize=9)
+        axes.set_title(pictured(panel.title), fontsize=9)
 
 
 def _legend(fig: Any, every: Sequence[Any]) -> None:
@@ -62,7 +62,7 @@ def _entry(mark: Mark, named: set[str]) -> str | None:
     """The mark's name in a legend, which each group has once in a figure."""
     if isinstance(mark, Rule):
         return None
-    name = _plain(mark.label if mark.group is None else mark.group)
+    name = pictured(mark.label if mark.group is None else mark.group)
     if not name or name in named:
         return None
     named.add(name)
@@ -113,11 +113,6 @@ def _reach(axes: Any, axis: Axis, which: str) -> None:
     if axis.high is not None:
         limits(None, axis.high)
     if axis.places:
-        names = [_plain(name) for name in axis.places]
+        names = [pictured(name) for name in axis.places]
         turned = {"rotation": 90} if which == "x" and sum(map(len, names)) > 70 else {}
         getattr(axes, f"set_{which}ticks")(range(len(names)), names, **turned)
-
-
-def _plain(text: str) -> str:
-    """A text as it is: dollar signs begin no formula."""
-    return drawn(text).replace("$", r"\$")

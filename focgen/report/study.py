@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from focgen.control.controller import ARITHMETICS
+from focgen.present import present
 from focgen.report.style import (
     BLUE,
     COLOURS,
@@ -19,9 +22,12 @@ from focgen.report.style import (
     sparse_ticks,
     with_unit,
 )
-from focgen.studies.model import Curves, Row, Study
+from focgen.studies.results import Curves, Row, Study
 
-ARITHMETIC_COLOURS = {"f64": BLUE, "f32": GREEN, "q31": ORANGE, "q15": RED}
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ARITHMETIC_COLOURS = dict(zip(ARITHMETICS, (BLUE, GREEN, ORANGE, RED, *CYCLE)))
 _MOST_LINES = 5
 LEAST = 1e-5  # % of the step: where the distance from the ideal is cut off
 PLACES = {"short": "length", "exponential": "states"}  # what a form's size is
@@ -72,7 +78,7 @@ def accuracy(study: Study) -> bytes:
         return png(fig)
 
 
-def _by_size(axis, rows: Sequence[Row], memory: str) -> None:
+def _by_size(axis: Axes, rows: Sequence[Row], memory: str) -> None:
     """Error and bound of one form of memory, a colour for each arithmetic."""
     for arithmetic, colour in ARITHMETIC_COLOURS.items():
         _against(axis, [r for r in rows if r.arithmetic == arithmetic], PLACES[memory], colour, arithmetic)
@@ -84,15 +90,16 @@ def _by_size(axis, rows: Sequence[Row], memory: str) -> None:
         sparse_ticks(axis.xaxis)
     else:
         axis.set_xlabel("exponentials")
-        axis.xaxis.get_major_locator().set_params(integer=True)
+        locator: Any = axis.xaxis.get_major_locator()
+        locator.set_params(integer=True)
 
 
-def _against(axis, rows: Sequence[Row], place: str, colour: str, label: str) -> None:
+def _against(axis: Axes, rows: Sequence[Row], place: str, colour: str, label: str) -> None:
     rows = sorted((r for r in rows if getattr(r, place) is not None), key=lambda r: getattr(r, place))
     if not rows:
         return
     x = [getattr(r, place) for r in rows]
-    axis.plot(x, [r.error for r in rows], "o-", color=colour, ms=3.5, label=label)
+    axis.plot(x, [present(r.error) for r in rows], "o-", color=colour, ms=3.5, label=label)
     axis.plot(x, [np.nan if r.bound is None else r.bound for r in rows], ":", color=colour, lw=1.0)
 
 
@@ -120,17 +127,24 @@ def fronts(study: Study) -> bytes:
 
 def _target(study: Study) -> str:
     """The core that was counted on."""
-    return next(row.compiled_for for row in study.rows if row.instructions is not None).partition(",")[0]
+    return present(next(row.compiled_for for row in study.rows if row.instructions is not None)).partition(
+        ","
+    )[0]
 
 
-def _front(axis, study: Study, cost: str) -> None:
+def _front(axis: Axes, study: Study, cost: str) -> None:
     for row in own_rows(study):
         if getattr(row, cost) is not None:
             marker, colour = _MARKERS[row.memory], ARITHMETIC_COLOURS[row.arithmetic]
-            axis.plot(getattr(row, cost), row.error, marker, color=colour, ms=4, alpha=0.85)
+            axis.plot(getattr(row, cost), present(row.error), marker, color=colour, ms=4, alpha=0.85)
     best = [study.rows[i] for i in study.pareto[cost]]
     axis.step(
-        [getattr(r, cost) for r in best], [r.error for r in best], where="post", color=GREY, lw=0.9, zorder=1
+        [getattr(r, cost) for r in best],
+        [present(r.error) for r in best],
+        where="post",
+        color=GREY,
+        lw=0.9,
+        zorder=1,
     )
     axis.set_xscale("log")
     axis.set_yscale("log")
@@ -147,9 +161,11 @@ def chosen(study: Study, part: str) -> list[tuple[Row, Curves, str]]:
         for r, c in zip(study.rows, study.curves)
         if r in rows and r.arithmetic == wanted and getattr(c, part)
     ]
-    short = sorted((p for p in pairs if p[0].memory == "short"), key=lambda p: p[0].length)
-    exponential = sorted((p for p in pairs if p[0].memory == "exponential"), key=lambda p: -p[0].tolerance)
-    places = _spread([row.length for row, _ in short])
+    short = sorted((p for p in pairs if p[0].memory == "short"), key=lambda p: present(p[0].length))
+    exponential = sorted(
+        (p for p in pairs if p[0].memory == "exponential"), key=lambda p: -present(p[0].tolerance)
+    )
+    places = _spread([present(row.length) for row, _ in short])
     shown = [short[i] for i in places] + exponential[len(exponential) // 2 :][:1]
     return [(row, curves, CYCLE[i % len(CYCLE)]) for i, (row, curves) in enumerate(shown)]
 
@@ -167,7 +183,7 @@ def row_label(row: Row) -> str:
     return f"L = {row.length}" if row.memory == "short" else f"{row.states} exponentials"
 
 
-def _style(row: Row) -> dict:
+def _style(row: Row) -> dict[str, Any]:
     return {"ls": "--", "lw": 1.8} if row.memory == "exponential" else {}
 
 
@@ -225,7 +241,7 @@ def loops(study: Study) -> bytes:
 
 def plant(study: Study) -> bytes:
     """The plant's step, simulated with each memory in its denominator, over an hour."""
-    found = study.plant
+    found = present(study.plant)
     with figure(1, 1, size=(7.0, 3.6)) as (fig, axis):
         for row, colour in zip(found.rows, CYCLE):
             label = f"L = {row.length}" if row.length else f"{row.states} exponentials"

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
+from focgen.control.controller import ARITHMETICS
+from focgen.present import present
 from focgen.report.page import TableOf, text_table
-from focgen.studies.model import Ideal, Row, Study
+from focgen.studies.results import Ideal, Row, Study
 
 _HEADS = (
     "memory",
@@ -53,9 +56,13 @@ def band_text(study: Study) -> str:
 def rows_table(study: Study, sample_time: float) -> TableOf:
     """One line a variant at ``sample_time``, by arithmetic, then by cost."""
     rows = [row for row in study.rows if row.sample_time == sample_time]
-    order = {a: i for i, a in enumerate(("f64", "f32", "q31", "q15"))}
     rows.sort(
-        key=lambda r: (order[r.arithmetic], r.memory == "exponential", r.length or 0, -(r.tolerance or 0.0))
+        key=lambda r: (
+            ARITHMETICS.index(r.arithmetic),
+            r.memory == "exponential",
+            r.length or 0,
+            -(r.tolerance or 0.0),
+        )
     )
     lines = tuple(_line(row) for row in rows)
     return _without_empty(TableOf(_HEADS, lines, f"sample time {sample_time:g} s"))
@@ -89,7 +96,7 @@ def _without_empty(table: TableOf) -> TableOf:
     return TableOf(tuple(table.heads[i] for i in kept), cut, table.caption)
 
 
-def shown(value, form: Callable) -> str:
+def shown(value: float | None, form: Callable[..., Any]) -> str:
     """``value`` in a form, or a dash where there is none."""
     return "–" if value is None else form(value)
 
@@ -122,17 +129,17 @@ def _ideal_line(ideal: Ideal) -> tuple[str, ...]:
     loop = ideal.loop
     return (
         f"{ideal.sample_time:g}",
-        shown(loop and loop.settling_s, "{:.3f}".format),
-        shown(loop and loop.overshoot_pct, "{:.1f}".format),
-        shown(loop and loop.iae, "{:.4f}".format),
-        shown(loop and loop.margin_deg, "{:.1f}".format),
+        shown(loop.settling_s if loop else None, "{:.3f}".format),
+        shown(loop.overshoot_pct if loop else None, "{:.1f}".format),
+        shown(loop.iae if loop else None, "{:.4f}".format),
+        shown(loop.margin_deg if loop else None, "{:.1f}".format),
         f"{ideal.sampling_phase_deg:.2f}",
     )
 
 
 def plant_table(study: Study) -> TableOf:
     """The plant's step with each memory in its denominator: error after so long, and where it ends."""
-    plant = study.plant
+    plant = present(study.plant)
     labels = tuple(plant.rows[0].errors)
     heads = ("memory", *labels, "ends at")
     lines = tuple(

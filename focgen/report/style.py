@@ -15,11 +15,13 @@ from contextlib import contextmanager
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from focgen.errors import MissingExtra
 
 if TYPE_CHECKING:
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 DPI = 150
@@ -89,7 +91,7 @@ def _notebooks() -> type[Figure]:
     return Figure
 
 
-def _matplotlib():
+def _matplotlib() -> ModuleType:
     try:
         import matplotlib
     except ImportError:
@@ -121,7 +123,7 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} ({unit})" if unit else name
 
 
-def sparse_ticks(axis) -> None:
+def sparse_ticks(axis: Axis) -> None:
     """Label a logarithmic ``axis`` (``axes.xaxis`` or ``axes.yaxis``, with everything drawn) so that labels
     stay apart: decades; within two of them 1, 2 and 5; within one a few round numbers.
     """
@@ -145,8 +147,23 @@ def png(fig: Figure) -> bytes:
     with _matplotlib().rc_context(_RC), warnings.catch_warnings():
         # where a legend took a second to place: that the computer is busy is no fault of the figure
         warnings.filterwarnings("ignore", "Creating legend with loc", UserWarning)
+        _tame(fig)
         fig.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
     return stream.getvalue()
+
+
+def _tame(fig: Figure) -> None:
+    """Show as it stands what would be a formula and is none: a unit, or a column's name."""
+    from matplotlib.mathtext import MathTextParser
+    from matplotlib.text import Text
+
+    parser = MathTextParser("path")
+    for text in fig.findobj(Text):
+        if text.get_text().count("$") > 1:
+            try:
+                parser.parse(text.get_text())
+            except ValueError:
+                text.set_parse_math(False)
 
 
 def save(fig: Figure, path: str | Path) -> Path:

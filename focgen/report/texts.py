@@ -23,3 +23,8 @@ def data(value: Any) -> Markup:
 def drawn(text: str) -> str:
     """Text that is drawn: one line; what cannot be seen, or turns the line about, becomes "?"."""
     return "".join(char if char.isprintable() else "?" for char in " ".join(text.split()))
+
+
+def pictured(text: str) -> str:
+    """Text in a picture of matplotlib: as it is, for dollar signs begin no formula."""
+    return drawn(text).replace("$", r"\$")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from focgen.report.style import COLOURS, figure, png
 from focgen.trials.score import Scores
 from focgen.trials.statistics import reliability, reliability_bins
 from focgen.trials.vocabulary import VOCABULARY
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LEAST = 20  # stated confidences below which a reliability picture says nothing
 
@@ -40,7 +44,7 @@ def reliability_picture(sets: Sequence[Scores]) -> bytes:
         return png(fig)
 
 
-def _reliability(axis, scores: Scores) -> None:
+def _reliability(axis: Axes, scores: Scores) -> None:
     confidence, right = zip(*scores.stated)
     whole = reliability(confidence, right)
     bins = reliability_bins(confidence, right, 8)
@@ -85,7 +89,7 @@ def _ordered() -> list[str]:
     return list(VOCABULARY)
 
 
-def _frame(axis, true: Sequence[str], names: Sequence[str]) -> None:
+def _frame(axis: Axes, true: Sequence[str], names: Sequence[str]) -> None:
     """Lines between the stages, and the diagonal's cells framed."""
     for labels, line in ((true, axis.axhline), (names, axis.axvline)):
         stages = [VOCABULARY[e][0] if e in VOCABULARY else "" for e in labels]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from focgen.loop.worst import Extreme, Worst
 from focgen.report.page import TableOf, text_table
 from focgen.rig.corners import differences
-from focgen.rig.model import Uncertainty
+from focgen.rig.rig import Uncertainty
 
 _MARGINS = ("phase_deg", "gain_db", "delay_s")
 _STEPS = ("overshoot_pct", "settling_s")
@@ -20,7 +21,7 @@ _MEANING = {
 }
 
 
-def worst_payload(worst: Worst) -> dict:
+def worst_payload(worst: Worst) -> dict[str, Any]:
     """The worst values, those of the rig as given, and ``at`` which pressure or set point of which corner."""
     extremes = {name: getattr(worst, name) for name in _MEANING}
     return {
@@ -37,8 +38,8 @@ def worst_payload(worst: Worst) -> dict:
     }
 
 
-def _nested(off: Uncertainty) -> dict:
-    found: dict = {}
+def _nested(off: Uncertainty) -> dict[str, Any]:
+    found: dict[str, Any] = {}
     for stage, key, value in differences(off):
         found.setdefault(stage, {})[key] = value
     return found

@@ -1,7 +1,7 @@
 """The rig: regulator → actuator → sensor, its file, and its simulation."""
 
 from focgen.rig.files import read_rig, write_rig
-from focgen.rig.model import (
+from focgen.rig.rig import (
     Actuator,
     Delays,
     LinearActuator,

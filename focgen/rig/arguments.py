@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 from focgen.errors import RigError
 from focgen.logs.experiment import Experiment
 from focgen.rig.files import read_rig
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 from focgen.spelling import Call, respelled
 
 P = ParamSpec("P")

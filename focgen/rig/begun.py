@@ -12,19 +12,20 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.logs.begin import REST
 from focgen.rig.effects import Run
 from focgen.rig.kernels import BALANCED
 
-_EXTENDED: WeakKeyDictionary[Run, tuple[Run, np.ndarray]] = WeakKeyDictionary()
+_EXTENDED: WeakKeyDictionary[Run, tuple[Run, Array]] = WeakKeyDictionary()
 
 
-def with_past(x: np.ndarray, run: Run) -> np.ndarray:
+def with_past(x: Array, run: Run) -> Array:
     """The input (n,) of a run with what was before each experiment ahead of it."""
     return np.concatenate([part for a, b in zip(_pasts(run), _parts(x, run)) for part in (a, b)])
 
 
-def past_of(run: Run) -> tuple[Run, np.ndarray]:
+def past_of(run: Run) -> tuple[Run, Array]:
     """The run with the pasts of its experiments, and where (n,) the samples of the experiments are in it."""
     found = _EXTENDED.get(run)
     if found is None:
@@ -32,7 +33,7 @@ def past_of(run: Run) -> tuple[Run, np.ndarray]:
     return found
 
 
-def _extended(run: Run) -> tuple[Run, np.ndarray]:
+def _extended(run: Run) -> tuple[Run, Array]:
     pasts, h = _pasts(run), run.h
     lengths = [b - a for a, b in run.spans]
     whole = [len(past) + length for past, length in zip(pasts, lengths)]
@@ -50,9 +51,9 @@ def _extended(run: Run) -> tuple[Run, np.ndarray]:
     return long, np.concatenate(kept)
 
 
-def _pasts(run: Run) -> list[np.ndarray]:
+def _pasts(run: Run) -> list[Array]:
     return [np.zeros(0) if begin == REST else begin.samples(run.h) for begin in run.begins]
 
 
-def _parts(signal: np.ndarray, run: Run) -> list[np.ndarray]:
+def _parts(signal: Array, run: Run) -> list[Array]:
     return [signal[a:b] for a, b in run.spans]

@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import product
 
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import UNITY, Actuator, Delays, LinearActuator, Relative, Rig, Uncertainty
+from focgen.rig.rig import UNITY, Actuator, Delays, LinearActuator, Relative, Rig, Uncertainty
 
 STAGES = ("regulator", "actuator", "sensor")
 EXACT = Uncertainty(Relative(0.0, 0.0), Relative(0.0, 0.0), Relative(0.0, 0.0))
@@ -53,7 +53,8 @@ def _uncertain(rig: Rig, stage: str) -> Relative:
 def transfer_of(rig: Rig, stage: str) -> TransferFunction | None:
     """The stage's linear part, None for an actuator that is absent."""
     if stage != "actuator":
-        return getattr(rig, stage)
+        made: TransferFunction | None = getattr(rig, stage)
+        return made
     return None if rig.actuator is None else rig.actuator.dynamics
 
 
@@ -71,7 +72,9 @@ def moved(rig: Rig, off: Uncertainty) -> Rig:
     )
 
 
-def _moved_actuator(actuator: Actuator | LinearActuator | None, off: Relative):
+def _moved_actuator(
+    actuator: Actuator | LinearActuator | None, off: Relative
+) -> Actuator | LinearActuator | None:
     if isinstance(actuator, LinearActuator):
         return replace(actuator, dynamics=_scaled(actuator.dynamics, off))
     if actuator is None:

@@ -6,19 +6,18 @@ from weakref import ref
 
 import numpy as np
 
+from focgen.arrays import Array, Bytes
 from focgen.logs.between import Between, smooth_bends
 from focgen.rig.kernels import BALANCED
 
 _KEPT = 6
-_known: list[
-    tuple
-] = []  # the last inputs by (input, rest, way), and their courses: reading one takes as long
-# as running a stage over it
+Course = tuple[Array, Array, Array]
 
-Course = tuple[np.ndarray, np.ndarray, np.ndarray]
+# the last inputs by (input, rest, way), and their courses: reading one takes as long as a stage takes to run
+_known: list[tuple[ref[Array], ref[Bytes], Between | bool, Course]] = []
 
 
-def course(x: np.ndarray, rest: np.ndarray, between: Between | bool) -> Course:
+def course(x: Array, rest: Bytes, between: Between | bool) -> Course:
     """How the input ``x`` (n,) moves within the sample that ends at each (n,): by how much in a line, and its
     bend and twist as in :class:`~focgen.logs.between.Course`; what is missing, it jumps. Experiments apart;
     a smooth one jumps at the first sample.
@@ -32,7 +31,7 @@ def course(x: np.ndarray, rest: np.ndarray, between: Between | bool) -> Course:
     return found
 
 
-def sharpened(x: np.ndarray, rest: np.ndarray) -> np.ndarray:
+def sharpened(x: Array, rest: Bytes) -> Array:
     """The input (n,) with the area of its bends laid on the samples at both ends, for what takes it to be
     straight between them."""
     _, bend, _ = course(x, rest, Between.SMOOTH)
@@ -40,13 +39,13 @@ def sharpened(x: np.ndarray, rest: np.ndarray) -> np.ndarray:
     return x - (bend + ahead) / 12.0
 
 
-def _plain(x: np.ndarray, rest: np.ndarray, between: Between | bool) -> Course:
+def _plain(x: Array, rest: Bytes, between: Between | bool) -> Course:
     line = np.zeros_like(x) if between == Between.HELD else np.diff(x, prepend=0.0)
     line = np.where(rest == BALANCED, 0.0, np.where(rest, x * (between != Between.HELD), line))
     return line, np.zeros_like(x), np.zeros_like(x)
 
 
-def _smooth(x: np.ndarray, rest: np.ndarray) -> Course:
+def _smooth(x: Array, rest: Bytes) -> Course:
     bend, twist = np.zeros_like(x), np.zeros_like(x)
     firsts = np.flatnonzero(rest).tolist()
     for first, last in zip(firsts, [*firsts[1:], len(x)]):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from focgen.arrays import Array, Bytes
 from focgen.fractional.delay import split_delay
 from focgen.rig import kernels
 
 
-def shifted(x: np.ndarray, rest: np.ndarray, whole: int) -> np.ndarray:
+def shifted(x: Array, rest: Bytes, whole: int) -> Array:
     """``x`` (n,) later by ``whole`` samples, anew wherever ``rest`` (n,) is not 0; before it is zero, or
     where ``rest`` is ``BALANCED`` what it is at first."""
     y = np.zeros_like(x)
@@ -20,7 +21,7 @@ def shifted(x: np.ndarray, rest: np.ndarray, whole: int) -> np.ndarray:
     return y
 
 
-def delayed(x: np.ndarray, rest: np.ndarray, h: float, delay: float) -> np.ndarray:
+def delayed(x: Array, rest: Bytes, h: float, delay: float) -> Array:
     """``x`` (n,), linear between samples of ``h`` s, later by ``delay`` s, each experiment from zero."""
     whole, part = split_delay(delay, h)
     return (1.0 - part) * shifted(x, rest, whole) + part * shifted(x, rest, whole + 1)

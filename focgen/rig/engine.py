@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
+from focgen.arrays import Array
+from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.rig import linear
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.delay import delayed
-from focgen.rig.effects import SLOTS, Form, Run
-from focgen.rig.model import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.dynamics import UNCHANGED, Dynamics
+from focgen.rig.effects import SLOTS, Form, Run
 from focgen.rig.modes import respond
+from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 
 STAGES = ("regulator", "actuator", "sensor")
 
@@ -31,11 +31,12 @@ class Placed:
     values: tuple[float, ...]
     carried: Mapping[str, float] = field(default_factory=dict)
 
-    def act(self, x: np.ndarray, run: Run) -> np.ndarray:
+    def act(self, x: Array, run: Run) -> Array:
         """What leaves it when ``x`` (n,) enters."""
-        return self.form.act(x, self.values, self._own(run))
+        made: Array = self.form.act(x, self.values, self._own(run))
+        return made
 
-    def leaves(self, x: np.ndarray, run: Run) -> dict[str, float]:
+    def leaves(self, x: Array, run: Run) -> dict[str, float]:
         """What of it outlives the session."""
         return self.form.leaves(x, self.values, self._own(run)) if self.form.leaves else {}
 
@@ -61,7 +62,7 @@ def slot_in(form: Form, stage: str) -> str:
     }[stage]
 
 
-Step = tuple[tuple, Callable[[np.ndarray, Run], np.ndarray], Placed | None]
+Step = tuple[tuple[Hashable, ...], Callable[[Array, Run], Array], Placed | None]
 
 
 @dataclass
@@ -74,19 +75,19 @@ class Chain:
 
     rig: Rig
     placed: tuple[Placed, ...] = ()
-    remember: dict | None = None
+    remember: dict[Hashable, list[tuple[Hashable, Array, Array]]] | None = None
     probe: bool = False
 
     def run(
         self,
-        x: np.ndarray,
+        x: Array,
         first: str,
         last: str,
         run: Run,
         between: Between | bool = Between.STRAIGHT,
-        tap: dict[str, np.ndarray] | None = None,
+        tap: dict[str, Array] | None = None,
         left: list[dict[str, float]] | None = None,
-    ) -> np.ndarray:
+    ) -> Array:
         """What leaves stage ``last`` when ``x`` (n,) enters stage ``first``.
 
         ``between``: what the input does from one sample to the next. ``tap`` receives what leaves each stage,
@@ -111,18 +112,31 @@ class Chain:
         """Whether a stage leaves what its input does between samples as it is."""
         if stage == "actuator":
             return getattr(self.rig.actuator, "dynamics", UNITY) == UNITY
-        return getattr(self.rig, stage) == UNITY
+        made: bool = getattr(self.rig, stage) == UNITY
+        return made
 
-    def _begun(self, x, first, last, run: Run, between, tap, left) -> np.ndarray:
+    def _begun(
+        self,
+        x: Array,
+        first: str,
+        last: str,
+        run: Run,
+        between: Between | bool,
+        tap: dict[str, Array] | None,
+        left: list[dict[str, float]] | None,
+    ) -> Array:
         """The same with what was before each experiment put ahead of it, and cut off again."""
         x = self._once("past", run.begins, x, with_past, run)
         long, kept = past_of(run)
         y = self.run(x, first, last, long, between, tap, left)
         if tap is not None:
             tap.update({stage: made[kept] for stage, made in tap.items()})
-        return y[kept]
+        found: Array = y[kept]
+        return found
 
-    def _once(self, place, key, x, act, run: Run) -> np.ndarray:
+    def _once(
+        self, place: Hashable, key: Hashable, x: Array, act: Callable[[Array, Run], Array], run: Run
+    ) -> Array:
         if self.remember is None:
             return act(x, run)
         kept = self.remember.setdefault(place, [])
@@ -172,7 +186,7 @@ def _index(placed: Sequence[Placed], one: Placed) -> int:
     return next(i for i, p in enumerate(placed) if p is one)
 
 
-def _transfer(transfer, between: Between | bool, delay: float) -> Step:
+def _transfer(transfer: TransferFunction, between: Between | bool, delay: float) -> Step:
     return (
         (transfer, between, delay),
         lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, between, delay),
@@ -180,7 +194,9 @@ def _transfer(transfer, between: Between | bool, delay: float) -> Step:
     )
 
 
-def _actuator(actuator, here: Sequence[Placed], between: Between | bool, delay: float) -> list[Step]:
+def _actuator(
+    actuator: Actuator | LinearActuator | None, here: Sequence[Placed], between: Between | bool, delay: float
+) -> list[Step]:
     drive = [_effect(p) for p in here if p.slot == "drive"]
     if actuator is None:
         return [*drive, _transfer(UNITY, between, delay)] if delay else drive
@@ -195,20 +211,23 @@ def _actuator(actuator, here: Sequence[Placed], between: Between | bool, delay: 
     return [line, *drive, _lag(1.0, actuator.T, actuator.alpha, dynamics, delay)]
 
 
-def _linear(actuator: LinearActuator, dynamics: Dynamics, between, delay: float) -> list[Step]:
+def _linear(
+    actuator: LinearActuator, dynamics: Dynamics, between: Between | bool, delay: float
+) -> list[Step]:
     if dynamics == UNCHANGED:
         return [_transfer(actuator.dynamics, between, delay)]
     plant, changed = plants.plant_of(actuator.dynamics), dynamics.changed
     if plant is not None and (changed == {"drag"} or changed & {"spring", "rise"}):
         return [_plant(plant, dynamics, between, delay)]
-    if not linear.single_lag(actuator.dynamics):
+    lag = linear.single_lag(actuator.dynamics)
+    if not lag:
         return [_bent(actuator.dynamics, dynamics, between, delay)]
-    gain, T, alpha = linear.single_lag(actuator.dynamics)
+    gain, T, alpha = lag
     return [_lag(gain, T, alpha, replace(dynamics, drag=dynamics.drag * abs(gain)), delay)]
 
 
-def _plant(plant: plants.Plant, dynamics: Dynamics, between, delay: float) -> Step:
-    def act(x: np.ndarray, run: Run) -> np.ndarray:
+def _plant(plant: plants.Plant, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:
+    def act(x: Array, run: Run) -> Array:
         made = plants.respond(plant, x, run.rest, run.h, dynamics, between, run.rough)
         return delayed(made, run.rest, run.h, delay) if delay else made
 
@@ -223,7 +242,7 @@ def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) 
     )
 
 
-def _bent(transfer, dynamics: Dynamics, between, delay: float) -> Step:
+def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:
     return (
         (transfer, dynamics, between, delay),
         lambda x, run: linear.run_bent(transfer, x, run.rest, run.h, between, dynamics, delay),
@@ -242,7 +261,8 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     if stage != "actuator" or rig.actuator is None:
         return False
     changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
-    return changed <= _changeable(rig.actuator)
+    made: bool = changed <= _changeable(rig.actuator)
+    return made
 
 
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:

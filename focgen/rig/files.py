@@ -11,11 +11,12 @@ import tomlkit
 
 from focgen.custody import TABLE
 from focgen.errors import RigError
+from focgen.fractional.terms import read_transfer, terms_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.scales import Scale
 from focgen.output import write_file
-from focgen.rig.model import (
+from focgen.rig.rig import (
     UNITY,
     Actuator,
     Delays,
@@ -26,7 +27,7 @@ from focgen.rig.model import (
     Signals,
     Uncertainty,
 )
-from focgen.tomlfile import Table, terms_of
+from focgen.tomlfile import Table
 
 _STAGES = ("regulator", "actuator", "sensor")
 _ROLES = ("time", "output", "command", "pressure", "curvature", "reference")
@@ -101,7 +102,8 @@ def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:
     if not isinstance(table.raw(role), dict):
         return table.text(role), None
     given = table.section(role, "")
-    name = given.required("column") and given.text("column")
+    given.required("column")
+    name = given.text("column")
     scale = Scale(given.number("scale", 1.0), given.number("offset", 0.0), given.text("unit"))
     given.done()
     if scale.unit is not None and ("scale" in given or "offset" in given):
@@ -175,7 +177,9 @@ def _actuator(table: Table | None) -> Actuator | LinearActuator | None:
 
 
 def _proper(table: Table) -> TransferFunction:
-    transfer = table.transfer()
+    transfer = read_transfer(table)
+    if not transfer.num:
+        raise table.fail("num", "is zero", "give what the stage lets pass, or leave the stage out")
     if not transfer.is_proper:
         raise table.fail("num", "has a higher order than the denominator", "give a proper transfer function")
     return transfer
@@ -257,6 +261,15 @@ def rig_table(rig: Rig) -> dict[str, Any]:
     for key, delay in vars(rig.delays).items():
         if delay:
             table.setdefault(key, {})["delay"] = delay
+    table |= _bounds_table(rig)
+    if rig.effects:
+        table["effects"] = [dict(effect) for effect in rig.effects]
+    return table
+
+
+def _bounds_table(rig: Rig) -> dict[str, Any]:
+    """Ranges, and uncertainties other than the usual; neither where there is none."""
+    table: dict[str, Any] = {}
     ranges = {key: list(span) for key, span in vars(rig.ranges).items() if span is not None}
     if ranges:
         table["ranges"] = ranges
@@ -264,8 +277,6 @@ def rig_table(rig: Rig) -> dict[str, Any]:
     uncertain = {key: part for key, part in vars(rig.uncertainty).items() if part != usual[key]}
     if uncertain:
         table["uncertainty"] = {key: _relative_table(part, usual[key]) for key, part in uncertain.items()}
-    if rig.effects:
-        table["effects"] = [dict(effect) for effect in rig.effects]
     return table
 
 

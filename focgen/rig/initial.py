@@ -9,18 +9,19 @@ there it cannot have moved yet, whatever its parameters are, so that a past show
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.logs.begin import REST, Begin
 from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
-from focgen.rig.model import LinearActuator, Rig
 from focgen.rig.response import response_time
+from focgen.rig.rig import LinearActuator, Rig
 
 NOTE = "begins away from rest: the state that it starts from is estimated"
 ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
@@ -102,7 +103,9 @@ def _range(logs: Sequence[Experiment], role: str) -> tuple[float, float]:
     return min(0.0, *(low for low, _ in ends)), max(0.0, *(high for _, high in ends))
 
 
-def _begun(rig: Rig, log: Experiment, placed, entries, scales: _Scales) -> Experiment:
+def _begun(
+    rig: Rig, log: Experiment, placed: Sequence[Placed], entries: Iterable[str], scales: _Scales
+) -> Experiment:
     if len(log) < 2 * _FIRST or not all(np.all(np.isfinite(log[role])) for role in scales.sizes):
         return log
     found = {entry: _Setting(rig, log, entry, placed, scales).chosen() for entry in entries}
@@ -124,23 +127,26 @@ class _Try:
 
     begin: Begin
     free: int
-    raw: np.ndarray
-    left: np.ndarray
+    raw: Array
+    left: Array
 
     @property
     def cost(self) -> float:
         return float(np.sum(self.left**2))
 
     @property
-    def first(self) -> np.ndarray:
+    def first(self) -> Array:
         """How far the first samples are off (signals,)."""
-        return np.abs(self.raw[:_FIRST].mean(axis=0))
+        made: Array = np.abs(self.raw[:_FIRST].mean(axis=0))
+        return made
 
 
 class _Setting:
     """One experiment, the rig, and what is measured behind the ``entry``."""
 
-    def __init__(self, rig: Rig, log: Experiment, entry: str, placed: Sequence[Placed], scales: _Scales):
+    def __init__(
+        self, rig: Rig, log: Experiment, entry: str, placed: Sequence[Placed], scales: _Scales
+    ) -> None:
         self.chain, self.entry, self.h = Chain(rig, tuple(placed)), entry, log.sample_time
         pace, self.reach = scales.pace, scales.sizes[entry]
         self.range = [end / self.reach for end in scales.ranges[entry]]
@@ -168,16 +174,17 @@ class _Setting:
     def at(self, begin: Begin, free: int) -> _Try:
         """What a begin leaves, ``free`` numbers of which are fitted."""
         run = Run.of([self.n], [self.start], self.h, [begin])
-        tap: dict[str, np.ndarray] = {}
+        tap: dict[str, Array] = {}
         self.chain.run(self.x, *self.stages, run, between_of(self.chain.rig, self.entry), tap)
         made = [tap[stage] / unit for stage, unit in zip(self.roles, self.units)]
         raw = self.y - np.stack(made, axis=1)
         return _Try(begin, free, raw, self._counted(raw, self.asked.offset))
 
-    def _counted(self, raw: np.ndarray, offset: float) -> np.ndarray:
+    def _counted(self, raw: Array, offset: float) -> Array:
         """What is left (n, signals) less an offset of so much at most, the later the less it counts."""
         mean = (raw * self.counts**2).sum(axis=0) / (self.counts**2).sum()
-        return (raw - np.clip(mean, -offset, offset)) * self.counts
+        made: Array = (raw - np.clip(mean, -offset, offset)) * self.counts
+        return made
 
     def chosen(self) -> Begin:
         """The begin that the data ask for."""
@@ -186,7 +193,10 @@ class _Setting:
         moved = rest.first > np.maximum(_APART * noise / np.sqrt(_FIRST), asked.off)
         if not moved.any() or not self.shown:
             return REST
-        off = lambda t: float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))  # noqa: E731
+
+        def off(t: _Try) -> float:
+            return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
+
         tries = [t for t in self.tries() if off(t) < asked.mended]
         if not tries:
             return REST
@@ -214,18 +224,18 @@ class _Setting:
         two = self._descended([later, level, later + 1.0], self._twice)
         return [held, one, from_level, two]
 
-    def _stepped(self, x: np.ndarray) -> Begin:
+    def _stepped(self, x: Array) -> Begin:
         earlier = float(x[1]) * self.reach if len(x) > 1 else 0.0
         return Begin((earlier, self.level), (float(np.exp(x[0])),))
 
-    def _twice(self, x: np.ndarray) -> Begin:
+    def _twice(self, x: Array) -> Begin:
         late, early = float(np.exp(x[0])), float(np.exp(max(x[2], x[0])))
         return Begin((0.0, float(x[1]) * self.reach, self.level), (early, late))
 
-    def _descended(self, x, begin) -> _Try:
+    def _descended(self, start: Sequence[float], begin: Callable[[Array], Begin]) -> _Try:
         """Gauss-Newton on log times and levels, damped where it fails."""
-        low, high = self._bounds(len(x))
-        x = np.clip(np.array(x, float), low, high)
+        low, high = self._bounds(len(start))
+        x: Array = np.clip(np.array(start, float), low, high)
         now, damping = self.at(begin(x), len(x)), _DAMPED
         for _ in range(_ROUNDS):
             moved = [self.at(begin(x + _STEP * e), 0).left - now.left for e in np.eye(len(x))]
@@ -241,7 +251,7 @@ class _Setting:
                 break
         return now
 
-    def _bounds(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+    def _bounds(self, count: int) -> tuple[Array, Array]:
         """Of the log time of a step, the level before, and the log time of an earlier step."""
         first, last = np.log([self.h, self.longest])
         rows = [(first, last), (self.range[0] - _BEYOND, self.range[1] + _BEYOND), (first, last)]
@@ -249,20 +259,25 @@ class _Setting:
         return low, high
 
 
-def _step(slope: np.ndarray, left: np.ndarray, damping: float) -> np.ndarray:
+def _step(slope: Array, left: Array, damping: float) -> Array:
     normal = slope.T @ slope
     weight = damping * np.diag(normal) + 1e-9 * np.trace(normal) + 1e-300
-    return np.clip(np.linalg.solve(normal + np.diag(weight), slope.T @ left), -1.0, 1.0)
+    made: Array = np.clip(np.linalg.solve(normal + np.diag(weight), slope.T @ left), -1.0, 1.0)
+    return made
 
 
 def _likeliest(tries: Sequence[_Try], nats: float) -> _Try:
     """The try of highest evidence (Schwarz's criterion); any but a rest needs so many more."""
     count = _effective(min(tries, key=lambda t: t.cost).left)
-    asked = lambda t: t.free * np.log(count) + (not t.begin.at_rest) * nats  # noqa: E731
-    return min(tries, key=lambda t: count * np.log(max(t.cost, 1e-300)) + asked(t))
+
+    def criterion(t: _Try) -> float:
+        asked = t.free * np.log(count) + (not t.begin.at_rest) * nats
+        return float(count * np.log(max(t.cost, 1e-300)) + asked)
+
+    return min(tries, key=criterion)
 
 
-def _effective(left: np.ndarray) -> float:
+def _effective(left: Array) -> float:
     """How many samples a residual (n, signals) is worth, by its correlation from one to the next."""
     count = 0.0
     for part in left.T:
@@ -273,6 +288,6 @@ def _effective(left: np.ndarray) -> float:
     return max(count, 2.0)
 
 
-def _white(y: np.ndarray) -> float:
+def _white(y: Array) -> float:
     """The standard deviation of what is white of a signal (n,), 0 where it is too short to tell."""
     return white_level(y) if len(y) > 4 else 0.0

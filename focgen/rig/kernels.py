@@ -9,11 +9,14 @@ been held for ever, and else 0; it returns a new array of shape (n,).
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Bytes
 from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 
@@ -54,7 +57,7 @@ _FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "
 
 
 @cache
-def _library():
+def _library() -> tuple[Any, Any]:
     from cffi import FFI
 
     ffi = FFI()
@@ -68,7 +71,7 @@ def _library():
         return ffi, ffi.dlopen(target)
 
 
-def _call(name: str, x: np.ndarray, rest: np.ndarray, *others) -> np.ndarray:
+def _call(name: str, x: Array, rest: Bytes, *others: Any) -> Array:
     ffi, library = _library()
     x = np.ascontiguousarray(x, float)
     y = np.empty_like(x)
@@ -83,19 +86,19 @@ def _call(name: str, x: np.ndarray, rest: np.ndarray, *others) -> np.ndarray:
 
 
 def modes(
-    x,
-    rest,
-    a,
-    b0,
-    b1,
-    pair,
+    x: Array,
+    rest: Bytes,
+    a: Array,
+    b0: Array,
+    b1: Array,
+    pair: Array,
     through: float,
     switching: bool,
     place: float = 0.0,
     stiffness: float = 0.0,
     slide: float = 0.0,
     stick: float = 0.0,
-) -> np.ndarray:
+) -> Array:
     """Sum of first-order modes; ``a``, ``b0``, ``b1`` (2, m) and ``pair`` (2, 6), rows loading and
     unloading; beyond ``place`` an obstacle takes ``stiffness`` times how far from ``x``."""
     ffi, _ = _library()
@@ -118,7 +121,7 @@ def modes(
     )
 
 
-def lag(x, rest, h: float, up: float, down: float) -> np.ndarray:
+def lag(x: Array, rest: Bytes, h: float, up: float, down: float) -> Array:
     """A first-order lag with time constants ``up`` while rising and ``down`` while falling, s (0: none)."""
     ffi, _ = _library()
     rows = [np.array(_lag(h, float(t))) for t in (up, down)]
@@ -133,40 +136,42 @@ def _lag(h: float, tau: float) -> tuple[float, float, float]:
     return a, mean - a, 1.0 - mean
 
 
-def orifice(x, rest, h: float, fill: float, vent: float, scale: float) -> np.ndarray:
+def orifice(x: Array, rest: Bytes, h: float, fill: float, vent: float, scale: float) -> Array:
     """A chamber filled and vented through orifices; ``fill``, ``vent`` in s for a step of ``scale``."""
     return _call("focgen_orifice", x, rest, h, float(fill), float(vent), float(scale), 2)
 
 
-def rate_limit(x, rest, h: float, rate: float, tau: float = 0.0, soft: bool = False) -> np.ndarray:
+def rate_limit(x: Array, rest: Bytes, h: float, rate: float, tau: float = 0.0, soft: bool = False) -> Array:
     """Follow ``x`` with |dy/dt| ≤ ``rate`` (units of x per s), through a lag ``tau`` in s."""
     return _call("focgen_rate", x, rest, h, float(rate), float(tau), int(soft), 4 if soft else 1)
 
 
-def play(x, rest, width: float, start: float = 0.0) -> np.ndarray:
+def play(x: Array, rest: Bytes, width: float, start: float = 0.0) -> Array:
     """Backlash of half width ``width``, units of x."""
     return _call("focgen_play", x, rest, float(width), float(start))
 
 
-def stick(x, rest, band: float, left: float, anew: bool = False, place: float = np.nan) -> np.ndarray:
+def stick(
+    x: Array, rest: Bytes, band: float, left: float, anew: bool = False, place: float = np.nan
+) -> Array:
     """Stick–slip: held within ``band`` of ``x``, then slips to ``left`` from it, and follows at that distance
     until x turns round, or ``anew`` is held at once. ``place``: how far below x it lies where an experiment
     begins in equilibrium (not a number: where coming from 0 leaves it); units of x."""
     return _call("focgen_stick", x, rest, float(band), float(left), int(anew), float(place))
 
 
-def bouc_wen(x, rest, width: float) -> np.ndarray:
+def bouc_wen(x: Array, rest: Bytes, width: float) -> Array:
     """Bouc–Wen's hysteretic variable in [−1, 1], of power 1 and as stiff wherever it unloads; ``width`` is
     the input's travel to reverse it, units of x."""
     return _call("focgen_bouc_wen", x, rest, float(width))
 
 
-def power_creep(x, rest, h: float, tau: float, scale: float, power: float) -> np.ndarray:
+def power_creep(x: Array, rest: Bytes, h: float, tau: float, scale: float, power: float) -> Array:
     """What creeps after ``x`` at the rate ``scale``/``tau`` |distance/``scale``|^``power``; ``power`` > 1."""
     return _call("focgen_power_creep", x, rest, float(h), float(tau), float(scale), float(power))
 
 
-def rational(x, rest, b, a) -> np.ndarray:
+def rational(x: Array, rest: Bytes, b: Array, a: Array) -> Array:
     """A discrete filter with numerator ``b`` and denominator ``a`` (a[0] = 1), of any length."""
     ffi, _ = _library()
     order = max(len(a), len(b)) - 1
@@ -179,8 +184,13 @@ def rational(x, rest, b, a) -> np.ndarray:
 
 
 def plant(
-    x, rest, course: tuple[np.ndarray, ...], levels: tuple[int, int, int], numbers, tables
-) -> np.ndarray:
+    x: Array,
+    rest: Bytes,
+    course: tuple[Array, ...],
+    levels: tuple[int, int, int],
+    numbers: Array,
+    tables: Array,
+) -> Array:
     """A plant with dry friction and a hysteretic spring; what the arguments are is said in ``plant.c``.
 
     ``course``: ``line``, ``bend`` and ``twist`` (n,); ``levels``: the order, and the levels ``base`` and
@@ -192,7 +202,17 @@ def plant(
     return _call("focgen_plant", x, rest, *parts, *levels, numbers, tables)
 
 
-def bent_modes(x, rest, a, b0, b1, pair, through: float, switching: bool, spring) -> np.ndarray:
+def bent_modes(
+    x: Array,
+    rest: Bytes,
+    a: Array,
+    b0: Array,
+    b1: Array,
+    pair: Array,
+    through: float,
+    switching: bool,
+    spring: Sequence[float],
+) -> Array:
     """As :func:`modes`, with the input less what ``spring`` (7,) takes: see ``bending.c``."""
     ffi, _ = _library()
     tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
@@ -213,7 +233,7 @@ def bent_modes(x, rest, a, b0, b1, pair, through: float, switching: bool, spring
     )
 
 
-def bent_rational(x, rest, b, c, a, spring) -> np.ndarray:
+def bent_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, spring: Sequence[float]) -> Array:
     """As :func:`rational`, with ``c`` the numerator for what ``spring`` (7,) takes from the input."""
     ffi, _ = _library()
     order = max(len(a), len(b), len(c)) - 1
@@ -224,7 +244,7 @@ def bent_rational(x, rest, b, c, a, spring) -> np.ndarray:
     return _call("focgen_bent_filter", x, rest, order, *pointers)
 
 
-def products(rows: np.ndarray) -> np.ndarray:
+def products(rows: Array) -> Array:
     """Every row's product with every other, (k, k), of ``rows`` (k, n); unlike ``rows @ rows.T`` in one
     thread."""
     ffi, library = _library()
@@ -236,7 +256,7 @@ def products(rows: np.ndarray) -> np.ndarray:
     return found
 
 
-def innovations(y, made, weight, rest, coarse: int, ar) -> np.ndarray:
+def innovations(y: Array, made: Array, weight: Array, rest: Bytes, coarse: int, ar: Array) -> Array:
     """(y − made) · weight of every experiment in means of ``coarse`` samples, whitened by ``ar``; all (n,)
     but ``ar``."""
     ffi, library = _library()

@@ -2,33 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
+from focgen.arrays import Array, Bytes
 from focgen.fractional.delay import split_delay
 from focgen.fractional.simulation import Convolution
-from focgen.fractional.transfer import TransferFunction
+from focgen.fractional.transfer import Term, TransferFunction
 from focgen.logs.between import Between
 from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
-from focgen.rig.model import UNITY
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled
+from focgen.rig.rig import UNITY
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
 
 
 def run(
     transfer: TransferFunction,
-    x: np.ndarray,
-    rest: np.ndarray,
+    x: Array,
+    rest: Bytes,
     h: float,
     duration: float,
     between: Between | bool = Between.STRAIGHT,
     delay: float = 0.0,
-) -> np.ndarray:
+) -> Array:
     """The response to ``x`` (n,) sampled every ``h`` s, later by ``delay`` s, at rest wherever ``rest`` (n,)
     is true, every ``duration`` s or sooner.
 
@@ -51,13 +53,13 @@ def run(
     return shifted(found, rest, whole) if whole else found
 
 
-def _passed(x: np.ndarray, rest: np.ndarray, h: float, delay: float, held: bool) -> np.ndarray:
+def _passed(x: Array, rest: Bytes, h: float, delay: float, held: bool) -> Array:
     """A pure delay: between its samples a staircase is what it was at the one before."""
     whole, part = split_delay(delay, h)
     return shifted(x, rest, whole + (part > 0.0)) if held else delayed(x, rest, h, delay)
 
 
-def _smooth(transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: float) -> np.ndarray:
+def _smooth(transfer: TransferFunction, x: Array, rest: Bytes, h: float) -> Array:
     """The response of whole orders to an input that runs in lines and bends."""
     x = np.ascontiguousarray(x, float)
     line, bend, twist = course(x, rest, Between.SMOOTH)
@@ -70,7 +72,7 @@ def _smooth(transfer: TransferFunction, x: np.ndarray, rest: np.ndarray, h: floa
 
 
 @lru_cache(maxsize=512)
-def _bent(transfer: TransferFunction, h: float) -> tuple[np.ndarray, ...]:
+def _bent(transfer: TransferFunction, h: float) -> tuple[Array, ...]:
     """Numerators in powers of z^-1 of what a sample's inputs t, t (t − 1) and t (t − 1)(2 t − 1), t = 0 … 1,
     leave, over the denominator of :func:`_discrete`: from the first samples of the exact responses."""
     _, a = _discrete(transfer, h, True)
@@ -82,7 +84,7 @@ def _bent(transfer: TransferFunction, h: float) -> tuple[np.ndarray, ...]:
     return tuple(np.convolve(a, shape)[:count] for shape in shapes)
 
 
-def _powers(transfer: TransferFunction, h: float, k: int, count: int) -> np.ndarray:
+def _powers(transfer: TransferFunction, h: float, k: int, count: int) -> Array:
     """The output (count,) at the end of a sample in which the input is t^k, and at the ends that follow."""
     from scipy.linalg import expm
     from scipy.signal import tf2ss
@@ -99,7 +101,9 @@ def _powers(transfer: TransferFunction, h: float, k: int, count: int) -> np.ndar
     return np.array(made)
 
 
-def _at_samples(transfer, x, rest, h: float, duration: float, held: bool) -> np.ndarray:
+def _at_samples(
+    transfer: TransferFunction, x: Array, rest: Bytes, h: float, duration: float, held: bool
+) -> Array:
     if transfer.is_integer:
         return kernels.rational(x, rest, *_discrete(transfer, h, held))
     lag = single_lag(transfer)
@@ -117,7 +121,9 @@ def _missing(transfer: TransferFunction, modes: Modes) -> float:
     return transfer.dc_gain - modes.gain if np.isfinite(transfer.dc_gain) else 0.0
 
 
-def _between(transfer, x, rest, h: float, duration: float, held: bool, share: float) -> np.ndarray:
+def _between(
+    transfer: TransferFunction, x: Array, rest: Bytes, h: float, duration: float, held: bool, share: float
+) -> Array:
     """The response at the ``share`` of the way from the sample before to each."""
     if transfer.is_integer:
         return kernels.rational(x, rest, *_discrete_between(transfer, h, held, share))
@@ -138,13 +144,13 @@ def is_spring(transfer: TransferFunction) -> bool:
 
 def run_bent(
     transfer: TransferFunction,
-    x: np.ndarray,
-    rest: np.ndarray,
+    x: Array,
+    rest: Bytes,
     h: float,
     between: Between | bool,
     dynamics: Dynamics,
     delay: float = 0.0,
-) -> np.ndarray:
+) -> Array:
     """As :func:`run` of a plant :func:`is_spring` whose spring follows ``dynamics``; the response counts as
     linear between samples, and the delay is exact in whole samples only."""
     if between == Between.SMOOTH:
@@ -155,9 +161,7 @@ def run_bent(
     return delayed(made, rest, h, delay) if delay else made
 
 
-def oscillator(
-    x: np.ndarray, rest: np.ndarray, h: float, period: float, damping: float, speed: bool = False
-) -> np.ndarray:
+def oscillator(x: Array, rest: Bytes, h: float, period: float, damping: float, speed: bool = False) -> Array:
     """The response of w²/(s² + 2 d w s + w²), w = 2π/``period`` (s), ``damping`` d < 1, input linear between
     samples; ``speed``: its rate of change over w instead."""
     w = 2.0 * np.pi / period
@@ -181,7 +185,7 @@ def single_lag(transfer: TransferFunction) -> tuple[float, float, float] | None:
 
 
 @lru_cache(maxsize=512)
-def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndarray, np.ndarray]:
+def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, Array]:
     """Numerator and denominator in powers of z^-1, exact at the samples: the modes one by one, put together
     again."""
     num, den = _coefficients(transfer.num), _coefficients(transfer.den)
@@ -201,13 +205,14 @@ def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[np.ndar
     return b.real, whole.real
 
 
-def _residues(num: np.ndarray, den: np.ndarray, poles: np.ndarray) -> np.ndarray:
-    return np.polyval(num, poles) / (
+def _residues(num: Array, den: Array, poles: Array) -> Array:
+    made: Array = np.polyval(num, poles) / (
         den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)])
     )
+    return made
 
 
-def _held(poles: np.ndarray, residues: np.ndarray, h: float, held: bool):
+def _held(poles: Array, residues: Array, h: float, held: bool) -> tuple[Array, Array, Array]:
     """What is left of each mode after ``h`` s, and what the past and the present input count."""
     a = np.exp(poles * h)
     gain = np.where(poles == 0, h, (a - 1) / np.where(poles == 0, 1, poles))  # of a step over one sample
@@ -216,9 +221,7 @@ def _held(poles: np.ndarray, residues: np.ndarray, h: float, held: bool):
 
 
 @lru_cache(maxsize=512)
-def _discrete_between(
-    transfer: TransferFunction, h: float, held: bool, share: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _discrete_between(transfer: TransferFunction, h: float, held: bool, share: float) -> tuple[Array, Array]:
     """As :func:`_discrete`, but the response at the ``share`` of the way from the sample before to each."""
     num, den = _coefficients(transfer.num), _coefficients(transfer.den)
     through = num[0] / den[0] if len(num) == len(den) else 0.0
@@ -237,7 +240,9 @@ def _discrete_between(
     return b.real, whole.real
 
 
-def _by_pulse(transfer: TransferFunction, a: np.ndarray, h: float, held: bool, share: float):
+def _by_pulse(
+    transfer: TransferFunction, a: Array, h: float, held: bool, share: float
+) -> tuple[Array, Array]:
     """The same from the first samples of the exact response to a pulse, which repeated poles do not
     trouble.
     """
@@ -246,20 +251,20 @@ def _by_pulse(transfer: TransferFunction, a: np.ndarray, h: float, held: bool, s
     return np.convolve(a, pulse)[: len(a) + 1], a
 
 
-def _ramp(q: np.ndarray, a: np.ndarray) -> np.ndarray:
+def _ramp(q: Array, a: Array) -> Array:
     """∫ (1 − t) e^{q (1 − t)} dt over 0 … 1: what the past sample of a linear input counts."""
     small = np.abs(q) < 1e-3
     safe = np.where(small, 1.0, q)
     return np.where(small, 0.5 + q / 3 + q * q / 8, (a * (safe - 1) + 1) / safe**2)
 
 
-def _coincide(poles: np.ndarray) -> bool:
+def _coincide(poles: Array) -> bool:
     """Whether two poles are so close that their residues would cancel."""
     distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(len(poles), np.inf))
     return bool(np.any(distance < 1e-3 * np.maximum(np.abs(poles)[:, None], 1e-12)))
 
 
-def _by_exponential(num: np.ndarray, den: np.ndarray, h: float, held: bool) -> tuple[np.ndarray, np.ndarray]:
+def _by_exponential(num: Array, den: Array, h: float, held: bool) -> tuple[Array, Array]:
     """The same from the matrix exponential, which repeated poles do not trouble, but which takes longer."""
     from scipy.signal import cont2discrete
 
@@ -270,7 +275,7 @@ def _by_exponential(num: np.ndarray, den: np.ndarray, h: float, held: bool) -> t
     return np.atleast_2d(b)[0], a
 
 
-def _coefficients(terms) -> np.ndarray:
+def _coefficients(terms: Sequence[Term]) -> Array:
     dense = np.zeros(int(terms[0].order) + 1 if terms else 1)
     for term in terms:
         dense[-1 - int(term.order)] = term.coefficient
@@ -300,7 +305,9 @@ def _fractional(transfer: TransferFunction, h: float, duration: float) -> Modes:
 
 
 @lru_cache(maxsize=64)
-def _tables(transfer: TransferFunction, h: float, duration: float):
+def _tables(
+    transfer: TransferFunction, h: float, duration: float
+) -> tuple[tuple[Array, Array, Array], Array, float]:
     """What the compiled loop needs of them: rows of the modes, the pair, and what passes at once."""
     modes = _fractional(transfer, h, duration)
     a = np.exp(-modes.rates * h)
@@ -309,8 +316,8 @@ def _tables(transfer: TransferFunction, h: float, duration: float):
     q = modes.pole * h
     m, scale = (np.exp(q) - 1) / q, -modes.residue / modes.pole
     pair = np.array([[c.real, c.imag] for c in (np.exp(q), scale * (m - np.exp(q)), scale * (1 - m))]).ravel()
-    rows = tuple(np.stack([row, row]) for row in (a, gain * (mean - a), gain * (1 - mean)))
-    return rows, np.stack([pair, pair]), modes.through
+    a, past, now = (np.stack([row, row]) for row in (a, gain * (mean - a), gain * (1 - mean)))
+    return (a, past, now), np.stack([pair, pair]), modes.through
 
 
 def _residue(transfer: TransferFunction, pole: complex) -> complex:

@@ -9,11 +9,13 @@ of it. One formula then holds for all α, α = 1 included, where the pole alone 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from focgen.arrays import Array, Bytes
 from focgen.fractional.delay import split_delay
 from focgen.rig import kernels
 from focgen.rig.delay import delayed, shifted
@@ -27,8 +29,8 @@ class Modes:
     """Rates (m,) in 1/s, weights (m,) in 1/s, the pair's pole and residue (1/s), and the instantaneous
     share."""
 
-    rates: np.ndarray
-    weights: np.ndarray
+    rates: Array
+    weights: Array
     pole: complex
     residue: complex
     through: float
@@ -65,15 +67,15 @@ def fractional_lag(T: float, alpha: float, h: float, duration: float) -> Modes:
 
 
 def respond(
-    x: np.ndarray,
-    rest: np.ndarray,
+    x: Array,
+    rest: Bytes,
     h: float,
     T: float,
     alpha: float,
     duration: float,
     dynamics: Dynamics = UNCHANGED,
     delay: float = 0.0,
-) -> np.ndarray:
+) -> Array:
     """The response of 1/(T s^alpha + 1) to ``x`` (n,), linear between samples of ``h`` s, later by ``delay``
     s; ``rest`` (n,) is true where an experiment begins, none longer than ``duration`` s.
 
@@ -100,17 +102,18 @@ def respond(
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
 
 
-def settled(made: np.ndarray, x: np.ndarray, rest: np.ndarray, missing: float) -> np.ndarray:
+def settled(made: Array, x: Array, rest: Bytes, missing: float) -> Array:
     """The response (n,) with what modes too slow to move, of gain ``missing``, keep of an input held for ever
     before an experiment."""
     if not np.any(rest == kernels.BALANCED):
         return made
     firsts = np.flatnonzero(rest)
     kept = missing * x[firsts] * (rest[firsts] == kernels.BALANCED)
-    return made + np.repeat(kept, np.diff([*firsts, len(x)]))
+    found: Array = made + np.repeat(kept, np.diff([*firsts, len(x)]))
+    return found
 
 
-def between(x: np.ndarray, rest: np.ndarray, h: float, modes: Modes, share: float) -> np.ndarray:
+def between(x: Array, rest: Bytes, h: float, modes: Modes, share: float) -> Array:
     """The response to ``x`` (n,) at the ``share``, 0 … 1, of the way to each sample from the one before.
 
     What a mode was a sample ago decays over that share, which is one more factor of its input; the rest is
@@ -125,30 +128,39 @@ def between(x: np.ndarray, rest: np.ndarray, h: float, modes: Modes, share: floa
     weight = gains * decay
     rows = [np.exp(h * rates[:-1].real), (weight * b0)[:-1].real, (weight * b1)[:-1].real]
     pair = [np.exp(h * pole), (weight * b0)[-1], (weight * b1)[-1]]
-    doubled = [np.stack([row, row]) for row in (*rows, np.array([[c.real, c.imag] for c in pair]).ravel())]
-    kept = kernels.modes(x, rest, *doubled, 0.0, switching=False)
-    return shifted(kept + before * x, rest, 1) + after * x
+    a, past, now, twins = (np.stack([row, row]) for row in (*rows, _parts(pair)))
+    kept = kernels.modes(x, rest, a, past, now, twins, 0.0, switching=False)
+    made: Array = shifted(kept + before * x, rest, 1) + after * x
+    return made
 
 
 @lru_cache(maxsize=256)
-def tables(T: float, alpha: float, h: float, duration: float, unloading: float):
+def tables(
+    T: float, alpha: float, h: float, duration: float, unloading: float
+) -> tuple[Array, Array, Array, Array, float]:
     """What the compiled loop needs, rows loading and unloading."""
     modes = fractional_lag(T, alpha, h, duration)
     loading = _tables(modes, h, 1.0)
     rows = [loading, loading if unloading == 1.0 else _tables(modes, h, unloading)]
-    return *(np.stack(part) for part in zip(*rows)), modes.through
+    a, past, now, pair = (np.stack(part) for part in zip(*rows))
+    return a, past, now, pair, modes.through
 
 
-def _tables(modes: Modes, h: float, speed: float):
+def _tables(modes: Modes, h: float, speed: float) -> tuple[Array, Array, Array, Array]:
     a, b0, b1 = hold(-modes.rates * speed * h)
     gain = modes.weights / modes.rates
     pa, p0, p1 = hold(np.array([modes.pole * speed * h]))
     scale = -modes.residue / modes.pole
     pair = [pa[0], scale * p0[0], scale * p1[0]]
-    return a, gain * b0, gain * b1, np.array([[c.real, c.imag] for c in map(complex, pair)]).ravel()
+    return a, gain * b0, gain * b1, _parts(pair)
 
 
-def hold(q):
+def _parts(pair: Sequence[complex]) -> Array:
+    """Real and imaginary parts in turn."""
+    return np.array([[c.real, c.imag] for c in pair]).ravel()
+
+
+def hold(q: Array) -> tuple[Array, Array, Array]:
     """Coefficients of z' = λ(z − x), λh = q, for x linear over the sample: a, of the past and of the present
     x."""
     a = np.exp(q)

@@ -19,6 +19,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from focgen.arrays import Array, Bytes
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.rig import kernels
@@ -64,13 +65,13 @@ def plant_of(transfer: TransferFunction) -> Plant | None:
 
 def respond(
     plant: Plant,
-    x: np.ndarray,
-    rest: np.ndarray,
+    x: Array,
+    rest: Bytes,
     h: float,
     dynamics: Dynamics = UNCHANGED,
     between: Between | bool = Between.STRAIGHT,
     rough: bool = False,
-) -> np.ndarray:
+) -> Array:
     """The output (n,) for the input ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is not
     0; of ``dynamics`` the drag, the hysteretic spring and the bend count.
 
@@ -104,7 +105,7 @@ def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> 
 
 
 @lru_cache(maxsize=256)
-def _tables(plant: Plant, h: float, base: int, last: int) -> np.ndarray:
+def _tables(plant: Plant, h: float, base: int, last: int) -> Array:
     """For steps of h/2^base … h/2^last: what the state (2, 2) and the input's four coefficients (2, 4) count,
     12 numbers a step."""
     if plant.order == 2:
@@ -122,7 +123,7 @@ def _tables(plant: Plant, h: float, base: int, last: int) -> np.ndarray:
     return np.concatenate(rows[::-1])
 
 
-def _series(state: np.ndarray, force: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+def _series(state: Array, force: Array, step: float) -> tuple[Array, Array]:
     """The state after a short step, by the series of the exponential: powers of the state's matrix for what
     was, and for an input t^i over the step the sum of A^j b i!/(i + j + 1)! step^(j + 1)."""
     power, kept, driven = np.eye(2), np.eye(2), np.zeros((2, 4))
@@ -145,6 +146,6 @@ _SECOND = np.array(
 )  # and
 
 
-def _doubled(kept: np.ndarray, driven: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _doubled(kept: Array, driven: Array) -> tuple[Array, Array]:
     """The same for a step twice as long."""
     return kept @ kept, kept @ driven @ _FIRST + driven @ _SECOND

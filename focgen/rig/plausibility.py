@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.logs import plausibility
+from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.plausibility import Link, Signals
 from focgen.rig.effects import Run
 from focgen.rig.engine import STAGES, Chain, between_of
-from focgen.rig.model import UNITY, Rig
+from focgen.rig.rig import UNITY, Rig
 
 _ROLES = ("command", "pressure", "curvature", "output")  # before each stage, and after the last
 _MOST = 40_000  # samples are enough to tell a unit
@@ -50,7 +53,7 @@ def links(
     """
     roles = [role for role in _ROLES if role in signals]
     found = []
-    for entry, exit in zip(roles, roles[1:]):
+    for entry, exit in pairwise(roles):
         stages = STAGES[_ROLES.index(entry) : _ROLES.index(exit)]
         if not _modelled(rig, stages):
             continue
@@ -78,7 +81,14 @@ def _modelled(rig: Rig, stages: Sequence[str]) -> bool:
     )
 
 
-def _simulated(rig: Rig, experiments, parts, stages, between, faster: float = 1.0) -> list[np.ndarray]:
+def _simulated(
+    rig: Rig,
+    experiments: Sequence[Experiment],
+    parts: Sequence[Array],
+    stages: Sequence[str],
+    between: Between | bool,
+    faster: float = 1.0,
+) -> list[Array]:
     if "actuator" not in stages:  # linear: an offset of the input from the first sample on is no step
         parts = [y - y[0] for y in parts]
     step = experiments[0].sample_time * faster
@@ -87,7 +97,7 @@ def _simulated(rig: Rig, experiments, parts, stages, between, faster: float = 1.
     return [made[a:b] for a, b in run.spans]
 
 
-def _link(entry: str, exit: str, expected: list[np.ndarray], measured: list[np.ndarray]) -> Link:
+def _link(entry: str, exit: str, expected: list[Array], measured: list[Array]) -> Link:
     """Offsets apart: each part about its mean."""
     s, y = (np.concatenate([part - part.mean() for part in parts]) for parts in (expected, measured))
     scale = float(np.linalg.norm(s) * np.linalg.norm(y))
@@ -146,7 +156,7 @@ def _exchanged(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     return ("curvature lags behind output; the columns of curvature and output exchanged?",)
 
 
-def _misfit(expected: list[np.ndarray], measured: list[np.ndarray]) -> float:
+def _misfit(expected: list[Array], measured: list[Array]) -> float:
     """Share of a signal that the expected one, whatever its size and offset, does not explain."""
     correlation = _link("", "", expected, measured).correlation
     return float(np.sqrt(max(0.0, 1.0 - correlation**2)))

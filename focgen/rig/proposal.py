@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs import clock
 from focgen.logs.columns import SIGNALS, Column, Guess, columns_of, guessed, run_of, time_of
@@ -18,7 +19,7 @@ from focgen.logs.read import Logs, each_of, tables_of
 from focgen.logs.table import LogTable, stem
 from focgen.output import check_apart, write_file
 from focgen.rig.files import read_rig
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
 _MEANING = {
@@ -119,7 +120,7 @@ def _time(table: LogTable, run: str | None) -> _Time:
     return _Time(name, "s", _rounded(step, drift))
 
 
-def _step(stamps: np.ndarray) -> float:
+def _step(stamps: Array) -> float:
     """Between samples, in the stamps' unit: of a uniform clock its mean, so that rounding does not count."""
     part = stamps[clock.sittings(stamps)[0]]
     steps = np.diff(part)
@@ -213,7 +214,7 @@ def _text(
     lines += ["", "[ranges]" + " " * (_COLUMN - 8) + "# what each signal can reach"]
     for role in ("command", "pressure", "output"):
         if role in roles:
-            low, high = np.nanmin(roles[role].values), np.nanmax(roles[role].values)
+            low, high = float(np.nanmin(roles[role].values)), float(np.nanmax(roles[role].values))
             least = _NOISE * (high - low)
             span = [_outward(low) if low < -least else 0.0, _outward(high) if high > least else 0.0]
             lines.append(_line(f"{role} = {span}", f"seen {low:.4g} to {high:.4g}"))

@@ -11,7 +11,7 @@ from focgen.logs import read
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import Logs
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
-from focgen.rig.model import Signals
+from focgen.rig.rig import Signals
 
 P = ParamSpec("P")
 R = TypeVar("R")

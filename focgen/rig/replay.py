@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import LogError, RigError
 from focgen.jsontext import UNWRITTEN
 from focgen.logs.between import Between
@@ -18,8 +19,8 @@ from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import begun
-from focgen.rig.model import Rig
 from focgen.rig.plausibility import doubts
+from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
@@ -46,7 +47,7 @@ class Replay(Shown):
     was run, on what."""
 
     logs: dict[str, Replayed]
-    simulated: dict[str, dict[str, np.ndarray]]
+    simulated: dict[str, dict[str, Array]]
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     rig: Rig | None = field(default=None, metadata=UNWRITTEN, compare=False)
@@ -79,9 +80,9 @@ def experiments(
 
 def simulate_session(
     rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] | None = None, continues: bool = True
-) -> list[dict[str, np.ndarray]]:
+) -> list[dict[str, Array]]:
     """The signals that each experiment should show, by role; ``continues``: after the session the rig's
-    effects left."""
+    effects left. Raises LogError for logs without an input in common."""
     entry = "command" if all("command" in log for log in logs) else "pressure"
     if not all(entry in log for log in logs):
         raise LogError(
@@ -92,7 +93,7 @@ def simulate_session(
     ahead = clock if begin < clock else 0.0
     starts, begins = [log.start + ahead for log in logs], [log.before(entry) for log in logs]
     run = Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins)
-    tap: dict[str, np.ndarray] = {}
+    tap: dict[str, Array] = {}
     x = np.concatenate([np.asarray(log[entry], float) for log in logs])
     first = "regulator" if entry == "command" else "actuator"
     chain = Chain(rig, tuple(placed_in(rig) if placed is None else placed))
@@ -149,11 +150,7 @@ def _placed(rig: Rig, table: Mapping[str, Any]) -> Placed:
     stage = table.get("stage", effect.stage)
     strange = set(table) - {p.name for p in form.parameters} - set(_BESIDES)
     if stage not in STAGES or strange:
-        what = (
-            f"has the stage {stage!r}"
-            if stage not in STAGES
-            else f"has the unknown key {sorted(strange)[0]!r}"
-        )
+        what = f"has the stage {stage!r}" if stage not in STAGES else f"has the unknown key {min(strange)!r}"
         raise RigError(f"{rig.name} [[effects]] {effect.name}", what, f"stages are {', '.join(STAGES)}")
     values = tuple(float(table[p.name]) for p in form.parameters)
     carried = {k: float(v) for k, v in table.get("carried", {}).items()}
@@ -183,12 +180,12 @@ def effect_tables(
     return tuple(tables)
 
 
-def goodness(measured: np.ndarray, simulated: np.ndarray) -> float:
+def goodness(measured: Array, simulated: Array) -> float:
     """1 − |measured − simulated| / |measured − mean|, eq. (4) of the paper; −inf where nothing varies."""
     spread = float(np.linalg.norm(measured - np.mean(measured)))
     return 1.0 - float(np.linalg.norm(measured - simulated)) / spread if spread else -np.inf
 
 
-def _compared(log: Experiment, made: dict[str, np.ndarray]) -> Replayed:
+def _compared(log: Experiment, made: dict[str, Array]) -> Replayed:
     rmse = {role: float(np.sqrt(np.mean((log[role] - y) ** 2))) for role, y in made.items() if role in log}
     return Replayed(goodness(log["output"], made["output"]), rmse["output"], rmse)

@@ -6,7 +6,7 @@ import numpy as np
 
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
-from focgen.rig.model import LinearActuator, Rig
+from focgen.rig.rig import LinearActuator, Rig
 
 
 def response_time(rig: Rig, h: float, record: float) -> float:

@@ -9,13 +9,13 @@ from typing import Any, Literal, NoReturn, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from focgen.arrays import Numbers
 from focgen.errors import InputError
-from focgen.plan.model import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, FLAG_SCHEDULE, Format, Plan
+from focgen.plan.plan import FLAG_HIGH, FLAG_INPUT, FLAG_INVALID, FLAG_LOW, FLAG_SCHEDULE, Format, Plan
 from focgen.plan.scenario import Params
 from focgen.plan.tuning import REFUSED_GAIN, REFUSED_HIGH, REFUSED_LOW
 from focgen.running.machine import Machine
 from focgen.running.signals import Counts, Physical
-
 
 _REFUSED = {REFUSED_GAIN: "gain", REFUSED_LOW: "u_min", REFUSED_HIGH: "u_max"}
 
@@ -41,7 +41,7 @@ class LoadedController:
 
     def __init__(
         self, plan: Plan, machine: Machine, path: Path, raw: bool, differences: tuple[str, ...] = ()
-    ):
+    ) -> None:
         self.plan, self.path, self.raw, self.differences = plan, path, raw, differences
         self._machine, self._state = machine, machine.state()
         self._signals = Counts() if raw else Physical()
@@ -85,12 +85,12 @@ class LoadedController:
         return self._step(ref, meas)
 
     @overload
-    def run(self, ref: ArrayLike, meas: ArrayLike, *, with_flags: Literal[False] = False) -> np.ndarray: ...
+    def run(self, ref: ArrayLike, meas: ArrayLike, *, with_flags: Literal[False] = False) -> Numbers: ...
 
     @overload
     def run(
         self, ref: ArrayLike, meas: ArrayLike, *, with_flags: Literal[True]
-    ) -> tuple[np.ndarray, np.ndarray]: ...
+    ) -> tuple[Numbers, Numbers]: ...
 
     def run(self, ref: ArrayLike, meas: ArrayLike, *, with_flags: bool = False) -> Any:
         """A step for each sample, from the present state on; the outputs, shape (samples,).
@@ -159,8 +159,8 @@ class LoadedController:
         memory = f"{plan.states} modes" if plan.exponential else f"{plan.length} past samples"
         signals = "counts" if self.raw else f"{units.measurement or '1'} -> {units.output or '1'}"
         edited = ", edited" if self.differences else ""
-        return f"<{type(self).__name__} {plan.name}: {plan.arithmetic}, {memory}, {plan.sample_time:g} s, " \
-               f"{signals}{edited}>"  # fmt: skip
+        kind = f"{plan.arithmetic}, {memory}, {plan.sample_time:g} s"
+        return f"<{type(self).__name__} {plan.name}: {kind}, {signals}{edited}>"
 
     # ----------------------------------------------------------------------------------------- the calls
 
@@ -195,7 +195,7 @@ class LoadedController:
         outputs = self._signals.back(u, self.plan.output)
         return (outputs, flags) if with_flags else outputs
 
-    def _rows(self, inputs: tuple[tuple[str, ArrayLike], ...]) -> list[np.ndarray]:
+    def _rows(self, inputs: tuple[tuple[str, ArrayLike], ...]) -> list[Numbers]:
         """Raw inputs of one length."""
         forms = dict(ref=self.plan.error, meas=self.plan.error)
         if self.plan.schedule:

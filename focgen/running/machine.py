@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from cffi import FFI
 
+from focgen.arrays import Numbers
 from focgen.codegen.render import render
 from focgen.compiler import compile_shared
 from focgen.errors import BuildError
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Params
 from focgen.targets.driver import DTYPES
 from focgen.verification.host import FLAGS
@@ -44,7 +45,7 @@ class Machine:
     check: Callable[..., int]
     tune: Callable[..., int]
 
-    def __init__(self, plan: Plan, folder: Path):
+    def __init__(self, plan: Plan, folder: Path) -> None:
         """Compile the C in ``folder``. Raises BuildError where that fails."""
         self.name, self.signal = plan.name, DTYPES[plan.output.ctype]
         self._ctype, self._ffi = plan.output.ctype, FFI()
@@ -78,7 +79,7 @@ class Machine:
             made.gain, made.u_min, made.u_max = list(given.gain), given.u_min, given.u_max
         return made
 
-    def loop(self, state: Any, inputs: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def loop(self, state: Any, inputs: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
         """One step for each sample of raw ``inputs``, arrays of one length in the C's own type; outputs and
         flags, each of that length.
         """

@@ -12,8 +12,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.errors import InputError
-from focgen.plan.model import Format
+from focgen.plan.plan import Format
 from focgen.plan.scenario import nearest_raw
 from focgen.targets.driver import DTYPES
 
@@ -25,7 +26,7 @@ class Signals(Protocol):
         """One value as the C takes it. Raises InputError for what is no such number."""
         ...
 
-    def many(self, name: str, values: Any, form: Format) -> np.ndarray:
+    def many(self, name: str, values: Any, form: Format) -> Numbers:
         """The same of an array, in the C's type."""
         ...
 
@@ -39,6 +40,7 @@ class Counts:
     """As they are."""
 
     def one(self, name: str, value: Any, form: Format) -> int | float:
+        """A number as its count. Raises ValueError for what is none."""
         if form.floating:
             return _number(name, value)
         try:
@@ -50,7 +52,8 @@ class Counts:
             raise _not_whole(name, value, form)
         return count
 
-    def many(self, name: str, values: Any, form: Format) -> np.ndarray:
+    def many(self, name: str, values: Any, form: Format) -> Numbers:
+        """An array, any shape, as counts of the format's type. Raises ValueError likewise."""
         found = _array(name, values)
         kind = DTYPES[form.ctype]
         if form.floating:
@@ -61,6 +64,7 @@ class Counts:
         return found.astype(kind)
 
     def back(self, raw: Any, form: Format) -> Any:
+        """What the C returned, as it is."""
         return raw
 
 
@@ -69,6 +73,7 @@ class Physical:
     """In the units of controller.toml."""
 
     def one(self, name: str, value: Any, form: Format) -> int | float:
+        """The nearest count, halves away from zero, saturated. Raises ValueError for NaN."""
         number = _number(name, value)
         if form.floating:
             return number
@@ -81,7 +86,8 @@ class Physical:
         nearest = whole + (size - whole >= 0.5)
         return min(nearest if scaled >= 0.0 else -nearest, top - 1)
 
-    def many(self, name: str, values: Any, form: Format) -> np.ndarray:
+    def many(self, name: str, values: Any, form: Format) -> Numbers:
+        """An array, any shape, likewise."""
         found = _array(name, values)
         if form.floating:
             return _floats(name, found, form)
@@ -91,6 +97,7 @@ class Physical:
         return nearest_raw(found, form).astype(DTYPES[form.ctype])
 
     def back(self, raw: Any, form: Format) -> Any:
+        """What the C returned, in physical units."""
         if form.floating:
             return raw
         return (raw.astype(float) if isinstance(raw, np.ndarray) else raw) * form.lsb
@@ -103,20 +110,20 @@ def _number(name: str, value: Any) -> float:
         raise InputError(name, f"is {value!r}", "give one number") from None
 
 
-def _floats(name: str, values: np.ndarray, form: Format) -> np.ndarray:
+def _floats(name: str, values: Numbers, form: Format) -> Numbers:
     """In the C's floating type; what is too large for it is infinite there, too."""
     with np.errstate(over="ignore"):
         return _as(name, values, DTYPES[form.ctype])
 
 
-def _as(name: str, values: np.ndarray, kind: type) -> np.ndarray:
+def _as(name: str, values: Numbers, kind: type) -> Numbers:
     try:
         return values.astype(kind)
     except (TypeError, ValueError):
         raise InputError(name, "holds what is no number", "give numbers") from None
 
 
-def _array(name: str, values: Any) -> np.ndarray:
+def _array(name: str, values: Any) -> Numbers:
     found = np.asarray(values)
     if found.ndim > 1:
         raise InputError(name, f"has {found.ndim} dimensions", "give one value for each sample")

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from focgen.arrays import Array, Complex
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest
 from focgen.control.margins import Curve, Margins, curve, margins
 from focgen.control.measures import measure_step
 from focgen.loop.chain import Chain, chain
+from focgen.loop.frequency import any_schedule, chain_transfer, held_response, sampled_response, slope_at
 from focgen.loop.frozen import frozen_loop, frozen_margins
 from focgen.loop.plan_stepper import PlanStepper
-from focgen.loop.response import any_schedule, chain_transfer, held_response, sampled_response, slope_at
 from focgen.loop.run import LoopRun, run_loop
 from focgen.loop.stepper import FloatStepper, Stepper
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.response import running_gain, running_response
-from focgen.rig.model import Rig
-from focgen.studies.model import Loop
+from focgen.rig.rig import Rig
+from focgen.studies.results import Loop
 
 _SETTLINGS = 12.0  # time constants of the slowest frozen loop that a step is followed for
 _FEWEST, _MOST, _UNKNOWN = 200, 20_000, 1000  # samples; the last where no loop gain reaches 1
@@ -40,7 +42,7 @@ class Bench:
     points: tuple[Equilibrium, ...]
 
     @property
-    def references(self) -> np.ndarray:
+    def references(self) -> Array:
         """The set points, shape (points,)."""
         return np.array([point.output for point in self.points])
 
@@ -50,8 +52,8 @@ class Steps:
     """What the loop did, and the step to the middle set point for the pictures: ``time``, ``output``."""
 
     loop: Loop
-    time: np.ndarray
-    output: np.ndarray
+    time: Array
+    output: Array
     reference: float
 
 
@@ -102,13 +104,14 @@ def _pressures(bench: Bench) -> list[float]:
     return list(dict.fromkeys(point.pressure for point in bench.points))
 
 
-def _curve(rig: Rig, controller: Controller, response) -> Curve:
+def _curve(rig: Rig, controller: Controller, response: Callable[[Array], Complex]) -> Curve:
     """The open loop but for controller gain and slope: hold and delays in it."""
     h, transfer = controller.sample_time, chain_transfer(rig)
 
-    def loop(omega):
+    def loop(omega: Array) -> Complex:
         held = held_response(transfer, h, omega, delay=rig.delays.total)
-        return response(omega) * held * np.exp(-1j * omega * h * _DELAY)
+        made: Complex = response(omega) * held * np.exp(-1j * omega * h * _DELAY)
+        return made
 
     return curve(loop, _LOW * 2.0 * math.pi / h, math.pi / h)
 
@@ -134,7 +137,7 @@ def _loop(run: LoopRun, bench: Bench, found: list[Margins]) -> Loop:
     away = np.abs(run.output - bench.references) / np.abs(bench.references - begin)
     iae = float((away.sum(axis=0) * run.sample_time).mean())
     return Loop(
-        finite(np.mean([s.settling_s for s in steps])),
+        finite(float(np.mean([s.settling_s for s in steps]))),
         finite(max(s.overshoot_pct for s in steps)),
         finite(iae),
         finite(min(m.phase_deg for m in found)),

@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from focgen.codegen.generate import folder_files
 from focgen.codegen.kernels import Kernels
@@ -15,7 +16,8 @@ from focgen.compiler import find_compiler
 from focgen.control.files import controller_text
 from focgen.errors import BuildError, FocgenError
 from focgen.output import write_files
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
+from focgen.present import present
 from focgen.targets.cost import object_sizes
 from focgen.verification.costs import cost
 
@@ -25,7 +27,7 @@ _NAME = "controller"
 
 @dataclass(frozen=True)
 class Costs:
-    """See :class:`focgen.studies.model.Row`; ``note`` says why a number is missing."""
+    """See :class:`focgen.studies.results.Row`; ``note`` says why a number is missing."""
 
     multiplies: int
     ram_bytes: int
@@ -61,7 +63,7 @@ def multiplies(plan: Plan) -> int:
     return sum(s.taps + 2 * s.modes for s in plan.sums)
 
 
-def _on_target(folder: str, target: str) -> dict:
+def _on_target(folder: str, target: str) -> dict[str, Any]:
     found = cost(folder, target).controllers[0].targets[target]
     if found.skipped is not None:
         return {"note": f"no cycles on {target}: {found.skipped}"}
@@ -71,12 +73,12 @@ def _on_target(folder: str, target: str) -> dict:
         "flash_bytes": found.flash_bytes,
         "stack_bytes": found.stack_bytes,
         "compiled_for": f"{target}, {found.compiler}",
-        "instructions": found.instructions_per_step.mean,
+        "instructions": present(found.instructions_per_step).mean,
         "cycles": None if cycles is None else cycles.mean,
     }
 
 
-def _on_host(folder: Path, name: str) -> dict:
+def _on_host(folder: Path, name: str) -> dict[str, Any]:
     """Code, constants and data of the compiled C."""
     made, source = folder / f"{name}.o", folder / f"{name}.c"
     command = [*find_compiler(), *_FLAGS, "-c", str(source), "-o", str(made)]

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from focgen.control.controller import ARITHMETICS, MEMORIES, Controller
 from focgen.errors import InputError, check_choice
 from focgen.fractional.exponential import HORIZONS
 from focgen.fractional.exponential import TOLERANCES as SPAN
-from focgen.plan.model import LONGEST
-from focgen.studies.model import Variant
+from focgen.plan.plan import LONGEST
+from focgen.studies.results import Variant
 
 LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 TOLERANCES = (0.1, 0.03, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -118,7 +119,7 @@ def _check(grid: Grid) -> None:
     _each("--horizon", (grid.horizon,), lambda n: HORIZONS[0] <= n <= HORIZONS[1], "give 100 … 1e8 samples")
 
 
-def _each(option: str, values, fits, remedy: str) -> None:
+def _each(option: str, values: Iterable[Any], fits: Callable[[Any], bool], remedy: str) -> None:
     for value in values:
         if not fits(value):
             raise InputError(option, f"is {value!r}", remedy)

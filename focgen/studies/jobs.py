@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,17 +16,20 @@ from focgen.control.files import controller_text
 from focgen.errors import PlanError
 from focgen.plan.build import build_plan
 from focgen.plan.canonical import memory_bias, realise
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
+from focgen.present import present
 from focgen.resources import shipped
 from focgen.rig.files import rig_text
 from focgen.studies.closed import Steps, ideal_loop, running_loop
 from focgen.studies.costs import costs
-from focgen.studies.model import Curves, Ideal, Loop, PlantRow, Row, Setup, Variant
 from focgen.studies.operator import fractional_terms, measure, variant_of
 from focgen.studies.plant import plant_of, plant_row
+from focgen.studies.results import Curves, Ideal, Loop, PlantRow, Row, Setup, Variant
 from focgen.studies.spectrum import Spectrum, memory_spectrum, omegas, sampling_spectrum
 
 _FORMAT = 1  # of a stored answer
+
+T = TypeVar("T", Row, Curves, PlantRow)
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,7 @@ def _dc_bias(plan: Plan) -> float | None:
     right = realise(plan.controller).steady_gain
     if plan.inner is not None or right == 0.0:
         return None
-    still = sum(plan.direct.values)
+    still = sum(present(plan.direct).values)
     if plan.feedback is not None:
         still /= 1.0 + sum(plan.feedback.table.values)
     return float(still / right - 1.0)
@@ -144,15 +147,16 @@ def _ideal(setup: Setup, variant: Variant) -> dict[str, Any]:
 
 
 def _plant(setup: Setup, variant: Variant) -> dict[str, Any]:
-    return {"plant": asdict(plant_row(plant_of(setup.controller, setup.rig), variant))}
+    return {"plant": asdict(plant_row(present(plant_of(setup.controller, setup.rig)), variant))}
 
 
 def _curves(spectrum: Spectrum, steps: Steps | None) -> Curves:
     parts = (spectrum.omega, spectrum.phase_deg, spectrum.magnitude_db)
-    frequency = (tuple(map(float, part[::2])) for part in parts)
+    omega, phase, magnitude = (tuple(map(float, part[::2])) for part in parts)
     if steps is None:
-        return Curves(*frequency)
-    return Curves(*frequency, tuple(map(float, steps.time)), tuple(map(float, steps.output)), steps.reference)
+        return Curves(omega, phase, magnitude)
+    time, output = (tuple(map(float, part)) for part in (steps.time, steps.output))
+    return Curves(omega, phase, magnitude, time, output, steps.reference)
 
 
 def read_row(found: dict[str, Any]) -> tuple[Row, Curves]:
@@ -172,6 +176,9 @@ def read_plant(found: dict[str, Any]) -> PlantRow:
     return _read(PlantRow, found["plant"])
 
 
-def _read(kind, values: dict[str, Any]):
+def _read(kind: type[T], values: dict[str, Any]) -> T:
     names = {f.name for f in fields(kind)}
-    return kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items() if k in names})
+    given: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in values.items() if k in names
+    }
+    return kind(**given)

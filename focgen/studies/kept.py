@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ from focgen.control.files import controller_of, controller_table
 from focgen.errors import ControllerError, InputError
 from focgen.jsontext import plain, read_json
 from focgen.logs.thinning import thinned
+from focgen.present import present
 from focgen.studies.jobs import read_ideal, read_plant, read_row
-from focgen.studies.model import Band, Curves, Plant, Study
+from focgen.studies.results import Band, Curves, Plant, Study
 from focgen.tomlfile import Table
 
 FILE = "curves.json"
@@ -43,7 +44,7 @@ def _thin(curves: Curves) -> dict[str, Any]:
     found = asdict(curves)
     for parts in (("omega", "phase_deg", "magnitude_db"), ("time", "output")):
         signals = [np.asarray(found[name], float) for name in parts]
-        kept = thinned(*signals[1:], most=MOST) if len(signals[0]) else []
+        kept: Any = thinned(*signals[1:], most=MOST) if len(signals[0]) else []
         found |= {
             name: [_rounded(v) for v in signal[kept]] for name, signal in zip(parts, signals) if len(signal)
         }
@@ -85,7 +86,9 @@ def _study(told: dict[str, Any], kept: dict[str, Any], where: str) -> Study:
     )
 
 
-def _paired(key: str, values: Sequence, curves: Sequence, read) -> list:
+def _paired(
+    key: str, values: Sequence[Any], curves: Sequence[Any], read: Callable[[dict[str, Any]], Any]
+) -> list[Any]:
     if len(values) != len(curves) or any(set(c) != {f.name for f in fields(Curves)} for c in curves):
         raise ValueError(key)
     return [read({key: value, "curves": one}) for value, one in zip(values, curves)]
@@ -94,6 +97,12 @@ def _paired(key: str, values: Sequence, curves: Sequence, read) -> list:
 def _plant(told: dict[str, Any] | None, kept: dict[str, Any] | None) -> Plant | None:
     if told is None:
         return None
-    parts = zip(told["rows"], kept["outputs"], strict=True)
+    parts = zip(told["rows"], present(kept)["outputs"], strict=True)
     rows = tuple(read_plant({"plant": row | {"output": output}}) for row, output in parts)
-    return Plant(told["transfer"], told["sample_time"], tuple(kept["time"]), tuple(kept["exact"]), rows)
+    return Plant(
+        told["transfer"],
+        told["sample_time"],
+        tuple(present(kept)["time"]),
+        tuple(present(kept)["exact"]),
+        rows,
+    )

@@ -6,22 +6,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
+from focgen.fractional.exponential import ExponentialMemory
 from focgen.fractional.transfer import Term, TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.canonical import realise
 from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.response import filtered_response
 from focgen.plan.scenario import Scenario, physical_trace, to_raw
-from focgen.studies.model import INPUTS, Variant
+from focgen.studies.results import INPUTS, Variant
 from focgen.studies.signals import Inputs, exact_power, inputs, relative_errors, signed
 
 
 @dataclass(frozen=True)
 class OpenLoop:
-    """See :class:`focgen.studies.model.Row` for each number."""
+    """See :class:`focgen.studies.results.Row` for each number."""
 
     errors: dict[str, float]
     bound: float | None
@@ -59,7 +61,7 @@ def variant_of(controller: Controller, variant: Variant) -> Controller:
     )
 
 
-def measure(controller: Controller, plan: Plan, own: float, samples: int, omega: np.ndarray) -> OpenLoop:
+def measure(controller: Controller, plan: Plan, own: float, samples: int, omega: Array) -> OpenLoop:
     """Run the operator and the controller's ``plan`` on the four inputs.
 
     ``controller`` is the variant; ``own`` and ``samples`` as :func:`focgen.studies.signals.inputs` has them;
@@ -74,17 +76,20 @@ def measure(controller: Controller, plan: Plan, own: float, samples: int, omega:
     bounds = [bound for _, bound, _ in each]
     exact = ideal(controller, given.scenario).d
     ahead = max(relative_errors(_ahead(plan, given.scenario), exact).values(), default=None)
-    return OpenLoop(errors, None if None in bounds else max(bounds), ahead, max(s for _, _, s in each))
+    proved = [bound for bound in bounds if bound is not None]
+    return OpenLoop(
+        errors, max(proved) if len(proved) == len(bounds) else None, ahead, max(s for _, _, s in each)
+    )
 
 
-def _ahead(plan: Plan, scenario: Scenario) -> np.ndarray:
+def _ahead(plan: Plan, scenario: Scenario) -> Array:
     """The signal ahead of the integrator, physical, shape (lanes, samples)."""
     return physical_trace(plan, execute(plan, to_raw(plan, scenario))).d
 
 
 def operator_alone(controller: Controller, term: Term) -> Controller:
     """The controller with nothing but one power of s, and its largest gain."""
-    gains = controller.gain.gains if controller.scheduled else (controller.gain,)
+    gains = controller.gains
     return replace(
         controller,
         transfer=TransferFunction([term]),
@@ -94,24 +99,30 @@ def operator_alone(controller: Controller, term: Term) -> Controller:
 
 
 def _power(
-    controller: Controller, term: Term, given: Inputs, omega: np.ndarray
+    controller: Controller, term: Term, given: Inputs, omega: Array
 ) -> tuple[dict[str, float], float | None, float]:
     """The errors of one power by input, what proves that they are no larger, and the error against s^α."""
     alone = operator_alone(controller, term)
     plan = build_plan(alone)
-    exact = alone.gain * term.coefficient * exact_power(term.order, alone.sample_time, given.error)
+    exact = alone.gains[0] * term.coefficient * exact_power(term.order, alone.sample_time, given.error)
     scenario = replace(given.scenario, sched=None)
     errors = relative_errors(_ahead(plan, scenario), exact)
     return errors, _proved(plan, np.abs(exact)), _continuous(plan, term, omega)
 
 
-def _continuous(plan: Plan, term: Term, omega: np.ndarray) -> float:
+def _continuous(plan: Plan, term: Term, omega: Array) -> float:
     """The largest |H(e^jωh) / (jω)^α − 1| of a power that stands alone."""
     exact = term.coefficient * (1j * omega) ** term.order
     return float(np.abs(filtered_response(plan, omega) / exact - 1.0).max())
 
 
-def _proved(plan: Plan, sizes: np.ndarray) -> float | None:
+def _kernels(plan: Plan) -> list[float]:
+    """What is proved of the kernels of memories below the order 1."""
+    fitted = (m for m in plan.memories if isinstance(m, ExponentialMemory))
+    return [m.certificate.kernel for m in fitted if m.differences == 1]
+
+
+def _proved(plan: Plan, sizes: Array) -> float | None:
     """The largest relative error that plan and certificate allow for the inputs whose exact outputs are
     ``sizes``; None where nothing is proved.
 
@@ -130,6 +141,6 @@ def _proved(plan: Plan, sizes: np.ndarray) -> float | None:
     for name, largest in zip(INPUTS, sizes.max(axis=1)):
         memory = left_out / largest
         if name in ("step", "ramp"):
-            memory = min([memory, *(m.certificate.kernel for m in plan.memories if m.differences == 1)])
+            memory = min([memory, *_kernels(plan)])
         found[name] = memory + proved.operator / largest
     return float(max(found.values()))

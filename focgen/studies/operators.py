@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from focgen.fractional.continuous import RATIOS
-from focgen.studies.model import Band, Row, Variant
+from focgen.present import present
 from focgen.studies.recommend import SETTLING
+from focgen.studies.results import Band, Row, Variant
 from focgen.studies.spectrum import PHASE
 
 TOLERANCES = (0.03, 0.01)
@@ -40,18 +42,23 @@ def compared_band(band: Band, sample_time: float) -> Band | None:
 
 def continuous_variants(band: Band, arithmetic: str, sample_time: float) -> list[Variant]:
     """Fits over a band that :func:`compared_band` gives."""
-    given = dict(operator="continuous", band=(band.low, band.high))
+    given: dict[str, Any] = dict(operator="continuous", band=(band.low, band.high))
     return [Variant("exponential", arithmetic, sample_time, tolerance=e, **given) for e in TOLERANCES]
+
+
+def _off(row: Row) -> float:
+    """How far a row that was compared is from s^α."""
+    return present(row.error_s)
 
 
 def chosen(weights: Row | None, fits: list[Row]) -> Choice | None:
     """Compare an exponential memory of the weights with the leanest fit that is at least as close to s^α, or
     else the closest; None where either is missing."""
-    able = sorted((row for row in fits if row.error_s is not None), key=lambda row: row.error_s)
+    able = sorted((row for row in fits if row.error_s is not None), key=_off)
     if weights is None or weights.error_s is None or not able:
         return None
-    closer = [row for row in able if row.error_s <= weights.error_s] or able[:1]
-    fit = min(closer, key=lambda row: (row.ram_bytes, row.error_s))
+    closer = [row for row in able if _off(row) <= weights.error_s] or able[:1]
+    fit = min(closer, key=lambda row: (row.ram_bytes, _off(row)))
     operator, cost = _decided(weights, fit)
     both = f"{_told('gl', weights)}; {_told('continuous', fit)}"
     return Choice(operator, f"Operator {operator}: {cost} ({both}).", (weights, fit))
@@ -60,7 +67,7 @@ def chosen(weights: Row | None, fits: list[Row]) -> Choice | None:
 def _decided(weights: Row, fit: Row) -> tuple[str, str]:
     """The operator, and what speaks for it."""
     if weights.margin_deg is None or fit.margin_deg is None:
-        if weights.error_s <= _LAG:
+        if _off(weights) <= _LAG:
             return "gl", f"its lag leaves s^α within {100 * _LAG:.2g} % over the band"
         return "continuous", f"the weights' lag takes them more than {100 * _LAG:.2g} % from s^α in the band"
     lost = fit.margin_deg - weights.margin_deg
@@ -82,7 +89,7 @@ def _slower(weights: Row, fit: Row) -> bool:
 
 
 def _told(name: str, row: Row) -> str:
-    said = [f"{100 * row.error_s:.2g} % from s^α at most"]
+    said = [f"{100 * _off(row):.2g} % from s^α at most"]
     if row.margin_deg is not None:
         said.append(f"{row.margin_deg:.1f}°")
     if row.settling_s is not None:

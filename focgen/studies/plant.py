@@ -7,14 +7,16 @@ from functools import lru_cache
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import actuator_of
 from focgen.fractional.recursion import ExponentialRecursion
 from focgen.fractional.responses import step_response
 from focgen.fractional.simulation import GrunwaldLetnikov, gl_operator
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Rig
-from focgen.studies.model import PlantRow, Variant
+from focgen.present import present
+from focgen.rig.rig import Rig
+from focgen.studies.results import PlantRow, Variant
 
 HOURS = 1.0
 _MOST = 400_000  # samples
@@ -41,7 +43,7 @@ def plant_samples(sample_time: float) -> int:
     return min(math.ceil(HOURS * 3600.0 / sample_time), _MOST) + 1
 
 
-def plant_times(sample_time: float) -> np.ndarray:
+def plant_times(sample_time: float) -> Array:
     """The samples that are drawn, spread evenly in log time; shape (n,), whole numbers."""
     last = plant_samples(sample_time) - 1
     first = max(1, round(_SECONDS_LEAST / sample_time))
@@ -49,7 +51,7 @@ def plant_times(sample_time: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=4)
-def exact_step(plant: TransferFunction, sample_time: float) -> np.ndarray:
+def exact_step(plant: TransferFunction, sample_time: float) -> Array:
     """The continuous plant's step response at :func:`plant_times`."""
     return step_response(plant, plant_times(sample_time) * sample_time)
 
@@ -58,7 +60,7 @@ def plant_row(plant: TransferFunction, variant: Variant) -> PlantRow:
     """Simulate the plant in float64 with the variant's memory."""
     h, count = variant.sample_time, plant_samples(variant.sample_time)
     if variant.memory == "exponential":
-        recursion = ExponentialRecursion(plant, h, variant.horizon, variant.tolerance)
+        recursion = ExponentialRecursion(plant, h, present(variant.horizon), present(variant.tolerance))
         output, rest, states = recursion.run(np.ones(count)), 1.0, recursion.states
     else:
         output = GrunwaldLetnikov(plant, h, variant.length).run(np.ones(count))

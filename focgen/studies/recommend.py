@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from focgen.control.controller import Controller
-from focgen.studies.model import Band, Ideal, Row
+from focgen.present import present
+from focgen.studies.results import Band, Ideal, Row
 from focgen.studies.spectrum import PHASE
 
 SETTLING = 0.03  # of the ideal's
@@ -19,9 +20,14 @@ def pareto(rows: Sequence[Row], sample_time: float) -> dict[str, tuple[int, ...]
     return {cost: _front(rows, sample_time, cost) for cost in COSTS}
 
 
+def _length(row: Row) -> int:
+    """Of a row of short memory."""
+    return present(row.length)
+
+
 def _front(rows: Sequence[Row], sample_time: float, cost: str) -> tuple[int, ...]:
     def place(i: int) -> tuple[float, float]:
-        return getattr(rows[i], cost), rows[i].error
+        return getattr(rows[i], cost), present(rows[i].error)
 
     able = [
         i
@@ -30,13 +36,13 @@ def _front(rows: Sequence[Row], sample_time: float, cost: str) -> tuple[int, ...
     ]
     found: list[int] = []
     for i in sorted(able, key=place):
-        if not found or rows[i].error < rows[found[-1]].error:
+        if not found or present(rows[i].error) < present(rows[found[-1]].error):
             found.append(i)
     return tuple(found)
 
 
 @dataclass(frozen=True)
-class Wish:
+class Requirement:
     """What a memory must do: phase within 2° over the band, and where the loop is known the mean settling
     time within 3 % of ``ideal``.
     """
@@ -51,8 +57,9 @@ class Wish:
         loop = self.ideal.loop
         if loop is None or loop.settling_s is None:
             return True
-        settled = row.settling_s is not None and row.stable
-        return bool(settled and abs(row.settling_s - loop.settling_s) <= SETTLING * loop.settling_s)
+        if row.settling_s is None or not row.stable:
+            return False
+        return abs(row.settling_s - loop.settling_s) <= SETTLING * loop.settling_s
 
     def __str__(self) -> str:
         said = f"the phase within {PHASE:g}° above {self.band.low:.2g} rad/s"
@@ -62,24 +69,24 @@ class Wish:
 
 
 def shortest(
-    rows: Sequence[Row], wish: Wish, more: Callable[[int], Row]
+    rows: Sequence[Row], requirement: Requirement, more: Callable[[int], Row]
 ) -> tuple[Row | None, tuple[Row, ...]]:
-    """The shortest short memory that keeps the wish, found by halving between ``rows``.
+    """The shortest short memory that keeps the requirement, found by halving between ``rows``.
 
     ``rows``: short memories of one arithmetic and sample time; ``more`` measures another length. The second
     result are the rows that it took.
     """
-    tried = sorted((r for r in rows if r.error is not None), key=lambda r: r.length)
-    best = next((r for i, r in enumerate(tried) if all(map(wish.kept, tried[i:]))), None)
+    tried = sorted((r for r in rows if r.error is not None), key=_length)
+    best = next((r for i, r in enumerate(tried) if all(map(requirement.kept, tried[i:]))), None)
     if best is None:
         return None, ()
-    low, made = max((r.length for r in tried if r.length < best.length), default=0), []
+    low, made = max((_length(r) for r in tried if _length(r) < _length(best)), default=0), []
     for _ in range(_ROUNDS):
-        middle = _round(low, best.length)
+        middle = _round(low, _length(best))
         if middle is None:
             break
         made.append(more(middle))
-        low, best = (low, made[-1]) if wish.kept(made[-1]) else (middle, best)
+        low, best = (low, made[-1]) if requirement.kept(made[-1]) else (middle, best)
     return best, tuple(made)
 
 
@@ -90,15 +97,15 @@ def _round(low: int, high: int) -> int | None:
     return middle if low < middle < high else None
 
 
-def leanest(rows: Sequence[Row], wish: Wish) -> Row | None:
-    """The row with the fewest bytes of state that keeps the wish."""
-    able = [row for row in rows if row.ram_bytes is not None and wish.kept(row)]
+def leanest(rows: Sequence[Row], requirement: Requirement) -> Row | None:
+    """The row with the fewest bytes of state that keeps the requirement."""
+    able = [row for row in rows if row.ram_bytes is not None and requirement.kept(row)]
     return min(able, key=lambda row: (row.ram_bytes, row.multiplies), default=None)
 
 
 def sentence(
     controller: Controller,
-    wish: Wish,
+    requirement: Requirement,
     short: Row | None,
     exponential: Row | None,
     asked: set[str],
@@ -109,16 +116,17 @@ def sentence(
     other = ""
     if exponential is not None:
         price = f"{exponential.ram_bytes} B ({exponential.states} states, {_work(exponential)})"
-        other = f"the exponential form does it in {price}"
+        other = f"exponential form does it in {price}."
     where = f"in {controller.arithmetic} at {controller.sample_time:g} s"
     if short is not None:
-        first = f"L = {short.length} keeps {wish} ({where}), at {short.ram_bytes} B and {_work(short)}"
-        return f"{first}; {other}." if other else f"{first}."
+        first = f"L = {short.length} keeps {requirement} ({where}), at {short.ram_bytes} B and {_work(short)}"
+        return f"{first}. The {other}" if other else f"{first}."
     if "short" in asked and other:
-        return f"No length up to L = {longest} keeps {wish} ({where}); {other}."
+        return f"No length up to L = {longest} keeps {requirement} ({where}). The {other}"
     if other:
-        return f"To keep {wish} ({where}), {other}."
-    return f"None of the {' and '.join(sorted(asked & set(able)))} memories looked at keeps {wish} ({where})."
+        return f"To keep {requirement} ({where}), the {other}"
+    looked_at = " and ".join(sorted(asked & set(able)))
+    return f"None of the {looked_at} memories looked at keeps {requirement} ({where})."
 
 
 def _work(row: Row) -> str:

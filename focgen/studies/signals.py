@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import fftconvolve
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.fractional.weights import gl_weights
 from focgen.plan.scenario import Scenario
-from focgen.studies.model import INPUTS
+from focgen.studies.results import INPUTS
 
 _PERIOD = 500  # samples of the sine's period at the controller's own sample time: 0.2 Hz at 10 ms
 _SEED = 20
@@ -22,7 +23,7 @@ class Inputs:
 
     sample_time: float
     amplitude: float
-    error: np.ndarray
+    error: Array
     scenario: Scenario
 
 
@@ -55,23 +56,23 @@ def inputs(controller: Controller, own: float, samples: int) -> Inputs:
     return Inputs(controller.sample_time, amplitude, error, _scenario(controller, error))
 
 
-def _scenario(controller: Controller, error: np.ndarray) -> Scenario:
+def _scenario(controller: Controller, error: Array) -> Scenario:
     (r0, r1), (m0, m1) = controller.ranges.reference, controller.ranges.measurement
     reference = np.clip(0.5 * (m0 + m1) + error, r0, r1)  # the measurement takes what is left: in its range
     sched = None
     if controller.scheduled:
-        points, gains = controller.gain.breakpoints, np.abs(controller.gain.gains)
+        points, gains = controller.schedule.breakpoints, np.abs(controller.gains)
         sched = np.full(error.shape, points[int(np.argmax(gains))])
     return Scenario(reference, reference - error, sched)
 
 
-def exact_power(order: float, sample_time: float, x: np.ndarray) -> np.ndarray:
+def exact_power(order: float, sample_time: float, x: Array) -> Array:
     """D^``order`` of the rows of ``x``, at rest before: the whole sum of eq. (10), shape (rows, samples)."""
     weights = sample_time**-order * gl_weights(order, x.shape[1] - 1)
     return np.array([fftconvolve(row, weights)[: x.shape[1]] for row in x])
 
 
-def relative_errors(found: np.ndarray, exact: np.ndarray) -> dict[str, float]:
+def relative_errors(found: Array, exact: Array) -> dict[str, float]:
     """For each input the largest error relative to the largest exact output, both (4, samples); without those
     whose exact output is 0 throughout.
     """

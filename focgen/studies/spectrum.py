@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Array, Complex
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding
+from focgen.loop.frequency import any_schedule, sampled_response
 from focgen.loop.frozen import frozen_loop, frozen_margins
-from focgen.loop.response import any_schedule, sampled_response
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.response import designed_response, running_gain, running_response
-from focgen.rig.model import Rig
-from focgen.studies.model import Band
+from focgen.rig.rig import Rig
+from focgen.studies.results import Band
 
 PHASE = 2.0  # degrees
 _BELOW, _ABOVE = 10.0, 10.0  # how far the band reaches beyond the slowest and the fastest crossover
@@ -26,9 +27,9 @@ _WITHOUT = (1e-3, 0.1)  # of the Nyquist frequency, where no rig tells the band
 class Spectrum:
     """Errors at ``omega`` (rad/s, inside the band), phase in degrees and magnitude in dB; all (points,)."""
 
-    omega: np.ndarray
-    phase_deg: np.ndarray
-    magnitude_db: np.ndarray
+    omega: Array
+    phase_deg: Array
+    magnitude_db: Array
 
     @property
     def good_from(self) -> float | None:
@@ -62,7 +63,7 @@ def _crossovers(controller: Controller, rig: Rig, setpoints: tuple[float, ...]) 
     return [m.crossover_rad_s for m in margins if math.isfinite(m.crossover_rad_s)]
 
 
-def omegas(band: Band, sample_time: float) -> np.ndarray:
+def omegas(band: Band, sample_time: float) -> Array:
     """The frequencies that are looked at, up to Nyquist, rad/s, shape (points,)."""
     return np.geomspace(band.low, min(band.high, 0.999 * math.pi / sample_time), _POINTS)
 
@@ -83,5 +84,5 @@ def sampling_spectrum(controller: Controller, band: Band) -> Spectrum:
     return _errors(omega, sampled_response(controller, omega) / exact)
 
 
-def _errors(omega: np.ndarray, ratio: np.ndarray) -> Spectrum:
+def _errors(omega: Array, ratio: Complex) -> Spectrum:
     return Spectrum(omega, np.degrees(np.angle(ratio)), 20.0 * np.log10(np.abs(ratio)))

@@ -18,7 +18,7 @@ class Store:
     A changed controller, rig, setting or version asks for other names, so nothing stale is ever used.
     """
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path) -> None:
         self.folder = folder / "rows"
 
     def find(self, job: Job) -> dict[str, Any] | None:
@@ -33,7 +33,8 @@ class Store:
         """Write an answer, whole or not at all, and return it as it will be read."""
         text = json.dumps(found, ensure_ascii=False, allow_nan=False)
         write_file(self._place(job), text + "\n")
-        return json.loads(text)
+        made: dict[str, Any] = json.loads(text)
+        return made
 
     def _place(self, job: Job) -> Path:
         return self.folder / f"{job.key}.json"

@@ -19,15 +19,15 @@ from focgen.errors import ControllerError, DesignError, InputError, check_choice
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.files import read_rig
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 from focgen.spelling import respelled
 from focgen.studies.grid import Grid, grid_of
 from focgen.studies.jobs import Job, read_ideal, read_plant, read_row
-from focgen.studies.model import Curves, Ideal, Plant, PlantRow, Row, Setup, Study, Variant
 from focgen.studies.operator import fractional_terms
 from focgen.studies.operators import Choice, chosen, compared_band, continuous_variants
 from focgen.studies.plant import exact_step, plant_of, plant_times
-from focgen.studies.recommend import Wish, leanest, pareto, sentence, shortest
+from focgen.studies.recommend import Requirement, leanest, pareto, sentence, shortest
+from focgen.studies.results import Curves, Ideal, Plant, PlantRow, Row, Setup, Study, Variant
 from focgen.studies.spectrum import band_of
 from focgen.studies.store import Store
 from focgen.studies.sweep import Workers, sweep
@@ -126,8 +126,10 @@ def _rig(
         what = f"{places[0]} has changed since the controller was designed from it"
         return None, [f"{what}: give --rig {places[0]} for the closed-loop columns with it as it is"]
     return None, [
-        f"{made_from.file}, which the controller was designed from, is not beside it: "
-        "give --rig for the closed-loop columns"
+        (
+            f"{made_from.file}, which the controller was designed from, is not beside it: "
+            "give --rig for the closed-loop columns"
+        )
     ]
 
 
@@ -163,7 +165,7 @@ _FAITHFUL = 0.03  # of the weights: what such a memory is off by is their lag, n
 class _Sweep:
     """The jobs of one study, and what becomes of them."""
 
-    def __init__(self, setup: Setup, grid: Grid, store: Store, workers: Workers):
+    def __init__(self, setup: Setup, grid: Grid, store: Store, workers: Workers) -> None:
         self.setup, self.grid, self.store, self.workers = setup, grid, store, workers
         self.own = setup.controller.sample_time
 
@@ -194,12 +196,10 @@ class _Sweep:
             self._plant(plant, plants) if plant is not None else None,
             pareto(every, self._first()),
             said if choice is None else f"{said} {choice.why}",
-            tuple(
-                [
-                    *notes,
-                    *_unsettled(perfect[self.grid.sample_times.index(self._first())][0]),
-                    *_missing(every),
-                ]
+            (
+                *notes,
+                *_unsettled(perfect[self.grid.sample_times.index(self._first())][0]),
+                *_missing(every),
             ),
             tuple(curves for _, curves in rows),
             tuple(curves for _, curves in perfect),
@@ -221,7 +221,7 @@ class _Sweep:
         h, arithmetics = self._first(), self.grid.arithmetics
         own = self.setup.controller.arithmetic
         arithmetic = own if own in arithmetics else arithmetics[0]
-        wish = Wish(self.setup.band, ideal)
+        requirement = Requirement(self.setup.band, ideal)
         mine = [row for row, _ in rows if row.arithmetic == arithmetic and row.sample_time == h]
         added: list[tuple[Row, Curves]] = []
 
@@ -230,10 +230,12 @@ class _Sweep:
             added.append(read_row(found[0]))
             return added[-1][0]
 
-        short, _ = shortest([r for r in mine if r.memory == "short"], wish, more)
-        exponential = leanest([r for r in mine if r.memory == "exponential"], wish)
+        short, _ = shortest([r for r in mine if r.memory == "short"], requirement, more)
+        exponential = leanest([r for r in mine if r.memory == "exponential"], requirement)
         as_run = replace(self.setup.controller, arithmetic=arithmetic, sample_time=h)
-        said = sentence(as_run, wish, short, exponential, set(self.grid.memories), max(self.grid.lengths))
+        said = sentence(
+            as_run, requirement, short, exponential, set(self.grid.memories), max(self.grid.lengths)
+        )
         return said, [*rows, *added]
 
     def _operator(self, rows: list[Row]) -> Choice | None:

@@ -13,6 +13,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import ExitStack, contextmanager
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 from focgen.errors import InputError, MissingExtra
@@ -32,18 +33,19 @@ class Workers:
     MissingExtra where Dask is not installed.
     """
 
-    def __init__(self, processes: int | None = None, scheduler: str | None = None):
+    def __init__(self, processes: int | None = None, scheduler: str | None = None) -> None:
         if processes is not None and processes < 1:
             raise InputError("--jobs", f"is {processes}", "give at least 1 process")
         self._processes, self._scheduler = processes or os.cpu_count() or 1, scheduler
-        self._stack, self._called = ExitStack(), None
+        self._stack = ExitStack()
+        self._called: Any = None  # a pool of processes, or a client of Dask
 
     def __enter__(self) -> Workers:
         if self._scheduler is not None:  # a wrong address is a fault even where all answers are known
             self._called = self._stack.enter_context(_cluster(self._scheduler))
         return self
 
-    def __exit__(self, *reason) -> None:
+    def __exit__(self, *reason: object) -> None:
         self._stack.close()
 
     def answers(self, jobs: Sequence[Job]) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -56,7 +58,7 @@ class Workers:
 
 def sweep(jobs: Sequence[Job], store: Store, workers: Workers) -> list[dict[str, Any]]:
     """Return the answers in the order of ``jobs``; what the store has is not asked for."""
-    found = [store.find(job) for job in jobs]
+    found: list[Any] = [store.find(job) for job in jobs]
     missing = [place for place, answered in enumerate(found) if answered is None]
     for place, answered in track(workers.answers([jobs[i] for i in missing]), "study", len(missing)):
         found[missing[place]] = store.keep(jobs[missing[place]], answered)
@@ -85,7 +87,7 @@ def _begin() -> None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
-def _end_with(parent) -> None:
+def _end_with(parent: BaseProcess) -> None:
     parent.join()
     os._exit(1)
 
@@ -111,14 +113,15 @@ def _from_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job]) -> Iterator[tuple
 
 
 @contextmanager
-def _cluster(address: str):
+def _cluster(address: str) -> Iterator[Any]:
     """A client of the Dask scheduler at ``address``."""
     try:
         from distributed import Client
     except ImportError:
         raise MissingExtra.of("distributed", "cluster", "--scheduler") from None
     try:
-        client = Client(address, timeout=_PATIENCE)
+        called: Any = Client  # Dask has no types
+        client = called(address, timeout=_PATIENCE)
     except (OSError, ValueError, TimeoutError) as reason:
         said = str(reason).splitlines()[0] if str(reason) else "no answer"
         remedy = "give the address of a running Dask scheduler"
@@ -129,8 +132,10 @@ def _cluster(address: str):
         client.close()
 
 
-def _from_cluster(client, jobs: Sequence[Job]) -> Iterator[tuple[int, dict[str, Any]]]:
-    from distributed import as_completed as as_answered
+def _from_cluster(client: Any, jobs: Sequence[Job]) -> Iterator[tuple[int, dict[str, Any]]]:
+    import distributed  # which has no types
+
+    as_answered: Any = distributed.as_completed
 
     futures = client.map(answer, jobs, pure=False)
     places = {future.key: place for place, future in enumerate(futures)}

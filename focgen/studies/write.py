@@ -8,13 +8,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from focgen.errors import MissingExtra
 from focgen.output import write_files
+from focgen.present import present
+from focgen.shown import files_of
 from focgen.studies.kept import FILE, curves_text
-from focgen.studies.model import Study
+from focgen.studies.results import Study
 
 
-def write(study: Study, folder: Path, inputs: Iterable = ()) -> None:
+def write(study: Study, folder: Path, inputs: Iterable[Any] = ()) -> None:
     """Write all of it, or none. Pictures and page where matplotlib is installed. Raises InputError where one
     of ``inputs`` would be written over.
     """
@@ -22,19 +23,7 @@ def write(study: Study, folder: Path, inputs: Iterable = ()) -> None:
         "study.json": json.dumps(payload(study), indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         FILE: curves_text(study),
     }
-    write_files(folder, files | _shown(study), inputs)
-
-
-def _shown(study: Study) -> dict[str, str | bytes]:
-    """Pictures, and a page with figures of its own or beside them: as far as the libraries are there."""
-    from focgen.report.pages.study import study_page
-    from focgen.report.study import study_pictures
-
-    try:
-        pictures = study_pictures(study)
-    except MissingExtra:
-        pictures = {}
-    return {**pictures, "report.html": study_page(study, pictures).best()}
+    write_files(folder, files | files_of(study), inputs)
 
 
 def payload(study: Study) -> dict[str, Any]:
@@ -59,5 +48,9 @@ def payload(study: Study) -> dict[str, Any]:
 
 
 def _plant(study: Study) -> dict[str, Any]:
-    rows = [{k: v for k, v in asdict(row).items() if k != "output"} for row in study.plant.rows]
-    return {"transfer": study.plant.transfer, "sample_time": study.plant.sample_time, "rows": rows}
+    rows = [{k: v for k, v in asdict(row).items() if k != "output"} for row in present(study.plant).rows]
+    return {
+        "transfer": present(study.plant).transfer,
+        "sample_time": present(study.plant).sample_time,
+        "rows": rows,
+    }

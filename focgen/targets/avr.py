@@ -16,17 +16,20 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.cache import kept
 from focgen.codegen.render import render
 from focgen.codegen.state import state_bytes
 from focgen.compiler import find_compiler
 from focgen.errors import BuildError
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Trace
-from focgen.targets.driver import DTYPES, RESUME, Answers, driver_context, lane_of, given_width
+from focgen.present import present
+from focgen.targets.driver import DTYPES, RESUME, Answers, driver_context, given_width, lane_of
 from focgen.targets.emulator import TargetFault
 
 MCU = "atmega2560"
@@ -46,7 +49,7 @@ class AvrRun:
     """``answers`` of every lane, ``cycles`` of every step (lanes, samples), ``stack`` bytes used at most."""
 
     answers: Answers
-    cycles: np.ndarray
+    cycles: Numbers
     stack: int
 
 
@@ -97,7 +100,7 @@ class AvrLibrary:
 
     alignment = 1
 
-    def __init__(self, plan: Plan, folder: Path, selftest: bool = False):
+    def __init__(self, plan: Plan, folder: Path, selftest: bool = False) -> None:
         self.plan, self.folder, self.test = plan, folder, b""
         with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
             feeder, idle = Path(scratch) / "feeder.c", Path(scratch) / "idle.c"
@@ -146,7 +149,8 @@ class AvrLibrary:
         """
         cell = _symbols(self.test)["cell"][0]
         found = _simulated(self.test, b"\0", [cell, 1, 4, cell, 0], _TEST_CYCLES, _TEST_SECONDS)
-        return struct.unpack_from("<I", found)[0]
+        made: int = struct.unpack_from("<I", found)[0]
+        return made
 
     def _kind(self) -> np.dtype:
         fields = [("u", DTYPES[self.plan.output.ctype]), ("d", DTYPES[self.plan.increment.ctype])]
@@ -163,7 +167,7 @@ class AvrLibrary:
             ("given", kind, given_width(self.plan)),
         ]
         records = np.zeros(scenario.samples, np.dtype(fields))
-        for name in records.dtype.names:
+        for name in present(records.dtype.names):
             records[name] = getattr(lane, name)
         records["event"][1:] |= RESUME
         records["event"][-1] |= _END_OF_LANE
@@ -203,7 +207,7 @@ def _compiled(sources: list[Path], folder: Path, *more: str) -> bytes:
         return target.read_bytes()
 
 
-def _elf(content: bytes):
+def _elf(content: bytes) -> Any:
     from elftools.elf.elffile import ELFFile
 
     return ELFFile(io.BytesIO(content))

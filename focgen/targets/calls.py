@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.plan.model import Plan
+from focgen.arrays import Numbers
+from focgen.plan.plan import Plan
 from focgen.targets.driver import CALLS, DTYPES, PREPARE, given_width
-from focgen.targets.run import PATIENCE, TargetLibrary
+from focgen.targets.library import PATIENCE, TargetLibrary
 from focgen.targets.timing import timing
 
 
@@ -43,7 +44,7 @@ def call_costs(library: TargetLibrary, plan: Plan) -> dict[str, CallCost]:
     return found
 
 
-def _arguments(plan: Plan) -> np.ndarray:
+def _arguments(plan: Plan) -> Numbers:
     """ref, meas, u0, u of track; parameters at the upper ends of their boxes."""
     forms = plan.reference, plan.measurement, plan.output, plan.output
     given = [0.5 * (float(form.low) + float(form.high)) for form in forms]

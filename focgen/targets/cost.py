@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from focgen.arrays import Numbers
 from focgen.errors import BuildError, MissingExtra
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
+from focgen.present import present
 from focgen.targets import avr
 from focgen.targets.calls import CallCost, call_costs
 from focgen.targets.cores import Core
-from focgen.targets.run import TargetLibrary
+from focgen.targets.library import TargetLibrary
 from focgen.targets.stack import Stack
 from focgen.targets.steps import StepCosts, exercise, step_costs
 from focgen.targets.timing import HOW
@@ -78,7 +78,7 @@ class Cost:
 
 
 def cost_of(entry: dict[str, Any]) -> Cost:
-    """The cost that an entry of :func:`focgen.targets.asked.entry_of` stands for.
+    """The cost that an entry of :func:`focgen.targets.selection.entry_of` stands for.
 
     Raises TypeError and KeyError where it is none.
     """
@@ -128,7 +128,11 @@ def with_runtimes(
     compilers that are ``lacking`` what installs them.
     """
     cycles = found.cycles_per_step
-    runtimes = {found.compiler: RuntimeCost(found.instructions_per_step.mean, cycles and cycles.mean)}
+    runtimes = {
+        present(found.compiler): RuntimeCost(
+            present(found.instructions_per_step).mean, None if cycles is None else cycles.mean
+        )
+    }
     for chain in others:
         library = TargetLibrary(core, chain, [plan], [folder])
         costs = step_costs(library, plan, measured_steps(plan, core))
@@ -137,6 +141,12 @@ def with_runtimes(
     for line in lacking:
         runtimes[line.partition(":")[0]] = RuntimeCost(skipped=line)
     return replace(found, runtimes=runtimes)
+
+
+def _symbols_of(file: Any) -> Iterator[Any]:
+    """The symbols of an ELF file, which the compiler's linker never leaves out."""
+    table: Any = file.get_section_by_name(".symtab")
+    yield from table.iter_symbols()
 
 
 def cost_on_avr(plan: Plan, folder: Path) -> Cost:
@@ -178,7 +188,7 @@ def measured_steps(plan: Plan, core: Core) -> int:
     return around if has else min(around, _FEW)
 
 
-def _per_step(values: np.ndarray, how: str) -> PerStep:
+def _per_step(values: Numbers, how: str) -> PerStep:
     return PerStep(float(values.mean()), float(values.max()), int(values.size), how)
 
 
@@ -213,7 +223,7 @@ def object_sizes(elf: bytes) -> tuple[dict[str, int], set[str]]:
         flags = section["sh_flags"]
         if flags & 2 and not section.name.startswith(_UNWINDING):
             sizes["code" if flags & 4 else "data" if flags & 1 else "constants"] += section["sh_size"]
-    functions = [s for s in file.get_section_by_name(".symtab").iter_symbols()
+    functions = [s for s in _symbols_of(file)
                  if s["st_info"]["type"] == "STT_FUNC" and s["st_shndx"] != "SHN_UNDEF"]  # fmt: skip
     sizes["save"] = sum(s["st_size"] for s in functions if _SAVING.fullmatch(s.name))
     sizes["code"] -= sizes["save"]

@@ -6,15 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.arrays import Kind, Numbers
 from focgen.codegen.conversions import period_us, tried_conversions
 from focgen.codegen.manifest import lsbs
 from focgen.codegen.render import render
 from focgen.codegen.state import counts_limits
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.plan.tuning import default_params, refused
+from focgen.present import present
 
-DTYPES = {
+DTYPES: dict[str, Kind] = {
     "double": np.float64,
     "float": np.float32,
     "int64_t": np.int64,
@@ -127,32 +129,34 @@ class Answers:
 
 def steps_alone(trace: Trace) -> Trace:
     """A trace from C with the flags of its steps, without what resets and tracks have raised."""
-    return replace(trace, flags=trace.flags & np.uint8(UNTUNED - 1))
+    return replace(trace, flags=present(trace.flags) & np.uint8(UNTUNED - 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Lane:
     """One lane of a scenario as C takes it, in the order of NAME_run's arguments."""
 
-    ref: np.ndarray
-    meas: np.ndarray
-    sched: np.ndarray
-    event: np.ndarray
-    given: np.ndarray
+    ref: Numbers
+    meas: Numbers
+    sched: Numbers
+    event: Numbers
+    given: Numbers
 
 
 def lane_of(plan: Plan, scenario: Scenario, lane: int) -> Lane:
     """The arrays of one lane; where nothing is scheduled ``sched`` is there and not looked at."""
     signal = DTYPES[plan.output.ctype]
     sched = scenario.ref if scenario.sched is None else scenario.sched
-    inputs = [np.ascontiguousarray(x[lane], dtype=signal) for x in (scenario.ref, scenario.meas, sched)]
-    return Lane(*inputs, *_events(plan, scenario, lane, signal))
+    ref, meas, by = (
+        np.ascontiguousarray(x[lane], dtype=signal) for x in (scenario.ref, scenario.meas, sched)
+    )
+    return Lane(ref, meas, by, *_events(plan, scenario, lane, signal))
 
 
-def _events(plan: Plan, scenario: Scenario, lane: int, signal: type) -> tuple[np.ndarray, np.ndarray]:
+def _events(plan: Plan, scenario: Scenario, lane: int, signal: type) -> tuple[Numbers, Numbers]:
     """What happens ahead of each sample, and its values (ref, meas, u0, u applied; parameters)."""
     event = np.zeros(scenario.samples, np.uint8)
-    given = np.zeros((scenario.samples, given_width(plan)), signal)
+    given: Numbers = np.zeros((scenario.samples, given_width(plan)), signal)
     for at in (scenario.samples // 3, 2 * scenario.samples // 3):
         event[at] |= _SAVE if at else 0
     for r in scenario.resets:
@@ -163,11 +167,11 @@ def _events(plan: Plan, scenario: Scenario, lane: int, signal: type) -> tuple[np
         if t.lane == lane:
             event[t.sample] |= _TRACK
             given[t.sample, 3] = t.u
-    for t in scenario.tunes:
-        if t.lane == lane:
-            event[t.sample] |= _TUNE
-            p = t.params
-            given[t.sample, 4:] = (*p.gain, p.u_min, p.u_max, refused(plan, p))
+    for tune in scenario.tunes:
+        if tune.lane == lane:
+            event[tune.sample] |= _TUNE
+            p = tune.params
+            given[tune.sample, 4:] = (*p.gain, p.u_min, p.u_max, refused(plan, p))
     for d in scenario.damages:
         if d.lane == lane:
             event[d.sample] |= _DAMAGES[d.what]

@@ -13,12 +13,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.cache import kept
 from focgen.compiler import compile_shared
 from focgen.errors import FocgenError, MissingExtra
+from focgen.present import present
 from focgen.targets.cores import Core
 from focgen.targets.legality import memory_accesses
 from focgen.targets.program import FLASH, FLASH_SIZE, RAM, RAM_SIZE, STACK, WORK_SIZE, Program
@@ -71,9 +75,9 @@ class Executed:
     is, was not followed by the one right behind it.
     """
 
-    address: np.ndarray
-    ran: np.ndarray
-    jumped: np.ndarray
+    address: Numbers
+    ran: Numbers
+    jumped: Numbers
 
     def without(self, ranges: Sequence[tuple[int, int]]) -> Executed:
         """All but the instructions in ranges (begin, end) of addresses."""
@@ -84,7 +88,7 @@ class Executed:
 
 
 @cache
-def _unicorn():
+def _unicorn() -> ModuleType:
     try:
         import unicorn
         import unicorn.arm_const
@@ -118,7 +122,7 @@ def _watcher() -> ctypes.CDLL:
 class Machine:
     """A core with a program in its flash. Raises MissingExtra without unicorn."""
 
-    def __init__(self, program: Program):
+    def __init__(self, program: Program) -> None:
         uc = _unicorn()
         self.program, self.core = program, program.core
         self._uc, self._names = uc, _registers(uc, program.core)
@@ -128,7 +132,7 @@ class Machine:
             if section.content:
                 self._machine.mem_write(section.address, section.content)
 
-    def _make(self):
+    def _make(self) -> Any:
         uc = self._uc
         if self.core.arm:  # UC_MODE_MCLASS would put a Cortex-M33 in its place
             machine = uc.Uc(uc.UC_ARCH_ARM, uc.UC_MODE_THUMB)
@@ -165,7 +169,8 @@ class Machine:
         if self._pc() != halt:
             raise TargetFault(f"did not return within {seconds:g} s, at {self.program.place(self._pc())}")
         self._check()
-        return self._machine.reg_read(self._names["first"])
+        made: int = self._machine.reg_read(self._names["first"])
+        return made
 
     def _set(self, arguments: tuple[int, ...]) -> None:
         names, machine = self._names, self._machine
@@ -176,7 +181,8 @@ class Machine:
             machine.reg_write(names["first"] + i, value)
 
     def _pc(self) -> int:
-        return self._machine.reg_read(self._names["pc"]) & (~1 if self.core.arm else ~0)
+        made: int = self._machine.reg_read(self._names["pc"]) & (~1 if self.core.arm else ~0)
+        return made
 
     def paint_stack(self) -> None:
         """Fill the stack's memory, to see later how much of it was used."""
@@ -202,13 +208,13 @@ class Machine:
         self._hook(self._uc.UC_HOOK_CODE, _watcher().focgen_on_code)
         self._machine.ctl_flush_tb()  # a hook does nothing to what has been translated before
 
-    def _hook(self, kind: int, function) -> None:
+    def _hook(self, kind: int, function: Any) -> None:
         """Not through Python: a call of it for every instruction would take hours. And no memory hooks: one
         that is called within an IT block loses the block's condition.
         """
-        handle = ctypes.c_size_t()
+        handle, seen = ctypes.c_size_t(), present(self._seen)
         status = _library().uc_hook_add(self._machine._uch, ctypes.byref(handle), kind,
-                                        ctypes.cast(function, ctypes.c_void_p), ctypes.byref(self._seen),
+                                        ctypes.cast(function, ctypes.c_void_p), ctypes.byref(seen),
                                         ctypes.c_uint64(1), ctypes.c_uint64(0))  # fmt: skip
         if status:
             raise FocgenError("unicorn", f"refused a hook ({status})", "pip install --upgrade unicorn")
@@ -217,7 +223,7 @@ class Machine:
         """Count from 0 again."""
         for array in self._arrays:
             array[:] = 0
-        self._seen.next = 0
+        present(self._seen).next = 0
 
     def executed(self) -> Executed:
         """What ran since watching began, or was forgotten."""
@@ -237,7 +243,7 @@ class Machine:
                               f"at {self.program.place(seen.first_pc)}")  # fmt: skip
 
 
-def _registers(uc, core: Core) -> dict[str, int]:
+def _registers(uc: ModuleType, core: Core) -> dict[str, int]:
     if core.arm:
         a = uc.arm_const
         return {

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from focgen.present import present
 from focgen.targets.cores import Core
+from focgen.targets.instruction import Instruction
 from focgen.targets.timing import stem
 
 _REGISTER, _IMMEDIATE, _MEMORY = 1, 2, 3  # kinds of operands
@@ -24,14 +26,14 @@ class Flow:
     table: bool = False
 
 
-def flow(core: Core, one, before) -> Flow:
+def flow(core: Core, one: Instruction, before: Instruction | None) -> Flow:
     """The flow of an instruction; ``before`` is the one ahead of it, or None. Raises ValueError for a call
     through a pointer.
     """
     return _arm(one) if core.arm else _riscv(one, before)
 
 
-def _arm(one) -> Flow:
+def _arm(one: Instruction) -> Flow:
     name, registers = stem(one), _registers(one)
     conditional = name != one.mnemonic.split(".")[0]
     if name == "blx" and registers:
@@ -42,12 +44,12 @@ def _arm(one) -> Flow:
         return Flow(jumps=one.operands[-1].imm, goes_on=conditional or name != "b")
     if name in ("tbb", "tbh"):
         return Flow(goes_on=False, table=True)
-    leaves = name == "bx" or name in ("pop", "ldm", "ldr") and "pc" in registers or (
+    leaves = name == "bx" or (name in ("pop", "ldm", "ldr") and "pc" in registers) or (
         name == "mov" and registers[:1] == ["pc"])  # fmt: skip
-    return Flow(pushed=_pushed(one, name, registers), goes_on=conditional or not leaves and name != "udf")
+    return Flow(pushed=_pushed(one, name, registers), goes_on=conditional or (not leaves and name != "udf"))
 
 
-def _pushed(one, name: str, registers: list[str]) -> int:
+def _pushed(one: Instruction, name: str, registers: list[str]) -> int:
     if name in ("push", "vpush"):
         return _bytes(registers)
     if name in ("pop", "vpop"):
@@ -57,8 +59,12 @@ def _pushed(one, name: str, registers: list[str]) -> int:
     if name in ("str", "strd", "ldr", "ldrd") and one.writeback:
         return _stored(one)
     last = one.operands[-1] if one.operands else None
-    if registers[:1] == ["sp"] and last.type == _IMMEDIATE and name in ("add", "addw", "sub", "subw"):
-        return last.imm if name.startswith("sub") else -last.imm
+    if (
+        registers[:1] == ["sp"]
+        and present(last).type == _IMMEDIATE
+        and name in ("add", "addw", "sub", "subw")
+    ):
+        return present(last).imm if name.startswith("sub") else -present(last).imm
     return 0
 
 
@@ -66,7 +72,7 @@ def _bytes(registers: list[str]) -> int:
     return sum(8 if name[0] == "d" else 4 for name in registers)
 
 
-def _stored(one) -> int:
+def _stored(one: Instruction) -> int:
     """What a store or load that moves the stack pointer moves it by."""
     memory = next(o for o in one.operands if o.type == _MEMORY)
     if one.reg_name(memory.mem.base) != "sp":
@@ -75,7 +81,7 @@ def _stored(one) -> int:
     return -(last.imm if last.type == _IMMEDIATE else memory.mem.disp)
 
 
-def _riscv(one, before) -> Flow:
+def _riscv(one: Instruction, before: Instruction | None) -> Flow:
     name, registers = one.mnemonic.removeprefix("c."), _registers(one)
     if name in ("jalr", "jr"):
         return _far(one, before, registers)
@@ -92,7 +98,7 @@ def _riscv(one, before) -> Flow:
     return Flow()
 
 
-def _far(one, before, registers: list[str]) -> Flow:
+def _far(one: Instruction, before: Instruction | None, registers: list[str]) -> Flow:
     """A return, or a call or jump in two instructions: the upper bits of the target, then the rest."""
     if registers and registers[-1] == "ra" and (len(registers) == 1 or registers[0] == "zero"):
         return Flow(goes_on=False)
@@ -105,5 +111,5 @@ def _far(one, before, registers: list[str]) -> Flow:
     return Flow(jumps=target, goes_on=False)
 
 
-def _registers(one) -> list[str]:
+def _registers(one: Instruction) -> list[str]:
     return [one.reg_name(o.reg) for o in one.operands if o.type == _REGISTER]

@@ -8,9 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from types import ModuleType
+from typing import Any
 
 from focgen.errors import MissingExtra
 from focgen.targets.cores import Core
+from focgen.targets.instruction import Instruction
 from focgen.targets.program import Program
 
 _RISCV = {"lw": 3, "sw": 3, "lh": 1, "lhu": 1, "sh": 1}
@@ -18,16 +21,17 @@ _WIDE_M0 = ("bl", "dmb", "dsb", "isb", "mrs", "msr", "udf")
 _ALIGNED = ("ldm", "stm", "ldrd", "strd", "push", "pop", "vldr", "vstr", "vldm", "vstm", "vpush", "vpop")
 
 
-def _capstone():
+def _capstone() -> ModuleType:
     try:
         import capstone
     except ImportError:
         raise MissingExtra.of("capstone", "targets", "reading machine code") from None
-    return capstone
+    found: ModuleType = capstone
+    return found
 
 
 @cache
-def disassembler(core: Core):
+def disassembler(core: Core) -> Any:
     """Capstone for a core, with details. Raises MissingExtra without it."""
     cs = _capstone()
     if core.arm:
@@ -38,7 +42,7 @@ def disassembler(core: Core):
     return made
 
 
-def instructions(program: Program) -> list:
+def instructions(program: Program) -> list[Any]:
     """Every instruction of a program by rising address, literal pools left out.
 
     What cannot be read as an instruction is passed over.
@@ -48,7 +52,7 @@ def instructions(program: Program) -> list:
     return program.read_code
 
 
-def _instructions(program: Program) -> Iterator:
+def _instructions(program: Program) -> Iterator[Any]:
     reader = disassembler(program.core)
     for begin, end in program.code_ranges:
         while begin < end:
@@ -71,7 +75,7 @@ def forbidden(program: Program) -> tuple[str, ...]:
     return tuple(seen.values())
 
 
-def _why_not(core: Core, one) -> str | None:
+def _why_not(core: Core, one: Instruction) -> str | None:
     groups = {one.group_name(g) for g in one.groups}
     name = one.mnemonic
     if name.startswith("v"):
@@ -90,10 +94,15 @@ def _why_not(core: Core, one) -> str | None:
 
 
 def _extends_and_adds(name: str, groups: set[str]) -> bool:
-    return "T2EXTRACTPACK" in groups and name.split(".")[0] not in ("sxtb", "sxth", "uxtb", "uxth")
+    return "T2EXTRACTPACK" in groups and name.split(".", maxsplit=1)[0] not in (
+        "sxtb",
+        "sxth",
+        "uxtb",
+        "uxth",
+    )
 
 
-def _double(one) -> bool:
+def _double(one: Instruction) -> bool:
     """Whether it computes with 64-bit floating values; moving them about is not computing."""
     return ".f64" in one.mnemonic
 
@@ -125,7 +134,7 @@ def memory_accesses(program: Program) -> Iterator[tuple[int, Access]]:
             yield one.address, Access(*operand, mask, one.cc - 1 if program.core.arm else 14, 0)
 
 
-def _mask(core: Core, one) -> int:
+def _mask(core: Core, one: Instruction) -> int:
     name = one.mnemonic.split(".")[0]
     if not core.arm:
         name = name.removeprefix("c.")
@@ -137,7 +146,7 @@ def _mask(core: Core, one) -> int:
     return 1 if name[3:].startswith(("h", "sh")) else 0 if name[3:].startswith(("b", "sb")) else 3
 
 
-def _memory_operand(core: Core, one) -> tuple[int, int, int, int] | None:
+def _memory_operand(core: Core, one: Instruction) -> tuple[int, int, int, int] | None:
     """Base, index (unicorn's numbers), offset and shift of an access; None for one that is always aligned."""
     cs = _capstone()
     kind = cs.arm.ARM_OP_MEM if core.arm else cs.riscv.RISCV_OP_MEM
@@ -154,11 +163,12 @@ def _memory_operand(core: Core, one) -> tuple[int, int, int, int] | None:
     return base, _number(core, one, memory.index), memory.disp, found[0].shift.value
 
 
-def _number(core: Core, one, register: int) -> int:
+def _number(core: Core, one: Instruction, register: int) -> int:
     """Unicorn's number of capstone's register."""
     if not register:
         return 0
     from unicorn import arm_const, riscv_const
 
     prefix, numbers = ("UC_ARM_REG_", arm_const) if core.arm else ("UC_RISCV_REG_", riscv_const)
-    return getattr(numbers, prefix + one.reg_name(register).upper())
+    made: int = getattr(numbers, prefix + one.reg_name(register).upper())
+    return made

@@ -5,13 +5,14 @@ from __future__ import annotations
 import io
 import tempfile
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from focgen.codegen.render import render
 from focgen.errors import MissingExtra
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.targets.cores import Core
 from focgen.targets.toolchains import EXACT, Toolchain, link
 
@@ -55,10 +56,10 @@ class Program:
     symbols: tuple[Symbol, ...]
     code_ranges: tuple[tuple[int, int], ...]
     elf: bytes = b""
-    read_code: list = field(init=False, repr=False, default_factory=list)
+    read_code: list[Any] = field(init=False, repr=False, default_factory=list)
     _by_name: dict[str, Symbol] = field(init=False, repr=False, default_factory=dict)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._by_name.update({symbol.name: symbol for symbol in self.symbols})
 
     def __getitem__(self, name: str) -> Symbol:
@@ -153,7 +154,7 @@ def read_program(core: Core, chain: Toolchain, names: tuple[str, ...], elf: byte
     return Program(core, chain, names, sections, tuple(symbols), ranges, elf)
 
 
-def _sections(file):
+def _sections(file: Any) -> Iterator[Section]:
     for section in file.iter_sections():
         flags, size = section["sh_flags"], section["sh_size"]
         if not flags & 2 or not size:  # not loaded
@@ -163,7 +164,7 @@ def _sections(file):
         yield Section(section.name, section["sh_addr"], content, size, kind)
 
 
-def _symbols(file) -> tuple[list[Symbol], list[tuple[int, bool]]]:
+def _symbols(file: Any) -> tuple[list[Symbol], list[tuple[int, bool]]]:
     """Functions and objects; and the marks where code ($t, $x) and data ($d) begin within sections."""
     found, marks = [], []
     code = {i for i, section in enumerate(file.iter_sections()) if section["sh_flags"] & 4}
@@ -179,7 +180,7 @@ def _symbols(file) -> tuple[list[Symbol], list[tuple[int, bool]]]:
     return found, sorted(set(marks))
 
 
-def _code_ranges(section: Section, marks: list[tuple[int, bool]]):
+def _code_ranges(section: Section, marks: list[tuple[int, bool]]) -> Iterator[tuple[int, int]]:
     """The parts of a code section that are instructions; all of it where nothing is marked."""
     end = section.address + section.size
     inside = [(a, is_code) for a, is_code in marks if section.address <= a < end]

@@ -16,12 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Trace
+from focgen.present import present
 from focgen.targets.cores import Core
 from focgen.targets.emulator import TargetFault
+from focgen.targets.library import Work, results
 from focgen.targets.program import Program
-from focgen.targets.run import Work, results
 
 _NAME = "qemu-system-arm"
 _PATIENCE = 60.0  # s
@@ -63,7 +64,10 @@ def _trace(program: Program, plan: Plan, scenario: Scenario) -> Trace:
         for address, content in job.inputs:
             image[address - core.work : address - core.work + len(content)] = content
     found = _run(program, bytes(image), _PATIENCE + scenario.ref.size * (200 + plan.taps) * 2e-5)
-    read = lambda address, size: found[address - core.results : address - core.results + size]  # noqa: E731
+
+    def read(address: int, size: int) -> bytes:
+        return found[address - core.results : address - core.results + size]
+
     u, d, flags = (np.stack(part) for part in zip(*(results(plan, job, read) for job in jobs)))
     return Trace(u, d if plan.integrator else u, flags)
 
@@ -74,7 +78,8 @@ def _run(program: Program, image: bytes, seconds: float) -> bytes:
         base = Path(scratch)
         (base / "program.elf").write_bytes(program.elf)
         (base / "inputs.bin").write_bytes(image)
-        command = [_NAME, "-M", program.core.board, "-nographic", "-monitor", "none", "-serial", "none",
+        command = [_NAME, "-nographic", "-M", present(program.core.board),
+                   "-monitor", "none", "-serial", "none",
                    "-semihosting-config", "enable=on,target=native", "-kernel", "program.elf", "-device",
                    f"loader,file=inputs.bin,addr={program.core.work:#x},force-raw=on"]  # fmt: skip
         try:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from focgen.targets.flow import Flow, flow
+from focgen.targets.instruction import Instruction
 from focgen.targets.legality import instructions
 from focgen.targets.program import Program
 
@@ -38,7 +39,7 @@ class Stack:
     A call through a pointer cannot be followed and is an error, as is recursion; generated C has neither.
     """
 
-    def __init__(self, program: Program):
+    def __init__(self, program: Program) -> None:
         self._program = program
         self._functions = {f.address: f for f in program.functions()}
         self._begins = sorted(self._functions)
@@ -103,7 +104,7 @@ class Stack:
         visits = {self._owner(address) for address in seen}
         return Frame(deepest, tuple(sorted(calls.items())), tuple(sorted(visits)))
 
-    def _onward(self, one, does: Flow) -> list[int]:
+    def _onward(self, one: Instruction, does: Flow) -> list[int]:
         found = [does.jumps] if does.jumps is not None else []
         found += [one.address + one.size] if does.goes_on else []
         if does.table:  # any piece of code behind the table, up to the function's end

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.plan.model import Plan
+from focgen.arrays import Numbers
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Reset, Scenario
-from focgen.targets.run import TargetLibrary
+from focgen.targets.library import TargetLibrary
+from focgen.targets.program import Program
 from focgen.targets.timing import timing
 
 
@@ -18,8 +20,8 @@ class StepCosts:
     core without one); ``stack``: bytes that steps used at most, as seen.
     """
 
-    instructions: np.ndarray
-    cycles: np.ndarray | None
+    instructions: Numbers
+    cycles: Numbers | None
     stack: int
 
 
@@ -58,7 +60,7 @@ def exercise(plan: Plan, steps: int, seed: int) -> Scenario:
     return Scenario(signals[0], signals[1], signals[2] if plan.schedule else None, (reset,))
 
 
-def _outside(program, plan: Plan) -> list[tuple[int, int]]:
+def _outside(program: Program, plan: Plan) -> list[tuple[int, int]]:
     """The code that runs besides the step: what feeds it."""
     names = (f"{plan.name}_run", f"{plan.name}_flags", f"{plan.name}_init", "focgen_run", "focgen_halt")
     found = [program[name] for name in names if name in program]

@@ -17,8 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Numbers
+from focgen.present import present
 from focgen.targets.cores import Core
 from focgen.targets.emulator import Executed
+from focgen.targets.instruction import Instruction, Operand
 from focgen.targets.legality import instructions
 from focgen.targets.program import Program
 
@@ -41,9 +44,9 @@ class Timing:
     else than the instruction behind it follows, ``next`` in addition where that one does.
     """
 
-    each: np.ndarray
-    jump: np.ndarray
-    next: np.ndarray
+    each: Numbers
+    jump: Numbers
+    next: Numbers
 
     def cycles(self, ran: Executed) -> float:
         """Estimate the cycles of what ran."""
@@ -68,7 +71,7 @@ def timing(program: Program) -> Timing | None:
     return table
 
 
-def stem(one) -> str:
+def stem(one: Instruction) -> str:
     """An instruction's name without width and condition."""
     name = one.mnemonic.split(".")[0]
     if not _sure(name):
@@ -81,7 +84,7 @@ def _sure(name: str) -> bool:
     return name not in ("teq", "mls", "smmls", "vmls", "vnmls", "vfms", "movs", "muls", "bics", "lsls")
 
 
-def _cycles(core: Core, one) -> tuple[float, float]:
+def _cycles(core: Core, one: Instruction) -> tuple[float, float]:
     """Cycles of one instruction, and what a jump adds."""
     name = stem(one)
     if core.name == "cortex-m0plus":
@@ -100,7 +103,7 @@ def _cycles(core: Core, one) -> tuple[float, float]:
     return _multiplied(core, name), refill
 
 
-def _m0plus(name: str, one) -> tuple[float, float]:
+def _m0plus(name: str, one: Instruction) -> tuple[float, float]:
     if name.startswith(("ldm", "stm", "push", "pop")):
         return 1 + _registers(name, one), 2
     if name.startswith(("ldr", "str")):
@@ -117,7 +120,7 @@ def _multiplied(core: Core, name: str) -> float:
     return 2 if name in ("mla", "mls") and core.name == "cortex-m3" else 1
 
 
-def _floating(name: str, one) -> float:
+def _floating(name: str, one: Instruction) -> float:
     if name.startswith(("vldm", "vstm", "vpush", "vpop")):
         return 1 + _words(one, 0 if name in ("vpush", "vpop") else 1)
     if name.startswith(("vldr", "vstr")):
@@ -127,49 +130,49 @@ def _floating(name: str, one) -> float:
     return _FLOAT.get(name, 1)
 
 
-def _together(core: Core, before, one) -> float:
+def _together(core: Core, before: Instruction | None, one: Instruction) -> float:
     """What two neighbours add to, or take from, their cycles."""
     if core.name == "cortex-m0plus":
         return 0
-    first, second = stem(before), stem(one)
+    first, second = stem(present(before)), stem(one)
     if first in _ARITHMETIC:  # a result that the next instruction reads comes a cycle later
-        return 1 if before.operands and _reads(one, before.operands[0].reg) else 0
-    overlaps = first.startswith("ldr") and not first.startswith("ldrd") and not before.writeback
+        return 1 if present(before).operands and _reads(one, present(before).operands[0].reg) else 0
+    overlaps = first.startswith("ldr") and not first.startswith("ldrd") and not present(before).writeback
     if not overlaps or second.startswith(("ldrd", "strd")):
         return 0
-    if second.startswith("ldr") and not one.writeback or second.startswith("str") and _indexed(one):
-        return 0 if _addressed_by(one, before.operands[0].reg) else -1
+    if (second.startswith("ldr") and not one.writeback) or (second.startswith("str") and _indexed(one)):
+        return 0 if _addressed_by(one, present(before).operands[0].reg) else -1
     return 0
 
 
-def _reads(one, register: int) -> bool:
+def _reads(one: Instruction, register: int) -> bool:
     operands = [o for o in one.operands if o.type == 1]  # registers
     sources = operands if stem(one) in ("vcmp", "vcmpe", "vstr", *_FLOAT) else operands[1:]
     return any(o.reg == register for o in sources)
 
 
-def _addressed_by(one, register: int) -> bool:
+def _addressed_by(one: Instruction, register: int) -> bool:
     """Whether a register is part of the address of a load or store."""
     return any(register in (o.mem.base, o.mem.index) for o in one.operands if o.type == 3)
 
 
-def _indexed(one) -> bool:
+def _indexed(one: Instruction) -> bool:
     """Whether a register is added to the address."""
     return any(o.type == 3 and o.mem.index for o in one.operands)
 
 
-def _registers(name: str, one) -> int:
+def _registers(name: str, one: Instruction) -> int:
     """Words that are loaded or stored by several at once."""
     if name.startswith(("ldrd", "strd")):
         return 2
     return len(one.operands) - (0 if name.startswith(("push", "pop")) else 1)
 
 
-def _words(one, skip: int) -> int:
+def _words(one: Instruction, skip: int) -> int:
     """Words of the floating registers among the operands."""
     names = [one.reg_name(o.reg) for o in one.operands[skip:] if o.type == 1]
     return sum(2 if name.startswith("d") else 1 for name in names if name[0] in "ds" and name != "sp")
 
 
-def _is_core_register(one, operand) -> bool:
+def _is_core_register(one: Instruction, operand: Operand) -> bool:
     return operand.type == 1 and one.reg_name(operand.reg)[0] not in "ds"

@@ -23,11 +23,8 @@ EXACT = ("-O2", "-std=c99", "-ffp-contract=off")
 
 _ZIG = ("-ffreestanding", "-fno-sanitize=undefined", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
 _GCC = ("-fno-tree-loop-distribute-patterns", "-nostdlib")
-_GCC_OF = {
-    True: ("arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
-    False: ("riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf"),
-}
-"""Command and package of GCC, for ARM and for RISC-V."""
+_ARM_GCC = "arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi"  # command and package
+_RISCV_GCC = "riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf"
 _SLOW = 300.0  # s; Zig's first build also builds its runtime
 
 
@@ -59,7 +56,7 @@ def absent(core: Core) -> tuple[str, ...]:
     if _zig() is None:
         lines.append("zig: not installed (pip install 'focgen[targets]')")
     if _gcc(core) is None:
-        name, package = _GCC_OF[core.arm]
+        name, package = _gcc_named(core)
         lines.append(f"{name}: not installed (apt-get install {package})")
     return tuple(lines)
 
@@ -73,7 +70,13 @@ def _zig() -> Toolchain | None:
 
 
 def _gcc(core: Core) -> Toolchain | None:
-    return _gcc_of(_GCC_OF[core.arm][0])
+    command, _ = _gcc_named(core)
+    return _gcc_of(command)
+
+
+def _gcc_named(core: Core) -> tuple[str, str]:
+    """Command and package of the GCC for a core."""
+    return _ARM_GCC if core.arm else _RISCV_GCC
 
 
 @cache

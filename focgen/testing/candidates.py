@@ -11,8 +11,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.errors import InputError
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Params, Reset, Scenario, Track, Tune
 from focgen.running.controller import LoadedController
 from focgen.running.load import load
@@ -25,9 +26,11 @@ class Steps(Protocol):
     ``tune(params)``, which takes ``gain``, ``u_min`` and ``u_max`` of :class:`focgen.plan.scenario.Params`.
     """
 
-    def reset(self, ref: Any, meas: Any, u0: Any) -> None: ...
+    def reset(self, ref: Any, meas: Any, u0: Any) -> None:
+        """Start at the output ``u0``, all in counts."""
 
-    def step(self, ref: Any, meas: Any, *sched: Any) -> Any: ...
+    def step(self, ref: Any, meas: Any, *sched: Any) -> Any:
+        """One sample in counts; the output in counts."""
 
 
 def tunes(candidate: Candidate) -> bool:
@@ -52,8 +55,8 @@ class Candidate:
 class Played:
     """What a candidate has answered, shape (lanes, samples); ``flags`` None where it has none."""
 
-    u: np.ndarray
-    flags: np.ndarray | None
+    u: Numbers
+    flags: Numbers | None
 
 
 def candidate_of(given: Any, plan: Plan) -> Candidate:
@@ -78,7 +81,7 @@ def candidate_of(given: Any, plan: Plan) -> Candidate:
 class _Function:
     """A plain step."""
 
-    def __init__(self, step: Callable[..., Any]):
+    def __init__(self, step: Callable[..., Any]) -> None:
         self.step = step
 
     def init(self) -> None:
@@ -154,7 +157,7 @@ def _lane(one: Steps, plan: Plan, scenario: Scenario, lane: int) -> tuple[list[f
                 _happen(one, event)
             u.append(float(one.step(*given)))
             if flagged:
-                now = getattr(one, "flags")
+                now = getattr(one, "flags")  # noqa: B009 - which a candidate may have
                 flags.append(int(now() if callable(now) else now))
         except Exception as error:
             now = events.get(k, "no event")

@@ -8,20 +8,21 @@ from typing import Any, Literal
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.control.controller import Controller
 from focgen.control.files import read_controller
 from focgen.errors import InputError, check_choice
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.plan.ideal import ideal
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Reset, Scenario, Track
 from focgen.running.controller import LoadedController
 from focgen.testing.candidates import Candidate, Played, candidate_of, played, tunes
 from focgen.testing.inputs import Trial, bounded_trials, exact_trials
 from focgen.testing.telling import difference
-from focgen.verification.apart import Crashed, TimedOut, apart
 from focgen.verification.folder import read_folder
+from focgen.verification.subprocess_call import Crashed, TimedOut, in_subprocess
 
 __all__ = ["Equivalence", "assert_equivalent"]
 
@@ -49,11 +50,11 @@ class Judged:
 
     trial: Trial
     seen: Played
-    u: np.ndarray
-    flags: np.ndarray | None
-    error: np.ndarray
-    allowed: np.ndarray | None
-    wrong: np.ndarray
+    u: Numbers
+    flags: Numbers | None
+    error: Numbers
+    allowed: Numbers | None
+    wrong: Numbers
 
 
 def assert_equivalent(
@@ -136,7 +137,7 @@ def _run(candidate: Candidate, plan: Plan, scenarios: list[Scenario]) -> list[Pl
         return played(candidate, plan, scenarios)
     limit = _PATIENCE + _SLOW * sum(s.ref.size for s in scenarios)
     try:
-        seen: list[Played] = apart(played, candidate, plan, scenarios, seconds=limit)
+        seen: list[Played] = in_subprocess(played, candidate, plan, scenarios, seconds=limit)
         return seen
     except Crashed as how:
         raise AssertionError(f"{candidate.label} crashed ({how})") from None
@@ -161,7 +162,7 @@ def _in_bound(plan: Plan, trial: Trial, seen: Played) -> Judged:
     return Judged(trial, seen, expected.u, None, error, allowed, ~(error <= allowed))
 
 
-def _steps(plan: Plan, scenario: Scenario) -> np.ndarray:
+def _steps(plan: Plan, scenario: Scenario) -> Numbers:
     """Over how many samples the output's error may have grown; shape (lanes, samples).
 
     An integral's since init, a reset or a track. Otherwise one, unless an inner integral remembers.
@@ -181,5 +182,5 @@ def _counted(judged: list[Judged]) -> tuple[int, int]:
     return sum(int(np.count_nonzero(one.wrong)) for one in judged), sum(one.wrong.size for one in judged)
 
 
-def _share(judged: Judged) -> np.ndarray:
+def _share(judged: Judged) -> Numbers:
     return np.zeros(1) if judged.allowed is None else judged.error / judged.allowed

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Track, to_physical, to_raw
 from focgen.verification.scenarios import mixed, raw_scenarios, worst_cases
 

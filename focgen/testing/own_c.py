@@ -45,7 +45,7 @@ class OwnC:
 
     isolated = True
 
-    def __init__(self, name: str, library: Any, ffi: FFI, glue: _Glue):
+    def __init__(self, name: str, library: Any, ffi: FFI, glue: _Glue) -> None:
         self.name, self.scheduled = name, glue.scheduled
         self._library, self._ffi = library, ffi
         self._state = ffi.new("double[]", -(-library.focgen_bytes() // 8) or 1)  # aligned for every member

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from focgen.plan.model import Format, Plan
+from focgen.plan.plan import Format, Plan
 from focgen.plan.scenario import Reset, Track, Tune
 from focgen.testing.candidates import events_of
 

@@ -1,13 +1,13 @@
 """The baseline every diagnosis must beat: which hand-made regressor looks most like the residual.
 
-The nominal rig is simulated stage by stage on measured inputs, its own parameters refitted to first order;
-the stage whose residual is the largest share of its signal is taken, and of its effects the one whose
+The nominal rig is simulated stage by stage on measured inputs, its nominal parameters refitted to first
+order; the stage whose residual is the largest share of its signal is taken, and of its effects the one whose
 regressor has the largest cosine with that residual.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +15,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 import focgen
-from focgen.rig.model import UNITY, Rig
+from focgen.arrays import Array
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import UNITY, Rig
 from focgen.trials.severity import Trial, moved_rigs, rms
 
 _STEP = 0.01
@@ -59,7 +61,8 @@ def guess(case: Path) -> str | None:
         return None
     logs = focgen.read_logs(rig, sorted((case / "logs").iterdir()))
     best, found = -1.0, None
-    inputs, waiting = "command", []
+    inputs = "command"
+    waiting: list[str] = []
     for name, effects in _STAGES.items():
         waiting += effects
         if name in logs[0]:
@@ -70,7 +73,9 @@ def guess(case: Path) -> str | None:
     return found
 
 
-def _look(rig: Rig, logs, inputs: str, name: str, effects: Sequence[str]) -> tuple[float, str]:
+def _look(
+    rig: Rig, logs: Sequence[Experiment], inputs: str, name: str, effects: Sequence[str]
+) -> tuple[float, str]:
     """Relative residual of the part from ``inputs`` to ``name``, and the best-looking of ``effects``."""
     part = _part(rig, inputs, name)
     every = round(rig.sample_time / _STEP)
@@ -93,7 +98,7 @@ def _look(rig: Rig, logs, inputs: str, name: str, effects: Sequence[str]) -> tup
             sensitive,
         )
         looks[effect] = abs(shape @ rest) / (np.linalg.norm(shape) * np.linalg.norm(rest) + 1e-300)
-    return rms(rest) / np.ptp(measured), max(looks, key=looks.get)
+    return rms(rest) / np.ptp(measured), max(looks, key=lambda effect: looks[effect])
 
 
 def _part(rig: Rig, inputs: str, name: str) -> Rig:
@@ -105,24 +110,26 @@ def _part(rig: Rig, inputs: str, name: str) -> Rig:
     return replace(rig, regulator=UNITY, actuator=None)
 
 
-def _without(values: np.ndarray, columns: list[np.ndarray]) -> np.ndarray:
+def _without(values: Array, columns: Sequence[Array]) -> Array:
     kept = [c / np.linalg.norm(c) for c in columns if np.linalg.norm(c) > 0.0]
     if not kept:
         return values
     matrix = np.stack(kept, axis=1)
-    return values - matrix @ np.linalg.lstsq(matrix, values, rcond=1e-8)[0]
+    made: Array = values - matrix @ np.linalg.lstsq(matrix, values, rcond=1e-8)[0]
+    return made
 
 
-def _low(s: np.ndarray, tau: float, Ts: float) -> np.ndarray:
+def _low(s: Array, tau: float, Ts: float) -> Array:
     share = np.exp(-Ts / tau)
-    return lfilter([1.0 - share], [1.0, -share], s)
+    made: Array = lfilter([1.0 - share], [1.0, -share], s)
+    return made
 
 
-def _rate(s: np.ndarray, Ts: float) -> np.ndarray:
+def _rate(s: Array, Ts: float) -> Array:
     return np.gradient(s, Ts)
 
 
-def _play(s: np.ndarray, width: float) -> np.ndarray:
+def _play(s: Array, width: float) -> Array:
     out, at = np.empty_like(s), 0.0
     for i, value in enumerate(s):
         at = min(max(at, value - width), value + width)
@@ -131,7 +138,7 @@ def _play(s: np.ndarray, width: float) -> np.ndarray:
 
 
 # of the simulated signal s (share of its span), the session's time t and the sample time
-_REGRESSORS = {
+_REGRESSORS: dict[str, Callable[[Array, Array, float], Array]] = {
     "transport_delay": lambda s, t, Ts: _rate(s, Ts),
     "slow_regulator": lambda s, t, Ts: s - _low(s, 0.3, Ts),
     "valve_asymmetry": lambda s, t, Ts: np.minimum(_rate(s, Ts), 0.0),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from pathlib import Path
+from typing import Any
 
 import cffi
 
@@ -20,7 +21,7 @@ def _compile(target: Path) -> None:
 
 
 @functools.cache
-def library():
+def library() -> tuple[Any, Any]:
     """Return ``(ffi, lib)``. Raises BuildError where there is no compiler or it fails."""
     digest = hashlib.sha256(" ".join(_FLAGS).encode())
     for path in sorted(_SOURCES.iterdir()):

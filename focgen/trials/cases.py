@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.control.controller import Controller
-from focgen.rig.model import Ranges, Rig
-from focgen.trials import excitation
+from focgen.rig.rig import Ranges, Rig
+from focgen.trials import patterns
 from focgen.trials.designs import Design, Truth, draw_design
 from focgen.trials.forms import Drawn, Spans
 from focgen.trials.machine import Machine, Session, Setting, Trace
@@ -28,10 +30,10 @@ class Case:
     what is true, in closed loop the ideal controller, and in open loop the ``bench``, for further logs."""
 
     rig: Rig
-    logs: list[tuple[str, dict]]
-    unseen: list[tuple[str, dict]]
+    logs: list[tuple[str, dict[str, Any]]]
+    unseen: list[tuple[str, dict[str, Any]]]
     recorder: Recorder
-    label: dict
+    label: dict[str, Any]
     controller: Controller | None = None
     bench: Bench | None = None
 
@@ -42,13 +44,13 @@ class Stage:
 
     rig: Rig
     full: float
-    seen: list[excitation.Experiment]
-    unseen: list[excitation.Experiment]
+    seen: list[patterns.Experiment]
+    unseen: list[patterns.Experiment]
     clocks: list[float]
     spans: Spans
     coarse: Trial
 
-    def commands(self, experiments: Sequence[excitation.Experiment], h: float) -> list[np.ndarray]:
+    def commands(self, experiments: Sequence[patterns.Experiment], h: float) -> list[Array]:
         """The experiments' commands on the grid of step ``h``."""
         repeat = round(self.rig.sample_time / h)
         return [np.repeat(e.levels * self.full, repeat) for e in experiments]
@@ -82,10 +84,10 @@ def label_of(
     assignment: Assignment,
     signals: str,
     suite: str,
-    truth: list[dict],
+    truth: list[dict[str, Any]],
     recorder: Recorder,
     design: Design | None = None,
-) -> dict:
+) -> dict[str, Any]:
     """What is sealed, but for the noise floor, which the logs tell."""
     return {
         "kind": assignment.kind,
@@ -97,21 +99,21 @@ def label_of(
     }
 
 
-def _set_up(assignment, signals, suite, design: Design | None, rng) -> Stage:
+def _set_up(
+    assignment: Assignment, signals: str, suite: str, design: Design | None, rng: np.random.Generator
+) -> Stage:
     Ts = float(rng.choice((0.02, 0.05)))
     rig, full = draw_linear(rng, Ts) if assignment.linear else draw_chain(rng, signals, Ts)
-    seen = design.draw(rng, Ts) if design else excitation.SUITES[suite](rng, Ts)
-    unseen = excitation.unseen(rng, Ts)
+    seen = design.draw(rng, Ts) if design else patterns.SUITES[suite](rng, Ts)
+    unseen = patterns.unseen(rng, Ts)
     clocks = clocks_of([*seen, *unseen], Ts, rng)
-    bare = Stage(rig, full, seen, unseen, clocks, None, None)
+    bare = Stage(rig, full, seen, unseen, clocks, None, None)  # type: ignore[arg-type]  # filled in below
     coarse = Trial(bare.commands(seen, _COARSE), clocks[: len(seen)], _COARSE)
     spans = spans_of(rig, full, coarse, clocks[-1])
     return replace(bare, spans=spans, coarse=coarse)
 
 
-def clocks_of(
-    experiments: Sequence[excitation.Experiment], Ts: float, rng: np.random.Generator
-) -> list[float]:
+def clocks_of(experiments: Sequence[patterns.Experiment], Ts: float, rng: np.random.Generator) -> list[float]:
     """When each experiment begins: after the one before and a rest of 10 to 30 s; whole samples."""
     clocks, now = [], 0.0
     for experiment in experiments:
@@ -144,14 +146,16 @@ def _atmosphere(rig: Rig, span: float) -> float:
     return 5.0 * span
 
 
-def draw_effect(effect: str, severity: str, stage: Stage, rng: np.random.Generator) -> tuple[Setting, dict]:
+def draw_effect(
+    effect: str, severity: str, stage: Stage, rng: np.random.Generator
+) -> tuple[Setting, dict[str, Any]]:
     """One of the effect's forms, calibrated, and what the label says of it."""
     drawn = draw_form(effect, rng, stage.spans)
     setting, gap = calibrate(drawn, stage.rig, stage.coarse, SEVERITIES[severity])
     return setting, _facts(drawn, setting, severity, gap)
 
 
-def draw_truth(truth: Truth, stage: Stage, rng: np.random.Generator) -> tuple[Setting, dict]:
+def draw_truth(truth: Truth, stage: Stage, rng: np.random.Generator) -> tuple[Setting, dict[str, Any]]:
     """The effect and form that a design asks for, and what the label says of it."""
     drawn = draw_form(truth.effect, rng, stage.spans, truth.form)
     if truth.amplitude:
@@ -160,7 +164,7 @@ def draw_truth(truth: Truth, stage: Stage, rng: np.random.Generator) -> tuple[Se
     return setting, _facts(drawn, setting, "given", gap)
 
 
-def _facts(drawn: Drawn, setting: Setting, severity: str, gap: float | None) -> dict:
+def _facts(drawn: Drawn, setting: Setting, severity: str, gap: float | None) -> dict[str, Any]:
     return {
         "effect": drawn.effect,
         "stage": drawn.stage,
@@ -172,7 +176,9 @@ def _facts(drawn: Drawn, setting: Setting, severity: str, gap: float | None) -> 
     }
 
 
-def visibility(truth: list[dict], settings: list[Setting], stage: Stage, recorder: Recorder) -> list[dict]:
+def visibility(
+    truth: list[dict[str, Any]], settings: list[Setting], stage: Stage, recorder: Recorder
+) -> list[dict[str, Any]]:
     """Add to each effect how much of it the logs can show, beside the others."""
     logged = [name for name in MEASURED if name in stage.rig.signals.columns()]
     if not truth:
@@ -201,7 +207,7 @@ class Bench:
     settings: tuple[Setting, ...]
     recorder: Recorder
 
-    def play(self, rng: np.random.Generator) -> list[tuple[str, dict]]:
+    def play(self, rng: np.random.Generator) -> list[tuple[str, dict[str, Any]]]:
         """The session and what stays sealed, as (name, columns by role)."""
         stage = self.stage
         session = Session(Machine(stage.rig, self.settings), _FINE)
@@ -211,7 +217,7 @@ class Bench:
             played.append((experiment.name, self._sampled(trace, session, rng)))
         return played
 
-    def further(self, command: np.ndarray, rng: np.random.Generator) -> dict:
+    def further(self, command: Array, rng: np.random.Generator) -> dict[str, Any]:
         """One more experiment after the session: the log by role of a ``command`` (n,) in its unit."""
         stage = self.stage
         session = Session(Machine(stage.rig, self.settings), _FINE)
@@ -220,11 +226,18 @@ class Bench:
         fine = np.repeat(np.asarray(command, float), round(stage.rig.sample_time / _FINE))
         return self._sampled(session.run(fine, stage.clocks[len(stage.seen)]), session, rng)
 
-    def _sampled(self, trace: Trace, session: Session, rng: np.random.Generator) -> dict:
+    def _sampled(self, trace: Trace, session: Session, rng: np.random.Generator) -> dict[str, Any]:
         return sample(trace, self.stage.rig.sample_time, self.recorder, session, rng)
 
 
-def play_case(stage: Stage, settings, recorder: Recorder, nominal: Rig, label: dict, rng) -> Case:
+def play_case(
+    stage: Stage,
+    settings: Sequence[Setting],
+    recorder: Recorder,
+    nominal: Rig,
+    label: dict[str, Any],
+    rng: np.random.Generator,
+) -> Case:
     """The session, made by the stage's rig with these ``settings`` and given with the ``nominal`` one."""
     bench = Bench(stage, tuple(settings), recorder)
     played = bench.play(rng)

@@ -10,12 +10,14 @@ controller saw them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Bytes, Numbers
 from focgen.control.controller import Controller, ControllerRanges, GainSchedule
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Actuator, Rig
+from focgen.rig.rig import Actuator, Rig
 from focgen.trials.forms import Spans
 from focgen.trials.machine import Session, Trace
 from focgen.trials.recording import Recorder, coloured, quantised
@@ -27,6 +29,9 @@ _JITTER = {"low": 0.06, "mid": 0.12, "high": 0.22}
 _LOST = {"low": 0.005, "mid": 0.02, "high": 0.06}
 _LEFT = {"low": 0.94, "mid": 0.85, "high": 0.7}
 CONTROLLER_EFFECTS = ("short_memory", "fixed_point", "sample_jitter", "missed_samples", "output_saturation")
+
+Played = tuple[Trace, Bytes, Array, Array, Array]
+"""The trace on the fine grid, flags, the output's noise, and the output and pressure that were seen."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,9 @@ class Fault:
 
 def draw_controller(rig: Rig, spans: Spans, rng: np.random.Generator) -> Controller:
     """The paper's controller for this rig; its gain is scheduled where the pressure is logged."""
-    actuator: Actuator = rig.actuator
+    actuator = rig.actuator
+    if not isinstance(actuator, Actuator):
+        raise TypeError("the paper's controller is of a fractional actuator")
     speed, dc = rng.uniform(0.5, 0.9), float(rig.regulator.dc_gain)
     points = tuple(np.linspace(0.0, spans.pressure, 6)) if rig.signals.pressure else None
     slope = [
@@ -71,7 +78,10 @@ def draw_controller(rig: Rig, spans: Spans, rng: np.random.Generator) -> Control
 
 def draw_unknown(rig: Rig, spans: Spans, rng: np.random.Generator) -> Controller:
     """A controller of somebody else's: PI or PID, sluggish to lively, the same at every level."""
-    lag = rig.actuator.T ** (1.0 / rig.actuator.alpha) * rng.uniform(0.3, 1.0)
+    actuator = rig.actuator
+    if not isinstance(actuator, Actuator):
+        raise TypeError("a lag is of a fractional actuator")
+    lag = actuator.T ** (1.0 / actuator.alpha) * rng.uniform(0.3, 1.0)
     gain = float(rng.uniform(0.3, 1.5)) * spans.command / spans.output / lag
     num = [(lag, 1.0), (1.0, 0.0)] + (
         [(0.25 * lag * rng.uniform(0.03, 0.1), 2.0)] if rng.random() < 0.3 else []
@@ -107,7 +117,7 @@ def draw_fault(effect: str | None, severity: str, used: float, rng: np.random.Ge
     return Fault()
 
 
-def ticks(count: int, every: int, fault: Fault, rng: np.random.Generator) -> np.ndarray:
+def ticks(count: int, every: int, fault: Fault, rng: np.random.Generator) -> Bytes:
     """When the controller runs, as flags on the fine grid (count,): every ``every`` steps, late or lost now
     and then.
     """
@@ -123,12 +133,12 @@ def ticks(count: int, every: int, fault: Fault, rng: np.random.Generator) -> np.
     return flags
 
 
-def _late(count: int, spread: float, rng) -> np.ndarray:
+def _late(count: int, spread: float, rng: np.random.Generator) -> Array:
     """Interrupts delay one sample in five, none is early."""
     return np.where(rng.random(count) < 0.2, rng.exponential(2.3 * spread, count), 0.0)
 
 
-def _kept(count: int, fault: Fault, rng) -> np.ndarray:
+def _kept(count: int, fault: Fault, rng: np.random.Generator) -> Array:
     kept = np.ones(count, bool)
     for start in np.flatnonzero(rng.random(count) < fault.lost / fault.burst):
         kept[max(start, 1) : start + rng.geometric(1.0 / fault.burst)] = False
@@ -139,10 +149,10 @@ def _kept(count: int, fault: Fault, rng) -> np.ndarray:
 class Loop:
     """A controller, ideal or with a fault, as the C knows it."""
 
-    def __init__(self, session: Session, controller: Controller, fault: Fault, spans: Spans):
+    def __init__(self, session: Session, controller: Controller, fault: Fault, spans: Spans) -> None:
         self.session, self.controller, self.fault, self.spans = session, controller, fault, spans
 
-    def fresh(self, ideal: bool = False):
+    def fresh(self, ideal: bool = False) -> tuple[Any, tuple[Array, Array]]:
         """A controller at rest; returns it with the arrays that it points to."""
         fault = Fault() if ideal else self.fault
         c, k = self.controller, self.session.ffi.new("controller *")
@@ -151,7 +161,7 @@ class Loop:
         k.length, k.Ts, (k.low, k.high) = length, c.sample_time, c.ranges.output
         k.applied_low, k.applied_high = k.low, fault.limit or k.high
         k.told = int(fault.told)
-        points, gains = (c.gain.breakpoints, c.gain.gains) if c.scheduled else ((0.0,), (c.gain,))
+        points, gains = c.schedule.breakpoints if c.scheduled else (0.0,), c.gains
         k.points = len(points)
         k.breakpoint[0 : len(points)], k.gain[0 : len(points)] = list(points), list(gains)
         if fault.bits:
@@ -161,7 +171,9 @@ class Loop:
         k.weights, k.errors = self.session.pointer(weights), self.session.pointer(errors)
         return k, (weights, errors)
 
-    def run(self, reference: np.ndarray, every: int, clock: float, recorder: Recorder, rng):
+    def run(
+        self, reference: Array, every: int, clock: float, recorder: Recorder, rng: np.random.Generator
+    ) -> Played:
         """One experiment: the trace on the fine grid, the flags, the output's noise, and what the controller
         saw of output and pressure, all (n,)."""
         count, session = len(reference), self.session
@@ -170,18 +182,19 @@ class Loop:
             _at(flags, coloured(rng, int(flags.sum()), recorder.noise.get(n, 0.0)))
             for n in ("output", "pressure")
         ]
-        k, held = self.fresh()
+        k, _held = self.fresh()
         out = [np.zeros(count) for _ in range(6)]
-        ports = [session.pointer(a) for a in (reference, flags, *noise, *out)]
+        arrays: tuple[Numbers, ...] = (reference, flags, *noise, *out)
+        ports = [session.pointer(a) for a in arrays]
         session.blocks(
             count, clock, lambda first, stop: session.lib.close_loop(session.chain, k, first, stop, *ports)
         )
         u, p, z, y, seen_y, seen_p = out
         return Trace(session.h, clock, u, p, z, y), flags, noise[0], seen_y, seen_p
 
-    def ideal_output(self, error: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+    def ideal_output(self, error: Array, pressure: Array) -> Array:
         """What the ideal controller gives for what was seen, sample by sample."""
-        k, held = self.fresh(ideal=True)
+        k, _held = self.fresh(ideal=True)
         error, pressure = (np.ascontiguousarray(a, float) for a in (error, pressure))
         u = np.zeros(len(error))
         ports = [self.session.pointer(a) for a in (error, pressure, u)]
@@ -189,7 +202,7 @@ class Loop:
         return u
 
 
-def gl_weights(transfer: TransferFunction, length: int, Ts: float) -> np.ndarray:
+def gl_weights(transfer: TransferFunction, length: int, Ts: float) -> Array:
     """Weights (length + 1,) of the past samples for a transfer function without a denominator."""
     total = np.zeros(length + 1)
     for term in transfer.num:
@@ -200,13 +213,22 @@ def gl_weights(transfer: TransferFunction, length: int, Ts: float) -> np.ndarray
     return total
 
 
-def _at(flags: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _at(flags: Bytes, values: Array) -> Array:
     spread = np.zeros(len(flags))
     spread[flags == 1] = values
     return spread
 
 
-def logged(trace: Trace, flags, noise_y, seen_y, seen_p, reference, recorder: Recorder, rng) -> dict:
+def logged(
+    trace: Trace,
+    flags: Bytes,
+    noise_y: Array,
+    seen_y: Array,
+    seen_p: Array,
+    reference: Array,
+    recorder: Recorder,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
     """The log of one closed-loop experiment by role: one row for each sample that the controller took."""
     at = np.flatnonzero(flags)
     curvature = trace.curvature[at] + coloured(rng, len(at), recorder.noise["curvature"])

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from focgen.rig.model import Ranges
-from focgen.trials import excitation
+from focgen.arrays import Array
+from focgen.control.controller import Controller
+from focgen.control.equilibrium import actuator_of
+from focgen.rig.rig import Ranges
+from focgen.trials import patterns
 from focgen.trials.cases import Case, Stage, believed, clocks_of, draw_effect, label_of, visibility
 from focgen.trials.closed import (
     CONTROLLER_EFFECTS,
     Fault,
     Loop,
+    Played,
     draw_controller,
     draw_fault,
     draw_unknown,
@@ -21,7 +27,7 @@ from focgen.trials.closed import (
 from focgen.trials.forms import Spans
 from focgen.trials.machine import Machine, Session
 from focgen.trials.plan import Assignment
-from focgen.trials.recording import MEASURED, draw_recorder, floor_of
+from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of
 from focgen.trials.rigs import draw_chain
 from focgen.trials.severity import Trial, rms
 
@@ -76,12 +82,12 @@ def make_closed_case(
     return Case(rig, logs[:count], logs[count:], recorder, label, known)
 
 
-def _set_up(signals: str, rng) -> tuple[Stage, list[np.ndarray]]:
+def _set_up(signals: str, rng: np.random.Generator) -> tuple[Stage, list[Array]]:
     rig, full = draw_chain(rng, signals, _TS)
     rig = replace(rig, signals=replace(rig.signals, reference="ref"))
-    seen, unseen = excitation.references(rng, _TS), excitation.unseen(rng, _TS)
+    seen, unseen = patterns.references(rng, _TS), patterns.unseen(rng, _TS)
     top = full * float(rig.regulator.dc_gain)
-    drive = float(rig.actuator.drive(top))
+    drive = float(actuator_of(rig).drive(top))
     atmosphere = {"_bar": 1.013, "_kPa": 101.3, "_MPa": 0.1013}.get(
         f"_{(rig.signals.pressure or 'p_').split('_')[-1]}"
     )
@@ -89,10 +95,18 @@ def _set_up(signals: str, rng) -> tuple[Stage, list[np.ndarray]]:
     spans = Spans(full, top, drive, drive, drive, atmosphere or 5.0 * top, clocks[-1])
     rig = replace(rig, ranges=Ranges((0.0, 1.3 * full), None, (0.0, 1.3 * drive)))
     references = [np.repeat(0.88 * drive * e.levels, _EVERY) for e in [*seen, *unseen]]
-    return Stage(rig, full, seen, unseen, clocks, spans, None), references
+    return Stage(rig, full, seen, unseen, clocks, spans, None), references  # type: ignore[arg-type]  # a loop has no trial
 
 
-def _run(session: Session, controller, fault: Fault, stage: Stage, references, recorder, rng) -> list[tuple]:
+def _run(
+    session: Session,
+    controller: Controller,
+    fault: Fault,
+    stage: Stage,
+    references: Sequence[Array],
+    recorder: Recorder,
+    rng: np.random.Generator,
+) -> list[Played]:
     loop = Loop(session, controller, fault, stage.spans)
     return [
         loop.run(reference, _EVERY, clock, recorder, rng)
@@ -100,7 +114,9 @@ def _run(session: Session, controller, fault: Fault, stage: Stage, references, r
     ]
 
 
-def _facts(fault: Fault, severity: str, loop: Loop, logs) -> dict:
+def _facts(
+    fault: Fault, severity: str, loop: Loop, logs: Sequence[tuple[str, dict[str, Array]]]
+) -> dict[str, Any]:
     """The label of a controller's fault; its gap is that of the command to the ideal one's, as a share of the
     span.
     """

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from focgen.trials import excitation
-from focgen.trials.excitation import Experiment
+from focgen.trials import patterns
+from focgen.trials.patterns import Experiment
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Design:
     resolves: tuple[str, ...]
     draw: Callable[[np.random.Generator, float], list[Experiment]]
 
-    def facts(self) -> dict:
+    def facts(self) -> dict[str, Any]:
         """What the label says of it."""
         return {"name": self.name, "tied": list(self.tied), "resolves": list(self.resolves)}
 
@@ -58,10 +59,10 @@ def _slow_sine(rng: np.random.Generator, Ts: float) -> list[Experiment]:
 def _gentle(rng: np.random.Generator, Ts: float) -> list[Experiment]:
     """Slow ramps only: whether the motion stops before or behind the sensor's own lag does not show."""
     up = [
-        Experiment(f"ramps{i + 1}", excitation.minor_loops(rng, Ts, speed))
+        Experiment(f"ramps{i + 1}", patterns.minor_loops(rng, Ts, speed))
         for i, speed in enumerate((0.05, 0.03))
     ]
-    return [*up, Experiment("sway", excitation.sines(rng, Ts, (0.02, 0.04), 2.0, 60.0))]
+    return [*up, Experiment("sway", patterns.sines(rng, Ts, (0.02, 0.04), 2.0, 60.0))]
 
 
 _AGAIN = (
@@ -91,7 +92,7 @@ DESIGNS = (
         ),
         "CBA",
         _AGAIN,
-        excitation.rising,
+        patterns.rising,
     ),
     Design(
         "no_curvature",

@@ -9,7 +9,7 @@ from typing import Any
 
 from focgen.errors import InputError
 from focgen.jsontext import fits, read_json
-from focgen.trials.excitation import SUITES
+from focgen.trials.patterns import SUITES
 
 SIGNALS = ("C", "B", "A")
 _NUMBER = re.compile(r"[0-9]{4,9}")
@@ -59,7 +59,7 @@ def facts_of(folder: Path) -> Facts:
     found = read_json(path, _ANEW)
     if not fits(found, _FACTS | _KINDS):
         raise InputError(str(path), f"is no trial: it needs {', '.join(_FACTS)}", _ANEW)
-    facts = Facts(*(found[key] for key in _FACTS), tuple(found.get("kinds", ())))
+    facts = Facts(**{key: found[key] for key in _FACTS}, kinds=tuple(found.get("kinds", ())))
     if facts.suite not in SUITES or facts.signals not in SIGNALS or facts.seed < 0:
         what = f"suite {facts.suite!r}, signals {facts.signals!r}, seed {facts.seed} are none of a trial's"
         raise InputError(str(path), what, _ANEW)
@@ -71,7 +71,7 @@ def facts_of(folder: Path) -> Facts:
     return facts
 
 
-def sealed_label(path: Path) -> tuple[str, dict]:
+def sealed_label(path: Path) -> tuple[str, dict[str, Any]]:
     """Salt and label of a sealed case. Raises InputError where the file holds none."""
     found = read_json(path, _ANEW)
     if not fits(found, {"salt": str, "label": _LABEL}) or not found["salt"].isascii():
@@ -87,7 +87,8 @@ def sealed_label(path: Path) -> tuple[str, dict]:
 
 def outcome_in(run: Path) -> dict[str, Any] | None:
     """What happened in a run; None where it left no word."""
-    return _found(run / "outcome.json", _OUTCOME)
+    made: dict[str, Any] | None = _found(run / "outcome.json", _OUTCOME)
+    return made
 
 
 def diagnosis_in(run: Path) -> dict[str, Any] | None:

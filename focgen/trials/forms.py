@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -39,8 +40,8 @@ class Form:
     name: str
     low: float
     high: float
-    draw: Callable[[np.random.Generator, Spans], Amplitude]
-    memory: Callable[[np.random.Generator], tuple] | None = None
+    draw: Callable[[np.random.Generator, Any], Amplitude]  # for Spans; for Angles where it is of a body
+    memory: Callable[[np.random.Generator], tuple[Any, ...]] | None = None
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Drawn:
     stage: str
     form: Form
     amplitude: Amplitude
-    memory: tuple | None
+    memory: tuple[Any, ...] | None
 
     def at(self, a: float) -> Setting:
         """The setting of amplitude ``a``."""

@@ -4,81 +4,81 @@ from __future__ import annotations
 
 import numpy as np
 
-from focgen.trials.forms import Form, alone, either_way, wander
+from focgen.trials.forms import Amplitude, Form, Spans, alone, either_way, wander
 
 
-def _preisach(rng, s):
+def _preisach(rng: np.random.Generator, s: Spans) -> Amplitude:
     width, level = rng.uniform(1.3, 1.9), rng.uniform(-0.15, 0.3)
     return lambda a: (a, width, level, s.drive)
 
 
-def _duhem(rng, s):
+def _duhem(rng: np.random.Generator, s: Spans) -> Amplitude:
     steep, power = rng.uniform(4.0, 10.0), rng.uniform(1.2, 1.8)
     return lambda a: (a, s.drive, steep, power)
 
 
-def _eyring(rng, s):
+def _eyring(rng: np.random.Generator, s: Spans) -> Amplitude:
     tau, stress = rng.uniform(30.0, 90.0), rng.uniform(0.25, 0.5)
     return lambda a: (a, tau, stress * s.drive)
 
 
-def _roxburgh(rng, s):
+def _roxburgh(rng: np.random.Generator, s: Spans) -> Amplitude:
     floor, slope = rng.uniform(0.08, 0.2), rng.uniform(0.1, 0.3)
     return lambda a: (a, s.drive, floor, slope)
 
 
-def _worked(rng, s):
+def _worked(rng: np.random.Generator, s: Spans) -> Amplitude:
     strokes = rng.uniform(3.0, 12.0)
     return lambda a: (a, s.drive, strokes)
 
 
-def _warm_gain(rng, s):
+def _warm_gain(rng: np.random.Generator, s: Spans) -> Amplitude:
     tau, sign = rng.uniform(0.3, 2.0) * s.session, either_way(rng)
     return lambda a: (sign * a, tau)
 
 
-def _wander_gain(rng, s):
+def _wander_gain(rng: np.random.Generator, s: Spans) -> Amplitude:
     waves, length = wander(rng), rng.uniform(1.0, 1.6) * s.session
     return lambda a: (a, length, *waves)
 
 
-def _viscosity(rng, s):
+def _viscosity(rng: np.random.Generator, s: Spans) -> Amplitude:
     blend = rng.uniform(0.01, 0.04)
     return lambda a: (a, blend * s.drive)
 
 
-def _locking(rng, s):
+def _locking(rng: np.random.Generator, s: Spans) -> Amplitude:
     sharp = rng.uniform(2.5, 6.0)
     return lambda a: (s.drive / a, sharp)
 
 
-def _balloon(rng, s):
+def _balloon(rng: np.random.Generator, s: Spans) -> Amplitude:
     middle, width, sign = rng.uniform(0.35, 0.65), rng.uniform(0.15, 0.3), either_way(rng)
     limit = 0.8 * width if sign < 0 else 1.0  # the curve must keep rising
     return lambda a: (sign * min(a, limit), s.drive, middle, width)
 
 
-def _preload(rng, s):
+def _preload(rng: np.random.Generator, s: Spans) -> Amplitude:
     bend = rng.uniform(0.2, 0.8)
     return lambda a: (a * s.drive, bend * a * s.drive)
 
 
-def _hertz(rng, s):
+def _hertz(rng: np.random.Generator, s: Spans) -> Amplitude:
     knee = rng.uniform(0.4, 0.65)
     return lambda a: (a, knee * s.curvature, 0.2 * s.curvature)
 
 
-def _foam(rng, s):
+def _foam(rng: np.random.Generator, s: Spans) -> Amplitude:
     knee = rng.uniform(0.4, 0.65)
     return lambda a: (s.curvature / a, knee * s.curvature)
 
 
-def _oscillator(rng, s):
+def _oscillator(rng: np.random.Generator, s: Spans) -> Amplitude:
     natural, damping = 2.0 * np.pi * rng.uniform(0.6, 2.2), rng.uniform(0.04, 0.2)
     return lambda a: (a, natural, damping, s.drive)
 
 
-def _log_memory(rng):
+def _log_memory(rng: np.random.Generator) -> tuple[str, float, float]:
     return ("creep", rng.uniform(4.0, 20.0), 200.0)
 
 

@@ -4,44 +4,44 @@ from __future__ import annotations
 
 import numpy as np
 
-from focgen.trials.forms import Form
+from focgen.trials.forms import Amplitude, Form, Spans
 
 
-def _seed(rng) -> float:
+def _seed(rng: np.random.Generator) -> float:
     return float(rng.integers(1, 2**31))
 
 
-def _ripple(rng, s):
+def _ripple(rng: np.random.Generator, s: Spans) -> Amplitude:
     f, seed = rng.uniform(0.4, 2.0), _seed(rng)
     return lambda a: (a * s.pressure, f, seed)
 
 
-def _seam(rng, s):
+def _seam(rng: np.random.Generator, s: Spans) -> Amplitude:
     on, off, seed = rng.uniform(2, 6), rng.uniform(6, 20), _seed(rng)
     return lambda a: (a, on, off, seed)
 
 
-def _swing(rng, s):
+def _swing(rng: np.random.Generator, s: Spans) -> Amplitude:
     period, phase = rng.uniform(25.0, 60.0), rng.uniform(0, 6.28)
     return lambda a: (a * s.curvature, period, phase)
 
 
-def _knock(rng, s):
+def _knock(rng: np.random.Generator, s: Spans) -> Amplitude:
     natural, ring = 2 * np.pi * rng.uniform(1.0, 3.0), rng.uniform(0.4, 1.0)
     return lambda a: (a * s.curvature, 0.03 * a * s.curvature, natural, ring)
 
 
-def _pick_up(rng, s):
+def _pick_up(rng: np.random.Generator, s: Spans) -> Amplitude:
     f, on, off, seed = rng.uniform(0.7, 4.0), rng.uniform(3, 12), rng.uniform(5, 20), _seed(rng)
     return lambda a: (a * s.output, f, on, off, seed)
 
 
-def _plug(rng, s):
+def _plug(rng: np.random.Generator, s: Spans) -> Amplitude:
     on, off, seed = rng.uniform(0.3, 1.2), rng.uniform(4.0, 12.0), _seed(rng)
     return lambda a: (a * s.output, on, off, seed)
 
 
-def _fold(rng, s):
+def _fold(rng: np.random.Generator, s: Spans) -> Amplitude:
     at = rng.uniform(0.3, 0.5)
     return lambda a: (a * at * s.curvature, 0.03 * s.curvature)
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from focgen.trials.forms import Form
+import numpy as np
+
+from focgen.trials.forms import Amplitude, Form, Spans
 
 
-def _block(rng, s):
+def _block(rng: np.random.Generator, s: Spans) -> Amplitude:
     return lambda a: (a * s.drive,)
 
 
-def _stribeck(rng, s):
+def _stribeck(rng: np.random.Generator, s: Spans) -> Amplitude:
     more, speed = rng.uniform(0.15, 0.5), rng.uniform(0.01, 0.05) * s.curvature
     return lambda a: (a * s.drive, more * a * s.drive, speed)
 

@@ -2,45 +2,47 @@
 
 from __future__ import annotations
 
-from focgen.trials.forms import Form, alone
+import numpy as np
+
+from focgen.trials.forms import Amplitude, Form, Spans, alone
 
 
-def _ladder(rng, s):
+def _ladder(rng: np.random.Generator, s: Spans) -> Amplitude:
     return lambda a: (a / 6.0,)
 
 
-def _second_order(rng, s):
+def _second_order(rng: np.random.Generator, s: Spans) -> Amplitude:
     damping = rng.uniform(1.0, 1.6)
     return lambda a: (2.0 * damping / a, damping)
 
 
-def _exhaust(rng, s):
+def _exhaust(rng: np.random.Generator, s: Spans) -> Amplitude:
     way = -1.0 if rng.random() < 0.25 else 1.0
     near = rng.uniform(0.03, 0.1)
     return lambda a: (0.6 / a, s.pressure, near * s.pressure, s.atmosphere, way, 1.5 * s.pressure)
 
 
-def _spool(rng, s):
+def _spool(rng: np.random.Generator, s: Spans) -> Amplitude:
     kinetic, lag = rng.uniform(0.4, 0.7), rng.uniform(0.01, 0.03)
     return lambda a: (a * s.command, kinetic * a * s.command, lag)
 
 
-def _stick_band(rng, s):
+def _stick_band(rng: np.random.Generator, s: Spans) -> Amplitude:
     jump = rng.uniform(0.2, 0.8)
     return lambda a: (a * s.command, jump * a * s.command)
 
 
-def _tank(rng, s):
+def _tank(rng: np.random.Generator, s: Spans) -> Amplitude:
     drain, refill = rng.uniform(0.05, 0.25), rng.uniform(0.5, 3.0)
     return lambda a: (s.pressure * (1.0 - 0.7 * a), drain, refill)
 
 
-def _soft_supply(rng, s):
+def _soft_supply(rng: np.random.Generator, s: Spans) -> Amplitude:
     knee = rng.uniform(0.01, 0.03)
     return lambda a: (s.pressure * (1.0 - 0.7 * a), knee * s.pressure)
 
 
-def _leak(rng, s):
+def _leak(rng: np.random.Generator, s: Spans) -> Amplitude:
     lag = rng.uniform(0.03, 0.2)
     return lambda a: (a, lag, s.pressure, s.atmosphere)
 

@@ -2,69 +2,71 @@
 
 from __future__ import annotations
 
-from focgen.trials.forms import Form, alone, either_way, wander
+import numpy as np
+
+from focgen.trials.forms import Amplitude, Form, Spans, alone, either_way, wander
 
 
-def _bend(rng, s):
+def _bend(rng: np.random.Generator, s: Spans) -> Amplitude:
     sign = either_way(rng)
     return lambda a: (sign * a, s.curvature)
 
 
-def _divider(rng, s):
+def _divider(rng: np.random.Generator, s: Spans) -> Amplitude:
     return lambda a: (a, s.curvature)
 
 
-def _hang(rng, s):
+def _hang(rng: np.random.Generator, s: Spans) -> Amplitude:
     up, down = rng.uniform(0.06, 0.15), rng.uniform(0.06, 0.15)
     return lambda a: (a, s.curvature, up, down)
 
 
-def _lens(rng, s):
+def _lens(rng: np.random.Generator, s: Spans) -> Amplitude:
     way = rng.uniform(0.15, 0.4)
     return lambda a: (a, s.curvature, way)
 
 
-def _healing(rng, s):
+def _healing(rng: np.random.Generator, s: Spans) -> Amplitude:
     tau = rng.uniform(3.0, 15.0)
     return lambda a: (a, tau, s.curvature)
 
 
-def _depths(rng, s):
+def _depths(rng: np.random.Generator, s: Spans) -> Amplitude:
     share = rng.uniform(0.65, 0.9)
     return lambda a: (a, share)
 
 
-def _warm_offset(rng, s):
+def _warm_offset(rng: np.random.Generator, s: Spans) -> Amplitude:
     tau, sign = rng.uniform(0.3, 1.5) * s.session, either_way(rng)
     return lambda a: (sign * a * s.output, tau)
 
 
-def _wander_offset(rng, s):
+def _wander_offset(rng: np.random.Generator, s: Spans) -> Amplitude:
     waves, length = wander(rng), rng.uniform(1.0, 1.6) * s.session
     return lambda a: (a * s.output, length, *waves)
 
 
-def _soft_rail(rng, s):
+def _soft_rail(rng: np.random.Generator, s: Spans) -> Amplitude:
     knee = rng.uniform(0.008, 0.03)
     return lambda a: (s.output * (1.0 - 0.7 * a), knee * s.output)
 
 
-def _sticky_rail(rng, s):
+def _sticky_rail(rng: np.random.Generator, s: Spans) -> Amplitude:
     lag = rng.uniform(0.05, 0.3)
     return lambda a: (s.output * (1.0 - 0.7 * a), lag)
 
 
-def _lazy(rng, s):
+def _lazy(rng: np.random.Generator, s: Spans) -> Amplitude:
     lazy = rng.uniform(0.05, 0.3)
     return lambda a: (a * s.output, lazy)
 
 
-def _uneven(rng, s):
+def _uneven(rng: np.random.Generator, s: Spans) -> Amplitude:
     uneven, phase = rng.uniform(0.03, 0.15), rng.uniform(0, 6.28)
     return lambda a: (a * s.output, uneven, phase)
 
 
-def _stretched_memory(rng):
+def _stretched_memory(rng: np.random.Generator) -> tuple[str, float, float]:
     return ("electrode", rng.uniform(2.0, 8.0), rng.uniform(0.5, 0.8))
 
 

@@ -11,6 +11,8 @@ import math
 
 import numpy as np
 
+from focgen.arrays import Array, Complex
+
 BLOCK = 256
 
 
@@ -19,11 +21,11 @@ class Memory:
     contribute.
     """
 
-    def __init__(self, weights: np.ndarray):
+    def __init__(self, weights: Array) -> None:
         count = len(weights)
         self.w = np.ascontiguousarray(weights)
         self.d, self.far = np.zeros(count), np.zeros(count)
-        self._spectra: dict[int, np.ndarray] = {}
+        self._spectra: dict[int, Complex] = {}
 
     def spread(self, blocks: int) -> None:
         """Add what the finished ``blocks`` owe to the steps after them."""
@@ -36,29 +38,32 @@ class Memory:
         target = self.far[now : now + reach]
         target += owed[: len(target)]
 
-    def _spectrum(self, reach: int) -> np.ndarray:
+    def _spectrum(self, reach: int) -> Complex:
         if reach not in self._spectra:
             self._spectra[reach] = np.fft.rfft(self.w[: 2 * reach], 2 * reach)
         return self._spectra[reach]
 
 
-def l1_weights(alpha: float, count: int) -> np.ndarray:
+def l1_weights(alpha: float, count: int) -> Array:
     """(j + 1)^(1 − alpha) − j^(1 − alpha), j = 0 … count − 1: the L1 scheme for 0 < alpha < 1."""
     return np.diff(np.arange(count + 1.0) ** (1.0 - alpha))
 
 
 def l1_factor(alpha: float, h: float) -> float:
     """h^−alpha / Gamma(2 − alpha), by which the L1 sum becomes the Caputo derivative."""
-    return h**-alpha / math.gamma(2.0 - alpha)
+    made: float = h**-alpha / math.gamma(2.0 - alpha)
+    return made
 
 
-def log_kernel(onset: float, full: float, h: float, count: int) -> np.ndarray:
+def log_kernel(onset: float, full: float, h: float, count: int) -> Array:
     """ln(1 + t/onset), scaled to 1 at ``full`` s, in the middle of each step."""
     t = (np.arange(count) + 0.5) * h
-    return np.log1p(t / onset) / np.log1p(full / onset)
+    made: Array = np.log1p(t / onset) / np.log1p(full / onset)
+    return made
 
 
-def stretched_kernel(tau: float, power: float, h: float, count: int) -> np.ndarray:
+def stretched_kernel(tau: float, power: float, h: float, count: int) -> Array:
     """exp(−(t/tau)^power) in the middle of each step."""
     t = (np.arange(count) + 0.5) * h
-    return np.exp(-((t / tau) ** power))
+    made: Array = np.exp(-((t / tau) ** power))
+    return made

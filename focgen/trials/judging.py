@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 # What a name of the generator may rightly be called by the vocabulary instead of `unknown`.
 ALSO = {"folded_reading": {"sensor_nonlinearity"}}
@@ -11,6 +12,9 @@ ALSO = {"folded_reading": {"sensor_nonlinearity"}}
 LIKE = {"friction": "hysteresis"}
 PROPOSED = "proposed"  # the name of the experiment that a diagnosis proposes, beside those of the menu
 _CAUSED = ("named", "set")
+
+Candidates = tuple[tuple[str, float], ...]
+"""Effect and confidence of each, most likely first."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class Judged:
     form: str
     verdict: str
     stage: str | None
-    causes: tuple[tuple[tuple[str, float], ...], ...]
+    causes: tuple[Candidates, ...]
     proposal: str
     tied: tuple[str, ...] = ()
     resolves: tuple[str, ...] = ()
@@ -98,7 +102,7 @@ class Judged:
     def says_unknown(self) -> bool:
         """Whether the effect was recognised as none of the vocabulary's."""
         allowed = set().union(*(ALSO.get(e, set()) for e in self.effects))
-        return self.verdict == "unknown" or bool(allowed) and self.caused and set(self.reported) <= allowed
+        return self.verdict == "unknown" or (bool(allowed) and self.caused and set(self.reported) <= allowed)
 
     @property
     def says_tied(self) -> bool:
@@ -116,7 +120,7 @@ class Judged:
         return [(cause[0][1], cause[0][0] in self.effects) for cause in self.causes if cause]
 
 
-def _matched(effects, causes) -> int:
+def _matched(effects: tuple[str, ...], causes: tuple[Candidates, ...]) -> int:
     """How many true effects can be paired with causes of their own (at most two: tried both ways)."""
     names = [{effect for effect, _ in cause} for cause in causes]
     best = 0
@@ -131,7 +135,13 @@ def _matched(effects, causes) -> int:
     return best
 
 
-def judge(number: str, label: dict, outcome: dict, diagnosis: dict | None, **measured) -> Judged:
+def judge(
+    number: str,
+    label: dict[str, Any],
+    outcome: dict[str, Any],
+    diagnosis: dict[str, Any] | None,
+    **measured: Any,
+) -> Judged:
     """Hold a diagnosis (None: failed) against its label; ``measured``: further fields of :class:`Judged`."""
     truth, design = label["truth"], label.get("design") or {}
     said = diagnosis or {"verdict": "failed"}
@@ -157,7 +167,7 @@ def judge(number: str, label: dict, outcome: dict, diagnosis: dict | None, **mea
     )
 
 
-def _candidates(cause: dict, truth: list[dict]) -> tuple[tuple[str, float], ...]:
+def _candidates(cause: dict[str, Any], truth: list[dict[str, Any]]) -> Candidates:
     """Effect and confidence of each, by the name of the truth where it may be called as it was."""
     named = [(c["effect"], float(c["confidence"])) for c in cause["candidates"]]
     for effect in (t["effect"] for t in truth):
@@ -166,11 +176,11 @@ def _candidates(cause: dict, truth: list[dict]) -> tuple[tuple[str, float], ...]
     return tuple(named)
 
 
-def _proposal(proposed: dict | None) -> str:
+def _proposal(proposed: dict[str, Any] | None) -> str:
     return f"{proposed.get('what', '')} {proposed.get('why', '')}" if proposed else ""
 
 
-def forgone(diagnosis: dict | None, told: dict | None) -> float | None:
+def forgone(diagnosis: dict[str, Any] | None, told: dict[str, Any] | None) -> float | None:
     """The part of the refitted gap, as mean square above the floor, that the fit of the true effects closes
     beyond what was closed without being told."""
     if not diagnosis or not told:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Numbers
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Actuator, Rig
+from focgen.rig.rig import Actuator, Rig
 from focgen.trials.build import library
 from focgen.trials.history import BLOCK, Memory, l1_factor, l1_weights, log_kernel, stretched_kernel
 
@@ -19,7 +21,7 @@ class Setting:
 
     form: str
     parameters: tuple[float, ...]
-    memory: tuple | None = None
+    memory: tuple[Any, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -38,13 +40,13 @@ class Trace:
 
     h: float
     clock: float
-    command: np.ndarray
-    pressure: np.ndarray
-    curvature: np.ndarray
-    output: np.ndarray
+    command: Array
+    pressure: Array
+    curvature: Array
+    output: Array
 
     @property
-    def time(self) -> np.ndarray:
+    def time(self) -> Array:
         """Seconds since the experiment began."""
         return np.arange(len(self.command)) * self.h
 
@@ -52,7 +54,7 @@ class Trace:
 class Session:
     """A machine in use: what outlives a rest stays from one experiment to the next."""
 
-    def __init__(self, machine: Machine, h: float):
+    def __init__(self, machine: Machine, h: float) -> None:
         self.machine, self.h = machine, h
         self.ffi, self.lib = library()
         self.chain = self.ffi.new("chain *")
@@ -73,11 +75,11 @@ class Session:
             slot.w, slot.d, slot.far = (self.pointer(a) for a in (memory.w, memory.d, memory.far))
         return kept
 
-    def pointer(self, values: np.ndarray):
+    def pointer(self, values: Numbers) -> Any:
         """A C pointer to an array's data."""
         return self.ffi.cast("double *" if values.dtype == float else "uint8_t *", values.ctypes.data)
 
-    def run(self, command: np.ndarray, clock: float) -> Trace:
+    def run(self, command: Array, clock: float) -> Trace:
         """One experiment from rest, the command held from step to step."""
         command = np.ascontiguousarray(command, float)
         out = [np.zeros(len(command)) for _ in range(3)]
@@ -87,7 +89,7 @@ class Session:
         )
         return Trace(self.h, clock, command, *out)
 
-    def blocks(self, count: int, clock: float, advance) -> None:
+    def blocks(self, count: int, clock: float, advance: Callable[[int, int], None]) -> None:
         """Rest, then call ``advance(first, stop)`` for block after block, spreading the memories between."""
         self.lib.at_rest(self.chain)
         self.chain.clock = clock
@@ -97,27 +99,25 @@ class Session:
             for memory in kept.values():
                 memory.spread(index + 1)
 
-    def read(self, output: np.ndarray) -> np.ndarray:
+    def read(self, output: Array) -> Array:
         """The samples as the converter gives them (a new array)."""
         values = np.array(output, float)
         self.lib.read_samples(self.chain, self.pointer(values), len(values))
         return values
 
 
-def simulate(
-    machine: Machine, commands: Sequence[np.ndarray], clocks: Sequence[float], h: float
-) -> list[Trace]:
+def simulate(machine: Machine, commands: Sequence[Array], clocks: Sequence[float], h: float) -> list[Trace]:
     """The session's experiments: ``commands`` on the fine grid of step ``h`` s, beginning at ``clocks`` s."""
     session = Session(machine, h)
     return [session.run(command, clock) for command, clock in zip(commands, clocks)]
 
 
-def _kernel(memory: tuple, h: float, count: int) -> np.ndarray:
-    kernels = {"creep": log_kernel, "electrode": stretched_kernel}
+def _kernel(memory: tuple[Any, ...], h: float, count: int) -> Array:
+    kernels: dict[str, Callable[..., Array]] = {"creep": log_kernel, "electrode": stretched_kernel}
     return kernels[memory[0]](*memory[1:], h, count)
 
 
-def _fill(chain, machine: Machine, h: float, lib) -> None:
+def _fill(chain: Any, machine: Machine, h: float, lib: Any) -> None:
     rig, chain.h = machine.rig, h
     _fill_linear(chain.regulator, rig.regulator)
     _fill_linear(chain.sensor, rig.sensor)
@@ -143,7 +143,7 @@ def _fill(chain, machine: Machine, h: float, lib) -> None:
 _SEEDED = ("supply_ripple", "opening_seam", "loose_joint", "pick_up", "loose_plug")
 
 
-def _fill_linear(slot, transfer: TransferFunction) -> None:
+def _fill_linear(slot: Any, transfer: TransferFunction) -> None:
     """A proper transfer function of whole orders ≤ 3 as a companion form with a direct path."""
     den = {int(t.order): t.coefficient for t in transfer.den}
     num = {int(t.order): t.coefficient for t in transfer.num}

@@ -21,6 +21,7 @@ import numpy as np
 import tomlkit
 
 import focgen
+from focgen.arrays import Array
 from focgen.control.files import controller_text
 from focgen.errors import InputError
 from focgen.output import write_file, write_files
@@ -31,8 +32,8 @@ from focgen.trials.closed_cases import make_closed_case
 from focgen.trials.disturbed import DISTURBED, disturbed
 from focgen.trials.engine.cases import make_engine_case
 from focgen.trials.engine.machine import engine
-from focgen.trials.excitation import STREAMS, SUITES
 from focgen.trials.facts import SIGNALS
+from focgen.trials.patterns import STREAMS, SUITES
 from focgen.trials.plan import CLOSED_KINDS, KINDS, Assignment, assignments
 from focgen.trials.plants_cases import make_plants_case
 from focgen.trials.recording import as_csv
@@ -43,6 +44,7 @@ DEFAULT_KINDS = {
     "short": KINDS,
     **dict.fromkeys(("closed", "engine", "plants", "loops"), CLOSED_KINDS),
     **dict.fromkeys(DISTURBED, KINDS),
+    "sound": ("none", "parameters"),
 }
 
 
@@ -166,7 +168,7 @@ def _write(folder: Path, number: str, case: Case, salt: str) -> str:
     return committed
 
 
-def _files(case: Case, experiments: list[tuple[str, dict[str, np.ndarray]]]) -> dict[str, str]:
+def _files(case: Case, experiments: list[tuple[str, dict[str, Array]]]) -> dict[str, str]:
     """File name → CSV; the names keep the order of the session."""
     signals, unit = case.rig.signals, case.recorder.time_unit
     if case.recorder.one_file:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,8 @@ from focgen.errors import InputError
 from focgen.trials import plants
 from focgen.trials.closed import CONTROLLER_EFFECTS
 from focgen.trials.engine.forms import BODY, HANDS
-from focgen.trials.vocabulary import OUTSIDE, VOCABULARY
+from focgen.trials.forms_outside import OUTSIDE
+from focgen.trials.vocabulary import VOCABULARY
 
 KINDS = ("single", "pair", "none", "parameters", "outside", "unidentifiable", "linear")
 CLOSED_KINDS = ("single", "none", "parameters", "outside")
@@ -103,7 +105,9 @@ class Assignment:
 def assignments(
     count: int, kinds: tuple[str, ...], signals: str, suite: str, rng: np.random.Generator
 ) -> list[Assignment]:
-    """``count`` cases of the given kinds, in the usual shares, shuffled; effects equally often."""
+    """``count`` cases of the given kinds, in the usual shares, shuffled; effects equally often. Raises
+    InputError for a kind that the suite does not have.
+    """
     allowed = CLOSED_KINDS if suite in ("closed", "engine", "plants", "loops") else KINDS
     unknown = sorted(set(kinds) - set(allowed))
     if unknown:
@@ -113,13 +117,13 @@ def assignments(
     shares = {kind: _SHARES[kind] for kind in kinds}
     whole = sum(shares.values())
     quota = {kind: max(1, round(count * share / whole)) for kind, share in shares.items()}
-    quota[max(quota, key=quota.get)] += count - sum(quota.values())
+    quota[max(quota, key=lambda kind: quota[kind])] += count - sum(quota.values())
     found = [a for kind, n in quota.items() for a in _of_kind(kind, max(n, 0), signals, suite, rng)]
     rng.shuffle(found)
     return found[:count]
 
 
-def _of_kind(kind: str, count: int, signals: str, suite: str, rng) -> list[Assignment]:
+def _of_kind(kind: str, count: int, signals: str, suite: str, rng: np.random.Generator) -> list[Assignment]:
     if kind == "single":
         effects = _vocabulary(suite)
         return _dealt(effects, ("low", "mid", "high"), kind, count, rng)
@@ -132,7 +136,9 @@ def _of_kind(kind: str, count: int, signals: str, suite: str, rng) -> list[Assig
     return [Assignment(kind, (), "high") for _ in range(count)]
 
 
-def _dealt(effects, severities, kind, count, rng) -> list[Assignment]:
+def _dealt(
+    effects: Sequence[str], severities: Sequence[str], kind: str, count: int, rng: np.random.Generator
+) -> list[Assignment]:
     """Deal effects like cards, no one twice more often than another, each time with its next severity."""
     first = rng.integers(len(severities), size=len(effects))
     cards: list[Assignment] = []
@@ -162,7 +168,7 @@ def _outside(signals: str, suite: str) -> tuple[str, ...]:
     return tuple(name for name in OUTSIDE if signals == "C" or name != "room_swing")
 
 
-def _pair(signals: str, rng) -> tuple[str, ...]:
+def _pair(signals: str, rng: np.random.Generator) -> tuple[str, ...]:
     """Two effects, in half of the cases of one stage, that are not alike."""
     names = list(VOCABULARY)
     alike = _ALIKE + (_ALIKE_BLIND if signals == "A" else ())

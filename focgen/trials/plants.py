@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import LinearActuator, Rig
+from focgen.rig.rig import LinearActuator, Rig
 from focgen.trials.forms import Form
 from focgen.trials.rigs import columns_of, draw_chain, draw_regulator, draw_units
 from focgen.trials.vocabulary import VOCABULARY, forms_of

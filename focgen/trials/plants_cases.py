@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from focgen.trials import excitation
+from focgen.trials import patterns
 from focgen.trials.cases import (
     Case,
     Stage,
@@ -20,6 +21,7 @@ from focgen.trials.cases import (
 )
 from focgen.trials.designs import Truth
 from focgen.trials.disturbed import off
+from focgen.trials.machine import Setting
 from focgen.trials.plan import Assignment
 from focgen.trials.plants import AXIS, draw_kind, draw_plant, forms_on, given_of
 from focgen.trials.plants_moves import moves, unseen_moves
@@ -52,15 +54,17 @@ def make_plants_case(assignment: Assignment, signals: str, rng: np.random.Genera
 
 def _set_up(kind: str, signals: str, rng: np.random.Generator) -> Stage:
     rig, full = draw_plant(rng, kind, signals, _TS)
-    seen, unseen = (moves, unseen_moves) if kind == AXIS else (excitation.engine, excitation.unseen)
-    seen, unseen = seen(rng, _TS), unseen(rng, _TS)
+    given, kept = (moves, unseen_moves) if kind == AXIS else (patterns.engine, patterns.unseen)
+    seen, unseen = given(rng, _TS), kept(rng, _TS)
     clocks = clocks_of([*seen, *unseen], _TS, rng)
-    bare = Stage(rig, full, seen, unseen, clocks, None, None)
+    bare = Stage(rig, full, seen, unseen, clocks, None, None)  # type: ignore[arg-type]  # filled in below
     coarse = Trial(bare.commands(seen, _COARSE), clocks[: len(seen)], _COARSE)
     return replace(bare, spans=spans_of(rig, full, coarse, clocks[-1]), coarse=coarse)
 
 
-def _draw(effect: str, severity: str, kind: str, stage: Stage, rng: np.random.Generator):
+def _draw(
+    effect: str, severity: str, kind: str, stage: Stage, rng: np.random.Generator
+) -> tuple[Setting, dict[str, Any]]:
     """One of the effect's forms that the plant can have, calibrated, and what the label says of it."""
     forms = forms_on(kind, effect)
     name = forms[rng.integers(len(forms))].name

@@ -5,16 +5,19 @@ Each experiment takes back what it gave, so that the axis stays about where it b
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from focgen.trials.excitation import Experiment
+from focgen.arrays import Array
+from focgen.trials.patterns import Experiment
 
 
-def _rest(seconds: float, Ts: float) -> np.ndarray:
+def _rest(seconds: float, Ts: float) -> Array:
     return np.zeros(round(seconds / Ts))
 
 
-def doublets(rng: np.random.Generator, Ts: float, sizes) -> np.ndarray:
+def doublets(rng: np.random.Generator, Ts: float, sizes: Sequence[float]) -> Array:
     """A push and its opposite of each size, with a rest behind it; every other one begins the other way."""
     parts = [_rest(1.0, Ts)]
     for i, size in enumerate(rng.permutation(sizes)):
@@ -23,7 +26,7 @@ def doublets(rng: np.random.Generator, Ts: float, sizes) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def sways(rng: np.random.Generator, Ts: float, frequencies, size: float) -> np.ndarray:
+def sways(rng: np.random.Generator, Ts: float, frequencies: Sequence[float], size: float) -> Array:
     """Whole cycles of sines, at least 7 s of each."""
     parts = [_rest(1.0, Ts)]
     for f in frequencies:
@@ -32,7 +35,7 @@ def sways(rng: np.random.Generator, Ts: float, frequencies, size: float) -> np.n
     return np.concatenate([*parts, _rest(2.0, Ts)])
 
 
-def ramps(rng: np.random.Generator, Ts: float, tops, slope: float) -> np.ndarray:
+def ramps(rng: np.random.Generator, Ts: float, tops: Sequence[float], slope: float) -> Array:
     """Slow triangles, there and back: from them one reads what force begins to move."""
     parts = [_rest(1.0, Ts)]
     for top in tops:
@@ -42,7 +45,7 @@ def ramps(rng: np.random.Generator, Ts: float, tops, slope: float) -> np.ndarray
     return np.concatenate(parts)
 
 
-def mixed(rng: np.random.Generator, Ts: float, seconds: float) -> np.ndarray:
+def mixed(rng: np.random.Generator, Ts: float, seconds: float) -> Array:
     """Three sines of other than whole ratios, with rests."""
     t = np.arange(round(seconds / Ts)) * Ts
     parts = zip((0.5, 0.35, 0.25), (0.15, 0.37, 0.81), rng.uniform(0.0, 2.0 * np.pi, 3))

@@ -5,12 +5,15 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.signal import lfilter
 
-from focgen.rig.model import Signals
-from focgen.trials.machine import Session, Trace
+from focgen.arrays import Array
+from focgen.present import present
+from focgen.rig.rig import Signals
+from focgen.trials.machine import Trace
 
 MEASURED = ("pressure", "curvature", "output")
 
@@ -41,27 +44,37 @@ def draw_recorder(rng: np.random.Generator, spans: dict[str, float], Ts: float) 
     }
     if "pressure" in noise:
         noise["pressure"] *= 0.6
-    lsb = {name: 1.3 * span / 2 ** rng.integers(11, 17) for name, span in spans.items()}
+    lsb = {name: float(1.3 * span / 2 ** rng.integers(11, 17)) for name, span in spans.items()}
     jitter = rng.uniform(0.005, 0.04) * Ts if rng.random() < 0.5 else 0.0
     skew = rng.uniform(-0.5, 0.5) * Ts if rng.random() < 0.5 else 0.0
     return Recorder(noise, lsb, skew, jitter, bool(rng.random() < 0.5), bool(rng.random() < 0.3))
 
 
-def coloured(rng: np.random.Generator, count: int, level: float) -> np.ndarray:
+def coloured(rng: np.random.Generator, count: int, level: float) -> Array:
     """Noise of rms ``level``: half of its power white, half with a pole at 0.9; shape (count,)."""
     white, other = rng.normal(size=(2, count + 100))
     slow = lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], other)
-    return level * np.sqrt(0.5) * (white + slow)[100:]
+    made: Array = level * np.sqrt(0.5) * (white + slow)[100:]
+    return made
 
 
-def quantised(values: np.ndarray, lsb: float) -> np.ndarray:
+def quantised(values: Array, lsb: float) -> Array:
     """Rounded to the converter's steps."""
     return lsb * np.round(values / lsb)
 
 
-def sample(trace: Trace, Ts: float, recorder: Recorder, session: Session, rng: np.random.Generator) -> dict:
+class Reader(Protocol):
+    """A session that reads an output (n,) as the rig's converter does."""
+
+    def read(self, output: Array) -> Array:
+        """The samples, a new array."""
+
+
+def sample(
+    trace: Trace, Ts: float, recorder: Recorder, session: Reader, rng: np.random.Generator
+) -> dict[str, Any]:
     """The log of one experiment by role, ``time`` included: arrays (n,); ``noise`` is that of the output."""
-    count = int(round(len(trace.command) * trace.h / Ts))
+    count = round(len(trace.command) * trace.h / Ts)
     instants = np.arange(count) * Ts
     if recorder.jitter:
         instants = np.abs(instants + rng.uniform(-recorder.jitter, recorder.jitter, count))
@@ -77,17 +90,17 @@ def sample(trace: Trace, Ts: float, recorder: Recorder, session: Session, rng: n
     return columns
 
 
-def floor_of(logs: Sequence[tuple[str, dict]]) -> float:
+def floor_of(logs: Sequence[tuple[str, dict[str, Any]]]) -> float:
     """The rms of the output's noise over the experiments, each counted alike."""
     return float(np.sqrt(np.mean([np.mean(np.square(columns["noise"])) for _, columns in logs])))
 
 
-def as_csv(rows: Sequence[tuple[str, dict]], signals: Signals, time_unit: float, runs: bool) -> str:
+def as_csv(rows: Sequence[tuple[str, dict[str, Any]]], signals: Signals, time_unit: float, runs: bool) -> str:
     """One CSV of one or more experiments (name, columns by role)."""
     roles = ["time", *signals.columns()]
     names = [signals.time, *signals.columns().values()]
     out = io.StringIO()
-    out.write(",".join(([signals.run] if runs else []) + names) + "\n")
+    out.write(",".join(([present(signals.run)] if runs else []) + names) + "\n")
     for name, columns in rows:
         lead = f"{name}," if runs else ""
         table = np.stack([columns["time"] * time_unit, *(columns[role] for role in roles[1:])], axis=1)

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Actuator, LinearActuator, Rig, Signals
+from focgen.present import present
+from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,7 @@ def draw_linear(rng: np.random.Generator, sample_time: float) -> tuple[Rig, floa
     full_in, full_out = 10.0 ** rng.uniform(-1, 3), 10.0 ** rng.uniform(-2, 3)
     gain = full_out / full_in
     kind = rng.integers(3)
+    actuator: Actuator | LinearActuator
     if kind == 0:
         actuator = Actuator(rng.uniform(0.5, 2.0), rng.uniform(0.55, 0.9), (gain,))
     elif kind == 1:
@@ -113,18 +115,22 @@ def draw_linear(rng: np.random.Generator, sample_time: float) -> tuple[Rig, floa
 
 
 def nominal_of(rig: Rig, rng: np.random.Generator, scatter: tuple[float, float]) -> Rig:
-    """The rig as its owner believes it to be: own parameters off by ``scatter`` (low, high), either way.
+    """The rig as its owner believes it to be: nominal parameters off by ``scatter`` (low, high), either way.
 
     The order of the fractional stage is off by half as much; an offset, and the zero of a drive, are not
     known at all.
     """
     exact = scatter == (0.0, 0.0)
-    offset, bias = (rig.actuator.offset, getattr(rig.actuator, "bias", 0.0)) if exact else (0.0, 0.0)
+    actuator = rig.actuator
+    if actuator is None:
+        raise ValueError("the rig has no actuator")
+    offset, bias = (actuator.offset, getattr(actuator, "bias", 0.0)) if exact else (0.0, 0.0)
 
     def off(value: float, share: float = 1.0) -> float:
-        return value * (1.0 + share * rng.uniform(*scatter) * rng.choice((-1.0, 1.0)))
+        made: float = value * (1.0 + share * rng.uniform(*scatter) * rng.choice((-1.0, 1.0)))
+        return made
 
-    actuator = rig.actuator
+    believed: Actuator | LinearActuator
     if isinstance(actuator, Actuator):
         gain = tuple(off(g) for g in actuator.gain)
         believed = Actuator(off(actuator.T), min(off(actuator.alpha, 0.5), 0.95), gain, offset)
@@ -152,7 +158,7 @@ def in_time_unit(rig: Rig, unit: float) -> Rig:
     if isinstance(actuator, Actuator):
         actuator = replace(actuator, T=actuator.T * unit**actuator.alpha)
     else:
-        actuator = replace(actuator, dynamics=slowed(actuator.dynamics))
+        actuator = replace(present(actuator), dynamics=slowed(present(actuator).dynamics))
     return replace(
         rig,
         sample_time=rig.sample_time * unit,

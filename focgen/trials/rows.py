@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from focgen.present import present
 from focgen.trials.judging import PROPOSED, Judged
 from focgen.trials.statistics import interval, reliability
 from focgen.trials.vocabulary import stage_of
@@ -46,7 +48,7 @@ class _Measure:
     of: Callable[[Judged], float]
     sense: str = _AT_LEAST
     limits: tuple[float, ...] = ()
-    figure: Callable = np.mean
+    figure: Callable[..., Any] = np.mean
     guessed: Callable[[Judged, str], float] | None = None
 
 
@@ -67,11 +69,13 @@ def _promised(j: Judged) -> bool:
 
 
 def _error(j: Judged) -> float:
-    return abs(j.promise - j.achieved)
+    return abs(present(j.promise) - present(j.achieved))
 
 
 def _covered(j: Judged) -> bool:
-    return j.promise_interval is not None and j.promise_interval[0] <= j.achieved <= j.promise_interval[1]
+    if j.promise_interval is None:
+        return False
+    return j.promise_interval[0] <= present(j.achieved) <= j.promise_interval[1]
 
 
 def _hit(j: Judged, guess: str) -> bool:
@@ -128,7 +132,7 @@ ROWS = (
     _Measure("pairs: both found", _pair, lambda j: j.found, limits=(0.88,)),
     _Measure("  … within one stage", lambda j: _pair(j) and _one_stage(j), lambda j: j.found),
     _Measure("  … across stages", lambda j: _pair(j) and not _one_stage(j), lambda j: j.found),
-    _Measure("  … missed: the true pair closes < 0.02 more", _missed, lambda j: j.forgone < 0.02),
+    _Measure("  … missed: the true pair closes < 0.02 more", _missed, lambda j: present(j.forgone) < 0.02),
     _Measure("pairs: false extras per case", _pair, lambda j: j.extras, _AT_MOST, (0.12,)),
     _Measure("singles: false extras per case", _visible, lambda j: j.extras, _AT_MOST),
     _Measure("promised shrink: median error", _promised, _error, _AT_MOST, (0.04,), np.median),
@@ -157,8 +161,17 @@ ROWS = (
         lambda j: j.wrongly_named,
         _AT_MOST,
     ),
-    _Measure("median time, s", lambda j: j.seconds is not None, lambda j: j.seconds, _AT_MOST, (), np.median),
-    _Measure("longest time, s", lambda j: j.seconds is not None, lambda j: j.seconds, _AT_MOST, (), np.max),
+    _Measure(
+        "median time, s",
+        lambda j: j.seconds is not None,
+        lambda j: present(j.seconds),
+        _AT_MOST,
+        (),
+        np.median,
+    ),
+    _Measure(
+        "longest time, s", lambda j: j.seconds is not None, lambda j: present(j.seconds), _AT_MOST, (), np.max
+    ),
 )
 
 
@@ -189,7 +202,10 @@ def _beside(measure: _Measure, judged: Sequence[Judged]) -> dict[str, float]:
     """The figure of those that always name one effect, over the cases in which they did."""
     if measure.guessed is None:
         return {}
-    guesses = {"correlation": lambda j: j.baseline, "best fit": lambda j: j.best_fit}
+    guesses: dict[str, Callable[[Judged], Any]] = {
+        "correlation": lambda j: j.baseline,
+        "best fit": lambda j: j.best_fit,
+    }
     found = {}
     for name, guess in guesses.items():
         values = [float(measure.guessed(j, guess(j))) for j in judged if measure.who(j) and guess(j)]
@@ -235,7 +251,7 @@ def _achieved(judged: Sequence[Judged]) -> list[Row]:
     mean = Row(
         "achieved shrink, mean",
         float(ours.mean()),
-        interval(ours),
+        interval(ours.tolist()),
         count,
         "",
         None,

@@ -18,9 +18,9 @@ from focgen.output import write_file
 from focgen.progress import say, track
 from focgen.shown import Shown
 from focgen.trials import achieved, baselines
-from focgen.trials.asked import ask, resolved
 from focgen.trials.facts import achieved_in, diagnosis_in, facts_of
 from focgen.trials.judging import Judged, forgone, judge
+from focgen.trials.proposed import ask, resolved
 from focgen.trials.rows import Row, rows, stated_in
 from focgen.trials.run import diagnose_case, outcome_of, processes, ran
 from focgen.trials.sealing import unseal

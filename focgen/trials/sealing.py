@@ -5,28 +5,29 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 from focgen.custody import sha256_of
 from focgen.errors import InputError
 from focgen.trials.facts import sealed_label
 
 
-def canonical(label: dict) -> bytes:
+def canonical(label: dict[str, Any]) -> bytes:
     """The bytes a label is hashed as."""
     return json.dumps(label, sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode("ascii")
 
 
-def commitment(salt: str, label: dict) -> str:
+def commitment(salt: str, label: dict[str, Any]) -> str:
     """SHA-256 of salt and label, hexadecimal."""
     return hashlib.sha256(salt.encode("ascii") + canonical(label)).hexdigest()
 
 
-def sealed(salt: str, label: dict) -> str:
+def sealed(salt: str, label: dict[str, Any]) -> str:
     """The text of a sealed label's file."""
     return json.dumps({"salt": salt, "label": label}, indent=1, sort_keys=True) + "\n"
 
 
-def unseal(path: Path, committed: str, unseen: Path) -> dict:
+def unseal(path: Path, committed: str, unseen: Path) -> dict[str, Any]:
     """The label, if it and the unseen logs are what was committed to. Raises InputError where not."""
     salt, label = sealed_label(path)
     if commitment(salt, label) != committed:

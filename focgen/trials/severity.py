@@ -5,7 +5,7 @@ noise, of the rig with the effect minus the same rig without it, as a share of t
 amplitude is found by bisection so that the gap is the severity's: low 3 %, mid 8 %, high 20 %, or the form's
 largest.
 
-*Surviving gap*: what is left of it, in the logged signals, once the own parameters of the rig have been
+*Surviving gap*: what is left of it, in the logged signals, once the nominal parameters of the rig have been
 refitted: the projection off their sensitivities. Those of the actuator (T, alpha, gain or num and den,
 offset, the zero of an integrating one's drive) move freely, gain and times of regulator and sensor by three
 times their uncertainty. Each signal is weighted by its noise. *Visible*: in at least one logged signal the
@@ -14,15 +14,17 @@ surviving gap is 0.3 of the noise or more, both root mean square.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.corners import EXACT, moved
-from focgen.rig.model import UNITY, Actuator, LinearActuator, Relative, Rig
+from focgen.rig.rig import UNITY, Actuator, LinearActuator, Relative, Rig
 from focgen.trials.forms import Drawn
 from focgen.trials.machine import Machine, Session, Setting
 
@@ -36,11 +38,11 @@ _SIGNAL_OF = {"regulator": "pressure", "actuator": "curvature", "sensor": "outpu
 class Trial:
     """What the rig goes through: commands on the grid of step ``h`` s, and the session's clock at each."""
 
-    commands: Sequence[np.ndarray]
+    commands: Sequence[Array]
     clocks: Sequence[float]
     h: float
 
-    def signals(self, rig: Rig, settings: Sequence[Setting] = ()) -> dict[str, np.ndarray]:
+    def signals(self, rig: Rig, settings: Sequence[Setting] = ()) -> dict[str, Array]:
         """Noise-free pressure, curvature and output (N,) of all experiments, one after the other."""
         session = Session(Machine(rig, tuple(settings)), self.h)
         traces = [session.run(command, clock) for command, clock in zip(self.commands, self.clocks)]
@@ -52,12 +54,12 @@ class Trial:
         return found
 
 
-def rms(values: np.ndarray) -> float:
+def rms(values: Array) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def calibrate(drawn: Drawn, rig: Rig, trial: Trial, target: float) -> tuple[Setting, float]:
+def calibrate(drawn: Drawn, rig: Any, trial: Any, target: float) -> tuple[Setting, float]:
     """The setting whose gap is ``target`` (share of the span), or the form's largest; and the gap it has."""
     name = _SIGNAL_OF[drawn.stage]
     without = trial.signals(rig)[name]
@@ -80,11 +82,9 @@ def calibrate(drawn: Drawn, rig: Rig, trial: Trial, target: float) -> tuple[Sett
     return drawn.at(best[0]), best[1]
 
 
-def surviving(
-    rig: Rig, trial: Trial, gap: dict[str, np.ndarray], noise: dict[str, float]
-) -> dict[str, float]:
-    """Root mean square of what a refit of the own parameters leaves of ``gap``, signal by signal, over its
-    noise.
+def surviving(rig: Rig, trial: Trial, gap: Mapping[str, Array], noise: dict[str, float]) -> dict[str, float]:
+    """Root mean square of what a refit of the nominal parameters leaves of ``gap``, signal by signal, over
+    its noise.
 
     ``gap`` and ``noise`` (rms) carry the logged signals only.
     """
@@ -94,25 +94,26 @@ def surviving(
         _stacked({n: (trial.signals(other)[n] - base[n]) / step for n in gap}, noise)
         for other, step, _ in moves
     ]
-    wish = _stacked(gap, noise)
-    rest = wish - _refitted(np.stack(columns, axis=1), np.array([most for *_, most in moves]), wish)
+    target = _stacked(gap, noise)
+    rest = target - _refitted(np.stack(columns, axis=1), np.array([most for *_, most in moves]), target)
     return {name: rms(part) for name, part in zip(gap, np.split(rest, len(gap)))}
 
 
-def _refitted(columns: np.ndarray, most: np.ndarray, wish: np.ndarray) -> np.ndarray:
-    """What comes closest to ``wish`` (n,) of ``columns`` (n, k), each at ``most`` (k,) times, either way."""
+def _refitted(columns: Array, most: Array, target: Array) -> Array:
+    """What of ``columns`` (n, k), each ``most`` (k,) times at most, up or down, is closest to ``target``."""
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     basis, upper = np.linalg.qr(columns / size)
-    times = lsq_linear(upper, basis.T @ wish, (-most * size, most * size), tol=1e-12).x
-    return basis @ (upper @ times)
+    times = lsq_linear(upper, basis.T @ target, (-most * size, most * size), tol=1e-12).x
+    made: Array = basis @ (upper @ times)
+    return made
 
 
-def _stacked(signals: dict[str, np.ndarray], noise: dict[str, float]) -> np.ndarray:
+def _stacked(signals: Mapping[str, Array], noise: dict[str, float]) -> Array:
     return np.concatenate([signals[name] / noise[name] for name in signals])
 
 
 def moved_rigs(rig: Rig) -> Iterator[tuple[Rig, float]]:
-    """The rig with each of its own parameters moved a little, and by how much."""
+    """The rig with each of its nominal parameters moved a little, and by how much."""
     actuator, small = rig.actuator, 1e-3
     if actuator is None:
         return
@@ -141,7 +142,7 @@ def _scaled_rigs(rig: Rig) -> Iterator[tuple[Rig, float, float]]:
                 yield moved(rig, replace(EXACT, **{stage: off})), small, _USUAL * most
 
 
-def _moved_linear(actuator: LinearActuator, small: float):
+def _moved_linear(actuator: LinearActuator, small: float) -> Iterator[LinearActuator]:
     transfer = actuator.dynamics
     for part in ("num", "den"):
         terms = getattr(transfer, part)

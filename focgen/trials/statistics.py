@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.special import betaincinv
 
+from focgen.arrays import Array
+
 
 def interval(
-    values: Sequence[float], figure: Callable = np.mean, draws: int = 2000, seed: int = 0
+    values: Sequence[float], figure: Callable[..., Any] = np.mean, draws: int = 2000, seed: int = 0
 ) -> tuple[float, float]:
     """90 % interval of ``figure`` of the values; NaN where there are none.
 
     Jeffreys' interval for a share of hits, which has a width even where all hit or none does (L. D. Brown,
     T. T. Cai and A. DasGupta, Statistical Science 16, 2001); the percentile bootstrap for any other figure.
     """
-    values = np.asarray(values, float)
-    if len(values) == 0:
+    seen: Array = np.asarray(values, float)
+    if len(seen) == 0:
         return float("nan"), float("nan")
-    if figure is np.mean and np.all((values == 0.0) | (values == 1.0)):
-        return _jeffreys(int(values.sum()), len(values))
+    if figure is np.mean and np.all((seen == 0.0) | (seen == 1.0)):
+        return _jeffreys(int(seen.sum()), len(seen))
     rng = np.random.default_rng(seed)
-    picks = rng.integers(0, len(values), (draws, len(values)))
-    low, high = np.quantile([figure(values[p]) for p in picks], (0.05, 0.95))
+    picks = rng.integers(0, len(seen), (draws, len(seen)))
+    low, high = np.quantile([figure(seen[p]) for p in picks], (0.05, 0.95))
     return float(low), float(high)
 
 
@@ -32,14 +35,16 @@ def _jeffreys(hits: int, count: int) -> tuple[float, float]:
     return 0.0 if hits == 0 else float(low), 1.0 if hits == count else float(high)
 
 
-def calibration_error(confidence: np.ndarray, right: np.ndarray, bins: int = 10) -> float:
+def calibration_error(confidence: Array, right: Array, bins: int = 10) -> float:
     """Mean distance of confidence and hit rate over bins of equal count, weighted by their size."""
     order = np.argsort(confidence, kind="stable")
     groups = np.array_split(order, min(bins, len(order)))
     return float(sum(len(g) * abs(confidence[g].mean() - right[g].mean()) for g in groups) / len(order))
 
 
-def reliability(confidence: Sequence[float], right: Sequence[bool], draws: int = 4000, seed: int = 0) -> dict:
+def reliability(
+    confidence: Sequence[float], right: Sequence[bool], draws: int = 4000, seed: int = 0
+) -> dict[str, Any]:
     """Calibration error, what a perfectly calibrated tool would score on as many cases, and the bootstrap
     p-value.
 

@@ -11,6 +11,7 @@ import json
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import focgen
 
@@ -25,11 +26,11 @@ def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
     started = time.perf_counter()
     fault = None
     try:
-        extra = {"pictures": False} | ({"only": effects} if effects else {})
+        extra: dict[str, Any] = {"pictures": False} | ({"only": effects} if effects else {})
         if (case / "controller.toml").exists():
             extra["controller"] = case / "controller.toml"
         focgen.diagnose(case / "rig.toml", sorted((case / "logs").iterdir()), out=out, **extra)
-    except Exception as error:  # every failure is a miss, whatever it is
+    except Exception as error:  # noqa: BLE001 - every failure is a miss, whatever it is
         fault = f"{type(error).__name__}: {error}"
     outcome = {
         "status": "failed" if fault else "done",

@@ -1,0 +1,1 @@
+"""Generated C compared with the reference, in every bit."""

@@ -8,18 +8,20 @@ from typing import Protocol
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.plan.ending import Ending, endings
-from focgen.plan.model import ErrorBound, Plan
+from focgen.plan.plan import ErrorBound, Plan
 from focgen.plan.scenario import Scenario, Trace, to_raw
 from focgen.plan.usable import refused_events
+from focgen.present import present
 from focgen.targets.driver import REFUSED, Answers, header_scales
-from focgen.verification.apart import Crashed, TimedOut, apart
 from focgen.verification.errors_seen import ErrorsSeen, MaxError, errors_seen
 from focgen.verification.folder import GeneratedFolder
 from focgen.verification.host import Library
 from focgen.verification.scenarios import mixed, raw_scenarios, thinned
 from focgen.verification.states import wrong_member
+from focgen.verification.subprocess_call import Crashed, TimedOut, in_subprocess
 
 PATIENCE = 20.0
 """Seconds that C may take at least before it is said not to return."""
@@ -66,9 +68,11 @@ class Runs(Protocol):
 
     alignment: int
 
-    def answers(self, plan: Plan, scenario: Scenario) -> Answers: ...
+    def answers(self, plan: Plan, scenario: Scenario) -> Answers:
+        """What the C answers to a scenario."""
 
-    def scales(self, plan: Plan) -> dict[str, float]: ...
+    def scales(self, plan: Plan) -> dict[str, float]:
+        """The physical sizes of a count that its header gives, by macro."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +100,9 @@ class Cases:
 
 def cases_of(plan: Plan, samples: int, seed: int, worst: int | None = None) -> Cases:
     """What to try a plan with; of the worst cases at most ``worst`` samples, where given."""
-    scenarios = raw_scenarios(plan, samples, seed)
+    scenarios: dict[str, Scenario | None] = {**raw_scenarios(plan, samples, seed)}
     if worst is not None:
-        scenarios["worst cases"] = thinned(scenarios["worst cases"], worst)
+        scenarios["worst cases"] = thinned(present(scenarios["worst cases"]), worst)
     physical = mixed(plan.controller, samples, seed + 1)
     scenarios["errors"] = to_raw(plan, physical)
     found = (Case(label, s, *endings(plan, s)) for label, s in scenarios.items() if s is not None)
@@ -124,16 +128,17 @@ def observed(plan: Plan, library: Runs, samples: int, seed: int, read: Generated
     """The same with the C in a process of its own: what it does to itself ends there."""
     cases = cases_of(plan, samples, seed)
     try:
-        seen = apart(answered, library, plan, cases, seconds=host_limit(plan, cases))
+        seen = in_subprocess(answered, library, plan, cases, seconds=host_limit(plan, cases))
     except (Crashed, TimedOut) as how:
         return failed(how)
-    return judged(plan, cases, *seen, read, alignment=library.alignment)
+    answers, scales = seen
+    return judged(plan, cases, answers, scales, read, alignment=library.alignment)
 
 
 def self_tested(result: TargetResult, plan: Plan, library: Library) -> TargetResult:
     """Add what the folder's self-test says, on this computer."""
     try:
-        return replace(result, selftest=apart(library.selftest, plan, seconds=PATIENCE))
+        return replace(result, selftest=in_subprocess(library.selftest, plan, seconds=PATIENCE))
     except (Crashed, TimedOut) as how:
         return failed(how)
 
@@ -198,13 +203,15 @@ def _header(plan: Plan, found: dict[str, float]) -> tuple[str, ...]:
     )
 
 
-def _differs(plan: Plan, seen: Trace, expected: Trace) -> np.ndarray:
+def _differs(plan: Plan, seen: Trace, expected: Trace) -> Numbers:
     """Where output, flags or, with an integrator, the increment differ in a bit; (lanes, samples)."""
     wrong = (_bits(seen.u) != _bits(expected.u)) | (seen.flags != expected.flags)
-    return wrong | (_bits(seen.d) != _bits(expected.d)) if plan.integrator else wrong
+    if plan.integrator:
+        wrong = wrong | (_bits(seen.d) != _bits(expected.d))
+    return np.asarray(wrong)
 
 
-def _bits(values: np.ndarray) -> np.ndarray:
+def _bits(values: Numbers) -> Numbers:
     """What is compared: integers as they are, floating values by their bits, +0 and −0 alike."""
     if values.dtype.kind != "f":
         return values.astype(np.int64)
@@ -214,12 +221,12 @@ def _bits(values: np.ndarray) -> np.ndarray:
 
 def _said(plan: Plan, case: Case) -> Trace:
     """What is expected; beside the flags, whether a reset or a track ahead of the step has raised its own."""
-    flags = case.expected.flags
+    flags = present(case.expected.flags)
     refused = refused_events(plan, case.scenario, flags)
     return replace(case.expected, flags=np.where(refused, flags | REFUSED, flags).astype(np.uint8))
 
 
-def _described(plan: Plan, case: Case, seen: Trace, wrong: np.ndarray) -> str:
+def _described(plan: Plan, case: Case, seen: Trace, wrong: Numbers) -> str:
     lane, sample = (int(i) for i in np.argwhere(wrong)[np.argmin(np.argwhere(wrong)[:, 1])])
     at, expected = (lane, sample), _said(plan, case)
     return (
@@ -231,7 +238,7 @@ def _described(plan: Plan, case: Case, seen: Trace, wrong: np.ndarray) -> str:
 
 def _answer(trace: Trace, at: tuple[int, int]) -> str:
     """A sample's output, increment (equal to it without an integrator) and flags."""
-    return f"u = {trace.u[at]}, increment {trace.d[at]}, flags {trace.flags[at]}"
+    return f"u = {trace.u[at]}, increment {trace.d[at]}, flags {present(trace.flags)[at]}"
 
 
 def _errors(plan: Plan, cases: Cases, seen: Trace, bound: ErrorBound) -> ErrorsSeen:

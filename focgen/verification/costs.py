@@ -15,10 +15,10 @@ from focgen.errors import InputError, MissingExtra, check_choice
 from focgen.jsontext import read_json
 from focgen.output import write_file
 from focgen.shown import Shown
-from focgen.targets.asked import asked_for, entry_of
 from focgen.targets.cores import core
 from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr, with_runtimes
 from focgen.targets.emulator import emulator_title
+from focgen.targets.selection import entry_of, selected
 from focgen.targets.toolchains import Toolchain, absent, toolchains
 from focgen.verification.folder import REMEMBERED, GeneratedFolder, read_folder, sources
 
@@ -62,7 +62,7 @@ def cost(folder: str | Path, target: str | Sequence[str] = "all", compiler: str 
     Raises InputError for a folder that is none, has been edited, or was made by another version of focgen,
     BuildError where the C does not compile.
     """
-    names = asked_for(target, TARGETS)
+    names = selected(target, TARGETS)
     check_choice("--compiler", compiler, COMPILERS)
     folders = [_read(path, edited) for path in _generated(Path(folder))]
     other = None if against is None else _read(Path(against), edited)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.plan.ideal import ideal
-from focgen.plan.model import ErrorBound, Plan
+from focgen.plan.plan import ErrorBound, Plan
 from focgen.plan.scenario import Scenario, Trace, physical_trace
 
 
@@ -50,12 +51,12 @@ def errors_seen(plan: Plan, physical: Scenario, trace: Trace, bound: ErrorBound)
     return ErrorsSeen(largest, _share(operator, allowed), _share(output, since * bound.output_per_sample))
 
 
-def _share(errors: np.ndarray, allowed: np.ndarray) -> float:
+def _share(errors: Numbers, allowed: Numbers) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.max(np.where(errors > 0.0, errors / allowed, 0.0)))
 
 
-def _samples_since_reset(scenario: Scenario) -> np.ndarray:
+def _samples_since_reset(scenario: Scenario) -> Numbers:
     """1 at the first sample after init or a reset, and so on; shape (lanes, samples)."""
     count = np.tile(np.arange(1, scenario.samples + 1), (scenario.lanes, 1))
     for r in sorted(scenario.resets, key=lambda r: r.sample):

@@ -13,13 +13,15 @@ from typing import Any
 from focgen.codegen.generate import folder_files
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.manifest import sha256
-from focgen.codegen.packages.archive import compare_archive
+from focgen.codegen.neighbours import others
+from focgen.codegen.packages.archive import DIGEST, compare_archive
 from focgen.control.files import read_controller
 from focgen.custody import followed
 from focgen.errors import InputError
+from focgen.journal import finish
 from focgen.output import write_files
 from focgen.plan.build import build_plan
-from focgen.plan.model import ErrorBound, Plan
+from focgen.plan.plan import ErrorBound, Plan
 from focgen.verification.recorded import AGAIN, Recorded, read_recorded
 
 _EXAMPLES = ("example/", "examples/", "extras/")
@@ -52,11 +54,13 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     version of focgen. Nothing of it is compiled.
     """
     path = Path(path)
+    finish(path)
     recorded = read_recorded(path)
     controller = read_controller(path / "controller.toml")
-    options = recorded.length, recorded.name, recorded.memory, recorded.tolerance, recorded.horizon
-    options += recorded.operator, recorded.band, recorded.tunable
-    plan = build_plan(controller, recorded.arithmetic, *options)
+    memory = recorded.memory, recorded.tolerance, recorded.horizon, recorded.operator, recorded.band
+    plan = build_plan(
+        controller, recorded.arithmetic, recorded.length, recorded.name, *memory, recorded.tunable
+    )
     given = _bytes(path / "controller.toml")
     files = folder_files(plan, given, recorded.selftest, recorded.kernels, recorded.floats, recorded.package)
     for name in files:
@@ -123,7 +127,16 @@ def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Ite
         elif not _same_bytes(path / name, files[name]):
             yield f"{name}: has been edited"
     folders = {parent.as_posix() for name in files for parent in Path(name).parents}
-    known = {*files, *folders, REMEMBERED, *([f"{controller}.fmu"] * any(map(_of_fmu, files)))}
+    beside_it = dict(others(path, controller))
+    for other in sorted(beside_it):
+        yield f"{other}: stands here as well and was not looked at; to verify it, give it its own folder"
+    known = {
+        *files,
+        *folders,
+        REMEMBERED,
+        *(name for own in beside_it.values() for name in own),
+        *(_archive(controller) if any(map(_of_fmu, files)) else ()),
+    }
     found = [
         one for folder in sorted(folders) if (path / folder).is_dir() for one in (path / folder).iterdir()
     ]
@@ -131,6 +144,10 @@ def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Ite
     yield from (f"{_shown(name)}: does not belong to the folder" for name in strangers[:_MOST])
     if len(strangers) > _MOST:
         yield f"{len(strangers) - _MOST} more files do not belong to the folder"
+
+
+def _archive(controller: str) -> tuple[str, str]:
+    return f"{controller}.fmu", f"{controller}.fmu{DIGEST}"
 
 
 def _of_fmu(name: str) -> bool:

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from cffi import FFI
 
+from focgen.arrays import Numbers
 from focgen.compiler import compile_shared
 from focgen.errors import BuildError
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of, steps_alone
 
@@ -32,7 +33,7 @@ class Library:
         folders: Sequence[Path],
         flags: Sequence[str] = FLAGS,
         selftest: bool = False,
-    ):
+    ) -> None:
         self._ffi = FFI()
         self.alignment = max(self._ffi.alignof(ctype) for ctype in ("int64_t", "double"))
         with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
@@ -86,7 +87,7 @@ class Library:
         place = getattr(self._library, f"{plan.name}_bytes")(size)
         return bytes(self._ffi.buffer(place, size[0]))
 
-    def _lane(self, plan: Plan, scenario: Scenario, lane: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _lane(self, plan: Plan, scenario: Scenario, lane: int) -> tuple[Numbers, Numbers, Numbers]:
         signal, count, given = DTYPES[plan.output.ctype], scenario.samples, lane_of(plan, scenario, lane)
         u, flags = np.empty(count, signal), np.empty(count, np.uint8)
         d = np.zeros(count, DTYPES[plan.increment.ctype])

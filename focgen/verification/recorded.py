@@ -17,7 +17,7 @@ from focgen.errors import InputError, check_choice
 from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.exponential import HORIZONS, TOLERANCES
 from focgen.jsontext import fits, read_json
-from focgen.plan.model import LONGEST, ErrorBound
+from focgen.plan.plan import LONGEST, ErrorBound
 
 AGAIN = "run focgen generate again"
 _QUANTISATION = {"operator": float, "output_per_sample": float, "operator_per_sample?": float}

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Numbers
 from focgen.control.controller import Controller
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Params, Reset, Scenario, Track, Tune, to_raw
 from focgen.plan.worst import worst_case_input
+from focgen.present import present
 from focgen.verification.unusable import strewn
 
 LANES = 8
@@ -26,13 +29,13 @@ def mixed(controller: Controller, samples: int, seed: int, beyond: bool = False)
     each = -(-samples // LANES)
     ranges = controller.ranges
     ref, meas = (_signals(rng, span, each, beyond) for span in (ranges.reference, ranges.measurement))
-    sched = _signals(rng, ranges.schedule, each, beyond) if controller.scheduled else None
+    sched = _signals(rng, present(ranges.schedule), each, beyond) if controller.scheduled else None
     events = _resets(rng, controller, each, beyond), _tracks(rng, controller, each)
     tunes = tunes_of(rng, controller, each) if controller.tunable else ()
     return Scenario(ref, meas, sched, *events, tunes=tunes)
 
 
-def _signals(rng: np.random.Generator, span: tuple[float, float], count: int, beyond: bool) -> np.ndarray:
+def _signals(rng: np.random.Generator, span: tuple[float, float], count: int, beyond: bool) -> Numbers:
     kinds = rng.permutation(len(_KINDS))
     rows = np.stack([_KINDS[kinds[lane % len(_KINDS)]](rng, count) for lane in range(LANES)])
     if beyond:
@@ -40,28 +43,29 @@ def _signals(rng: np.random.Generator, span: tuple[float, float], count: int, be
     return span[0] + (span[1] - span[0]) * rows
 
 
-def _noise(rng, count):
+def _noise(rng: np.random.Generator, count: int) -> Numbers:
     return rng.uniform(0.0, 1.0, count)
 
 
-def _steps(rng, count):
+def _steps(rng: np.random.Generator, count: int) -> Numbers:
     return np.repeat(rng.uniform(0.0, 1.0, count), int(rng.integers(10, 120)))[:count]
 
 
-def _extremes(rng, count):
+def _extremes(rng: np.random.Generator, count: int) -> Numbers:
     """From end to end: the worst for derivatives, and saturation."""
     return np.repeat(rng.integers(0, 2, count), int(rng.integers(1, 40)))[:count].astype(float)
 
 
-def _sine(rng, count):
-    return 0.5 + 0.5 * np.sin(np.arange(count) * 10.0 ** rng.uniform(-3.0, 0.0))
+def _sine(rng: np.random.Generator, count: int) -> Numbers:
+    made: Numbers = 0.5 + 0.5 * np.sin(np.arange(count) * 10.0 ** rng.uniform(-3.0, 0.0))
+    return made
 
 
-def _wander(rng, count):
+def _wander(rng: np.random.Generator, count: int) -> Numbers:
     return np.clip(rng.uniform() + np.cumsum(rng.normal(0.0, 0.01, count)), 0.0, 1.0)
 
 
-def _held(rng, count):
+def _held(rng: np.random.Generator, count: int) -> Numbers:
     """An end for ever: integrators run into their limits and stay."""
     return np.full(count, float(rng.integers(0, 2)))
 
@@ -69,13 +73,14 @@ def _held(rng, count):
 _KINDS = (_noise, _steps, _extremes, _sine, _wander, _held)
 
 
-def _resets(rng, controller: Controller, count: int, beyond: bool) -> tuple[Reset, ...]:
+def _resets(rng: np.random.Generator, controller: Controller, count: int, beyond: bool) -> tuple[Reset, ...]:
     inputs = controller.ranges.reference, controller.ranges.measurement
     spans = *((_wider(span) for span in inputs) if beyond else inputs), controller.ranges.output
     places = [
         (lane, int(at)) for lane in range(1, LANES) for at in rng.choice(count, min(2, count), replace=False)
     ]
-    return tuple(Reset(lane, at, *(float(rng.uniform(*span)) for span in spans)) for lane, at in places)
+    drawn = ((lane, at, [float(rng.uniform(*span)) for span in spans]) for lane, at in places)
+    return tuple(Reset(lane, at, ref, meas, u0) for lane, at, (ref, meas, u0) in drawn)
 
 
 def _wider(span: tuple[float, float]) -> tuple[float, float]:
@@ -83,7 +88,7 @@ def _wider(span: tuple[float, float]) -> tuple[float, float]:
     return span[0] - margin, span[1] + margin
 
 
-def _tracks(rng, controller: Controller, count: int) -> tuple[Track, ...]:
+def _tracks(rng: np.random.Generator, controller: Controller, count: int) -> tuple[Track, ...]:
     low, high = controller.ranges.output
     margin = 0.3 * (high - low)  # an outer limiter may well be wider
     places = {(lane, int(rng.integers(count))) for lane in range(0, LANES, 2) for _ in range(6)}
@@ -96,7 +101,7 @@ def tunes_of(rng: np.random.Generator, controller: Controller, count: int) -> tu
     """Physical parameters from all over the box, its corners among them, at random moments of every lane but
     the first.
     """
-    box, found = controller.tunable, []
+    box, found = present(controller.tunable), []
     for lane in range(1, LANES):
         for at in sorted(rng.choice(count, min(_TUNED, count), replace=False).tolist()):
             corners = lane % 2 == 0
@@ -123,7 +128,7 @@ def mistuned(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
 
 
 def _outside(plan: Plan, params: Params, rng: np.random.Generator) -> Params:
-    box, which = plan.tuning, int(rng.integers(len(params.gain) + 2))
+    box, which = present(plan.tuning), int(rng.integers(len(params.gain) + 2))
     ends = [(box.factor.low, box.factor.high)] * len(params.gain) + [box.low, box.high]
     low, high = ends[which]
     top = (1 << (plan.output.bits - 1)) - 1
@@ -149,7 +154,7 @@ def worst_cases(plan: Plan) -> Scenario:
     return side_by_side(list({_content(scenario): scenario for scenario in made}.values()))
 
 
-def _content(scenario: Scenario) -> tuple:
+def _content(scenario: Scenario) -> tuple[Any, ...]:
     """What tells scenarios apart."""
     signals = scenario.ref, scenario.meas, scenario.sched
     return (
@@ -163,19 +168,22 @@ def _content(scenario: Scenario) -> tuple:
 def side_by_side(scenarios: list[Scenario]) -> Scenario:
     """All lanes in one scenario; shorter ones go on with their last inputs."""
     longest = max(s.samples for s in scenarios)
-    stacked = lambda parts: np.concatenate([_prolonged(p, longest) for p in parts])  # noqa: E731
+
+    def stacked(parts: list[Numbers]) -> Numbers:
+        return np.concatenate([_prolonged(p, longest) for p in parts])
+
     begins = np.cumsum([0, *(s.lanes for s in scenarios)])
     return Scenario(
         stacked([s.ref for s in scenarios]),
         stacked([s.meas for s in scenarios]),
-        None if scenarios[0].sched is None else stacked([s.sched for s in scenarios]),
+        None if scenarios[0].sched is None else stacked([present(s.sched) for s in scenarios]),
         tuple(replace(r, lane=r.lane + int(b)) for s, b in zip(scenarios, begins) for r in s.resets),
         tuple(replace(t, lane=t.lane + int(b)) for s, b in zip(scenarios, begins) for t in s.tracks),
         tunes=tuple(replace(t, lane=t.lane + int(b)) for s, b in zip(scenarios, begins) for t in s.tunes),
     )
 
 
-def _prolonged(values: np.ndarray, samples: int) -> np.ndarray:
+def _prolonged(values: Numbers, samples: int) -> Numbers:
     return np.pad(values, ((0, 0), (0, samples - values.shape[1])), mode="edge")
 
 
@@ -214,7 +222,7 @@ def raw_scenarios(plan: Plan, samples: int, seed: int) -> dict[str, Scenario]:
 
 def at_breakpoints(plan: Plan) -> Scenario:
     """Raw inputs: the schedule at each breakpoint and next to it on both sides; an error up, down, small."""
-    form, points = plan.schedule.signal, np.asarray(plan.schedule.breakpoints)
+    form, points = present(plan.schedule).signal, np.asarray(present(plan.schedule).breakpoints)
     if plan.floating:
         points = points.astype(np.float32 if form.ctype == "float" else np.float64)
         beside = [np.nextafter(points, points.dtype.type(end)) for end in (-np.inf, np.inf)]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Numbers
 from focgen.codegen.banks import means, rests
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.lookahead import AHEAD, LookAhead
@@ -13,7 +15,8 @@ from focgen.codegen.state import Member, counts_limits, members, size_of
 from focgen.plan.counts import taken_in
 from focgen.plan.ending import Ending
 from focgen.plan.formats import shift
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
+from focgen.present import present
 
 _DTYPES = {"float": np.float32, "double": np.float64}
 
@@ -67,7 +70,7 @@ def remembered(plan: Plan, ending: Ending, kernels: Kernels = PORTABLE) -> dict[
         now = ending.applied
         found |= {"gains": now.gains, "slopes": now.slopes, "u_min": now.low, "u_max": now.high}
         if counts_limits(plan):
-            ends = (taken_in(np.float32(end), plan.integrator.state) for end in (now.low, now.high))
+            ends = (taken_in(np.float32(end), present(plan.integrator).state) for end in (now.low, now.high))
             found |= dict(zip(("low", "high"), ends))
     for history, past, rest in (("error", ending.error, ending.error_rest),
                                 ("filtered", ending.filtered, ending.filtered_rest)):  # fmt: skip
@@ -88,7 +91,7 @@ def remembered(plan: Plan, ending: Ending, kernels: Kernels = PORTABLE) -> dict[
     return found
 
 
-def _ring(past: np.ndarray, rest, size: int, start: int) -> tuple[np.ndarray, int]:
+def _ring(past: Numbers, rest: Any, size: int, start: int) -> tuple[Numbers, int]:
     """A ring that held ``rest`` alone, and has taken the samples since from the slot after ``start`` on."""
     ring = np.full(size, rest)
     slots = (start + 1 + np.arange(len(past))) % size
@@ -96,7 +99,7 @@ def _ring(past: np.ndarray, rest, size: int, start: int) -> tuple[np.ndarray, in
     return ring, (start + len(past)) % size
 
 
-def looked_ahead(ahead: LookAhead, past: np.ndarray, rest) -> np.ndarray:
+def looked_ahead(ahead: LookAhead, past: Numbers, rest: Any) -> Numbers:
     """The sums that look ahead after the samples ``past``, before which all were ``rest``: of the present
     group, and as far as they have been made of the next.
     """
@@ -107,7 +110,7 @@ def looked_ahead(ahead: LookAhead, past: np.ndarray, rest) -> np.ndarray:
     return np.concatenate([whole[:AHEAD], part])
 
 
-def _runs(ahead: LookAhead, weights, count: int, begin: int, past: np.ndarray, rest) -> np.ndarray:
+def _runs(ahead: LookAhead, weights: Array, count: int, begin: int, past: Numbers, rest: Any) -> Numbers:
     """The sums of a group that begins at sample ``begin`` after so many runs: of its complete blocks and, in
     fixed point, of the open one; floating sums are one block.
     """

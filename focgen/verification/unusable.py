@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from focgen.plan.model import Plan
+from focgen.arrays import Numbers
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Damage, Scenario
 from focgen.plan.usable import EXPONENT, invalid_samples
 
@@ -23,7 +25,7 @@ def strewn(plan: Plan, scenario: Scenario, seed: int) -> Scenario:
     rng = np.random.default_rng([seed, 48])
     kind = scenario.ref.dtype.type
     bad = np.array([np.nan, np.inf, -np.inf, limit(plan), -limit(plan)], kind)
-    signals = {"ref": scenario.ref.copy(), "meas": scenario.meas.copy()}
+    signals: dict[str, Any] = {"ref": scenario.ref.copy(), "meas": scenario.meas.copy()}
     if scenario.sched is not None:
         signals["sched"] = scenario.sched.copy()
     for values in signals.values():
@@ -43,7 +45,7 @@ def limit(plan: Plan) -> float:
     return 2.0 ** EXPONENT[plan.output.ctype]
 
 
-def _places(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
+def _places(rng: np.random.Generator, shape: tuple[int, int]) -> Numbers:
     """Rows of samples, about ``_SHARE`` of all."""
     where = np.zeros(shape, bool)
     for lane in where:
@@ -53,7 +55,7 @@ def _places(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
     return where
 
 
-def _largest(rng: np.random.Generator, values: np.ndarray, others: list[np.ndarray], bound) -> None:
+def _largest(rng: np.random.Generator, values: Numbers, others: list[Numbers], bound: float) -> None:
     """Put a few of the largest usable values in, where the other inputs are good, near the end: they stay in
     the memory.
     """
@@ -80,7 +82,7 @@ def _damages(plan: Plan, scenario: Scenario, rng: np.random.Generator) -> tuple[
     return tuple(found)
 
 
-def _resets(rng: np.random.Generator, scenario: Scenario, bad: np.ndarray) -> tuple:
+def _resets(rng: np.random.Generator, scenario: Scenario, bad: Numbers) -> tuple[Any, ...]:
     changed = []
     for reset in scenario.resets:
         name = rng.choice(["ref", "meas", "u0"])
@@ -88,5 +90,5 @@ def _resets(rng: np.random.Generator, scenario: Scenario, bad: np.ndarray) -> tu
     return tuple(changed)
 
 
-def _tracks(rng: np.random.Generator, scenario: Scenario, bad: np.ndarray) -> tuple:
+def _tracks(rng: np.random.Generator, scenario: Scenario, bad: Numbers) -> tuple[Any, ...]:
     return tuple(replace(t, u=rng.choice(bad)) if rng.random() < 0.5 else t for t in scenario.tracks)

@@ -9,11 +9,11 @@ from pathlib import Path
 from focgen.codegen.kernels import TARGETS as CORES
 from focgen.errors import InputError
 from focgen.shown import Shown
-from focgen.targets.asked import asked_for
+from focgen.targets.selection import selected
 from focgen.verification.compare import TargetResult, compare, observed, self_tested
-from focgen.verification.elsewhere import on_avr, on_core
 from focgen.verification.folder import GeneratedFolder, read_folder, sources
 from focgen.verification.host import Library
+from focgen.verification.on_target import on_avr, on_core
 
 __all__ = ["TARGETS", "TargetResult", "Verification", "compare", "verify"]
 
@@ -76,7 +76,7 @@ def verify(
         raise InputError("--samples", what, "verify several times, each with a --seed of its own")
     if seed < 0:
         raise InputError("--seed", f"is {seed}", "give 0 or more")
-    names, read = asked_for(target, TARGETS), read_folder(folder)
+    names, read = selected(target, TARGETS), read_folder(folder)
     if read.differences and not edited:
         results = dict.fromkeys(names, TargetResult(skipped=_LEFT))
     else:

@@ -11,9 +11,9 @@ import numpy as np
 from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
-from focgen.rig.model import LinearActuator, Rig, Signals
 from focgen.rig.replay import replay
-from focgen.trials import excitation
+from focgen.rig.rig import LinearActuator, Rig, Signals
+from focgen.trials import patterns
 from focgen.trials.cases import _spans
 from focgen.trials.machine import Machine, Session
 from focgen.trials.recording import MEASURED, coloured
@@ -34,7 +34,7 @@ def session(signals: str, effect: str, seed: int = 7):
     rng = np.random.default_rng(seed)
     rig, full = draw_chain(rng, signals, TS)
     seen, length = [], 0.0
-    for experiment in excitation.full(rng, TS):
+    for experiment in patterns.full(rng, TS):
         if length < SECONDS:
             kept = experiment.levels[: round((SECONDS - length) / TS)]
             seen.append(replace(experiment, levels=kept))

@@ -50,7 +50,7 @@ def run() -> str:
     ]
     counts = "".join(f"{f'N = {n}':>22}" for n in (1000, 10_000, 100_000))
     lines.append(f"{'':24}{counts}{'error':>12}")
-    rows = {name: "" for name in SIMULATORS}
+    rows = dict.fromkeys(SIMULATORS, "")
     errors = {}
     for count in (1000, 10_000, 100_000):
         u = np.ones(count)

@@ -13,7 +13,7 @@ from focgen.identification.fractional import fit_fractional
 from focgen.identification.kernel import kernels
 from focgen.identification.problem import Problem, starts
 from focgen.logs.experiment import Experiment
-from focgen.rig.model import Actuator, Rig, Signals
+from focgen.rig.rig import Actuator, Rig, Signals
 
 STEP, COUNT, K, T, ALPHA, LEVEL = 0.01, 2000, 0.05, 1.32, 0.6, 0.15
 JOINT = 4000
@@ -108,8 +108,10 @@ def run() -> str:
         lines += [
             f"{what} with 2 % noise, median of {len(sessions)}, same data and start.",
             f"least_squares(lm) around lfilter, eq. (10)  {1e3 * plain:8.1f} ms",
-            f"fit_fractional, offset and intervals too    {1e3 * ours:8.1f} ms    "
-            f"{plain / ours:.1f} times as fast",
+            (
+                f"fit_fractional, offset and intervals too    {1e3 * ours:8.1f} ms    "
+                f"{plain / ours:.1f} times as fast"
+            ),
             "",
         ]
     lines.append("Error without noise, plain | ours, and the ratio of the errors in α.")

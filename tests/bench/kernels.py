@@ -152,7 +152,7 @@ def costs(library, plan) -> np.ndarray:
 def on_cores() -> list[str]:
     """Cycles a tap by the timing model: the slope from L = 64, and the whole sum at L = 1024."""
     from focgen.targets.cores import core
-    from focgen.targets.run import TargetLibrary
+    from focgen.targets.library import TargetLibrary
     from focgen.targets.toolchains import toolchains
 
     one_tap = TransferFunction([(1.0, 0.0)])

@@ -24,7 +24,7 @@ from focgen.errors import PlanError
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_files
 from focgen.plan.build import build_plan
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.response import filtered_response
 from focgen.studies.costs import multiplies
 from tests.bench._on_core import CalledCost, called
@@ -164,7 +164,7 @@ uint32_t called(uint32_t k)
 def our_cost(plan: Plan, chain) -> np.ndarray:
     """Mean cycles of a whole step and words of state: difference, clamps, flags and guards included."""
     from focgen.targets.cores import core
-    from focgen.targets.run import TargetLibrary
+    from focgen.targets.library import TargetLibrary
     from focgen.targets.steps import step_costs
 
     with tempfile.TemporaryDirectory() as scratch:

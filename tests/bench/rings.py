@@ -14,7 +14,7 @@ from focgen.codegen.generate import folder_files
 from focgen.codegen.kernels import Kernels
 from focgen.output import write_files
 from focgen.plan.build import build_plan
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from tests.bench._on_core import CalledCost, called
 from tests.bench.kernels import LENGTH, ON_CORE, SUMS, TYPES, controller
 
@@ -59,7 +59,7 @@ def mirrored(plan: Plan, chain, samples: list[int]) -> CalledCost:
 def generated(plan: Plan, chain, target: str | None) -> tuple[float, float]:
     """Mean instructions and cycles of a whole step, once round the ring."""
     from focgen.targets.cores import core
-    from focgen.targets.run import TargetLibrary
+    from focgen.targets.library import TargetLibrary
     from focgen.targets.steps import step_costs
 
     with tempfile.TemporaryDirectory() as scratch:

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
-from focgen.rig.model import Actuator, Ranges, Rig, Signals
+from focgen.rig.rig import Actuator, Ranges, Rig, Signals
 from tests.foreign.chain import Fault, Physics, Session
 from tests.foreign.forms import MAKE, MOST, STAGE
 

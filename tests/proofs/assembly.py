@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from focgen.codegen.kernels import Kernels
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.plan.scenario import Reset, Scenario
 from focgen.targets.cores import core
 from focgen.targets.emulator import Machine
 from focgen.targets.legality import disassembler
-from focgen.targets.run import TargetLibrary
+from focgen.targets.library import TargetLibrary
 from focgen.targets.toolchains import toolchains
 from tests.proofs.verdict import Verdict
 
@@ -174,13 +174,13 @@ class Follower:
 
     def _decides(self, one) -> bool:
         """Whether flags decide on it."""
-        import capstone.arm as arm
+        from capstone import arm
 
         return one.cc not in (arm.ARM_CC_AL, arm.ARM_CC_INVALID)
 
     def _address_of(self, one) -> set[str]:
         """Registers that an access takes its address from."""
-        import capstone.arm as arm
+        from capstone import arm
 
         found = set()
         for operand in one.operands:
@@ -192,7 +192,7 @@ class Follower:
 
     def _flow(self, one) -> tuple[set[str], set[str]]:
         """Registers and flags that an instruction reads, and that it writes."""
-        import capstone.arm as arm
+        from capstone import arm
 
         names = [one.reg_name(o.reg) for o in one.operands if o.type == arm.ARM_OP_REG]
         mnemonic, reads = one.mnemonic, set(names)

@@ -19,7 +19,7 @@ from focgen.codegen.banks import BankText, bank_texts
 from focgen.codegen.kernels import named_sums
 from focgen.plan.banks import driven_by
 from focgen.plan.formats import Interval
-from focgen.plan.model import Bank, Plan, Sum
+from focgen.plan.plan import Bank, Plan, Sum
 from tests.proofs.harness import reachable
 from tests.proofs.verdict import Verdict
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from focgen.codegen.banks import means
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.state import carries
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from tests.proofs import lookahead
 from tests.proofs.harness import apart, harness, reachable
 from tests.proofs.verdict import Verdict

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from tests.proofs import esbmc
 from tests.proofs.verdict import Verdict
 

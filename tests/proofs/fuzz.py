@@ -1,4 +1,4 @@
-"""``make fuzz``: sequences of init, step, reset and track, led by coverage, under both sanitisers.
+"""``make fuzz-c``: sequences of init, step, reset and track, led by coverage, under both sanitisers.
 
 After every call an oracle looks at the whole state: slots inside their rings, every member within what
 :func:`tests.proofs.harness.reachable` says, the output within its limits, nothing in a floating state that is
@@ -19,7 +19,7 @@ from pathlib import Path
 from focgen.codegen.kernels import PORTABLE, Kernels
 from focgen.codegen.manifest import flags
 from focgen.codegen.state import members
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from tests.c_code import lacking
 from tests.proofs.harness import inside, reachable
 from tests.proofs.spread import ARITHMETICS, KERNELS, controllers, generated, remembering, tuned

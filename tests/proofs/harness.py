@@ -16,7 +16,7 @@ from focgen.codegen.literals import literal
 from focgen.codegen.state import Member, members
 from focgen.plan.counts import MOST
 from focgen.plan.formats import Interval, limit, span
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 
 
 def reachable(plan: Plan, kernels: Kernels = PORTABLE) -> dict[str, Interval | None]:

@@ -10,7 +10,7 @@ from focgen.codegen.kernels import Kernels, named_sums
 from focgen.codegen.lookahead import AHEAD, LookAhead, Run
 from focgen.codegen.state import Member, members
 from focgen.plan.formats import Interval, span, weighted
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from tests.proofs.harness import arguments, calls, chosen, every, function, program, reachable, within
 
 State = tuple[Interval, ...]

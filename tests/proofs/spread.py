@@ -12,7 +12,7 @@ from focgen.control.files import controller_text
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_files
 from focgen.plan.build import build_plan
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 
 ARITHMETICS = ("q15", "q31", "f32", "f64")
 KERNELS = (("rv32imac", "q15"), ("rv32imac", "q31"), ("cortex-m4", "f32"), ("cortex-m0plus", "q31"))

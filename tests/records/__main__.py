@@ -17,8 +17,8 @@ import numpy as np
 from focgen.diagnosis.diagnose import diagnose
 from focgen.logs.experiment import Experiment
 from focgen.rig.files import read_rig
-from focgen.rig.model import Rig
 from focgen.rig.replay import experiments, replay
+from focgen.rig.rig import Rig
 from tests.records import made
 from tests.records.benchmarks import BENCHMARKS, Benchmark
 

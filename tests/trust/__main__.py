@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from focgen.control.controller import ARITHMETICS
-from focgen.verification.apart import apart
+from focgen.verification.subprocess_call import in_subprocess
 from tests.trust.campaign import campaign, table
 
 
@@ -21,7 +21,7 @@ def main() -> int:
     for run in range(args.runs):
         for arithmetic in ARITHMETICS:
             print(f"run {run + 1}, {arithmetic} ...", file=sys.stderr, flush=True)
-            rows += apart(campaign, arithmetic, args.seconds, args.seed + run, args.memory)
+            rows += in_subprocess(campaign, arithmetic, args.seconds, args.seed + run, args.memory)
     print(table(rows))
     wrong = [row for row in rows if not row.holds]
     for row in wrong:

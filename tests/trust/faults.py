@@ -16,6 +16,8 @@ class Fault:
     """Nothing: the others say what is different between their ``begin`` and ``end`` (samples)."""
 
     about = "none"
+    owed = ("short", "exponential")
+    """With which memories the loop has to recover within the time that is given."""
 
     def __init__(self, begin: int, end: int, rng: np.random.Generator):
         self.begin, self.end, self.rng = begin, end, rng
@@ -94,11 +96,32 @@ class Flips(Fault):
 
 
 class AnyState(Fault):
+    """What the interface forbids. A finite output within its limits is owed all the same; but the means of an
+    exponential memory, full of numbers that no past can leave, take as long as they do to forget them."""
+
     about = "power-on without init, the state being random"
+    owed = ("short",)
 
     def before(self, k, seat, ref, y):
         if k == self.begin:
             seat.damage(self.rng, None)
+
+
+class Zeroed(Fault):
+    about = "power-on without init, the state all zeros as a start of C leaves it"
+
+    def before(self, k, seat, ref, y):
+        if k == self.begin:
+            seat.zero()
+
+
+class Restarted(Fault):
+    about = "power-on with init, the state having been random"
+
+    def before(self, k, seat, ref, y):
+        if k == self.begin:
+            seat.damage(self.rng, None)
+            seat.init()
 
 
 class ScheduleLost(Fault):
@@ -162,5 +185,6 @@ class DeadRegulator(Fault):
         return 0.0 if self.acts(k) else u
 
 
-FAULTS = (Fault, Stuck, Spikes, Missing, NotANumber, Late, Flips, AnyState, ScheduleLost, Saturation, Jumps,
+FAULTS = (Fault, Stuck, Spikes, Missing, NotANumber, Late, Flips, AnyState, Zeroed,
+          Restarted, ScheduleLost, Saturation, Jumps,
           Manual, BrownOut, DeadRegulator)  # fmt: skip

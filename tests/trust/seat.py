@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from focgen.plan.execute import execute
-from focgen.plan.model import Format, Plan
+from focgen.plan.plan import Format, Plan
 from focgen.plan.scenario import Reset, Scenario, Track
 from focgen.running.controller import LoadedController
 from focgen.running.signals import Physical
@@ -85,6 +85,17 @@ class Seat:
             for at in rng.choice(8 * size, bits, replace=False):
                 view[int(at) // 8] = bytes([view[int(at) // 8][0] ^ (1 << int(at) % 8)])
         self.lanes.append(Lane(known=False))
+
+    def zero(self) -> None:
+        """The state as a variable of C begins that nobody has set."""
+        size = self.c._machine.bytes
+        self.c._machine._ffi.buffer(self.c._state)[:size] = bytes(size)
+        self.lanes.append(Lane(known=False))
+
+    def init(self) -> None:
+        """From here on the reference knows the state, as from the beginning."""
+        self.c.init()
+        self.lanes.append(Lane())
 
     def _raw(self, value: float, form: Format) -> int | float:
         """What a converter hands over: of a value that is none, integers show the end of their type."""

@@ -6,6 +6,7 @@ give the same bytes.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import platform
 import tempfile
@@ -23,6 +24,8 @@ _SYSTEMS = {"Linux": ("linux", "so"), "Darwin": ("darwin", "dylib"), "Windows": 
 _MACHINES = {"AMD64": "x86_64", "arm64": "aarch64", "ARM64": "aarch64"}
 _OLD = {"x86_64-linux": "linux64", "x86_64-darwin": "darwin64", "x86_64-windows": "win64"}  # of FMI 2.0
 _BINARIES = "binaries/"
+DIGEST = ".sha256"
+"""Ends the name of the file beside an archive that holds its SHA-256, as ``sha256sum -c`` reads it."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,12 @@ def archived(name: str, files: Mapping[str, str | bytes], fmi: int | None) -> di
     system, ending = _SYSTEMS.get(platform.system(), ("linux", "so"))
     machine = f"{_MACHINES.get(platform.machine(), platform.machine())}-{system}"
     place = f"{_BINARIES}{machine if fmi == 3 else _OLD.get(machine, machine)}/{name}.{ending}"
-    return {f"{name}.fmu": _zip({**inside, place: _binary(name, inside, fmi)})}
+    whole = _zip({**inside, place: _binary(name, inside, fmi)})
+    return {f"{name}.fmu": whole, f"{name}.fmu{DIGEST}": f"{_sha256(whole)}  {name}.fmu\n".encode("ascii")}
+
+
+def _sha256(whole: bytes) -> str:
+    return hashlib.sha256(whole).hexdigest()
 
 
 def _members(name: str, files: Mapping[str, str | bytes], fmi: int) -> dict[str, bytes]:
@@ -94,12 +102,20 @@ def compare_archive(path: Path, name: str, files: Mapping[str, str | bytes], fmi
     try:
         with zipfile.ZipFile(path) as archive:
             faults = tuple(_faults(archive, _members(name, files, fmi)))
+        if not faults and _recorded(path) != f"{_sha256(path.read_bytes())}  {path.name}\n".encode("ascii"):
+            faults = (f"is not what was built, by {path.name}{DIGEST}",)
     except (zipfile.BadZipFile, zlib.error, OSError, NotImplementedError, RuntimeError, EOFError):
         return Compared((f"{path.name}: is no zip that can be read",))
     return Compared(
         tuple(f"{path.name}: {fault}" for fault in faults),
         (f"{path.name}: its binary was not compared, only the C that it is made from",),
     )
+
+
+def _recorded(path: Path) -> bytes:
+    """What stands beside an archive; nothing where there is no such file."""
+    place = path.with_name(path.name + DIGEST)
+    return place.read_bytes() if place.is_file() else b""
 
 
 def _faults(archive: zipfile.ZipFile, expected: Mapping[str, bytes]) -> Iterator[str]:

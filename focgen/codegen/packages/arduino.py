@@ -10,7 +10,7 @@ from focgen.codegen.literals import literal
 from focgen.codegen.packages.context import BuildContext, Made, build_context, licence, rendered
 from focgen.codegen.state import state_bytes
 from focgen.errors import InputError
-from focgen.plan.model import Format
+from focgen.plan.plan import Format
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import focgen
 from focgen.codegen.render import render
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 from focgen.resources import shipped
 
 
@@ -55,7 +55,7 @@ def release() -> str:
     return ".".join("".join(filter(str.isdigit, part)) or "0" for part in (*numbers, "0", "0")[:3])
 
 
-def rendered(folder: str, context, *names: tuple[str, str]) -> dict[str, str | bytes]:
+def rendered(folder: str, context: object, *names: tuple[str, str]) -> dict[str, str | bytes]:
     """Files by their names in the folder, each from a template of ``templates/packages/FOLDER``."""
     return {name: render(f"packages/{folder}/{template}", context) for name, template in names}
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from focgen.codegen.packages.context import Made, licence, release, rendered
 from focgen.codegen.texts import UserText
-from focgen.plan.model import Plan
+from focgen.plan.plan import Plan
 
 
 @dataclass(frozen=True)
@@ -119,16 +119,17 @@ def _parameters(plan: Plan) -> list[Parameter]:
     found = [
         Parameter(
             Variable(number, member, f"{which} limit of the output", unit, _value(plan, start)),
-            *(_value(plan, end) for end in ends),
+            _value(plan, ends[0]),
+            _value(plan, ends[1]),
             member,
             f"{name}_U_LSB",
         )
         for number, (member, which, start, ends) in enumerate(limits, 8)
     ]
-    ends = [repr(float(end) * one) for end in (box.factor.low, box.factor.high)]
+    low, high = (repr(float(end) * one) for end in (box.factor.low, box.factor.high))
     for i in range(len(box.nominal)):
         gain = Variable(10 + i, f"gain_{i + 1}", "factor on a gain of the schedule", UserText(""), "1.0")
-        found.append(Parameter(gain, *ends, f"gain[{i}]", f"{name}_GAIN_LSB"))
+        found.append(Parameter(gain, low, high, f"gain[{i}]", f"{name}_GAIN_LSB"))
     return found
 
 

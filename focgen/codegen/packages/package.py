@@ -68,7 +68,12 @@ def packed(files: Mapping[str, str | bytes], made: Made) -> dict[str, str | byte
     laid = dict(files)
     if made.package == "arduino":
         laid[_ARDUINO_EXAMPLE] = laid.pop(_EXAMPLE)
-    return {**laid, README: f"{laid[README]}{section}", **added}
+    return {**laid, README: _text(laid[README]) + _text(section), **added}
+
+
+def _text(content: str | bytes) -> str:
+    """A README, which is always text."""
+    return content if isinstance(content, str) else content.decode()
 
 
 def moved(name: str) -> tuple[str, ...]:

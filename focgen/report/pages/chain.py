@@ -15,8 +15,8 @@ from focgen.report.page import Section, TableOf
 from focgen.report.pages.parts import curves_table, notes, number, warnings
 from focgen.report.style import CYCLE, with_unit
 from focgen.rig.engine import STAGES
-from focgen.rig.model import Actuator, Rig
 from focgen.rig.replay import Replay, simulate_session
+from focgen.rig.rig import Actuator, Rig
 
 _STEPS, _SAMPLES = 5, 600  # what a rig is shown by
 _TIME = Axis("time (s)")
@@ -68,8 +68,9 @@ def _actuator_text(rig: Rig) -> str:
 def _answers(rig: Rig) -> Figure:
     """Steps of pressure from rest, through the actuator and what follows it."""
     low, high = rig.ranges.pressure or (0.0, 1.0)
-    levels = np.linspace(0.0, 1.0, _STEPS + 1)[1:] * (high if high else low)
-    h = max(rig.sample_time, 12.0 * rig.actuator.T ** (1.0 / rig.actuator.alpha) / _SAMPLES)
+    levels = np.linspace(0.0, 1.0, _STEPS + 1)[1:] * (high or low)
+    actuator: Any = rig.actuator  # a fractional one: others have no such figure
+    h = max(rig.sample_time, 12.0 * actuator.T ** (1.0 / actuator.alpha) / _SAMPLES)
     held = [
         Experiment(f"{p:.4g}", h, {"pressure": np.full(_SAMPLES, p)}, start=2.0 * i * _SAMPLES * h)
         for i, p in enumerate(levels)
@@ -129,8 +130,10 @@ def controller_section(controller: Controller) -> Section:
     integral = ", then the integrator" if controller.integrator else ""
     gain = "the gain schedule" if controller.scheduled else f"{controller.gain:.4g}"
     told = (
-        f"{controller.name}: error → {controller.transfer} → × {gain}{integral}, every "
-        f"{controller.sample_time:g} s.",
+        (
+            f"{controller.name}: error → {controller.transfer} → × {gain}{integral}, every "
+            f"{controller.sample_time:g} s."
+        ),
     )
     spans = vars(controller.ranges).items()
     rows = tuple((name, f"{span[0]:g} to {span[1]:g}") for name, span in spans if span is not None)
@@ -142,7 +145,7 @@ def controller_section(controller: Controller) -> Section:
 
 def _schedule(controller: Controller) -> Figure:
     unit = controller.units.schedule
-    at, gains = np.array(controller.gain.breakpoints), np.array(controller.gain.gains)
+    at, gains = np.array(controller.schedule.breakpoints), np.array(controller.gains)
     beyond = np.linspace(at[0] - 0.2 * (at[-1] - at[0]), at[-1] + 0.2 * (at[-1] - at[0]), 300)
     table = Line("schedule table", beyond, controller.gain_at(beyond), "running", width=2.2)
     dots = Line("breakpoints", at, gains, "running", "none", dots=7.0)
@@ -173,10 +176,12 @@ def firmware_section(manifest: Mapping[str, Any]) -> Section:
     """What a manifest says of the generated C: its size, and what is proved of it."""
     bound, sizes = manifest["error_bound"]["quantisation"], manifest["sizes"]
     told = (
-        f"{manifest['name']} in {manifest['arithmetic']} with {manifest['memory']} memory, every "
-        f"{manifest['sample_time']:g} s. Its state takes {sizes['state_bytes']} B, its tables "
-        f"{sizes['table_bytes']} B. Against the same controller in float64 the signal ahead of the "
-        f"integrator is off by {bound['operator']:.3g} at most, which is proved.",
+        (
+            f"{manifest['name']} in {manifest['arithmetic']} with {manifest['memory']} memory, every "
+            f"{manifest['sample_time']:g} s. Its state takes {sizes['state_bytes']} B, its tables "
+            f"{sizes['table_bytes']} B. Against the same controller in float64 the signal ahead of the "
+            f"integrator is off by {bound['operator']:.3g} at most, which is proved."
+        ),
     )
     rows = tuple(
         (p["node"], number(p["worst"]), p["type"], number(p["margin_bits"]), p["how"])
@@ -243,7 +248,9 @@ def _compared(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _used(ran: Mapping[str, Any], table: TableOf) -> Figure:
     """How much of the proven bound the largest error seen takes."""
-    names = tuple(name for name, one in ran.items() if one["max_error"] and one["error_bound"])
+    names = tuple(
+        name for name, one in ran.items() if one["max_error"] and (one["error_bound"] or {}).get("operator")
+    )
     shares = np.array(
         [100.0 * ran[n]["max_error"]["operator"] / ran[n]["error_bound"]["operator"] for n in names]
     )

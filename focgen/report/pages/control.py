@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Bools
 from focgen.control.controller import Controller
 from focgen.control.measures import BAND
 from focgen.loop.design import Design
-from focgen.loop.response import PointMargins, Shapes, shapes
+from focgen.loop.frequency import PointMargins, Shapes, shapes
 from focgen.loop.simulate import SetpointResult, Simulation
 from focgen.plan.build import build_plan
+from focgen.present import present
 from focgen.report.control_summary import (
     margins_table,
     mean_settling,
@@ -19,14 +22,14 @@ from focgen.report.control_summary import (
     points_table,
     schedule_lines,
     setpoints_table,
-    wish_line,
+    specification_line,
 )
 from focgen.report.figures import Area, Axis, Figure, Line, Panel, Rule, curve
 from focgen.report.page import Page, Section, TableOf
 from focgen.report.pages.parts import notes, number, sentence
 from focgen.report.style import CYCLE, GREY, with_unit
 from focgen.report.worst_summary import worst_sentences, worst_table
-from focgen.rig.model import Rig
+from focgen.rig.rig import Rig
 
 _TIME = Axis("time (s)")
 _LOWEST, _HIGHEST = 1e-5, 1e3  # of |L|: what is drawn
@@ -37,7 +40,7 @@ _LOWEST, _HIGHEST = 1e-5, 1e3  # of |L|: what is drawn
 
 def design_page(design: Design, rig: Rig) -> Page:
     """The page of a design."""
-    verdict = sentence(wish_line(design))
+    verdict = sentence(specification_line(design))
     return Page(
         f"A controller for {rig.name}",
         f"{sentence(schedule_lines(design)[0])} {verdict}",
@@ -47,7 +50,7 @@ def design_page(design: Design, rig: Rig) -> Page:
 
 def design_sections(design: Design, rig: Rig) -> tuple[Section, ...]:
     """The controller, its margins, and what becomes of it within the rig's uncertainty."""
-    told = tuple(map(sentence, [*schedule_lines(design), memory_line(design), wish_line(design)]))
+    told = tuple(map(sentence, [*schedule_lines(design), memory_line(design), specification_line(design)]))
     schedule = (_schedule(design, rig),) if design.schedule.breakpoints else ()
     worst = tuple(map(sentence, worst_sentences(design.worst)))
     return (
@@ -66,11 +69,12 @@ def _schedule(design: Design, rig: Rig) -> Figure:
     first, last = schedule.breakpoints[0], schedule.breakpoints[-1]
     inside = np.linspace(first, last, 200)
     beyond = np.linspace(first - 0.3 * (last - first), last + 0.1 * (last - first), 300)
+    actuator: Any = rig.actuator  # a fractional one: others are not scheduled
     wanted = schedule.intercept + schedule.slope * inside
     x = Axis(with_unit("pressure", unit))
     gains = (
         Line("schedule table", beyond, design.controller.gain_at(beyond), "running", width=2.4),
-        Line("K_o(p)/K(p)", inside, wanted / rig.actuator.K(inside), "ideal", width=1.1),
+        Line("K_o(p)/K(p)", inside, wanted / actuator.K(inside), "ideal", width=1.1),
         Line(
             "breakpoints",
             np.array(schedule.breakpoints),
@@ -79,7 +83,7 @@ def _schedule(design: Design, rig: Rig) -> Figure:
             "none",
             dots=7.0,
         ),
-        Rule(schedule.lower_limit, GREY, "dotted", upright=True),
+        Rule(present(schedule.lower_limit), GREY, "dotted", upright=True),
     )
     places = np.array([p.pressure for p in design.points])
     line = (
@@ -129,10 +133,10 @@ def bode_figure(loops: Shapes, worst: PointMargins, controller: Controller, numb
                 f"{name}: {margin.phase_deg:.1f}°", at, where, colour, "none", dots=9.0, group="phase margin"
             )
         )
-    at = f"p = {worst.pressure:.4g} {controller.units.schedule}".rstrip()
+    place = f"p = {worst.pressure:.4g} {controller.units.schedule}".rstrip()
     x = Axis("frequency (rad/s)", log=True)
     return Figure(
-        f"The open loop at {at}",
+        f"The open loop at {place}",
         "At the operating point with the smallest phase margin. The dots stand at the crossover; how far "
         "they are above −180° is the phase margin.",
         "Bode plot: magnitude and phase of the open loop over frequency, ideal and as it will run.",
@@ -154,6 +158,7 @@ def simulation_page(simulation: Simulation) -> Page:
 
 
 def simulation_lead(simulation: Simulation) -> str:
+    """How many steps settle, in a sentence."""
     results, count = simulation.setpoints, len(simulation.setpoints)
     bad = [r for r in results if r.verdict != "settles"]
     if bad:
@@ -197,7 +202,7 @@ def _steps(simulation: Simulation) -> Figure:
     )
 
 
-def _stays_at(limit: float, command: np.ndarray) -> bool:
+def _stays_at(limit: float, command: Array) -> bool:
     """Whether the command stays at the limit for more than the moment it starts from."""
     return bool(np.count_nonzero(np.isclose(command, limit, rtol=0.0, atol=1e-9)) > 0.01 * command.size)
 
@@ -209,7 +214,7 @@ def _interesting(simulation: Simulation) -> float:
     )
 
 
-def _from_rest(simulation: Simulation) -> tuple[list, list]:
+def _from_rest(simulation: Simulation) -> tuple[list[Any], list[Any]]:
     run, tops, bottoms = simulation.running, [], []
     kept = run.time <= 1.2 * _interesting(simulation)
     for i, result in enumerate(simulation.setpoints):
@@ -224,7 +229,7 @@ def _from_rest(simulation: Simulation) -> tuple[list, list]:
     return tops, bottoms
 
 
-def _other(simulation: Simulation, index: int, kept: np.ndarray) -> list[Line]:
+def _other(simulation: Simulation, index: int, kept: Bools) -> list[Line]:
     """What to compare with, dotted: the loop without the rig's effects, or without any, the frozen one."""
     nominal, time = simulation.nominal, simulation.running.time
     other = simulation.frozen[index] if nominal is None else nominal.output[:, index]
@@ -232,7 +237,7 @@ def _other(simulation: Simulation, index: int, kept: np.ndarray) -> list[Line]:
     return [] if other is None else [curve(name, time[kept], other[kept], GREY, dash="dotted", width=1.2)]
 
 
-def _in_a_row(simulation: Simulation) -> tuple[list, list]:
+def _in_a_row(simulation: Simulation) -> tuple[list[Any], list[Any]]:
     run, tops = simulation.running, []
     for i, result in enumerate(simulation.setpoints):
         span = (i * simulation.duration, (i + 1) * simulation.duration)
@@ -246,7 +251,7 @@ def _in_a_row(simulation: Simulation) -> tuple[list, list]:
     return tops, [curve("command", run.time, run.command[:, 0], "command", steps=True)]
 
 
-def _reference(result: SetpointResult, span: tuple[float, float], colour: str) -> list:
+def _reference(result: SetpointResult, span: tuple[float, float], colour: str) -> list[Any]:
     half, x = BAND * abs(result.reference - result.start), np.array(span)
     level = np.full(2, result.reference)
     return [
@@ -255,7 +260,7 @@ def _reference(result: SetpointResult, span: tuple[float, float], colour: str) -
     ]
 
 
-def _settled(time: np.ndarray, output: np.ndarray, begin: float, settling: float, colour: str) -> list[Line]:
+def _settled(time: Array, output: Array, begin: float, settling: float, colour: str) -> list[Line]:
     if not math.isfinite(settling):
         return []
     at = np.array([settling])

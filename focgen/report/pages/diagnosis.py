@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from focgen.diagnosis.drawn import Drawn
-from focgen.diagnosis.model import Diagnosis
+from focgen.diagnosis.model import Diagnosis, Estimate
 from focgen.report.diagnosis_summary import diagnosis_story
 from focgen.report.page import Page, Section, TableOf
 from focgen.report.pages.diagnosis_figures import diagnosis_figures
@@ -64,6 +64,7 @@ def diagnosis_sections(found: Diagnosis, drawn: Drawn | None) -> tuple[Section, 
 
 
 def units_of(drawn: Drawn | None) -> Mapping[str, str]:
+    """The unit of each role, where it is known."""
     return drawn.units if drawn else {}
 
 
@@ -88,8 +89,10 @@ def diagnosis_lead(found: Diagnosis, units: Mapping[str, str]) -> str:
 
 def _files(found: Diagnosis) -> tuple[str, ...]:
     return (
-        f"{found.refitted_rig} is the rig with its own numbers refitted, {found.augmented_rig} the same "
-        "with the effects in it. Both can be replayed, simulated and designed for.",
+        (
+            f"{found.refitted_rig} is the rig with its own numbers refitted, {found.augmented_rig} the same "
+            "with the effects in it. Both can be replayed, simulated and designed for."
+        ),
     )
 
 
@@ -104,10 +107,10 @@ def sizes(found: Diagnosis, units: Mapping[str, str]) -> tuple[TableOf, ...]:
     for i, cause in enumerate(found.causes, 1):
         for candidate in cause.candidates:
             head = (candidate.effect, str(i), cause.stage, f"{candidate.confidence:.0%}")
-            known = [(name, e) for name, e in candidate.parameters.items() if name != "scale"] or [
-                ("–", None)
+            known: list[tuple[str, Estimate | None]] = [
+                (name, e) for name, e in candidate.parameters.items() if name != "scale"
             ]
-            for name, estimate in known:
+            for name, estimate in known or [("–", None)]:
                 rows.append((*head, name, *_cells(estimate, units)))
     if not rows:
         return ()
@@ -115,7 +118,7 @@ def sizes(found: Diagnosis, units: Mapping[str, str]) -> tuple[TableOf, ...]:
     return (TableOf(heads, tuple(rows), "What was found, with its size"),)
 
 
-def _cells(estimate, units: Mapping[str, str]) -> tuple[str, str, str]:
+def _cells(estimate: Estimate | None, units: Mapping[str, str]) -> tuple[str, str, str]:
     if estimate is None:
         return "–", "–", ""
     unit = estimate.unit

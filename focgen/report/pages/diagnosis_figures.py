@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
 
 import numpy as np
 
+from focgen.arrays import Array
+from focgen.diagnosis.belief.standing import tied_within
 from focgen.diagnosis.drawn import Drawn, Mean, Rivals, Trace, sweeps
 from focgen.diagnosis.model import Diagnosis
 from focgen.report.figures import Axis, Bars, Figure, Line, Panel, Rule
@@ -15,7 +18,7 @@ from focgen.report.style import with_unit
 
 _GAP = 0.02  # of the session: between experiments that follow each other at once
 _MOST_RIVALS = 8
-_TIED = 2.0  # standard deviations
+_TIED = tied_within()  # standard deviations
 _STATES = (
     ("as_given", "as given", "measured"),
     ("refitted", "refitted", "bad"),
@@ -34,7 +37,8 @@ def diagnosis_figures(
     far = (_waterfall(found),)
     if drawn is None:
         return {"where": (), "which": (), "far": far}
-    which = tuple(_behind(rivals) for rivals in drawn.rivals if len(rivals.effects) > 1) + (
+    which = (
+        *tuple(_behind(rivals) for rivals in drawn.rivals if len(rivals.effects) > 1),
         _means(drawn, units),
     )
     loops = _loops(drawn, units)
@@ -103,8 +107,8 @@ def _behind(rivals: Rivals) -> Figure:
     )
     return Figure(
         f"What else might be {rivals.found}",
-        "How far the evidence for every other effect is behind. What is less than two standard deviations "
-        "behind cannot be told from the best by these logs.",
+        "How far the evidence for every other effect is behind. Left of the line "
+        "are those that may be the cause as well, by these logs.",
         f"Bars: standard deviations by which {', '.join(names[::-1])} are behind {rivals.found}.",
         (panel,),
         TableOf(
@@ -176,11 +180,11 @@ def _mean(mean: Mean) -> Line:
     )
 
 
-def _least(values: np.ndarray) -> float | None:
+def _least(values: Array) -> float | None:
     return float(values.min()) if len(values) else None
 
 
-def _most(values: np.ndarray) -> float | None:
+def _most(values: Array) -> float | None:
     return float(values.max()) if len(values) else None
 
 
@@ -188,15 +192,16 @@ def _session(drawn: Drawn, units: Mapping[str, str]) -> Figure:
     """Input, output and error of all experiments, on the session's clock."""
     begins = _begins(drawn.traces)
 
-    def whole(values) -> np.ndarray:
+    def whole(values: Callable[[Trace], Array]) -> Array:
         return np.concatenate([np.append(values(t), np.nan) for t in drawn.traces])
 
     clock = np.concatenate([np.append(b + t.time, np.nan) for b, t in zip(begins, drawn.traces)])
-    outputs = [Line("measured", clock, whole(lambda t: t.measured), "measured", width=2.0)]
+    outputs = [Line("measured", clock, whole(attrgetter("measured")), "measured", width=2.0)]
     errors = []
     for key, label, colour in _STATES[1:]:
-        outputs.append(Line(label, clock, whole(lambda t: getattr(t, key)), colour, width=1.3))
-        errors.append(Line(label, clock, whole(lambda t: t.measured - getattr(t, key)), colour, width=1.2))
+        made = whole(attrgetter(key))
+        outputs.append(Line(label, clock, made, colour, width=1.3))
+        errors.append(Line(label, clock, whole(attrgetter("measured")) - made, colour, width=1.2))
     entry, time = drawn.entry, Axis("the session's time (s)")
     shown = with_unit("output", units.get("output", ""))
     panels = (

@@ -17,6 +17,7 @@ from focgen.diagnosis.model import (
 )
 from focgen.errors import InputError
 from focgen.jsontext import fits, read_json
+from focgen.present import present
 
 _SPAN = [(float, None)]
 _ESTIMATE = {"value": (float, None), "ci95": _SPAN, "unit": str}
@@ -28,11 +29,11 @@ _CANDIDATE = {
     "separation": (float, None),
 }
 _FOUND = {"stage": str, "candidates": [_CANDIDATE], "shrink": (float, None), "shrink_interval": _SPAN}
-_GAP = {key: float for key in ("as_given", "refitted", "explained", "floor")} | {
+_GAP = dict.fromkeys(("as_given", "refitted", "explained", "floor"), float) | {
     "unit": str,
     "gof": {"as given": float, "refitted": float, "explained": float, "possible": float},
 }
-_DIAGNOSIS = {
+_DIAGNOSIS: dict[str, Any] = {
     "verdict": str,
     "where": {"stage": (str, None), "inferred": bool, "share": dict, "regimes": dict},
     "causes": [_FOUND],
@@ -43,7 +44,6 @@ _DIAGNOSIS = {
     "augmented_rig": str,
     "next_experiment": ({"why": str, "what": str, "expected_separation": (float, None)}, None),
     "unexplained": dict,
-    "tied": list,
     "notes": [str],
     "fits": [{"effect": str, "error": (float, None)}],
     "warnings": [str],
@@ -65,7 +65,6 @@ def read_diagnosis(path: Path) -> Diagnosis:
         shrink_interval=_pair(value["shrink_interval"]),
         next_experiment=ahead
         and NextExperiment(ahead["why"], ahead["what"], _real(ahead["expected_separation"])),
-        tied=tuple(map(tuple, value["tied"])),
         notes=tuple(value["notes"]),
         fits=tuple(PlainFit(one["effect"], _real(one["error"])) for one in value["fits"]),
         warnings=tuple(value["warnings"]),
@@ -83,19 +82,18 @@ def _sound(value: dict[str, Any]) -> bool:
         and all(fits(share, (float, None)) for share in value["where"]["share"].values())
         and all(fits(estimate, _ESTIMATE) and len(estimate["ci95"]) == 2 for estimate in estimates)
         and all(isinstance(what, dict) for what in value["unexplained"].values())
-        and all(isinstance(group, list) for group in value["tied"])
         and (value["shrink"] is None) == (value["shrink_interval"] is None)
     )
 
 
 def _found(value: dict[str, Any]) -> Found:
     candidates = tuple(_candidate(one) for one in value["candidates"])
-    return Found(value["stage"], candidates, _real(value["shrink"]), _pair(value["shrink_interval"]))
+    return Found(value["stage"], candidates, _real(value["shrink"]), present(_pair(value["shrink_interval"])))
 
 
 def _candidate(value: dict[str, Any]) -> Candidate:
     parameters = {
-        name: Estimate(_real(e["value"]), _pair(e["ci95"]), e["unit"])
+        name: Estimate(_real(e["value"]), present(_pair(e["ci95"])), e["unit"])
         for name, e in value["parameters"].items()
     }
     return Candidate(
@@ -108,5 +106,5 @@ def _real(value: float | None) -> float:
     return float("nan") if value is None else float(value)
 
 
-def _pair(value: list | None) -> tuple[float, float] | None:
+def _pair(value: list[Any] | None) -> tuple[float, float] | None:
     return None if value is None else (_real(value[0]), _real(value[1]))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from focgen.control.units import unit_of_role
-from focgen.identification.model import Identification
+from focgen.identification.identification import Identification
 from focgen.identification.stages import StageFit
+from focgen.present import present
 from focgen.report.figures import Area, Axis, Bars, Figure, Line, Panel, Rule, curve
 from focgen.report.identification import LAST, candidates, named, swings
 from focgen.report.identification_summary import (
@@ -37,6 +40,7 @@ def identification_page(found: Identification) -> Page:
 
 
 def identification_lead(found: Identification) -> str:
+    """What was found, in a few sentences."""
     if found.joint is None:
         return " ".join(sentence(stage_text(fit)) for fit in found.stages.values())
     joint, gof = found.joint, found.gof
@@ -73,7 +77,7 @@ def _fits(found: Identification) -> Figure:
     fitted = found.experiments[0].fitted
     tops, errors = [], []
     for i, fit in enumerate(found.experiments):
-        joint = found.joint.simulated[fit.name]
+        joint = present(found.joint).simulated[fit.name]
         tops.append(curve(fit.name, fit.time, fit.measured, _RUNS[i % len(_RUNS)], width=1.4))
         tops.append(
             curve(
@@ -142,13 +146,13 @@ def _parameters(found: Identification) -> tuple[Figure, ...]:
     steps = [fit for fit in found.experiments if fit.step]
     if len(steps) < 2:
         return ()
-    levels, joint = np.array([fit.level for fit in steps]), found.joint
+    levels, joint = np.array([fit.level for fit in steps]), present(found.joint)
     reach = np.linspace(levels.min(), levels.max(), 50)
     x = Axis(named(found, driving_role(found), "level of the "))
     panels = []
     for key, label in (("K", with_unit("K", gain_unit(found))), ("T", "T (s^α)"), ("alpha", "α")):
         spans = np.array([[a, b, np.nan] for a, b in (fit.ci95[key] for fit in steps)])
-        marks = [
+        marks: list[Any] = [
             Line(
                 "95 % interval",
                 np.repeat(levels, 3),

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.report.figures import Figure
 from focgen.report.page import Section, TableOf
 
@@ -33,7 +34,7 @@ def number(value: float | None) -> str:
     return "–" if value is None or not np.isfinite(value) else f"{value:.4g}"
 
 
-def curves_table(caption: str, curves: Sequence[tuple[str, Sequence[float]]]) -> TableOf:
+def curves_table(caption: str, curves: Sequence[tuple[str, Sequence[float] | Array]]) -> TableOf:
     """Of every curve, named, how it begins and ends and how far it reaches."""
     rows = []
     for name, values in curves:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
+from focgen.present import present
 from focgen.report.figures import Area, Axis, Figure, Line, Mark, Panel, Rule, curve
 from focgen.report.page import Page, Picture, Section, TableOf
 from focgen.report.pages.parts import notes, number
@@ -20,7 +23,7 @@ from focgen.report.study import (
 )
 from focgen.report.study_summary import band_text, ideal_table, plant_table, rows_table, sample_times
 from focgen.report.style import CYCLE, GREY, with_unit
-from focgen.studies.model import Curves, Row, Study
+from focgen.studies.results import Curves, Row, Study
 
 _LENGTHS = {"short": Axis("length L (past samples)", log=True), "exponential": Axis("exponentials")}
 _ERROR = Axis("error / largest output", log=True)
@@ -50,7 +53,7 @@ def study_sections(study: Study, pictures: Collection[str] = ()) -> tuple[Sectio
     shown = tuple(_accuracy(study, memory) for memory in PLACES if _of(study, memory))
     drawn = beside("accuracy.png", "pareto.png")
     parts = [Section("Accuracy and cost", (), tables, drawn, ("study.json",), (*shown, *_fronts(study)))]
-    loops = (_frequency(study),) if any(c.omega for c in study.curves) else ()
+    loops: tuple[Figure, ...] = (_frequency(study),) if any(c.omega for c in study.curves) else ()
     loops += (_loops(study),) if _closed(study) else ()
     drawn = beside("frequency.png", "loops.png")
     parts.append(
@@ -91,7 +94,7 @@ def _accuracy(study: Study, memory: str) -> Figure:
             bounds = np.array([np.nan if r.bound is None else r.bound for r in rows])
             marks.append(Line(arithmetic, x, np.array([r.error for r in rows]), colour, dots=7.0))
             marks.append(Line(f"{arithmetic}, bound", x, bounds, colour, "dotted", 1.3, group="proven bound"))
-    rows = tuple(
+    cells = tuple(
         (r.variant.label, r.arithmetic, number(r.error), number(r.bound)) for r in _of(study, memory)
     )
     return Figure(
@@ -101,7 +104,7 @@ def _accuracy(study: Study, memory: str) -> Figure:
         f"Curves on logarithmic axes: error and proven bound over the size of {memory} memory, by "
         "arithmetic.",
         (Panel(_LENGTHS[memory], _ERROR, tuple(marks)),),
-        TableOf(("memory", "arithmetic", "error", "bound"), rows, f"{memory.capitalize()} memory"),
+        TableOf(("memory", "arithmetic", "error", "bound"), cells, f"{memory.capitalize()} memory"),
     )
 
 
@@ -158,11 +161,11 @@ def _front(study: Study, cost: str) -> Panel:
     return Panel(Axis(SHARES[cost], log=True), _ERROR, tuple(marks))
 
 
-def _costs(rows: Sequence[Row], cost: str) -> np.ndarray:
+def _costs(rows: Sequence[Row], cost: str) -> Array:
     return np.array([getattr(r, cost) for r in rows], float)
 
 
-def _how(row: Row, colour: str) -> dict:
+def _how(row: Row, colour: str) -> dict[str, Any]:
     return {"colour": colour, "dash": "dashed" if row.memory == "exponential" else "solid", "width": 1.8}
 
 
@@ -216,7 +219,7 @@ def _loops(study: Study) -> Figure:
             Panel(
                 time,
                 Axis(with_unit("output", study.controller.units.measurement)),
-                (*tops, Rule(ideal.reference, GREY)),
+                (*tops, Rule(present(ideal.reference), GREY)),
             ),
             Panel(time, Axis("off the ideal (% of step)", log=True), tuple(bottoms), height=230),
         ),
@@ -230,7 +233,7 @@ def _loops(study: Study) -> Figure:
 
 def _plant(study: Study) -> Figure:
     """The plant's step, simulated with each memory in its denominator."""
-    plant, marks = study.plant, []
+    plant, marks = present(study.plant), []
     for i, row in enumerate(plant.rows):
         name = f"L = {row.length}" if row.length else f"{row.states} exponentials"
         marks.append(curve(name, plant.time, row.output, CYCLE[i % len(CYCLE)], width=2.0))

@@ -36,12 +36,13 @@ def trials_lead(sets: Sequence[Scores]) -> str:
 
 
 def section(scores: Scores) -> Section:
+    """The scores as a section of a page: table, then figures."""
     table = TableOf(
         ("score", "value", "90 % interval", "cases", "to reach", "reached"),
         tuple(map(_line, scores.rows)),
         title(scores),
     )
-    figures = (_reliability(scores),) if len(scores.stated) >= LEAST else ()
+    figures: tuple[Figure, ...] = (_reliability(scores),) if len(scores.stated) >= LEAST else ()
     figures += (_calls(scores),) if scores.confusions else ()
     return Section(
         f"Signals {scores.signals}, suite {scores.suite}",

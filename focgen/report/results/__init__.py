@@ -44,6 +44,11 @@ def figure_of(found: Any, which: int = 0) -> Any:
     return _view(found).figure(found, which)
 
 
+def files_of(found: Any) -> dict[str, str | bytes]:
+    """What is drawn of the result for its folder, by file name; pictures where matplotlib is installed."""
+    return _view(found).files(found)
+
+
 def frame_of(found: Any) -> Any:
     """The result's numbers, ``pandas.DataFrame``. Raises MissingExtra where pandas is not installed."""
     return _view(found).frame(found)

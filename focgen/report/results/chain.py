@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from focgen.codegen.generate import Generated
-from focgen.identification.model import Identification
+from focgen.identification.identification import Identification
 from focgen.loop.design import Design
 from focgen.loop.simulate import Simulation
 from focgen.report.control_summary import (
@@ -17,7 +17,7 @@ from focgen.report.control_summary import (
     points_table,
     schedule_lines,
     setpoints_table,
-    wish_line,
+    specification_line,
 )
 from focgen.report.figures import Axis, Bars, Figure, Panel
 from focgen.report.firmware_summary import controller_title, costs_table, verification_payload
@@ -122,7 +122,7 @@ IDENTIFICATION = View[Identification](
 
 
 def _designed(found: Design) -> str:
-    kept = "" if found.holds else ", NOT as wished"
+    kept = "" if found.holds else ", NOT as specified"
     worst = min(found.margins, key=lambda point: point.running.phase_deg).running
     return (
         f"{found.controller.name}: settles in {number(found.settling_s)} s, overshoot "
@@ -149,7 +149,7 @@ def _design_figures(found: Design) -> Sequence[Figure]:
 
 DESIGN = View[Design](
     _designed,
-    lambda found: f"{schedule_lines(found)[0]}. {sentence(wish_line(found))}",
+    lambda found: f"{schedule_lines(found)[0]}. {sentence(specification_line(found))}",
     points_table,
     _points,
     _design_figures,

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
 
 from focgen.diagnosis.model import Diagnosis
+from focgen.errors import MissingExtra
+from focgen.report.diagnosis import diagnosis_pictures
 from focgen.report.figures import Figure
 from focgen.report.page import TableOf
 from focgen.report.pages.chain import replay_section
 from focgen.report.pages.diagnosis import diagnosis_lead, diagnosis_sections, sizes, units_of
 from focgen.report.pages.parts import figures_of, notes, number, warnings
-from focgen.report.pages.study import study_sections
+from focgen.report.pages.study import study_page, study_sections
 from focgen.report.pages.trials import section, trials_lead
 from focgen.report.results.view import Rows, View
+from focgen.report.study import study_pictures
 from focgen.report.study_summary import rows_table, sample_times
 from focgen.rig.replay import Replay
-from focgen.studies.model import Study
+from focgen.studies.results import Study
 from focgen.trials.score import Summary
+
+_Found = TypeVar("_Found")
+
+
+def _if_drawn(pictures: Callable[[_Found], dict[str, bytes]], found: _Found) -> dict[str, bytes]:
+    """None where matplotlib is not installed."""
+    try:
+        return pictures(found)
+    except MissingExtra:
+        return {}
+
 
 # ------------------------------------------------------------------------------------------ diagnosis
 
@@ -66,6 +80,7 @@ DIAGNOSIS = View[Diagnosis](
     _candidates,
     _diagnosis_figures,
     lambda found: (*warnings(found.warnings), *notes(found.notes)),
+    lambda found: dict(_if_drawn(diagnosis_pictures, found)),
 )
 
 
@@ -122,6 +137,12 @@ def _variants(found: Study) -> Rows:
     ]
 
 
+def _study_files(found: Study) -> dict[str, str | bytes]:
+    """Pictures, and a page with figures of its own or beside them: as far as the libraries are there."""
+    pictures = _if_drawn(study_pictures, found)
+    return {**pictures, "report.html": study_page(found, pictures).best()}
+
+
 STUDY = View[Study](
     lambda found: f"{found.controller.name}: {len(found.rows)} variants; {found.recommendation}",
     lambda found: found.recommendation,
@@ -129,6 +150,7 @@ STUDY = View[Study](
     _variants,
     lambda found: figures_of(study_sections(found)),
     lambda found: notes(found.notes),
+    _study_files,
 )
 
 

@@ -23,13 +23,18 @@ def _nothing(found: Any) -> tuple[str, ...]:
     return ()
 
 
+def _no_files(found: Any) -> dict[str, str | bytes]:
+    return {}
+
+
 @dataclass(frozen=True)
 class View(Generic[R]):
     """What there is to show of a result of one kind.
 
     ``line``: its figures that matter, behind its kind and name; ``lead``: what came out, in a sentence;
     ``table``: a small one, or None; ``rows``: all numbers, one dictionary a row, by column; ``figures``:
-    those of its page; ``said``: warnings and notes.
+    those of its page; ``said``: warnings and notes; ``files``: what is drawn of it for the folder that it is
+    written to.
     """
 
     line: Callable[[R], str]
@@ -38,6 +43,7 @@ class View(Generic[R]):
     rows: Callable[[R], Rows]
     figures: Callable[[R], Sequence[Figure]]
     said: Callable[[R], Sequence[str]] = _nothing
+    files: Callable[[R], dict[str, str | bytes]] = _no_files
 
     def text(self, found: R) -> str:
         """One line, in the brackets of Python's objects."""

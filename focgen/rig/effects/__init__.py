@@ -6,11 +6,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
-from typing import Mapping
+from typing import NoReturn
 
 from focgen.rig.effects._effect import SLOTS, STAGES, Effect, Excitation, Form, Parameter, Run
 
@@ -22,7 +23,6 @@ __all__ = [
     "Form",
     "Parameter",
     "Run",
-    "confused",
     "form_of",
     "library",
 ]
@@ -36,17 +36,10 @@ def library() -> Mapping[str, Effect]:
     return MappingProxyType({m.EFFECT.name: m.EFFECT for m in modules})
 
 
-@cache
-def confused(name: str) -> frozenset[str]:
-    """The families that are easily confused with one, whichever of the two says so."""
-    own = library()[name].confused_with
-    return frozenset(e.name for e in library().values() if name in e.confused_with or e.name in own)
-
-
 def form_of(effect: str, form: str) -> Form:
     """The form of a family by their names. Raises KeyError where there is none."""
     return next((f for f in library()[effect].forms if f.name == form), None) or _missing(effect, form)
 
 
-def _missing(effect: str, form: str):
+def _missing(effect: str, form: str) -> NoReturn:
     raise KeyError(f"{effect} has no form {form!r}")

@@ -1,23 +1,25 @@
 """Smooth static curves of any shape, shared by the families that bend."""
 
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from focgen.rig.effects._effect import LARGEST, Form, Parameter
+from focgen.arrays import Array
+from focgen.rig.effects._effect import LARGEST, Form, Parameter, Run, Values
 
 _BEYOND = 1.2  # of the largest level seen: the bend grows no further there
 _KNOTS = np.linspace(0.0, 1.0, 6)  # of the largest level seen
 
 
-def _quartic(x, values, run):
+def _quartic(x: Array, values: Values, run: Run) -> Array:
     *sizes, scale = values
     place = np.minimum(np.abs(x) / scale, _BEYOND)
     return x * (1.0 + sum(size * place ** (i + 1) for i, size in enumerate(sizes)))
 
 
-def quartic(slot):
+def quartic(slot: str) -> Form:
     """x (1 + a q + b q² + c q³), q = |x| over the largest level."""
     sizes = (
         Parameter(n, lower=-2.0, upper=2.0, starts=(0.02,), zero=0.0) for n in ("first", "second", "third")
@@ -31,20 +33,25 @@ def _cardinal() -> CubicSpline:
     return CubicSpline(_KNOTS, np.eye(len(_KNOTS))[:, 1:], bc_type="natural")
 
 
-def _bend(place: np.ndarray, sizes: tuple[float, ...]) -> np.ndarray:
+def _bend(place: Array, sizes: Sequence[float]) -> Array:
     """The spline through ``sizes`` at the knots beyond zero; level beyond the last."""
     c = np.tensordot(_cardinal().c, np.asarray(sizes), axes=1)
     place = np.minimum(place, _KNOTS[-1])
     piece = np.minimum((place * (len(_KNOTS) - 1)).astype(int), len(_KNOTS) - 2)
     q = place - _KNOTS[piece]
     a, b, slope, start = (row[piece] for row in c)
-    return ((a * q + b) * q + slope) * q + start
+    made: Array = ((a * q + b) * q + slope) * q + start
+    return made
 
 
-def spline(slot, place=lambda x, run: np.abs(x), leaves=None):
+def spline(
+    slot: str,
+    place: Callable[[Array, Run], Array] = lambda x, run: np.abs(x),
+    leaves: Callable[[Array, Values, Run], dict[str, float]] | None = None,
+) -> Form:
     """x (1 + S(q)), S a natural cubic spline from zero, q = ``place(x, run)`` over the largest level."""
 
-    def act(x, values, run):
+    def act(x: Array, values: Values, run: Run) -> Array:
         *sizes, scale = values
         return x * (1.0 + _bend(place(x, run) / scale, sizes))
 

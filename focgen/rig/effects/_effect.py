@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array, Bytes, Complex
 from focgen.logs.begin import Begin
 
-_POINTS = 5  # parameters: a form of more is a curve through points
 STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
     "regulator": ("command", "supply"),
@@ -38,7 +38,7 @@ class Parameter:
     """
 
     name: str
-    level: int = 0
+    level: float = 0
     time: int = 0
     lower: float = -np.inf
     upper: float = np.inf
@@ -51,6 +51,9 @@ class Parameter:
 
 LARGEST = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
 """The largest level seen where a form acts: a unit to it, not a thing to fit."""
+
+PERIOD = "period"
+"""The name of a parameter that is the period of a form's own tone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +68,8 @@ class Run:
     """
 
     h: float
-    rest: np.ndarray
-    clock: np.ndarray
+    rest: Bytes
+    clock: Array
     duration: float
     carried: Mapping[str, float] = field(default_factory=dict)
     begins: tuple[Begin, ...] = ()
@@ -90,7 +93,8 @@ class Run:
         return cls(h, rest, clock, max(lengths) * h, begins=begins)
 
 
-Act = Callable[[np.ndarray, tuple[float, ...], Run], Any]
+Values = tuple[float, ...]
+Act = Callable[[Any, Values, Any], Any]  # in the slot `dynamics` no signal passes: see Form
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,7 @@ class Form:
     is not there. ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is
     linear, None where not. ``wanders``: it follows the session's time through free values, so that it
-    foretells nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
+    predicts nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
     ``begun``: it says where something lay that was held when an experiment began elsewhere than at rest.
     """
 
@@ -111,17 +115,12 @@ class Form:
     slot: str
     parameters: tuple[Parameter, ...]
     act: Act
-    seen: Callable[[np.ndarray], tuple[float, ...] | None] | None = None
-    leaves: Callable[[np.ndarray, tuple[float, ...], Run], dict[str, float]] | None = None
-    response: Callable[[tuple[float, ...], np.ndarray], np.ndarray] | None = None
+    seen: Callable[[Array], Values | None] | None = None
+    leaves: Callable[[Array, Values, Run], dict[str, float]] | None = None
+    response: Callable[[Values, Complex], Complex] | None = None
     wanders: bool = False
     jumps: bool = False
     begun: bool = False
-
-    @property
-    def drawn(self) -> bool:
-        """Whether it is a curve drawn through points: such a form describes, and explains little."""
-        return len(self.parameters) > _POINTS
 
 
 @dataclass(frozen=True)
@@ -158,10 +157,9 @@ class Effect:
     ``anywhere``: it is at home in all. ``single``: nature has one form only.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
-    ``noiselike``: what it does cannot be foretold from the input, as rounding; ``tonal``: it is one tone;
-    ``shifts``: it does what columns out of step do, which then are a part of it. ``uneven``: the family that
-    it is as well where it is uneven; ``smooth``: its curves have no kinks; ``bends``: they leave the gain at
-    zero as it is, and change it elsewhere.
+    ``noiselike``: what it does cannot be predicted from the input, as rounding; ``shifts``: it does what
+    columns out of step do, which then are a part of it. ``bends``: its curves leave the gain at zero as it
+    is, and change it elsewhere.
     """
 
     name: str
@@ -175,8 +173,10 @@ class Effect:
     anywhere: bool = False
     single: bool = False
     noiselike: bool = False
-    tonal: bool = False
     shifts: bool = False
-    uneven: str = ""
-    smooth: bool = False
     bends: bool = False
+
+    @property
+    def tonal(self) -> bool:
+        """Whether it rings with one tone: each of its forms has a period of its own."""
+        return all(any(p.name == PERIOD for p in form.parameters) for form in self.forms)

@@ -1,57 +1,58 @@
 """A linear lag more than nominal, shared by the families that have one."""
 
+from focgen.arrays import Array, Complex
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Form, Parameter
+from focgen.rig.effects._effect import Form, Parameter, Run, Values
 from focgen.rig.modes import respond
 
 _LAG = (Parameter("lag", time=1, lower=0.0, upper=20.0, starts=(0.02, 0.2), zero=0.0),)
 
 
-def _one(x, values, run):
+def _one(x: Array, values: Values, run: Run) -> Array:
     return kernels.lag(x, run.rest, run.h, values[0], values[0])
 
 
-def _two(x, values, run):
+def _two(x: Array, values: Values, run: Run) -> Array:
     return _one(_one(x, values, run), values, run)
 
 
-def lag_response(tau, s):
+def lag_response(tau: float, s: Complex) -> Complex:
     """1/(tau s + 1)."""
     return 1.0 / (tau * s + 1.0)
 
 
-def _partial(x, values, run):
+def _partial(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
     return x + share * (_one(x, (tau,), run) - x)
 
 
-def _partial_response(values, s):
+def _partial_response(values: Values, s: Complex) -> Complex:
     share, tau = values
     return 1.0 + share * (lag_response(tau, s) - 1.0)
 
 
-def _spread(x, values, run):
+def _spread(x: Array, values: Values, run: Run) -> Array:
     tau, order = values
     return respond(x, run.rest, run.h, max(tau, 1e-9 * run.h) ** order, order, run.duration)
 
 
-def _spread_response(values, s):
+def _spread_response(values: Values, s: Complex) -> Complex:
     tau, order = values
     return 1.0 / ((tau * s) ** order + 1.0)
 
 
-def _partial_form(slot):
+def _partial_form(slot: str) -> Form:
     share = Parameter("share", lower=0.0, upper=1.0, starts=(0.3, 0.5), zero=0.0)
     tau = Parameter("lag", time=1, lower=0.02, upper=20.0, starts=(0.2, 1.5), log=True)
     return Form("partial", slot, (share, tau), _partial, response=_partial_response)
 
 
-def slower_forms(slot):
+def slower_forms(slot: str) -> list[Form]:
     """Besides, a lag of a part of the signal: what makes a lag of a longer one."""
     return [*forms(slot), _partial_form(slot)]
 
 
-def forms(slot):
+def forms(slot: str) -> list[Form]:
     """One lag, and two equal ones, at ``slot``."""
     return [
         Form("one_lag", slot, _LAG, _one, response=lambda values, s: lag_response(values[0], s)),
@@ -59,7 +60,7 @@ def forms(slot):
     ]
 
 
-def deep_forms(slot):
+def deep_forms(slot: str) -> list[Form]:
     """Besides, a lag of a part of the signal only, and one with its times spread (Cole and Cole, J. Chem.
     Phys. 9, 1941), as where something has to soak in."""
     order = Parameter("order", lower=0.4, upper=1.0, starts=(0.8,))

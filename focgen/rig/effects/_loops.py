@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.effects._effect import LARGEST, Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Form, Parameter, Run, Values
 
 _SHARE = Parameter("share", lower=0.0, upper=0.7, starts=(0.2, 0.2), zero=0.0)
 _WIDTH = Parameter("width", level=1, lower=2e-3, upper=0.6, starts=(0.05, 0.2), log=True)
@@ -13,27 +14,27 @@ _WIDTH = Parameter("width", level=1, lower=2e-3, upper=0.6, starts=(0.05, 0.2), 
 _NARROW = Parameter("width", level=1, lower=2e-3, upper=0.12, starts=(0.04, 0.1), log=True)
 
 
-def _prandtl_ishlinskii(x, values, run):
+def _prandtl_ishlinskii(x: Array, values: Values, run: Run) -> Array:
     share, width = values
     loops = sum(kernels.play(x, run.rest, width * f) for f in (0.5, 1.0, 1.5)) / 3.0
     return x + share * (loops - x)
 
 
-def _play(x, values, run):
+def _play(x: Array, values: Values, run: Run) -> Array:
     return kernels.play(x, run.rest, values[0])
 
 
-def _bouc_wen(x, values, run):
+def _bouc_wen(x: Array, values: Values, run: Run) -> Array:
     size, width = values
     return x - size * kernels.bouc_wen(x, run.rest, width)
 
 
-def _loaded(x, values, run):
+def _loaded(x: Array, values: Values, run: Run) -> Array:
     size, growing, width = values
     return x - (size + growing * np.abs(x)) * kernels.bouc_wen(x, run.rest, width)
 
 
-def _wide(x, values, run):
+def _wide(x: Array, values: Values, run: Run) -> Array:
     narrow, broad, width = values
     return (
         x
@@ -42,14 +43,14 @@ def _wide(x, values, run):
     )
 
 
-def _widening(x, values, run):
+def _widening(x: Array, values: Values, run: Run) -> Array:
     even, growing, width, scale = values
     square = x * np.abs(x) / scale
     loops = even * (kernels.play(x, run.rest, width) - x)
     return x + loops + growing * (kernels.play(square, run.rest, width) - square)
 
 
-def forms(slot):
+def forms(slot: str) -> list[Form]:
     """The forms of a hysteresis at ``slot``."""
     return [
         Form("prandtl_ishlinskii", slot, (_SHARE, _WIDTH), _prandtl_ishlinskii),

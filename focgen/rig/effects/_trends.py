@@ -1,56 +1,65 @@
 """Slow functions of the session's time, shared by the families that drift.
 
 A trend of one sense goes on after the session. A wander is followed through the session, and nobody can
-foretell its next turn: what remains of it later is its mean.
+predict its next turn: what remains of it later is its mean.
 """
+
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from focgen.rig.effects._effect import Form, Parameter
+from focgen.arrays import Array
+from focgen.rig.effects._effect import Act, Form, Parameter, Run, Values
 
 _SESSION = Parameter("session", time=1, clock="session", lower=1.0, upper=1.0 + 1e-9, starts=(1.0,))
 
 
-def _linear(x, values, run):
+def _linear(x: Array, values: Values, run: Run) -> Array:
     return values[0] * run.clock
 
 
-def _settling(x, values, run):
+def _settling(x: Array, values: Values, run: Run) -> Array:
     size, tau = values
-    return -size * np.expm1(-run.clock / tau)
+    made: Array = -size * np.expm1(-run.clock / tau)
+    return made
 
 
-def _bending(x, values, run):
+def _bending(x: Array, values: Values, run: Run) -> Array:
     """From 0 to ``size`` at the session's end, never back; then straight on."""
     size, straight, session = values
     q = run.clock / session
     inside = np.minimum(q, 1.0)
-    return size * (inside * (straight + (1.0 - straight) * inside) + (2.0 - straight) * (q - inside))
+    made: Array = size * (inside * (straight + (1.0 - straight) * inside) + (2.0 - straight) * (q - inside))
+    return made
 
 
-def _wandering(x, values, run):
+def _wandering(x: Array, values: Values, run: Run) -> Array:
     *sizes, session = values
     knots = session / len(sizes) * np.arange(len(sizes) + 1)
     path = CubicSpline(knots, [0.0, *sizes], bc_type="natural")
-    return np.where(run.clock <= knots[-1], path(run.clock), path.integrate(0.0, knots[-1]) / knots[-1])
+    made: Array = np.where(
+        run.clock <= knots[-1], path(run.clock), path.integrate(0.0, knots[-1]) / knots[-1]
+    )
+    return made
 
 
-def forms(slot, level, onto):
+def forms(slot: str, level: int, onto: Callable[[Array, Array], Array]) -> list[Form]:
     """The forms of a trend; ``onto(x, trend)`` applies it, ``level`` is the power of the level in its
     unit."""
 
-    def act(trend):
+    def act(trend: Act) -> Act:
         return lambda x, values, run: onto(x, trend(x, values, run))
 
-    size = dict(level=level, lower=-2.0, upper=2.0, zero=0.0, clock="session")
+    size = partial(Parameter, level=level, lower=-2.0, upper=2.0, zero=0.0, clock="session")
     return [
-        Form("linear", slot, (Parameter("rate", time=-1, starts=(0.1,), **size),), act(_linear)),
+        Form("linear", slot, (size("rate", time=-1, starts=(0.1,)),), act(_linear)),
         Form(
             "settling",
             slot,
             (
-                Parameter("size", starts=(0.1, 0.1), **size),
+                size("size", starts=(0.1, 0.1)),
                 Parameter(
                     "time", time=1, clock="session", lower=0.08, upper=5.0, starts=(0.1, 0.5), log=True
                 ),
@@ -61,7 +70,7 @@ def forms(slot, level, onto):
             "bending",
             slot,
             (
-                Parameter("size", starts=(0.1, 0.1), **size),
+                size("size", starts=(0.1, 0.1)),
                 Parameter("straightness", lower=0.0, upper=2.0, starts=(0.5, 1.5)),
                 _SESSION,
             ),
@@ -71,7 +80,7 @@ def forms(slot, level, onto):
             "wandering",
             slot,
             (  # a natural spline through values at the quarters of the session
-                *(Parameter(name, starts=(0.01,), **size) for name in ("first", "second", "third", "fourth")),
+                *(size(name, starts=(0.01,)) for name in ("first", "second", "third", "fourth")),
                 _SESSION,
             ),
             act(_wandering),

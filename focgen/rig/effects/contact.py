@@ -4,35 +4,41 @@ from dataclasses import replace
 
 import numpy as np
 
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.arrays import Array
+from focgen.rig.dynamics import Dynamics
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _PLACE = Parameter("curvature", level=1, lower=0.1, upper=1.3, starts=(0.8, 0.5, 0.95), zero=1.3)
 
 
-def _knee(x, values, run):
+def _knee(x: Array, values: Values, run: Run) -> Array:
     place, slope = values
-    return np.minimum(x, place) + slope * np.maximum(x - place, 0.0)
+    made: Array = np.minimum(x, place) + slope * np.maximum(x - place, 0.0)
+    return made
 
 
-def _gradual(x, values, run):
+def _gradual(x: Array, values: Values, run: Run) -> Array:
     place, stiffness = values
     beyond = np.maximum(x - place, 0.0) * stiffness
-    return np.minimum(x, place) + np.log1p(beyond) / stiffness
+    made: Array = np.minimum(x, place) + np.log1p(beyond) / stiffness
+    return made
 
 
-def _soft(x, values, run):
+def _soft(x: Array, values: Values, run: Run) -> Array:
     place, slope, width = values
     beyond = width * (np.logaddexp(0.0, (x - place) / width) - np.logaddexp(0.0, -place / width))
-    return x - (1.0 - slope) * beyond
+    made: Array = x - (1.0 - slope) * beyond
+    return made
 
 
-def _hertz(x, values, run):
+def _hertz(x: Array, values: Values, run: Run) -> Array:
     place, stiffness = values
     beyond = np.maximum(x - place, 0.0)
-    return x - beyond + beyond / (1.0 + np.sqrt(stiffness * beyond))
+    made: Array = x - beyond + beyond / (1.0 + np.sqrt(stiffness * beyond))
+    return made
 
 
-def _spring(x, values, run):
+def _spring(x: Dynamics, values: Values, run: None) -> Dynamics:
     place, stiffness = values
     return replace(x, place=place, stiffness=stiffness)
 

@@ -2,54 +2,57 @@
 
 import numpy as np
 
+from focgen.arrays import Array, Complex
 from focgen.rig import kernels
-from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import lag_response
 
 _DECADES = np.geomspace(0.03, 30.0, 7)
 _SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
 
-def _tau(lower, *starts):
+def _tau(lower: float, *starts: float) -> Parameter:
     """A time constant long beside the rig's response: what is quicker is no creep."""
     return Parameter("time", time=1, lower=lower, upper=3000.0, starts=starts, log=True)
 
 
-def _pole(x, values, run):
+def _pole(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
     return x + share * kernels.lag(x, run.rest, run.h, tau, tau)
 
 
-def _logarithmic(x, values, run):
+def _logarithmic(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
     return x + share / 7.0 * sum(kernels.lag(x, run.rest, run.h, t, t) for t in tau * _DECADES)
 
 
-def _two(x, values, run):
+def _two(x: Array, values: Values, run: Run) -> Array:
     quick, slow, tau = values
-    return (
+    made: Array = (
         x
         + quick * kernels.lag(x, run.rest, run.h, tau / 5, tau / 5)
         + slow * kernels.lag(x, run.rest, run.h, tau, tau)
     )
+    return made
 
 
-def _power(x, values, run):
+def _power(x: Array, values: Values, run: Run) -> Array:
     share, tau, power, scale = values
     return x + share * kernels.power_creep(x, run.rest, run.h, tau, scale, power)
 
 
-def _pole_response(values, s):
+def _pole_response(values: Values, s: Complex) -> Complex:
     share, tau = values
     return 1.0 + share * lag_response(tau, s)
 
 
-def _logarithmic_response(values, s):
+def _logarithmic_response(values: Values, s: Complex) -> Complex:
     share, tau = values
-    return 1.0 + share / 7.0 * sum(lag_response(t, s) for t in tau * _DECADES)
+    made: Complex = 1.0 + share / 7.0 * np.sum([lag_response(t, s) for t in tau * _DECADES], axis=0)
+    return made
 
 
-def _two_response(values, s):
+def _two_response(values: Values, s: Complex) -> Complex:
     quick, slow, tau = values
     return 1.0 + quick * lag_response(tau / 5, s) + slow * lag_response(tau, s)
 

@@ -2,21 +2,23 @@
 
 import numpy as np
 
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.arrays import Array
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _LEVEL = Parameter("threshold", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.25), zero=0.0)
 
 
-def _hard(x, values, run):
+def _hard(x: Array, values: Values, run: Run) -> Array:
     return np.sign(x) * np.maximum(np.abs(x) - values[0], 0.0)
 
 
-def _soft(x, values, run):
+def _soft(x: Array, values: Values, run: Run) -> Array:
     threshold, width = values
     size = width * (
         np.logaddexp(0.0, (np.abs(x) - threshold) / width) - np.logaddexp(0.0, -threshold / width)
     )
-    return np.sign(x) * size
+    made: Array = np.sign(x) * size
+    return made
 
 
 EFFECT = Effect(

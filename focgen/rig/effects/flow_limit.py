@@ -1,18 +1,19 @@
 """A supply or valve that cannot move the pressure faster than a rate, up or down."""
 
+from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _RATE = Parameter(
     "rate", level=1, time=-1, lower=1e-3, upper=1e3, starts=(10.0, 2.0, 0.5), zero=1e3, log=True
 )
 
 
-def _hard(x, values, run):
+def _hard(x: Array, values: Values, run: Run) -> Array:
     return kernels.rate_limit(x, run.rest, run.h, values[0])
 
 
-def _soft(x, values, run):
+def _soft(x: Array, values: Values, run: Run) -> Array:
     return kernels.rate_limit(x, run.rest, run.h, values[0], tau=values[1], soft=True)
 
 

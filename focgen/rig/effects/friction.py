@@ -2,20 +2,20 @@
 
 from dataclasses import replace
 
-from focgen.rig.effects._effect import Effect, Form, Parameter
-from focgen.rig.dynamics import Friction, Rise
+from focgen.rig.dynamics import Dynamics, Friction, Rise
+from focgen.rig.effects._effect import Effect, Form, Parameter, Values
 
 
-def _coulomb(x, values, run):
+def _coulomb(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, drag=x.drag + Friction(values[0], values[0]))
 
 
-def _breakaway(x, values, run):
+def _breakaway(x: Dynamics, values: Values, run: None) -> Dynamics:
     force, more = values
     return replace(x, drag=x.drag + Friction(force, force + more))
 
 
-def _rising(x, values, run):
+def _rising(x: Dynamics, values: Values, run: None) -> Dynamics:
     force, rise, speed = values
     return replace(x, drag=x.drag + Friction(force, force), rise=Rise(rise, speed))
 

@@ -4,32 +4,35 @@ from dataclasses import replace
 
 import numpy as np
 
+from focgen.arrays import Array
+from focgen.rig.dynamics import Bend, Dynamics
 from focgen.rig.effects import _curves
-from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
-from focgen.rig.dynamics import Bend
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 
 
-def _cubic(x, values, run):
+def _cubic(x: Array, values: Values, run: Run) -> Array:
     size, scale = values
     return x * (1.0 + size * (x / scale) ** 2)
 
 
-def _gent(x, values, run):
-    return x / (1.0 + np.maximum(values[0] * np.abs(x), -0.95) * np.abs(values[0] * x))
+def _gent(x: Array, values: Values, run: Run) -> Array:
+    made: Array = x / (1.0 + np.maximum(values[0] * np.abs(x), -0.95) * np.abs(values[0] * x))
+    return made
 
 
-def _exponential(x, values, run):
+def _exponential(x: Array, values: Values, run: Run) -> Array:
     bend = values[0]
     y = np.clip(bend * x, -30.0, 30.0)
-    return x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
+    made: Array = x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
+    return made
 
 
-def _stiffening(x, values, run):
+def _stiffening(x: Dynamics, values: Values, run: None) -> Dynamics:
     size, scale = values
     return replace(x, bend=Bend(0.0, size, scale))
 
 
-def _bent_spring(x, values, run):
+def _bent_spring(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, bend=Bend(*values))
 
 

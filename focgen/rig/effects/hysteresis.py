@@ -3,17 +3,17 @@ a mass, of the spring that pulls it back."""
 
 from dataclasses import replace
 
-from focgen.rig.dynamics import Spring
+from focgen.rig.dynamics import Dynamics, Spring
 from focgen.rig.effects import _loops
-from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Values
 
 
-def _spring(x, values, run):
+def _spring(x: Dynamics, values: Values, run: None) -> Dynamics:
     share, loading, unloading, scale = values
     return replace(x, spring=Spring(share, loading / scale, unloading / scale, 1.0, scale))
 
 
-def _sharp_spring(x, values, run):
+def _sharp_spring(x: Dynamics, values: Values, run: None) -> Dynamics:
     share, loading, unloading, power, scale = values
     return replace(x, spring=Spring(share, loading / scale, unloading / scale, power, scale))
 

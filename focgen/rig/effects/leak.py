@@ -2,18 +2,19 @@
 
 import numpy as np
 
-from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
+from focgen.arrays import Array
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 
 
-def _laminar(x, values, run):
+def _laminar(x: Array, values: Values, run: Run) -> Array:
     return x * (1.0 - values[0])
 
 
-def _turbulent(x, values, run):
+def _turbulent(x: Array, values: Values, run: Run) -> Array:
     return x - np.sign(x) * values[0] * (np.sqrt(np.abs(x) + values[0] ** 2 / 4) - values[0] / 2)
 
 
-def _growing(x, values, run):
+def _growing(x: Array, values: Values, run: Run) -> Array:
     share, scale = values
     return x * (1.0 - share * np.minimum(np.abs(x) / scale, 1.0))
 

@@ -1,28 +1,33 @@
 """A lightly damped mode of the actuator: it rings after fast changes."""
 
+from typing import Any
+
 import numpy as np
 
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.arrays import Array, Complex
+from focgen.rig.effects._effect import PERIOD, Effect, Form, Parameter, Run, Values
 from focgen.rig.linear import oscillator
 
 
-def _series(x, values, run):
-    return oscillator(x, run.rest, run.h, *values)
+def _series(x: Array, values: Values, run: Run) -> Array:
+    period, damping = values
+    return oscillator(x, run.rest, run.h, period, damping)
 
 
-def _beside(x, values, run):
+def _beside(x: Array, values: Values, run: Run) -> Array:
     share, quarter, period, damping = values
     place = oscillator(x, run.rest, run.h, period, damping)
     speed = oscillator(x, run.rest, run.h, period, damping, speed=True)
     return x + share * (place - x) + quarter * speed
 
 
-def _mode_response(period, damping, s):
-    w = 2.0 * np.pi / period
-    return w * w / (s * s + 2.0 * damping * w * s + w * w)
+def _mode_response(period: float, damping: float, s: Complex) -> Complex:
+    w: Any = 2.0 * np.pi / period
+    made: Complex = w * w / (s * s + 2.0 * damping * w * s + w * w)
+    return made
 
 
-def _beside_response(values, s):
+def _beside_response(values: Values, s: Complex) -> Complex:
     share, quarter, period, damping = values
     mode = _mode_response(period, damping, s)
     return 1.0 + share * (mode - 1.0) + quarter * s * period / (2.0 * np.pi) * mode
@@ -30,7 +35,7 @@ def _beside_response(values, s):
 
 # a sharp mode is found from close by only
 _STARTS = tuple(0.02 * 1.16**k for k in range(41))
-_PERIOD = Parameter("period", time=1, lower=0.002, upper=30.0, starts=_STARTS, log=True)
+_PERIOD = Parameter(PERIOD, time=1, lower=0.002, upper=30.0, starts=_STARTS, log=True)
 _DAMPING = Parameter("damping", lower=0.005, upper=0.3, starts=(0.1,), log=True)
 
 EFFECT = Effect(
@@ -40,14 +45,13 @@ EFFECT = Effect(
     reveals="fast steps, sines up to the mode: ringing of one frequency",
     confused_with=("sensor_lag", "transport_delay"),
     needs=lambda e: None if e.fastest < 1.0 else "no change of the input is fast beside the rig's response",
-    tonal=True,
     forms=[
         Form(
             "series",
             "response",
             (_PERIOD, _DAMPING),
             _series,
-            response=lambda values, s: _mode_response(*values, s),
+            response=lambda values, s: _mode_response(values[0], values[1], s),
         ),
         # driven by the pressure, not by the slower motion beside it: larger, and with a phase of its own
         Form(

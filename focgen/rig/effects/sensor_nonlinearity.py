@@ -2,32 +2,35 @@
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.rig.effects import _curves
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 
-def _quadratic(x, values, run):
+def _quadratic(x: Array, values: Values, run: Run) -> Array:
     return x * (1.0 + values[0] * x)
 
 
-def _exponential(x, values, run):
+def _exponential(x: Array, values: Values, run: Run) -> Array:
     y = np.clip(values[0] * x, -30.0, 30.0)
-    return x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
+    made: Array = x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
+    return made
 
 
-def _cubic(x, values, run):
+def _cubic(x: Array, values: Values, run: Run) -> Array:
     first, second = values
     return x * (1.0 + first * x + second * x * x)
 
 
-def _folded(x, values, run):
+def _folded(x: Array, values: Values, run: Run) -> Array:
     """Turned over below ``centre``, and zero at rest: a bridge that crosses its balance, read without its
     sign."""
     share, centre = values
-    return x + 2.0 * share * (np.maximum(centre - x, 0.0) - max(centre, 0.0))
+    made: Array = x + 2.0 * share * (np.maximum(centre - x, 0.0) - max(centre, 0.0))
+    return made
 
 
-def _bend(name, level, *starts):
+def _bend(name: str, level: int, *starts: float) -> Parameter:
     return Parameter(name, level=level, lower=-2.0, upper=2.0, starts=starts, zero=0.0)
 
 
@@ -38,7 +41,6 @@ EFFECT = Effect(
     reveals="six or more levels with the curvature logged beside the reading",
     confused_with=("gain_nonlinearity", "contact", "sensor_saturation"),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
-    smooth=True,
     bends=True,
     forms=[
         Form("quadratic", "strain", (_bend("bend", -1, 0.1),), _quadratic),

@@ -2,24 +2,26 @@
 
 import numpy as np
 
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.arrays import Array
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _COARSE = 0.006  # of the range: finer steps are the resolution of any converter
-_COVERED = (0.6, 0.999)  # of the samples lie on a few levels; on two, which may be rests of a finer reading
+_COVERED = 0.6  # of the samples lie on a few levels
+_COVERED_BY_TWO = 0.999  # the same of two levels, which may be rests of a finer reading
 
 
-def _round(x, values, run):
+def _round(x: Array, values: Values, run: Run) -> Array:
     step, phase = values
     return step * np.round((x - phase) / step) + phase if step > 0 else x
 
 
-def _seen(y):
+def _seen(y: Array) -> Values | None:
     """Step and phase where most samples lie on a few evenly spaced levels."""
     span = float(np.ptp(y))
     values, counts = np.unique(np.round((y - y.min()) / max(span, 1e-300) * 20_000), return_counts=True)
     common = values[counts > 0.002 * len(y)] / 20_000 * span + y.min()
     covered = counts[counts > 0.002 * len(y)].sum() / len(y)
-    if len(common) < 2 or covered < _COVERED[len(common) == 2]:
+    if len(common) < 2 or covered < (_COVERED_BY_TWO if len(common) == 2 else _COVERED):
         return None
     gaps = np.diff(common)
     gaps = gaps[gaps > 0.25 * np.median(gaps)]
@@ -39,7 +41,6 @@ EFFECT = Effect(
     needs=lambda e: None,
     single=True,
     noiselike=True,
-    uneven="sensor_nonlinearity",
     forms=[
         Form(
             "rounding",

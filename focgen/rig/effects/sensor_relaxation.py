@@ -1,32 +1,34 @@
 """A reading that overshoots with the rate of strain, then relaxes."""
 
+from focgen.arrays import Array, Complex
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import lag_response
 
 _SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1, 0.1), zero=0.0)
 _TIME = Parameter("time", time=1, lower=0.02, upper=100.0, starts=(0.3, 2.0, 10.0), log=True)
 
 
-def _one(x, values, run):
+def _one(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
     return x + share * (x - kernels.lag(x, run.rest, run.h, tau, tau))
 
 
-def _spread(x, values, run):
+def _spread(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
     slow = sum(kernels.lag(x, run.rest, run.h, t, t) for t in (tau / 4, tau, 4 * tau)) / 3.0
     return x + share * (x - slow)
 
 
-def _one_response(values, s):
+def _one_response(values: Values, s: Complex) -> Complex:
     share, tau = values
     return 1.0 + share * (1.0 - lag_response(tau, s))
 
 
-def _spread_response(values, s):
+def _spread_response(values: Values, s: Complex) -> Complex:
     share, tau = values
-    return 1.0 + share * (1.0 - sum(lag_response(t, s) for t in (tau / 4, tau, 4 * tau)) / 3.0)
+    quick, middle, slow = (lag_response(t, s) for t in (tau / 4, tau, 4 * tau))
+    return 1.0 + share * (1.0 - (quick + middle + slow) / 3.0)
 
 
 EFFECT = Effect(

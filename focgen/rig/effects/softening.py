@@ -2,50 +2,54 @@
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.rig.effects import _curves
-from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 
 _GROWTH = Parameter("growth", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
 
-def _scale(*starts):
+def _scale(*starts: float) -> Parameter:
     return Parameter("scale", level=1, lower=0.05, upper=20.0, starts=starts, log=True)
 
 
-def _peak(x, run):
+def _peak(x: Array, run: Run) -> Array:
     return np.maximum(np.maximum.accumulate(np.abs(x)), run.carried.get("largest", 0.0))
 
 
-def _done(x, run):
+def _done(x: Array, run: Run) -> Array:
     rises = np.where(run.rest, np.abs(x), np.maximum(np.diff(np.abs(x), prepend=0.0), 0.0))
     return run.carried.get("work", 0.0) + np.cumsum(rises)
 
 
-def _largest(x, values, run):
+def _largest(x: Array, values: Values, run: Run) -> Array:
     growth, scale = values
     return x * (1.0 + growth * _peak(x, run) / scale)
 
 
-def _saturating(x, values, run):
+def _saturating(x: Array, values: Values, run: Run) -> Array:
     growth, scale = values
-    return x * (1.0 - growth * np.expm1(-_peak(x, run) / scale))
+    made: Array = x * (1.0 - growth * np.expm1(-_peak(x, run) / scale))
+    return made
 
 
-def _work(x, values, run):
+def _work(x: Array, values: Values, run: Run) -> Array:
     growth, scale = values
-    return x * (1.0 - growth * np.expm1(-_done(x, run) / scale))
+    made: Array = x * (1.0 - growth * np.expm1(-_done(x, run) / scale))
+    return made
 
 
-def _reloading(x, values, run):
+def _reloading(x: Array, values: Values, run: Run) -> Array:
     growth, scale = values
-    return x * (1.0 - growth * np.expm1((np.abs(x) - _peak(x, run)) / scale))
+    made: Array = x * (1.0 - growth * np.expm1((np.abs(x) - _peak(x, run)) / scale))
+    return made
 
 
-def _leaves_peak(x, values, run):
+def _leaves_peak(x: Array, values: Values, run: Run) -> dict[str, float]:
     return {"largest": float(_peak(x, run)[-1])}
 
 
-def _leaves_work(x, values, run):
+def _leaves_work(x: Array, values: Values, run: Run) -> dict[str, float]:
     return {"work": float(_done(x, run)[-1])}
 
 

@@ -2,18 +2,22 @@
 
 import numpy as np
 
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.arrays import Array
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _CEILING = Parameter("ceiling", level=1, lower=0.1, upper=1.3, starts=(0.95, 0.75), zero=1.3)
 
 
-def _hard(x, values, run):
+def _hard(x: Array, values: Values, run: Run) -> Array:
     return np.minimum(x, values[0])
 
 
-def _soft(x, values, run):
+def _soft(x: Array, values: Values, run: Run) -> Array:
     ceiling, width = values
-    return x - width * np.logaddexp(0.0, (x - ceiling) / width) + width * np.logaddexp(0.0, -ceiling / width)
+    made: Array = (
+        x - width * np.logaddexp(0.0, (x - ceiling) / width) + width * np.logaddexp(0.0, -ceiling / width)
+    )
+    return made
 
 
 EFFECT = Effect(

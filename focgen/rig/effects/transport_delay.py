@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.rig.delay import delayed
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 
-def _shift(x, values, run):
+def _shift(x: Array, values: Values, run: Run) -> Array:
     return delayed(x, run.rest, run.h, values[0])
 
 

@@ -2,15 +2,17 @@
 
 from dataclasses import replace
 
+from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.dynamics import Dynamics
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 
-def _speed(x, values, run):
+def _speed(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, unloading=x.unloading * values[0])
 
 
-def _lag(x, values, run):
+def _lag(x: Array, values: Values, run: Run) -> Array:
     up, down = max(-values[0], 0.0), max(values[0], 0.0)
     return kernels.lag(x, run.rest, run.h, up, down)
 

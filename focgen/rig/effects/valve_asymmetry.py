@@ -1,18 +1,19 @@
 """A valve that vents more slowly, or faster, than it fills."""
 
+from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 
-def _time(name, *starts):
+def _time(name: str, *starts: float) -> Parameter:
     return Parameter(name, time=1, lower=0.0, upper=20.0, starts=starts, zero=0.0)
 
 
-def _lags(x, values, run):
+def _lags(x: Array, values: Values, run: Run) -> Array:
     return kernels.lag(x, run.rest, run.h, *values)
 
 
-def _orifice(x, values, run):
+def _orifice(x: Array, values: Values, run: Run) -> Array:
     fill, vent, scale = values
     return kernels.orifice(x, run.rest, run.h, fill, vent, scale)
 

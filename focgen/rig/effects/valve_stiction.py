@@ -1,15 +1,17 @@
 """A valve that does nothing until a change of the command has crossed a band."""
 
+from collections.abc import Sequence
 from itertools import product
 
+from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Effect, Form, Parameter
+from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _BANDS = tuple(0.003 * 1.3**k for k in range(17))  # of the largest command, far above whose swing it may lie
 _LEFTS, _PLACES = (0.0, 0.35, 0.7), (0.0,)
 
 
-def _parameters(*further):
+def _parameters(*further: Sequence[float]) -> tuple[Parameter, ...]:
     """Band, what of it is left after a slip, and where the valve lay: every combination to begin with."""
     starts = zip(*product(_BANDS, _LEFTS, *further))
     band = Parameter("band", level=1, lower=0.0, upper=0.5, starts=next(starts), zero=0.0)
@@ -17,20 +19,20 @@ def _parameters(*further):
     return (band, left, *(Parameter("place", lower=-1.0, upper=1.0, starts=s, zero=0.0) for s in starts))
 
 
-def _play(x, values, run):
+def _play(x: Array, values: Values, run: Run) -> Array:
     return kernels.play(x, run.rest, values[0])
 
 
-def _stick(x, values, run):
+def _stick(x: Array, values: Values, run: Run) -> Array:
     return kernels.stick(x, run.rest, values[0], 0.0)
 
 
-def _slip(x, values, run):
+def _slip(x: Array, values: Values, run: Run) -> Array:
     band, left, *place = values
     return kernels.stick(x, run.rest, band, left * band, False, *(p * band for p in place))
 
 
-def _slips(x, values, run):
+def _slips(x: Array, values: Values, run: Run) -> Array:
     band, left, *place = values
     return kernels.stick(x, run.rest, band, left * band, True, *(p * band for p in place))
 

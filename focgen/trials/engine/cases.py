@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.model import Actuator, Ranges, Rig
-from focgen.trials import excitation
+from focgen.rig.rig import Actuator, Ranges, Rig
+from focgen.trials import patterns
 from focgen.trials.cases import Case, clocks_of, label_of
 from focgen.trials.engine.bodies import Body
 from focgen.trials.engine.forms import BODY, HANDS, Angles
@@ -33,19 +36,19 @@ class Scene:
 
     true: EngineRig
     full: float
-    seen: list[excitation.Experiment]
-    unseen: list[excitation.Experiment]
+    seen: list[patterns.Experiment]
+    unseen: list[patterns.Experiment]
     clocks: list[float]
     spans: Spans
     angles: Angles
     trial: EngineTrial
 
     @property
-    def experiments(self) -> list[excitation.Experiment]:
+    def experiments(self) -> list[patterns.Experiment]:
         """All of them, the sealed ones last."""
         return [*self.seen, *self.unseen]
 
-    def commands(self, experiments, h: float) -> list[np.ndarray]:
+    def commands(self, experiments: Sequence[patterns.Experiment], h: float) -> list[Array]:
         """The experiments' commands on the grid of step ``h``."""
         repeat = round(self.true.rig.sample_time / h)
         return [np.repeat(e.levels * self.full, repeat) for e in experiments]
@@ -67,9 +70,9 @@ def make_engine_case(assignment: Assignment, signals: str, rng: np.random.Genera
 def _set_up(signals: str, rng: np.random.Generator) -> Scene:
     Ts, units = float(rng.choice((0.01, 0.02))), draw_units(rng)
     true, full, angle = _draw_rig(units, signals, Ts, rng)
-    seen, unseen = excitation.engine(rng, Ts), excitation.unseen(rng, Ts)
+    seen, unseen = patterns.engine(rng, Ts), patterns.unseen(rng, Ts)
     clocks = clocks_of([*seen, *unseen], Ts, rng)
-    bare = Scene(true, full, seen, unseen, clocks, None, None, None)
+    bare = Scene(true, full, seen, unseen, clocks, None, None, None)  # type: ignore[arg-type]  # filled in below
     trial = EngineTrial(bare.commands(seen, _COARSE), clocks[: len(seen)], _COARSE)
     scene = replace(bare, trial=trial, angles=Angles(angle, true.body.time, clocks[-1]))
     scene = replace(scene, true=_identified(scene, rng))
@@ -83,7 +86,9 @@ def _set_up(signals: str, rng: np.random.Generator) -> Scene:
     )
 
 
-def _draw_rig(units: Units, signals: str, Ts: float, rng) -> tuple[EngineRig, float, float]:
+def _draw_rig(
+    units: Units, signals: str, Ts: float, rng: np.random.Generator
+) -> tuple[EngineRig, float, float]:
     """The true rig, its full command, and the angle in rad that this bends it by."""
     links = 5 if rng.random() < 0.35 else 1
     lag = float(rng.uniform(0.03, 0.08)) if rng.random() < 0.3 else 0.0
@@ -97,24 +102,26 @@ def _draw_rig(units: Units, signals: str, Ts: float, rng) -> tuple[EngineRig, fl
     return EngineRig(rig, body, angle / top, unit), top / gain, angle
 
 
-def _identified(scene: Scene, rng) -> EngineRig:
+def _identified(scene: Scene, rng: np.random.Generator) -> EngineRig:
     """The true rig with the actuator that its owner finds in its healthy motion."""
     true, body = scene.true, scene.true.body
     session = EngineSession(true, (), _COARSE)
     traces = [session.run(c, t) for c, t in zip(scene.trial.commands, scene.trial.clocks)]
     order = 2 if body.filter or rng.random() < 0.3 else 1
-    parts = [[getattr(t, n) for t in traces] for n in ("pressure", "curvature")]
-    actuator = fitted(*parts, _COARSE, order, body.time)
+    pressures, curvatures = [t.pressure for t in traces], [t.curvature for t in traces]
+    actuator = fitted(pressures, curvatures, _COARSE, order, body.time)
     return replace(true, rig=replace(true.rig, actuator=actuator))
 
 
-def _recorder(scene: Scene, rng) -> Recorder:
+def _recorder(scene: Scene, rng: np.random.Generator) -> Recorder:
     drawn = draw_recorder(rng, {n: getattr(scene.spans, n) for n in MEASURED}, scene.true.rig.sample_time)
     noise = {n: getattr(scene.spans, n) * float(rng.uniform(*_NOISE)) for n in MEASURED}
     return replace(drawn, noise=noise, jitter=0.0, skew=0.0)
 
 
-def _draw(effect: str, severity: str, scene: Scene, rng) -> tuple[Setting, dict]:
+def _draw(
+    effect: str, severity: str, scene: Scene, rng: np.random.Generator
+) -> tuple[Setting, dict[str, Any]]:
     """One of the effect's forms, calibrated, and what the label says of it."""
     forms = BODY.get(effect) or HANDS.get(effect)
     if forms:
@@ -128,8 +135,8 @@ def _draw(effect: str, severity: str, scene: Scene, rng) -> tuple[Setting, dict]
     return setting, {**facts, **kept}
 
 
-def _seen(facts: dict, setting: Setting, scene: Scene, recorder: Recorder) -> dict:
-    """Add how much of the effect the logs can show, once the rig's own parameters are refitted."""
+def _seen(facts: dict[str, Any], setting: Setting, scene: Scene, recorder: Recorder) -> dict[str, Any]:
+    """Add how much of the effect the logs can show, once the rig's nominal parameters are refitted."""
     rig = _smooth(scene.true.rig)
     logged = [name for name in MEASURED if name in rig.signals.columns()]
     whole, without = (scene.trial.signals(scene.true, s) for s in ((setting,), ()))
@@ -146,7 +153,9 @@ def _smooth(rig: Rig) -> Rig:
     return replace(rig, actuator=replace(rig.actuator, alpha=0.99))
 
 
-def _play(scene: Scene, settings: list[Setting], recorder: Recorder, label: dict, rng) -> Case:
+def _play(
+    scene: Scene, settings: list[Setting], recorder: Recorder, label: dict[str, Any], rng: np.random.Generator
+) -> Case:
     rig = scene.true.rig
     session, played = EngineSession(scene.true, settings, _FINE), []
     for experiment, command, clock in zip(

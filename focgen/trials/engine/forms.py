@@ -13,7 +13,7 @@ import numpy as np
 
 from focgen.trials.engine import governors
 from focgen.trials.engine.bodies import Body, Link, Parts, Series
-from focgen.trials.forms import Form, either_way
+from focgen.trials.forms import Amplitude, Form, either_way
 
 
 @dataclass(frozen=True)
@@ -104,98 +104,98 @@ GOVERNED: dict[str, Callable[..., governors.Govern]] = {
 }
 
 
-def _friction(rng: np.random.Generator, s: Angles):
+def _friction(rng: np.random.Generator, s: Angles) -> Amplitude:
     return lambda a: (a * s.angle,)
 
 
-def _slip(rng, s):
+def _slip(rng: np.random.Generator, s: Angles) -> Amplitude:
     stiffness = rng.uniform(0.3, 1.0)
     return lambda a: (stiffness, a * s.angle)
 
 
-def _width(rng, s):
+def _width(rng: np.random.Generator, s: Angles) -> Amplitude:
     return lambda a: (a * s.angle,)
 
 
-def _polynomial(rng, s):
+def _polynomial(rng: np.random.Generator, s: Angles) -> Amplitude:
     linear, sign = rng.uniform(0.0, 1.0), either_way(rng)
     most = 1e9 if sign > 0 else 0.13  # beyond, it would give way at the largest torque
 
-    def amplitude(a):
+    def amplitude(a: float) -> tuple[float, ...]:
         a = sign * min(a, most)
         return a * linear / s.angle, a * (1.0 - linear) / s.angle**2
 
     return amplitude
 
 
-def _tip(rng, s):
+def _tip(rng: np.random.Generator, s: Angles) -> Amplitude:
     phase, sign = rng.uniform(-0.3, 0.9), either_way(rng)
     return lambda a: (sign * min(a, 1e9 if sign > 0 else 0.6), phase)
 
 
-def _stop(rng, s):
+def _stop(rng: np.random.Generator, s: Angles) -> Amplitude:
     return lambda a: (s.angle * (1.0 - a),)
 
 
-def _bumper(rng, s):
+def _bumper(rng: np.random.Generator, s: Angles) -> Amplitude:
     at = rng.uniform(0.4, 0.65)
     return lambda a: (at * s.angle, a)
 
 
-def _kelvin(rng, s):
+def _kelvin(rng: np.random.Generator, s: Angles) -> Amplitude:
     time = rng.uniform(8.0, 25.0)
     return lambda a: (a, time)
 
 
-def _mode(rng, s):
+def _mode(rng: np.random.Generator, s: Angles) -> Amplitude:
     natural, damping = 2.0 * np.pi * rng.uniform(0.8, 3.0), rng.uniform(0.03, 0.12)
     return lambda a: (a, natural, damping)
 
 
-def _whip(rng, s):
+def _whip(rng: np.random.Generator, s: Angles) -> Amplitude:
     draw = _mode(rng, s)
     return lambda a: (a * s.time**2, *draw(a)[1:])
 
 
-def _damper(rng, s):
+def _damper(rng: np.random.Generator, s: Angles) -> Amplitude:
     return lambda a: (a, 0.02 * s.angle)
 
 
-def _largest(rng, s):
+def _largest(rng: np.random.Generator, s: Angles) -> Amplitude:
     scale = rng.uniform(0.3, 0.8)
     return lambda a: (a, scale * s.angle)
 
 
-def _travel(rng, s):
+def _travel(rng: np.random.Generator, s: Angles) -> Amplitude:
     strokes = rng.uniform(4.0, 15.0)
     return lambda a: (a, strokes * s.angle)
 
 
-def _warm(rng, s):
+def _warm(rng: np.random.Generator, s: Angles) -> Amplitude:
     time = rng.uniform(0.3, 1.5) * s.session
     return lambda a: (a, time)
 
 
-def _seed(rng) -> float:
+def _seed(rng: np.random.Generator) -> float:
     return float(rng.integers(1, 2**31))
 
 
-def _gusts(rng, s):
+def _gusts(rng: np.random.Generator, s: Angles) -> Amplitude:
     time, seed = rng.uniform(0.5, 3.0), _seed(rng)
     return lambda a: (a * s.angle, time, seed)
 
 
-def _hands(rng, s):
+def _hands(rng: np.random.Generator, s: Angles) -> Amplitude:
     apart, long, seed = rng.uniform(6.0, 15.0), rng.uniform(0.5, 2.0), _seed(rng)
     return lambda a: (a * s.angle, apart, long, seed)
 
 
-def _weights(rng, s):
+def _weights(rng: np.random.Generator, s: Angles) -> Amplitude:
     apart, long, seed = rng.uniform(8.0, 20.0), rng.uniform(8.0, 20.0), _seed(rng)
     return lambda a: (a * s.angle, apart, long, seed)
 
 
-def _shaken(rng, s):
+def _shaken(rng: np.random.Generator, s: Angles) -> Amplitude:
     frequency, drift = rng.uniform(0.6, 2.5), rng.uniform(20.0, 60.0)
     return lambda a: (a * s.angle, frequency, drift)
 

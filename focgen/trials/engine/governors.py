@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+
+from focgen.arrays import Array, Ints
 
 Govern = Callable[[float, float, float], None]
 """Called ahead of every step with the session's clock in s, the angle and its speed."""
@@ -16,13 +19,13 @@ class Hands:
     """What a governor may take hold of: the engine's ``model`` and ``data``, the step ``h`` in s, the healthy
     stiffness and damping of each hinge (k,), and what it ``kept`` from one experiment to the next."""
 
-    model: object
-    data: object
+    model: Any
+    data: Any
     h: float
-    stiffness: np.ndarray
-    damping: np.ndarray
-    hinges: np.ndarray
-    kept: dict
+    stiffness: Array
+    damping: Array
+    hinges: Ints
+    kept: dict[str, Any]
 
     def soften(self, factor: float) -> None:
         """Make every spring ``factor`` times as stiff as it was."""
@@ -108,7 +111,9 @@ def shaking(hands: Hands, torque: float, frequency: float, drift: float) -> Gove
     return act
 
 
-def _now_and_then(hands: Hands, apart: float, long: float, seed: float, torque) -> Govern:
+def _now_and_then(
+    hands: Hands, apart: float, long: float, seed: float, torque: Callable[[float, float], float]
+) -> Govern:
     rng = np.random.default_rng(int(seed))
     state = {"until": rng.exponential(apart), "on": False, "sign": 1.0}
 

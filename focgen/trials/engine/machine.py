@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import InputError
-from focgen.rig.model import UNITY, Rig
+from focgen.rig.rig import UNITY, Rig
 from focgen.trials import machine
 from focgen.trials.engine.bodies import Body, Parts, model_text
 from focgen.trials.engine.forms import ADDED, GOVERNED
@@ -51,9 +52,10 @@ class EngineRig:
 class EngineSession:
     """The rig in use: what outlives a rest stays from one experiment to the next."""
 
-    def __init__(self, true: EngineRig, settings: Sequence[Setting], h: float):
+    def __init__(self, true: EngineRig, settings: Sequence[Setting], h: float) -> None:
         self.h = h
-        bare, at = replace(true.rig, actuator=None), {"regulator": [], "sensor": [], "actuator": []}
+        bare = replace(true.rig, actuator=None)
+        at: dict[str, list[Setting]] = {"regulator": [], "sensor": [], "actuator": []}
         for setting in settings:
             at[_STAGE_OF.get(setting.form, "actuator")].append(setting)
         plain = {"regulator": replace(bare, sensor=UNITY), "sensor": replace(bare, regulator=UNITY)}
@@ -62,14 +64,14 @@ class EngineSession:
         )
         self.moved = Moved(true, at["actuator"], h)
 
-    def run(self, command: np.ndarray, clock: float) -> Trace:
+    def run(self, command: Array, clock: float) -> Trace:
         """One experiment from rest, the command (n,) held from step to step."""
         pressure = self.ahead.run(command, clock).pressure
         curvature = self.moved.run(pressure, clock)
         output = self.behind.run(curvature, clock).output
         return Trace(self.h, clock, np.ascontiguousarray(command, float), pressure, curvature, output)
 
-    def read(self, output: np.ndarray) -> np.ndarray:
+    def read(self, output: Array) -> Array:
         """The samples as the sensor's converter gives them (a new array)."""
         return self.behind.read(output)
 
@@ -77,7 +79,7 @@ class EngineSession:
 class Moved:
     """The body in the engine, with what ``settings`` add to it."""
 
-    def __init__(self, true: EngineRig, settings: Sequence[Setting], h: float):
+    def __init__(self, true: EngineRig, settings: Sequence[Setting], h: float) -> None:
         self.mujoco, self.true, self.h = engine(), true, h
         parts = Parts()
         for setting in settings:
@@ -92,7 +94,7 @@ class Moved:
         self.governors = [GOVERNED[s.form](hands, *s.parameters) for s in governed]
         self.seen = self.model.tendon("seen").id
 
-    def run(self, pressure: np.ndarray, clock: float) -> np.ndarray:
+    def run(self, pressure: Array, clock: float) -> Array:
         """The angle (n,) in the rig's unit under ``pressure`` (n,), from where the body hangs; infinite
         throughout where no spring holds it any more and the engine gives up."""
         self.mujoco.mj_resetData(self.model, self.data)
@@ -101,15 +103,15 @@ class Moved:
         lost = any(warning.number for warning in self.data.warning)
         return np.full(len(angle), np.inf) if lost else self.true.angle * angle
 
-    def _steps(self, torque: np.ndarray, clock: float | None) -> np.ndarray:
+    def _steps(self, torque: Array, clock: float | None) -> Array:
         """The angle at the beginning of each step, ``clock`` None: nobody interferes."""
         step, model, data, seen = self.mujoco.mj_step, self.model, self.data, self.seen
         angle, control, length, speed = np.empty(len(torque)), data.ctrl, data.ten_length, data.ten_velocity
-        governors = self.governors if clock is not None else ()
+        governors, began = (self.governors, clock) if clock is not None else ([], 0.0)
         for k, now in enumerate(torque.tolist()):
             control[0] = now
             for govern in governors:
-                govern(clock + k * self.h, float(length[seen]), float(speed[seen]))
+                govern(began + k * self.h, float(length[seen]), float(speed[seen]))
             step(model, data)
             angle[k] = length[seen]
         return angle
@@ -119,11 +121,11 @@ class Moved:
 class EngineTrial:
     """What the rig goes through: commands on the grid of step ``h`` s, and the session's clock at each."""
 
-    commands: Sequence[np.ndarray]
+    commands: Sequence[Array]
     clocks: Sequence[float]
     h: float
 
-    def signals(self, true: EngineRig, settings: Sequence[Setting] = ()) -> dict[str, np.ndarray]:
+    def signals(self, true: EngineRig, settings: Sequence[Setting] = ()) -> dict[str, Array]:
         """Noise-free pressure, curvature and output (N,) of all experiments, one after the other."""
         session = EngineSession(true, settings, self.h)
         traces = [session.run(command, clock) for command, clock in zip(self.commands, self.clocks)]

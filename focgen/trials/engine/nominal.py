@@ -9,20 +9,21 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import cont2discrete, lfilter
 
+from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.corners import EXACT, moved
-from focgen.rig.model import Actuator, LinearActuator, Relative, Rig
+from focgen.rig.rig import Actuator, LinearActuator, Relative, Rig
 
 _TIMES, _GAINS = (0.03, 0.10), 0.01  # by what data sheets of regulator and sensor are off
 
 
 def fitted(
-    pressures: Sequence[np.ndarray], curvatures: Sequence[np.ndarray], h: float, order: int, time: float
+    pressures: Sequence[Array], curvatures: Sequence[Array], h: float, order: int, time: float
 ) -> Actuator | LinearActuator:
     """The lag of ``order`` 1 or 2 that comes closest to the healthy body's motion, sampled every ``h`` s;
     ``time`` in s to begin with. One of order 1 is written as T and alpha = 1."""
 
-    def missed(v: np.ndarray) -> np.ndarray:
+    def missed(v: Array) -> Array:
         num, den = _coefficients(v)
         b, a, _ = cont2discrete((num, den), h, "foh")
         made = [lfilter(b.ravel(), a, p) for p in pressures]
@@ -38,7 +39,7 @@ def fitted(
     return LinearActuator(TransferFunction([(num[0], 0.0)], terms))
 
 
-def _coefficients(v: np.ndarray) -> tuple[list[float], list[float]]:
+def _coefficients(v: Array) -> tuple[list[float], list[float]]:
     """K/(T s + 1), or K/((T s + 1)(U s + 1)), from the logarithms of K, T and U."""
     gain, *times = (float(x) for x in np.exp(v))
     den = np.polymul([times[0], 1.0], [times[1], 1.0]) if len(times) == 2 else [times[0], 1.0]

@@ -1,0 +1,27 @@
+"""Which effect, if any, a residual asks for next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from focgen.diagnosis.belief.further import Ground
+from focgen.diagnosis.fitting.fit import Fit
+from focgen.diagnosis.numbers import NUMBERS
+
+
+def prior(effect: str, base: Fit) -> float:
+    """Log odds, before the data, that ``base`` lacks ``effect``; of another form of a family that it has."""
+    if effect in {c.effect for c in base.problem.candidates}:
+        return float(np.log(NUMBERS.again))
+    return float(np.log(NUMBERS.rare))
+
+
+def likeliest(ground: Ground, tried: Sequence[Fit]) -> tuple[Fit, float]:
+    """Of candidates the one of the highest posterior odds over nothing more, and those, in nats, by what it
+    explains: nominal parameters that come closer to those given choose among effects, and ask for none."""
+    odds = [ground.odds(f) + prior(f.problem.candidates[-1].effect, ground.base) for f in tried]
+    best = int(np.argmax(odds))
+    closer = max(ground.base.prior_penalty - tried[best].prior_penalty, 0.0)
+    return tried[best], odds[best] - closer

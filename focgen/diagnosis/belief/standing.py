@@ -1,0 +1,40 @@
+"""Which families may stand in the place of one: their probabilities, and the least set that holds most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from focgen.diagnosis.numbers import NUMBERS
+
+_SURE = 500.0  # nats: more is no surer
+
+
+def tied_within() -> float:
+    """Standard deviations within which the second of two families is in the set."""
+    none = max(1.0 - NUMBERS.held - NUMBERS.elsewhere, 1e-12)
+    return float(np.sqrt(2.0 * np.log(NUMBERS.held / none)))
+
+
+def behind(odds: float, best: float) -> float:
+    """Log odds as standard deviations behind the best, of a Gaussian that is as unlikely; negative ahead."""
+    return float(np.copysign(np.sqrt(2.0 * abs(best - odds)), best - odds))
+
+
+def probabilities(odds: Sequence[float]) -> np.ndarray:
+    """Of every family (k,), from their log odds over the effect not being there at all; they sum to less than
+    one, for it may not be, or be none of them."""
+    nats = np.clip(odds, -_SURE, _SURE)
+    none = np.logaddexp.reduce([0.0, *nats])
+    made: np.ndarray = (1.0 - NUMBERS.elsewhere) * np.exp(nats - none)
+    return made
+
+
+def least_set(sure: np.ndarray) -> np.ndarray:
+    """The places of the fewest families that hold :attr:`~focgen.diagnosis.numbers.Numbers.held` of what
+    all may hold together, the likeliest first."""
+    order = np.argsort(-sure, kind="stable")
+    held = np.cumsum(sure[order]) / max(float(np.sum(sure)), 1e-300)
+    asked = NUMBERS.held / (1.0 - NUMBERS.elsewhere)
+    return order[: int(np.searchsorted(held, min(asked, 1.0) - 1e-12)) + 1]

@@ -1,0 +1,199 @@
+"""Levenberg–Marquardt on simulated output, prewhitened, with numeric Jacobian and bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from focgen.diagnosis.fitting.predictability import predictable_share
+from focgen.diagnosis.problem.problem import Problem
+from focgen.rig.kernels import innovations as innovated
+from focgen.rig.kernels import products
+
+STEP = 1e-4
+FIXED = 1e-6  # a parameter whose bounds are as close is none
+_STALE = 2  # iterations that rows of the Jacobian are kept for
+_LAGGING = 0.01  # of what a fit is behind another: one that gains less by an iteration will not reach it
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted hypothesis: ``vector``, ``innovations`` (all experiments, one after the other), their
+    ``sse``, and the normal matrix ``information`` (J^T J of the innovations, and what is known beforehand in
+    the same unit)."""
+
+    problem: Problem
+    vector: np.ndarray
+    innovations: np.ndarray
+    sse: float
+    information: np.ndarray
+
+    @cached_property
+    def size(self) -> int:
+        """How many parameters the candidate effects have that are free."""
+        low, high = self.problem.bounds()
+        return int(np.sum(high[self.problem.head :] - low[self.problem.head :] > FIXED))
+
+    @cached_property
+    def prior_penalty(self) -> float:
+        """Nats against its nominal parameters, for being far from those given."""
+        return self.problem.nominals.prior_penalty(self.vector)
+
+    @cached_property
+    def cost(self) -> float:
+        """What the fit was to make least: the sum of squares, and what is known beforehand."""
+        return _cost(self.problem, self.vector, self.sse, len(self.innovations))
+
+    @cached_property
+    def weighed(self) -> np.ndarray:
+        """The residual (n,) by trust, as a share of the output's level."""
+        return self.problem.weighed(self.vector)
+
+    @cached_property
+    def predictable_share(self) -> float:
+        """The share of the residual's mean square that inputs predict."""
+        problem = self.problem
+        return predictable_share(problem.segment, self.weighed, problem.references.clocks["response"])
+
+    def residual(self) -> list[np.ndarray]:
+        """Measured less simulated, by experiment, as a share of the output's level, each sample by its
+        trust."""
+        return self.problem.segment.parts(self.weighed)
+
+
+@dataclass(frozen=True, eq=False)
+class Weighing:
+    """How residuals are weighed: means of ``coarse`` samples at a time, whitened by ``ar``."""
+
+    ar: np.ndarray
+    coarse: int = 1
+
+
+WHITE = Weighing(np.ones(1))
+"""Every sample by itself: noise without colour."""
+
+
+def means(part: np.ndarray, coarse: int) -> np.ndarray:
+    """Means of ``coarse`` neighbours; what does not fill the last one is left out."""
+    count = len(part) // coarse
+    return part if coarse == 1 else part[: count * coarse].reshape(count, coarse).mean(axis=1)
+
+
+def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing, probe: bool = False) -> np.ndarray:
+    """The weighed residual, as a share of the output's level; ``probe``: of a step from a vector that was
+    simulated just before, and will be again."""
+    segment = problem.segment
+    made, weight, rest = problem.simulate(vector, probe), segment.weight, segment.run.rest
+    if not segment.pace:
+        return innovated(segment.y, made, weight, rest, weighing.coarse, weighing.ar)
+    left = segment.recent(segment.y - made)
+    return innovated(left, np.zeros_like(left), weight, rest, weighing.coarse, weighing.ar)
+
+
+def fit(
+    problem: Problem,
+    start: np.ndarray,
+    weighing: Weighing,
+    iterations: int = 12,
+    tolerance: float = 1e-3,
+    known: np.ndarray | None = None,
+    leader: Fit | None = None,
+) -> Fit:
+    """The likeliest vector within the problem's bounds, from ``start``: least squares, weighed against what
+    is known beforehand; stops when the gain is below ``tolerance`` nats, or below a hundredth of those that
+    it is behind ``leader``, a fit of the same innovations.
+
+    ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a
+    little off. Otherwise the rows ahead of the candidates' own are made anew only every third time, for they
+    change little, and the fit does not end on old ones.
+    """
+    low, high = problem.bounds()
+    vector = np.clip(start, low, high)
+    now = innovations(problem, vector, weighing)
+    sse, damping = float(now @ now), 1e-3
+    cost, (expected, precision) = _cost(problem, vector, sse, len(now)), problem.known
+    normal, kept, age = np.eye(len(vector)), known, 0
+    for _ in range(iterations):
+        rows = jacobian(problem, vector, now, weighing, low, high, kept)
+        product = products(np.vstack([rows, now]))
+        unit = sse / max(len(now), 1)  # a nat's worth of squares, twice
+        normal = product[:-1, :-1] + unit * np.diag(precision)
+        slope = product[:-1, -1] + unit * precision * (vector - expected)
+        gained, before = False, cost
+        for _ in range(6):
+            trial = np.clip(vector - _step(normal, slope, damping, vector, low, high), low, high)
+            then = innovations(problem, trial, weighing)
+            worth = _cost(problem, trial, float(then @ then), len(then))
+            if worth < cost:
+                vector, now, sse, cost, gained = trial, then, float(then @ then), worth, True
+                damping = max(damping * 0.2, 1e-9)
+                break
+            damping *= 6.0
+        enough = max(tolerance, _LAGGING * _nats(len(now), cost, leader.cost)) if leader else tolerance
+        ended = not gained or _nats(len(now), before, cost) < enough
+        if ended and (kept is None or known is not None):
+            break
+        age = 0 if ended or age >= _STALE else age + 1
+        kept = known if known is not None else rows[: problem.head] if age else None
+    return Fit(problem, vector, now, sse, normal)
+
+
+def _nats(count: int, cost: float, better: float) -> float:
+    """By how much likelier a fit of ``count`` innovations is at the cost ``better``."""
+    return 0.5 * count * float(np.log(cost / max(better, 1e-300)))
+
+
+def _cost(problem: Problem, vector: np.ndarray, sse: float, count: int) -> float:
+    """The sum of squares that would be as unlikely alone as this one with these nominal parameters."""
+    return sse * float(np.exp(2.0 * problem.unlikely(vector) / max(count, 1)))
+
+
+def jacobian(
+    problem: Problem,
+    vector: np.ndarray,
+    now: np.ndarray,
+    weighing: Weighing,
+    low: np.ndarray,
+    high: np.ndarray,
+    known: np.ndarray | None = None,
+) -> np.ndarray:
+    """Rows (k, n): the innovations' derivatives, by differences; 0 for what cannot move."""
+    rows = [] if known is None else list(known)
+    for i in range(len(rows), len(vector)):
+        if high[i] - low[i] < FIXED:
+            rows.append(np.zeros_like(now))
+            continue
+        step = STEP if vector[i] + STEP <= high[i] else -STEP
+        moved = vector.copy()
+        moved[i] += step
+        rows.append((innovations(problem, moved, weighing, probe=True) - now) / step)
+    return np.stack(rows)
+
+
+def _step(
+    normal: np.ndarray,
+    slope: np.ndarray,
+    damping: float,
+    vector: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> np.ndarray:
+    """The damped step, with parameters held that stand at a bound and push beyond it."""
+    held = ((vector <= low) & (slope > 0)) | ((vector >= high) & (slope < 0))
+    free = ~held
+    step = np.zeros_like(vector)
+    if free.any():
+        scale = np.diag(normal)[free]
+        matrix = normal[np.ix_(free, free)] + damping * np.diag(
+            scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12
+        )
+        step[free] = np.linalg.lstsq(matrix, slope[free], rcond=1e-12)[0]
+    made: np.ndarray = np.clip(step, -1.0, 1.0)
+    return made
+
+
+def problem_residual(of: Fit) -> np.ndarray:
+    """Measured less simulated (n,)."""
+    return of.problem.residual(of.vector)

@@ -1,0 +1,1 @@
+"""Which effects a stretch needs: searched, accepted, held against their rivals."""

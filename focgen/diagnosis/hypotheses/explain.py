@@ -1,0 +1,400 @@
+"""Effects added to a segment one by one while the data ask for them, then each re-examined."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
+from focgen.diagnosis.fitting.integrating import pace, settled
+from focgen.diagnosis.fitting.predictability import Predictability, predictability
+from focgen.diagnosis.fitting.realign import realigned
+from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria, select
+from focgen.diagnosis.hypotheses.converter import Converter, converter_of
+from focgen.diagnosis.hypotheses.disturbance import disturbance
+from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
+from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.nominal_parameters import NominalParameters
+from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.scales import references
+from focgen.diagnosis.problem.segments import Segment, is_single, owner
+from focgen.logs.between import Between
+from focgen.logs.experiment import Experiment
+from focgen.present import present
+from focgen.rig.effects import Effect, library
+from focgen.rig.engine import between_of, fits_in
+from focgen.rig.rig import Rig
+
+_DEPTH = 4
+# of the rig's response, and a sample at most: what columns may be out of step by; more is a delay
+_OUT_OF_STEP = 0.05
+_GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
+_WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
+_SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
+_RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
+_KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
+# force the path shows more above the sensor's noise the longer it is kept
+_BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects;
+    ``errors``: by family, the root-mean-square residual with that effect alone, as a share of the refitted
+    nominal's; ``converter``: the coarse one that the output shows.
+    """
+
+    segment: Segment
+    given: np.ndarray
+    nominal: Fit
+    best: Fit
+    ar: np.ndarray
+    causes: tuple[Cause, ...]
+    left: Predictability
+    left_nominal: Predictability
+    errors: dict[str, float]
+    converter: Converter | None = None
+
+    @property
+    def strained(self) -> bool:
+        """Whether it takes nominal parameters of the actuator three times their uncertainty off, or more."""
+        return self.best.problem.nominals.strained(self.best.vector)
+
+    @property
+    def square(self) -> float:
+        """The mean square that its effects leave."""
+        return float(np.mean(self.best.weighed**2))
+
+    @property
+    def freed(self) -> bool:
+        """Whether it had to be let go further than that."""
+        return self.best.problem.nominals.far and self.strained
+
+    @property
+    def stage(self) -> str | None:
+        """The one stage this segment is, None where stages are merged."""
+        return self.segment.stages[0] if len(self.segment.stages) == 1 else None
+
+    def told(self, rig: Rig) -> Rig:
+        """``rig`` with what its command does between samples, where that is not as usual."""
+        between = self.segment.between
+        usual = self.segment.entry != "command" or between == between_of(rig, "command")
+        return rig if usual else replace(rig, between=Between(between))
+
+    def kept_by(self, given: Rig, refitted: Rig) -> bool:
+        """Whether the refit of its nominal parameters is part of the rig ``refitted``."""
+        stages = self.segment.stages
+        return any(
+            getattr(a, stage) != getattr(b, stage)
+            for a, b in ((given, refitted), (given.delays, refitted.delays))
+            for stage in stages
+        )
+
+
+def candidates_for(segment: Segment, rig: Rig) -> list[CandidateEffect]:
+    """Every form that may act in this segment. In a rig of one stage every family may, but of those that
+    share a formula only the one at home there. Where every experiment begins at rest, none that says where
+    something lay before."""
+    every = _placed_in(segment, rig)
+    return every if segment.run.begins else [c for c in every if not c.form.begun]
+
+
+def _placed_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
+    if not is_single(rig):
+        return [
+            CandidateEffect(e.name, form, stage)
+            for e in library().values()
+            if (stage := _place(e, segment))
+            for form in e.forms
+            if fits_in(form, stage, rig)
+        ]
+    stage = present(owner(rig))
+    found: dict[tuple[object, bool], CandidateEffect] = {}
+    for effect in sorted(library().values(), key=lambda e: e.stage != stage):
+        for form in effect.forms:
+            if fits_in(form, stage, rig):
+                found.setdefault((form.act, form.begun), CandidateEffect(effect.name, form, stage))
+    return list(found.values())
+
+
+def _place(effect: Effect, segment: Segment) -> str | None:
+    """Where a family is looked for: at home, or where it may be anywhere in the first stage: logs of stages
+    that are merged do not tell which."""
+    if effect.stage in segment.stages:
+        return effect.stage
+    return segment.stages[0] if effect.anywhere else None
+
+
+def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
+    """Forms that are at home in another stage and may sit in this one: tried where those at home leave
+    much."""
+    if is_single(rig):
+        return []
+    return [
+        CandidateEffect(e.name, form, stage)
+        for e in library().values()
+        for stage in e.also
+        if stage in segment.stages and e.stage not in segment.stages
+        for form in e.forms
+        if fits_in(form, stage, rig)
+    ]
+
+
+def _much_left(base: Fit) -> bool:
+    """Whether inputs predict most of what is left."""
+    return base.predictable_share > NUMBERS.much
+
+
+def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
+    """The segment's problem without effects."""
+    scales = references(rig, segment, logs)
+    freely = owner(rig) if owner(rig) in segment.stages else None
+    load, response = (scales.levels["load"], scales.levels["response"])
+    segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
+    slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
+    return Problem(
+        segment, NominalParameters(rig, segment.stages, freely, load, response), scales, slack=slack
+    )
+
+
+def explain(
+    rig: Rig,
+    segment: Segment,
+    logs: Sequence[Experiment],
+    threshold: float,
+    only: Sequence[str] | None = None,
+    trusted: bool = True,
+) -> Explanation:
+    """Find the segment's effects; ``threshold``: nats of evidence that noise alone does not reach.
+
+    ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``:
+    whether the input could be freed of its noise.
+    """
+    problem = _widened(_gauged(_zeroed(_held(rig, segment, logs))))
+    found = _explained(rig, problem, threshold, only, trusted)
+    if problem.segment.pace and not found.causes:
+        segment = replace(problem.segment, pace=_KEPT * problem.segment.pace)
+        kept = replace(problem, segment=segment, memory={})
+        other = _explained(rig, kept, threshold, only, trusted)
+        problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
+    if not found.strained or problem.nominals.far or found.left.share < NUMBERS.left:
+        return found
+    freed, asked = (
+        replace(problem, nominals=replace(problem.nominals, far=True), memory={}),
+        NUMBERS.unlikely * found.square,
+    )
+    beside = freed.with_candidates(found.best.problem.candidates)
+    if beside.candidates and np.mean(fit(beside, found.best.vector, Weighing(found.ar)).weighed ** 2) > asked:
+        return found
+    other = _explained(rig, freed, threshold, only, trusted)
+    return other if other.square < asked else found
+
+
+def _borne_out(kept: Explanation, usual: Explanation) -> bool:
+    """Whether what a longer path shows is seen a little at the usual pace, too: what an input was measured
+    wrong adds up in the path, and no force is behind it."""
+    candidates = kept.best.problem.candidates
+    if not kept.causes:
+        return False
+    beside, weighing = usual.nominal.problem.with_candidates(candidates), Weighing(usual.ar)
+    return evidence(fit(beside, kept.best.vector, weighing, 12), usual.nominal) > 0.0
+
+
+def _explained(
+    rig: Rig, problem: Problem, threshold: float, only: Sequence[str] | None, trusted: bool
+) -> Explanation:
+    segment = problem.segment
+    candidates, guests = candidates_for(segment, rig), guests_in(segment, rig)
+    if only is not None:
+        candidates, guests, threshold = [c for c in candidates if c.effect in only], [], 0.0
+    segment, given, converter = problem.segment, problem.nominal(), converter_of(problem, candidates)
+    asked = AcceptanceCriteria(threshold, trusted, converter, only is not None)
+    rankings, candidates = _grown(problem, given, candidates, guests, asked)
+    weighing = Weighing(rankings[-1].ar)
+    best = realigned(_dropped(rankings[-1].base, weighing, threshold), weighing)
+    nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
+    best, causes = reexamined(best, Beside(nominal, rankings, candidates, weighing, asked.surroundings))
+    if converter is not None:
+        best, causes = converter.beside(best, nominal, causes, weighing)
+    found, (best, nominal) = best, map(settled, _between_anew(rig, best, nominal, weighing))
+    segment = best.problem.segment
+    causes = tuple(replace(c, rivals=tuple(_in_the_end(r, found, best) for r in c.rivals)) for c in causes)
+    response = problem.references.clocks["response"]
+    return Explanation(
+        segment,
+        given,
+        nominal,
+        best,
+        weighing.ar,
+        causes,
+        predictability(segment, best.weighed, response),
+        predictability(segment, nominal.weighed, response),
+        rankings[0].errors,
+        converter,
+    )
+
+
+def _between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:
+    """Both fits with the command running between its samples as suits what was found: a nominal rig far from
+    what it models may be suited by another way. That has to leave much less: half a sample more or less may
+    make up for a little of whatever a model lacks."""
+    segment = best.problem.segment
+    if rig.between is not None or segment.entry != "command" or not best.problem.candidates:
+        return best, nominal
+    others = [replace(segment, between=way) for way in _ways(segment) if way != segment.between]
+    tried = [_moved_to(best, other, weighing) for other in others]
+    closest = min([best, *tried], key=lambda f: f.sse)
+    if closest.sse > NUMBERS.unlikely * best.sse:
+        return best, nominal
+    return closest, _moved_to(nominal, closest.problem.segment, weighing)
+
+
+def _moved_to(of: Fit, segment: Segment, weighing: Weighing) -> Fit:
+    """A fit made anew to another account of its segment."""
+    problem = replace(of.problem, segment=segment, memory={})
+    start = of.vector.copy()
+    start[len(problem.nominal_start)] = 0.0  # the alignment made up for the wrong way
+    return fit(problem, start, weighing, 8)
+
+
+def _in_the_end(rival: Rival, found: Fit, best: Fit) -> Rival:
+    """A rival that is what was ``found``, with what that is in the end."""
+    return replace(rival, fit=best) if rival.fit is found else rival
+
+
+def _grown(
+    base: Problem,
+    vector: np.ndarray,
+    candidates: list[CandidateEffect],
+    guests: list[CandidateEffect],
+    asked: AcceptanceCriteria,
+) -> tuple[list[Ranking], list[CandidateEffect]]:
+    """A ranking for each effect that the data ask for, the last one being of what is left; and the candidate
+    effects that were tried.
+    """
+    rankings: list[Ranking] = []
+    while len(rankings) < _DEPTH:
+        rankings.append(rank(base, vector, _worth_trying(base, vector, base.untried(candidates))))
+        best = select(rankings, asked)
+        if best is None and guests and _much_left(rankings[-1].base):
+            candidates, guests = candidates + guests, []
+            continue
+        if best is None:
+            break
+        best = _widened_beside(best, asked.threshold)
+        base, vector = best.problem, best.vector
+    return rankings, candidates
+
+
+def _widened_beside(best: Fit, threshold: float) -> Fit:
+    """Where a number of a stage stands at its end beside the effects found, it may pass that, if evidence
+    asks for it: what no effect stands for would be mended by one that imitates it."""
+    problem = best.problem
+    if problem.nominals.wide or not problem.nominals.beyond(best.vector):
+        return best
+    wide = replace(problem, nominals=replace(problem.nominals, wide=True))
+    now, then = (fit(p, best.vector, WHITE, 8) for p in (problem, wide))
+    known = problem.nominals.precision > 0.0
+    moved = np.abs(then.vector[: len(known)] - problem.nominal_start)[known]
+    away = moved * np.sqrt(problem.nominals.precision[known])
+    return then if evidence(then, now) > threshold and np.max(away) < _BELIEVED else best
+
+
+def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
+    """The problem with the command as a staircase, as a polygon or as a smooth curve, whichever the log was,
+    where the rig does not say it: loggers differ."""
+    ways = [segment.between] if segment.entry != "command" else _ways(segment)
+    if rig.between is not None:
+        ways = [rig.between]
+    problems = [problem_of(rig, replace(segment, between=way), logs) for way in ways]
+    if len(problems) == 1:
+        return problems[0]
+    *plain, last = [fit(p, p.nominal(), WHITE, 6) for p in problems]
+    closest = min(plain, key=lambda f: f.sse)
+    if ways[-1] == Between.SMOOTH and last.sse > _SMOOTHER * closest.sse:
+        return closest.problem
+    return min(closest, last, key=lambda f: f.sse).problem
+
+
+def _ways(segment: Segment) -> list[Between]:
+    """What a command may do between its samples."""
+    rests = np.mean(np.diff(segment.x) == 0.0) > _RESTS
+    return [way for way in _WAYS if not (rests and way == Between.SMOOTH)]
+
+
+def _zeroed(problem: Problem) -> Problem:
+    """The problem with a zero of the readings for each experiment, where that is all there is: a gauge is
+    zeroed anew, or its room is warmer. Where errors add up, a zero is lost among them."""
+    if problem.segment.pace or len(problem.segment.run.spans) < 2:
+        return problem
+    return _where_all(problem, replace(problem, uneven=True, memory={}))
+
+
+def _where_all(problem: Problem, more: Problem) -> Problem:
+    """``problem``, or ``more``, which has further nuisances, where these explain all that there is."""
+    if not _seems_more(problem, problem.nominal()):
+        return problem
+    return problem if _seems_more(more, more.nominal()) else more
+
+
+def _gauged(problem: Problem) -> Problem:
+    """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. Where
+    a stage has a gain of its own, that is part of it."""
+    return problem if problem.nominals.has_gain else _where_all(problem, replace(problem, gauge=_GAUGE))
+
+
+def _widened(problem: Problem) -> Problem:
+    """The problem with a stage faster, or of another gain, than three times the uncertainty of what was given
+    allows, and an actuator of any numbers, where that is all there is: then no effect stands for it."""
+    ground = _ground(problem, problem.nominal())
+    if not problem.nominals.beyond(ground.vector) or not _shows_more(ground):
+        return problem
+    wide = replace(problem, nominals=replace(problem.nominals, wide=True, far=True))
+    return problem if _seems_more(wide, wide.nominal()) else wide
+
+
+def _worth_trying(
+    base: Problem, vector: np.ndarray, candidates: list[CandidateEffect]
+) -> list[CandidateEffect]:
+    """All candidate effects where there seems to be more than noise; else none."""
+    return candidates if _seems_more(base, vector) else []
+
+
+def _seems_more(base: Problem, vector: np.ndarray) -> bool:
+    """Whether inputs predict something of the residual, or it is slower or less steady than noise is."""
+    return _shows_more(_ground(base, vector))
+
+
+def _ground(base: Problem, vector: np.ndarray) -> Fit:
+    return fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
+
+
+def _shows_more(ground: Fit) -> bool:
+    base = ground.problem
+    left, response = ground.residual(), base.references.clocks["response"]
+    found = disturbance(left, base.segment.run.h, response)
+    kept = base.segment.pace > 0.0 and found.pushed  # an integral of what inputs do shows little of them
+    return (
+        found.low_frequency
+        or found.tonal
+        or found.bursts
+        or kept
+        or ground.predictable_share > NUMBERS.chance
+    )
+
+
+def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
+    """Without the effects that the later ones made needless."""
+    while len(best.problem.candidates) > 1:
+        found = []
+        for candidate in best.problem.candidates:
+            without = left_out(best, [candidate], weighing)
+            found.append((evidence(best, without), without))
+        least, without = min(found, key=lambda pair: pair[0])
+        if least > threshold:
+            break
+        best = without
+    return fit(best.problem, best.vector, weighing, 6)

@@ -1,0 +1,102 @@
+"""The state in which each experiment of a session begins, before anything is said of the rig.
+
+What the past left is told by the rig as given, then once more by the refitted one: parameters a little off
+would make it a little wrong, and a begin a little wrong would draw the parameters. What is still wrong with
+it is left to the fits, as ways in which the begin of an experiment may be off: no effect is to be named for
+that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.problem.segments import Segment, cuts, make
+from focgen.logs.begin import Begin
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run
+from focgen.rig.engine import Chain, Placed
+from focgen.rig.initial import begun
+from focgen.rig.rig import Rig
+
+_AGAIN = 2  # times that the rig is refitted and the begins told anew
+_ROUNDS = 6  # of a refit
+_LEVEL = 0.1  # of the input's largest magnitude: by what a level before may be off, a standard deviation
+_TIME = 1.3  # times: by what the time of a step before may be
+_SEEN = 1e-3  # of the output's largest magnitude, in root mean square: less does not show
+
+
+def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments with what their signals were before, where the data ask for it; a session at rest as it
+    is.
+
+    Begins that leave the refitted rig no better than a rest does are none.
+    """
+    found = begun(rig, logs)
+    if not any(log.begins for log in found):
+        return found
+    at_rest = tuple(replace(log, begins={}) for log in logs)
+    for _ in range(_AGAIN):
+        found = begun(_refitted(rig, found)[0], found)
+    better = _refitted(rig, found)[1] < _refitted(rig, at_rest)[1]
+    return found if better else tuple(logs)
+
+
+def begun_with(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments with their begins told anew by the rig with the effects ``placed`` in it; a session at
+    rest as it is."""
+    return begun(rig, logs, placed) if any(log.begins for log in logs) else tuple(logs)
+
+
+def _refitted(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, float]:
+    """The rig with its nominal parameters fitted to the logs, and the mean squares that segments leave."""
+    roles, left = cuts(logs), 0.0
+    for entry, exit in pairwise(roles):
+        problem = problem_of(rig, make(logs, entry, exit), logs)
+        found = fit(problem, problem.nominal(), WHITE, _ROUNDS)
+        left += found.sse / len(found.innovations)
+        rig = problem.rig(found.vector) if len(problem.nominal_start) else rig
+    return rig, left
+
+
+def loosened(rig: Rig, segment: Segment) -> Segment:
+    """The segment with the ways in which the begins of its experiments may be off."""
+    if not segment.run.begins:
+        return segment
+    columns = []
+    for (first, last), begin in zip(segment.run.spans, segment.run.begins):
+        for way in _ways(rig, segment, first, last, begin) if not begin.at_rest else ():
+            column = np.zeros(len(segment.x))
+            column[first:last] = way
+            columns.append(column)
+    return replace(segment, loose=np.stack(columns, axis=1)) if columns else segment
+
+
+def _ways(rig: Rig, segment: Segment, first: int, last: int, begin: Begin) -> np.ndarray:
+    """Rows (k, n): what begins a little different would change of one experiment, uncorrelated."""
+    start, h = float(segment.run.clock[first]), segment.run.h
+
+    def made(begin: Begin) -> np.ndarray:
+        run = Run.of([last - first], [start], h, [begin])
+        return Chain(rig).run(
+            segment.x[first:last], segment.stages[0], segment.stages[-1], run, segment.between
+        )
+
+    base = made(begin)
+    changed = np.stack([made(other) - base for other in _beside(begin, _LEVEL * segment.level_in)])
+    _, sizes, axes = np.linalg.svd(changed, full_matrices=False)
+    found: np.ndarray = (sizes[:, None] * axes)[sizes > _SEEN * segment.level_out * np.sqrt(last - first)]
+    return found
+
+
+def _beside(begin: Begin, step: float) -> Iterator[Begin]:
+    """The begin with each of its numbers a standard deviation off."""
+    for k in range(len(begin.levels)):
+        yield replace(begin, levels=tuple(v + step * (i == k) for i, v in enumerate(begin.levels)))
+    for k in range(len(begin.ago)):
+        yield replace(begin, ago=tuple(t * (_TIME if i == k else 1.0) for i, t in enumerate(begin.ago)))

@@ -1,0 +1,149 @@
+"""Every effect found held against its rivals, each in its place beside the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.diagnosis.belief.choice import prior
+from focgen.diagnosis.belief.further import Ground, Surroundings
+from focgen.diagnosis.belief.standing import behind
+from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
+from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
+from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+
+_SWAPS = 3
+_MENDED = 3  # rivals that get a second form where the best has one
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A family that may be the cause instead: its ``odds``, nats, over there being no such cause,
+    ``separation`` from the best in standard deviations, ``gain`` in nats of the noise."""
+
+    effect: str
+    stage: str
+    separation: float
+    gain: float
+    fit: Fit
+    odds: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """One effect of a segment: ``rivals``, the best first; ``share``: of the refitted gap's explained mean
+    square."""
+
+    rivals: tuple[Rival, ...]
+    gain: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """What every effect is doubted with: the fit without any, the ``rankings`` made, which those made anew
+    join, the ``candidates`` to try, the ``weighing`` of residuals, and the ``surroundings``."""
+
+    nominal: Fit
+    rankings: list[Ranking]
+    candidates: Sequence[CandidateEffect]
+    weighing: Weighing
+    surroundings: Surroundings
+
+
+def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
+    """Every effect held against its rivals beside the others; where one of them does better, it takes the
+    place."""
+    for _ in range(_SWAPS):
+        causes = _causes(best, beside)
+        usurper = min((r for c in causes for r in c.rivals), key=lambda r: r.separation, default=None)
+        if usurper is None or usurper.separation >= 0:
+            return best, causes
+        best = usurper.fit
+    return best, _causes(best, beside)
+
+
+def _causes(best: Fit, beside: Beside) -> tuple[Cause, ...]:
+    """A cause for every family of ``best``."""
+    names = dict.fromkeys(c.effect for c in best.problem.candidates)
+    return tuple(sorted((_cause(name, best, beside) for name in names), key=lambda c: -c.share))
+
+
+def _cause(name: str, best: Fit, beside: Beside) -> Cause:
+    """One effect of ``best`` and its rivals, the best first. Of a rival that the experiments are not made to
+    show, no more free values are counted than of the effect: they were not to be seen."""
+    own = [c for c in best.problem.candidates if c.effect == name]
+    without = left_out(best, own, beside.weighing)
+    others = _rivals(best, _ranking(name, without, beside), beside, len(own) > 1)
+    fits = [best, *(f for _, f in others)]
+    ground = Ground.of(beside.nominal, without, fits, beside.weighing, beside.surroundings)
+    odds, gain = ground.odds(best) + prior(name, without), evidence(best, without)
+    rivals = [Rival(name, own[0].stage, 0.0, gain, best, odds)]
+    for other, again in others:
+        most = best.size - without.size if best.problem.lacks(other) else None
+        theirs = ground.odds(again, most) + prior(other, without)
+        stage = again.problem.candidates[-1].stage
+        rivals.append(Rival(other, stage, behind(theirs, odds), evidence(again, without), again, theirs))
+    share = share_of(beside.nominal, without, best)
+    return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), gain, share)
+
+
+def _ranking(name: str, without: Fit, beside: Beside) -> Ranking:
+    """The families tried where an effect of this name is left out."""
+    for ranking in beside.rankings:
+        if _alike(ranking.base.problem, without.problem):
+            return ranking
+    untried = [c for c in beside.candidates if c.effect != name and not c.form.seen]
+    beside.rankings.append(rank(without.problem, without.vector, untried))
+    return beside.rankings[-1]
+
+
+def _alike(a: Problem, b: Problem) -> bool:
+    """Whether two problems of a segment are the same."""
+    return a.candidates == b.candidates and a.nominals.wide == b.nominals.wide
+
+
+def share_of(nominal: Fit, without: Fit, best: Fit) -> float:
+    """The part of what ``best`` explains of the refitted gap, as mean square, that is lost ``without``."""
+    before, lost, after = (np.mean(f.weighed**2) for f in (nominal, without, best))
+    return float(np.clip((lost - after) / max(before - after, 1e-300), 0, 1))
+
+
+def _rivals(best: Fit, ranking: Ranking, beside: Beside, mended: bool) -> list[tuple[str, Fit]]:
+    """The families of ``ranking`` in the place of one of ``best``; ``mended``: that one has two forms, so
+    the foremost of the others may have, too."""
+    found: list[tuple[str, Fit]] = []
+    for other, candidate in ranking.best.items():
+        if other in {c.effect for c in best.problem.candidates}:
+            continue
+        again = fit(candidate.problem, candidate.vector, beside.weighing, 6, leader=best)
+        if mended and len(found) < _MENDED:
+            again = _second_form(again, beside.candidates, beside.weighing)
+        found.append((other, again))
+    return found
+
+
+def _second_form(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:
+    """With the form of the same family beside it that helps most, where one does."""
+    last = of.problem.candidates[-1]
+    forms = [c for c in candidates if c.effect == last.effect and c.stage == last.stage and c != last]
+    ranking = rank(of.problem, of.vector, forms)
+    if ranking.winner is None:
+        return of
+    better = fit(ranking.best[ranking.winner].problem, ranking.best[ranking.winner].vector, weighing, 6)
+    return better if evidence(better, of) > 0 else of
+
+
+def left_out(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:
+    """``of`` without ``candidates``, fitted again."""
+    problem, head = of.problem, of.problem.head
+    kept, vector, place = [], [of.vector[:head]], head
+    for candidate in problem.candidates:
+        count = len(candidate.form.parameters)
+        if candidate not in candidates:
+            kept.append(candidate)
+            vector.append(of.vector[place : place + count])
+        place += count
+    return fit(problem.with_candidates(kept), np.concatenate(vector), weighing, 8)

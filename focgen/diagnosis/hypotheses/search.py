@@ -1,0 +1,234 @@
+"""Which effects a segment needs: every form of every family fitted on top of what was found, the best one
+kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit, innovations, jacobian
+from focgen.diagnosis.fitting.jumps import by_trying
+from focgen.diagnosis.fitting.noise import fit_ar
+from focgen.diagnosis.fitting.repeats import without_hearsay
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+
+_COARSE = 5000  # samples of the first, coarse pass
+_QUICKEST = 4.0  # of them at least in a response
+_DEEP = 5  # how many forms are fitted to the end beside the families' best
+_QUICK = 0.3  # of the best quick fit's fall in the sum of squares: forms below are left at that
+_ADRIFT = 1.15  # of a fit's mean square without a colour
+_NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
+_FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
+_TRIED = 3  # start values of a form that are fitted, where it has more
+# iterations from each start value, beside nominal parameters as given, and from the best
+_FIRST, _FROM_GIVEN, _THEN = 2, 3, 3
+_BENT = 4.0  # nats against nominal parameters that make up for what is missing: then started as given, too
+_HOPELESS = 2.0  # beyond this many times the best sum of squares a form is dropped
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """``base`` and what each family adds to it, all under the same noise model ``ar``; ``best`` by family,
+    likeliest first.
+
+    ``errors``: by family, the root-mean-square residual with its best form, over that of ``base`` (a quick
+    fit's where no more was worth while). ``gain`` are nats of evidence over ``base``: half the
+    log-likelihood ratio's worth less half k ln n.
+    """
+
+    base: Fit
+    ar: np.ndarray
+    best: dict[str, Fit]
+    gain: dict[str, float]
+    errors: dict[str, float]
+
+    @property
+    def winner(self) -> str | None:
+        """The family of highest evidence."""
+        return next(iter(self.best), None)
+
+
+def evidence(of: Fit, against: Fit) -> float:
+    """Nats of evidence of one fit over another on the same innovations (Schwarz's approximation), own
+    parameters close to those given preferred."""
+    n = len(of.innovations)
+    gain = 0.5 * n * np.log(max(against.sse, 1e-300) / max(of.sse, 1e-300))
+    return float(gain - 0.5 * (of.size - against.size) * np.log(n) + against.prior_penalty - of.prior_penalty)
+
+
+def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffect]) -> Ranking:
+    """Fit every candidate effect on top of ``base`` (a vector of ``problem``), first on means of neighbouring
+    samples, then on every sample and with the colour of the noise.
+    """
+    factor = coarseness(problem)
+    thin = problem.thinned(factor)
+    ground = fit(thin, problem.stretched(base, 1.0 / factor), WHITE)
+    from_ = footings(thin, ground.vector) if candidates else []
+    tried = [t for candidate in candidates if (t := best_start(thin, from_, candidate)) is not None]
+    tried = without_hearsay(ground, tried)
+    errors = _errors(tried, ground)
+    tried = _promising(tried, ground)
+    rough, ground = _coloured(ground, min([ground, *tried], key=lambda t: t.sse), 6)
+    tried = sorted(raced(tried, rough, 10, 0.05), key=lambda t: -evidence(t, ground))
+    top = evidence(tried[0], ground) if tried else 0.0
+    kept = (
+        tried[:2]
+        if top < _NOTHING
+        else [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR]
+    )
+    full = [on_all(t, problem, factor) for t in (ground, *kept)]
+    return finish(full[0], full[1:], errors)
+
+
+def coarseness(problem: Problem) -> int:
+    """How many neighbouring samples a coarse pass takes the mean of."""
+    segment = problem.segment
+    shortest = min(last - first for first, last in segment.run.spans)
+    seen = int(problem.references.clocks["response"] / segment.run.h / _QUICKEST)
+    return max(1, min(len(segment.y) // _COARSE, shortest // 20, seen))
+
+
+def on_all(of: Fit, problem: Problem, factor: int) -> Fit:
+    """A fit to thinned samples as the start of one to all of them."""
+    whole = problem.with_candidates(of.problem.candidates)
+    return fit(whole, whole.stretched(of.vector, factor), WHITE, 0)
+
+
+def _promising(tried: Sequence[Fit], ground: Fit) -> list[Fit]:
+    """Without the forms that a quick fit shows to be far behind, each family's best kept."""
+    tried = sorted(tried, key=lambda t: t.sse)
+    best = ground.sse - tried[0].sse if tried else 0.0
+    near = [t for t in tried if ground.sse - t.sse > _QUICK * best]
+    return near + [t for t in _firsts(tried) if t not in near]
+
+
+def _firsts(tried: Sequence[Fit]) -> list[Fit]:
+    """The first of every family."""
+    found: dict[str, Fit] = {}
+    for t in tried:
+        found.setdefault(family(t), t)
+    return list(found.values())
+
+
+def _chosen(tried: Sequence[Fit]) -> list[Fit]:
+    """The best form of every family, and the best forms altogether."""
+    first = _firsts(tried)
+    return first + [t for t in tried[:_DEEP] if t not in first]
+
+
+def _colour(leader: Fit) -> np.ndarray:
+    """The whitening filter of what the best fit leaves. Where inputs predict much of that it is no noise
+    yet, and a filter that takes out its colour would hide what is missing: then there is none."""
+    return np.ones(1) if leader.predictable_share > NUMBERS.much else fit_ar(leader.residual())
+
+
+def _coloured(ground: Fit, leader: Fit, iterations: int) -> tuple[Weighing, Fit]:
+    """The weighing by the colour of what ``leader`` leaves, and the ground fitted so. Where that drives the
+    ground away from the data the colour is not the noise's: then none."""
+    weighing = Weighing(_colour(leader))
+    moved = fit(ground.problem, ground.vector, weighing, iterations)
+    if np.mean(moved.weighed**2) < _ADRIFT * np.mean(ground.weighed**2):
+        return weighing, moved
+    return WHITE, fit(ground.problem, ground.vector, WHITE, iterations)
+
+
+def _errors(tried: Sequence[Fit], ground: Fit) -> dict[str, float]:
+    """Each family's least root mean square over the ground's."""
+    found: dict[str, float] = {}
+    for t in tried:
+        error = float(np.sqrt(t.sse / max(ground.sse, 1e-300)))
+        found[family(t)] = min(found.get(family(t), error), error)
+    return found
+
+
+def finish(ground: Fit, tried: Sequence[Fit], errors: dict[str, float]) -> Ranking:
+    """Fit on every sample, in the colour of what the best one leaves."""
+    leader = min([ground, *tried], key=lambda t: t.sse)
+    for iterations in (3, 6):
+        weighing, ground = _coloured(ground, leader, iterations)
+        tried = sorted(raced(tried, weighing, iterations, 0.02), key=lambda t: t.sse)
+        leader = min([ground, *tried], key=lambda t: t.sse)
+        tried = [t for t in tried if t.sse < leader.sse * _HOPELESS or t is leader] or tried[:1]
+    return _ranking(ground, weighing.ar, tried, errors)
+
+
+def _ranking(ground: Fit, ar: np.ndarray, tried: Sequence[Fit], errors: dict[str, float]) -> Ranking:
+    families: dict[str, Fit] = {}
+    for one in sorted(tried, key=lambda t: -evidence(t, ground)):
+        families.setdefault(family(one), one)
+    return Ranking(ground, ar, families, {name: evidence(f, ground) for name, f in families.items()}, errors)
+
+
+def family(of: Fit) -> str:
+    """The family added last."""
+    return of.problem.candidates[-1].effect
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """Where quick fits set out from: a ``vector``, its innovations ``now`` (n,), and the Jacobian's ``rows``
+    (k, n) there, which a quick fit takes as they are; ``first`` iterations from there."""
+
+    vector: np.ndarray
+    now: np.ndarray
+    rows: np.ndarray
+    first: int
+
+
+def footings(problem: Problem, base: np.ndarray) -> list[Footing]:
+    """``base``, and where nominal parameters make up for what is missing the same with those given."""
+    found = [_footing(problem, base, _FIRST)]
+    if problem.nominals.prior_penalty(base) > _BENT:
+        given = np.r_[problem.nominal_start, base[len(problem.nominal_start) :]]
+        found.append(_footing(problem, given, _FROM_GIVEN))
+    return found
+
+
+def _footing(problem: Problem, vector: np.ndarray, first: int) -> Footing:
+    now = innovations(problem, vector, WHITE)
+    return Footing(vector, now, jacobian(problem, vector, now, WHITE, *problem.bounds()), first)
+
+
+def best_start(problem: Problem, from_: Sequence[Footing], candidate: CandidateEffect) -> Fit | None:
+    """The best of the fits from the candidate effect's start values beside each of the footings ``from_``, a
+    few iterations each, and a few more for the best of them.
+    """
+    extended = problem.with_candidates([*problem.candidates, candidate])
+    starts, fits = extended.starts(candidate), []
+    if candidate.form.jumps:
+        return by_trying(extended, from_[0].vector, starts, from_[0].rows)
+    if len(starts) > _TRIED:
+        starts = _likeliest(extended, from_[0], starts)
+    for start in starts:
+        for at in from_:
+            fits.append((_quick(extended, np.r_[at.vector, start], at, at.first), at))
+    best, at = min(fits, key=lambda pair: pair[0].sse)
+    if not np.isfinite(best.sse):
+        return None
+    return min(best, _quick(extended, best.vector, at, _THEN), key=lambda f: f.sse)
+
+
+def _quick(problem: Problem, start: np.ndarray, at: Footing, iterations: int) -> Fit:
+    return fit(problem, start, WHITE, iterations, tolerance=0.1, known=at.rows)
+
+
+def raced(tried: Sequence[Fit], weighing: Weighing, iterations: int, tolerance: float) -> list[Fit]:
+    """Each fitted further, the most promising first; one that falls behind is left there."""
+    found: list[Fit] = []
+    for t in sorted(tried, key=lambda t: t.sse):
+        leader = min(found, key=lambda f: f.cost, default=None)
+        found.append(fit(t.problem, t.vector, weighing, iterations, tolerance, leader=leader))
+    return found
+
+
+def _likeliest(problem: Problem, at: Footing, starts: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Of many start values those whose direction, the parameters of the footing free to give way, goes
+    furthest towards the data."""
+    own, _ = np.linalg.qr(at.rows[np.any(at.rows, axis=1)].T)
+    tried = np.stack([innovations(problem, np.r_[at.vector, start], WHITE) for start in starts]) - at.now
+    tried -= (tried @ own) @ own.T
+    reach = (tried @ at.now) ** 2 / np.maximum(np.sum(tried**2, axis=1), 1e-300)
+    return [starts[i] for i in np.argsort(-reach)[:_TRIED]]

@@ -1,0 +1,164 @@
+"""The stage that a refit moves freely: the actuator, or the one stage of a rig, as numbers of order one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from focgen.diagnosis.problem.factors import LEAST, WITHIN
+from focgen.fractional.transfer import TransferFunction
+from focgen.present import present
+from focgen.rig.rig import Actuator, LinearActuator, Rig
+
+_SLACK = 1e-6  # what stands as close to an end stands there
+_USUAL = 0.2  # relative deviation of nominal parameters from those given that surprises nobody
+
+
+@dataclass(frozen=True)
+class Free:
+    """Turns T, alpha, gain or num and den, and the offset, of ``stage`` into a vector and back; levels are
+    the segment's largest magnitudes."""
+
+    rig: Rig
+    stage: str
+    level_in: float
+    level_out: float
+
+    @property
+    def has_offset(self) -> bool:
+        """Whether its last number is an offset."""
+        return self.stage == "actuator" and self.rig.actuator is not None
+
+    def start(self) -> np.ndarray:
+        """The vector of the rig as given: logarithms of coefficients or T, α and the gain's numbers, then the
+        bias where the actuator integrates, and the offset last."""
+        if self.stage != "actuator":
+            return self._from_transfer(getattr(self.rig, self.stage))
+        a = self.rig.actuator
+        if isinstance(a, Actuator):
+            gains = [g * self.level_in ** (i + 1) / self.level_out for i, g in enumerate(a.gain)]
+            return np.array([np.log(a.T), a.alpha, *gains, a.offset / self.level_out])
+        if isinstance(a, LinearActuator):
+            bias = [a.bias / self.level_in] if a.integrates else []
+            made: np.ndarray = np.r_[self._from_transfer(a.dynamics), bias, a.offset / self.level_out]
+            return made
+        return np.zeros(0)
+
+    def bounds(self, far: bool = True, bent: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the vector; not ``far``: of an actuator, three times its uncertainty;
+        ``bent``: but for the gain.
+
+        A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead
+        zone.
+        """
+        low, high = self._utmost()
+        if not self.has_offset:
+            return low, high
+        near = self._usual(bent)
+        kept = np.logical_not(far) | (near[0] == near[1])  # what is known exactly does not move
+        return np.where(kept, np.maximum(low, near[0]), low), np.where(kept, np.minimum(high, near[1]), high)
+
+    def beyond(self, vector: np.ndarray, bent: bool = False) -> bool:
+        """Whether a number stands at an end of what is usual, or further off."""
+        if not self.has_offset:
+            return False
+        low, high = self._usual(bent)
+        ends = (vector < low + _SLACK) | (vector > high - _SLACK)
+        return bool(np.any(ends & (low < high)))
+
+    def _usual(self, bent: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Three times the actuator's uncertainty about what was given; any offset, and ``bent`` any gain that
+        is not known exactly."""
+        known, start, a = self.rig.uncertainty.actuator, self.start(), self.rig.actuator
+        gain, time = (factor_ends(known.gain), factor_ends(known.time))
+        if bent and known.gain:
+            gain = np.array([-np.inf, np.inf])
+        moves: list[Any]
+        if isinstance(a, Actuator):
+            off = np.inf if bent and known.gain else WITHIN * known.gain * np.abs(start[2:-1]).sum()
+            order = WITHIN * known.alpha * start[1]
+            moves = [time, (-order, order), *[(-off, off)] * (len(start) - 3)]
+        else:
+            linear = present(a)
+            last, parts = linear.dynamics.den[-1].order, (linear.dynamics.num, linear.dynamics.den[:-1])
+            orders = [t.order for t in parts[0]], [t.order - last for t in parts[1]]
+            drive = [(-np.inf, np.inf)] * linear.integrates  # its zero
+            moves = [*(gain + k * time for k in orders[0]), *(k * time for k in orders[1]), *drive]
+        ends = np.array([*moves, (-np.inf, np.inf)]).T
+        return start + ends[0], start + ends[1]
+
+    def _utmost(self) -> tuple[np.ndarray, np.ndarray]:
+        start = self.start()
+        low, high = start - 50.0, start + 50.0
+        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
+            low[0], high[0] = start[0] - 5.0, start[0] + 5.0
+            low[1], high[1] = 0.08, 1.9
+            if start[2] > 0.0:
+                low[2] = 0.0
+        elif len(start):
+            count = len(self._logs(self._transfer_of()))
+            low[:count], high[:count] = start[:count] - 8.0, start[:count] + 8.0
+        return low, high
+
+    def prior_penalty(self, vector: np.ndarray) -> float:
+        """Nats against nominal parameters this far from those given. The owner identified them once: a tenth
+        off is usual, a factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a
+        guess; an offset and a bias are free.
+        """
+        start = self.start()
+        if not len(start):
+            return 0.0
+        away, scale = vector - start, np.full(len(start), _USUAL)
+        if self.stage == "actuator":
+            free = 2 if getattr(self.rig.actuator, "integrates", False) else 1
+            away, scale = away[:-free], scale[:-free]
+        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
+            gains = np.abs(start[2:-1])
+            scale[1], scale[2:] = 0.5 * _USUAL * start[1], _USUAL * (gains + 0.1 * gains.sum() + 1e-12)
+        return float(np.sum(np.log1p((away / scale) ** 2)))
+
+    def put(self, rig: Rig, vector: np.ndarray) -> Rig:
+        """``rig`` with these parameters taken from ``vector``."""
+        if not len(vector):
+            return rig
+        if self.stage != "actuator":
+            changes: dict[str, Any] = {self.stage: self._to_transfer(getattr(self.rig, self.stage), vector)}
+            return replace(rig, **changes)
+        a, v = self.rig.actuator, [float(value) for value in vector]
+        if isinstance(a, Actuator):
+            gains = tuple(g * self.level_out / self.level_in ** (i + 1) for i, g in enumerate(v[2:-1]))
+            moved: Actuator | LinearActuator = Actuator(
+                float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out
+            )
+        else:
+            linear = present(a)
+            bias = v[-2] * self.level_in if linear.integrates else linear.bias
+            moved = LinearActuator(self._to_transfer(linear.dynamics, vector), v[-1] * self.level_out, bias)
+        return replace(rig, actuator=moved)
+
+    def _transfer_of(self) -> TransferFunction:
+        found = getattr(self.rig, self.stage)
+        made: TransferFunction = found.dynamics if self.stage == "actuator" else found
+        return made
+
+    @staticmethod
+    def _logs(transfer: TransferFunction) -> list[float]:
+        """Coefficients but the denominator's last, which only scales the others."""
+        return [t.coefficient for t in (*transfer.num, *transfer.den[:-1])]
+
+    def _from_transfer(self, transfer: TransferFunction) -> np.ndarray:
+        return np.log(np.abs(self._logs(transfer)))
+
+    def _to_transfer(self, transfer: TransferFunction, vector: np.ndarray) -> TransferFunction:
+        moved = [np.sign(c) * np.exp(v) for c, v in zip(self._logs(transfer), vector)]
+        count = len(transfer.num)
+        num = [(float(c), t.order) for c, t in zip(moved, transfer.num)]
+        den = [(float(c), t.order) for c, t in zip(moved[count:], transfer.den)]
+        return TransferFunction(num, [*den, (transfer.den[-1].coefficient, transfer.den[-1].order)])
+
+
+def factor_ends(known: float) -> np.ndarray:
+    """The logarithms of the factors (2,) that three times an uncertainty lets a number have."""
+    return np.log([max(1.0 - WITHIN * known, LEAST), 1.0 + WITHIN * known])

@@ -1,0 +1,273 @@
+"""One segment and one hypothesis about it: a vector of parameters, the simulation, the residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from focgen.diagnosis.problem.excitation import excitation
+from focgen.diagnosis.problem.nominal_parameters import NominalParameters
+from focgen.diagnosis.problem.segments import Segment
+from focgen.rig.effects import Excitation, Form, Parameter, library
+from focgen.rig.engine import Chain, Placed, slot_in
+from focgen.rig.rig import Rig
+
+_ZERO = 0.03  # of the level: an offset that is no fault
+_ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
+_OFF = 3.0  # standard deviations that an input may be off in each way
+_FAR_OFF = 20.0  # the same of a zero that no effect moves
+_BASELINE = 0.005  # of the level: what the zero of a reading differs by from one experiment to the next
+
+
+@dataclass(frozen=True)
+class CandidateEffect:
+    """An effect to be fitted: family, form, and the stage it is put in."""
+
+    effect: str
+    form: Form
+    stage: str
+
+    @property
+    def name(self) -> str:
+        """Family and form."""
+        return f"{self.effect}/{self.form.name}"
+
+
+@dataclass(frozen=True)
+class References:
+    """What multiples are taken of: a level by slot, and the clocks in s."""
+
+    levels: dict[str, float]
+    clocks: dict[str, float]
+
+    def scale(self, parameter: Parameter, slot: str) -> float:
+        """The physical size of 1 in units of this parameter."""
+        made: float = (
+            self.levels[parameter.at or slot] ** parameter.level
+            * self.clocks[parameter.clock] ** parameter.time
+        )
+        return made
+
+
+@dataclass(eq=False)
+class Problem:
+    """Residuals of a segment under the rig with ``candidates``.
+
+    The vector: the rig's nominal parameters, the nuisances (the alignment of input and output, at most
+    ``slack`` samples; where nothing of the segment has an offset of its own, one, and its gauge's error, at
+    most ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in
+    standard deviations; how far the begins of experiments are, likewise; where readings are ``uneven``, the
+    zero of each experiment's, likewise), then every candidate effect's parameters, all of order one.
+    """
+
+    segment: Segment
+    nominals: NominalParameters
+    references: References
+    candidates: tuple[CandidateEffect, ...] = ()
+    memory: dict[Any, Any] = field(default_factory=dict)
+    slack: float = 1.0
+    gauge: float = 0.0
+    uneven: bool = False
+
+    def __post_init__(self) -> None:
+        self.nominal_start = self.nominals.start()
+        zero = [] if self.nominals.has_offset else [_ZERO]
+        self.gauges = [*zero, self.gauge] if self.gauge else zero
+        self.nuisances = 1 + len(self.gauges) + self.ways + self.zeros
+
+    @property
+    def ways(self) -> int:
+        """In how many ways input and begins may be off."""
+        made: int = self.segment.input_modes.shape[1] + self.segment.loose.shape[1]
+        return made
+
+    @property
+    def zeros(self) -> int:
+        """How many experiments have a zero of their own."""
+        return len(self.segment.run.spans) if self.uneven else 0
+
+    @cached_property
+    def excitation(self) -> Excitation:
+        """What the experiments do to the segment."""
+        segment = self.segment
+        return excitation(segment.parts(segment.x), segment.run.h, self.references.clocks["response"])
+
+    def lacks(self, effect: str) -> str | None:
+        """What the experiments lack to show an effect."""
+        return library()[effect].needs(self.excitation)
+
+    def untried(self, candidates: Sequence[CandidateEffect]) -> list[CandidateEffect]:
+        """Those of ``candidates`` that may still be put to it: what is read off at sight is not fitted."""
+        return [c for c in candidates if c not in self.candidates and not c.form.seen]
+
+    def with_candidates(self, candidates: Sequence[CandidateEffect]) -> Problem:
+        """The same segment under other effects. A curve is as steep at zero as before, whatever it does
+        further on, so that the gain makes up for it."""
+        bent = any(library()[c.effect].bends for c in candidates)
+        return replace(self, candidates=tuple(candidates), nominals=replace(self.nominals, bent=bent))
+
+    def thinned(self, factor: int) -> Problem:
+        """The same on means of ``factor`` samples at a time."""
+        return replace(self, segment=self.segment.thinned(factor), memory={}, slack=self.slack / factor)
+
+    def stretched(self, vector: np.ndarray, factor: float) -> np.ndarray:
+        """``vector`` with its alignment, which is in samples, times ``factor``."""
+        moved = vector.copy()
+        moved[len(self.nominal_start)] *= factor
+        return moved
+
+    @property
+    def head(self) -> int:
+        """How many entries precede the candidate effects'."""
+        return len(self.nominal_start) + self.nuisances
+
+    def nominal(self) -> np.ndarray:
+        """The vector of the rig as given, without the candidate effects' entries."""
+        made: np.ndarray = np.r_[self.nominal_start, np.zeros(self.nuisances)]
+        return made
+
+    @cached_property
+    def known(self) -> tuple[np.ndarray, np.ndarray]:
+        """What every entry is expected to be beforehand, and how well that is known: 1/variance."""
+        own, aligned = self.nominals.precision, (self.slack * _ALIGNED) ** -2.0
+        free, effects = self.nuisances - 1 - self.zeros, sum(len(c.form.parameters) for c in self.candidates)
+        precision = np.r_[own, aligned, np.zeros(free), np.ones(self.zeros), np.zeros(effects)]
+        return np.pad(self.nominal_start, (0, len(precision) - len(own))), precision
+
+    def unlikely(self, vector: np.ndarray) -> float:
+        """Nats against ``vector`` for what is known beforehand."""
+        expected, precision = self.known
+        return 0.5 * float(precision @ (vector - expected) ** 2)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds."""
+        ends = self.nominals.bounds()
+        zeros = [self._drift] * self.zeros
+        nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *[_OFF] * self.ways, *zeros]
+        low: list[float] = [*ends[0], *(-b for b in nuisance)]
+        high: list[float] = [*ends[1], *nuisance]
+        for candidate in self.candidates:
+            for p in candidate.form.parameters:
+                least = self._least(p) if p.log else p.lower
+                low.append(np.log(least) if p.log else least)
+                high.append(np.log(max(p.upper, least)) if p.log else p.upper)
+        return np.array(low, float), np.array(high, float)
+
+    @property
+    def _drift(self) -> float:
+        """How far a zero may be off, in standard deviations: of what the sensor reads, an effect stands for
+        more; of another gauge, none does."""
+        return _OFF if "sensor" in self.segment.stages else _FAR_OFF
+
+    @property
+    def _shifted(self) -> bool:
+        """Whether a candidate effect says how late the output is: two numbers for one thing would share it at
+        random.
+        """
+        return any(library()[candidate.effect].shifts for candidate in self.candidates)
+
+    def _least(self, p: Parameter) -> float:
+        """The lower bound: a time constant of less than two samples is nothing that samples could show."""
+        return (
+            max(p.lower, 2.0 * self.segment.run.h / self.references.clocks[p.clock])
+            if p.time == 1
+            else p.lower
+        )
+
+    def starts(self, candidate: CandidateEffect) -> list[np.ndarray]:
+        """Start values of one candidate effect's entries."""
+        parameters = candidate.form.parameters
+        most = max(len(p.starts) for p in parameters)
+        rows = [[p.starts[min(i, len(p.starts) - 1)] for p in parameters] for i in range(most)]
+        return [np.array([np.log(v) if p.log else v for p, v in zip(parameters, row)]) for row in rows]
+
+    def values(self, vector: np.ndarray) -> list[tuple[float, ...]]:
+        """The candidate effects' parameters in the log's units."""
+        found, place = [], self.head
+        for candidate in self.candidates:
+            slot, row = slot_in(candidate.form, candidate.stage), []
+            for p in candidate.form.parameters:
+                value = np.exp(vector[place]) if p.log else vector[place]
+                row.append(float(value) * self.references.scale(p, slot))
+                place += 1
+            found.append(tuple(row))
+        return found
+
+    def rig(self, vector: np.ndarray) -> Rig:
+        """The rig with the vector's nominal parameters; the same object where they are as lately: making one
+        takes as long as running a stage."""
+        values = vector[: len(self.nominal_start)]
+        kept: list[tuple[bytes, Rig, Rig]] = self.memory.setdefault("rigs", [])
+        key = values.tobytes()
+        for old, given, rig in kept:
+            if old == key and given is self.nominals.rig:
+                return rig
+        rig = self.nominals.put(self.nominals.rig, values)
+        kept.insert(0, (key, self.nominals.rig, rig))
+        del kept[2:]
+        return rig
+
+    def placed(self, vector: np.ndarray) -> tuple[Placed, ...]:
+        """The candidate effects as effects of a chain."""
+        return tuple(
+            Placed(c.effect, c.form, c.stage, v) for c, v in zip(self.candidates, self.values(vector))
+        )
+
+    def simulate(self, vector: np.ndarray, probe: bool = False) -> np.ndarray:
+        """The segment's output (n,), in the log's units; a ``probe`` leaves nothing to the simulations that
+        follow, which go on from another vector."""
+        chain = Chain(self.rig(vector), self.placed(vector), self.memory, probe)
+        own, segment = len(self.nominal_start), self.segment
+        ends = np.cumsum([len(self.gauges), segment.input_modes.shape[1], segment.loose.shape[1]])
+        gauges, off, begun, zeros = np.split(vector[own + 1 : self.head], ends)
+        x = self._entered(float(vector[own]), off)
+        made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.between)
+        made = self._read(made, *gauges)
+        made = made + segment.loose @ begun if np.any(begun) else made
+        return made + self._uneven(zeros) if np.any(zeros) else made
+
+    def _uneven(self, zeros: np.ndarray) -> np.ndarray:
+        """What the readings (n,) are off by where the zeros of experiments are."""
+        lengths = [last - first for first, last in self.segment.run.spans]
+        return np.repeat(zeros * _BASELINE * self.segment.level_out, lengths)
+
+    def level(self, vector: np.ndarray) -> np.ndarray:
+        """``vector`` with the zeros of all experiments alike."""
+        alike = vector.copy()
+        alike[self.head - self.zeros : self.head] = 0.0
+        return alike
+
+    def _read(self, made: np.ndarray, zero: float = 0.0, gauge: float = 0.0) -> np.ndarray:
+        """What is read of a signal by gauges off by so much."""
+        return made * (1.0 + gauge) + zero * self.segment.level_out
+
+    def _entered(self, shift: float, off: np.ndarray) -> np.ndarray:
+        """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where
+        nothing changed, by which a chain remembers what it made of it."""
+        x = self.segment.bent
+        if shift == 0.0 and not np.any(off):
+            return x
+        key = (shift, *off)
+        kept: list[tuple[tuple[float, ...], np.ndarray]] = self.memory.setdefault("entered", [])
+        for old, y in kept:
+            if old == key:
+                return y
+        made: np.ndarray = (
+            x + abs(shift) * (self.segment.neighbours[shift < 0] - x) + self.segment.input_modes @ off
+        )
+        kept.insert(0, (key, made))
+        del kept[2:]
+        return made
+
+    def residual(self, vector: np.ndarray) -> np.ndarray:
+        """Measured less simulated (n,), in the log's units; where the rig integrates, the recent part."""
+        return self.segment.recent(self.segment.y - self.simulate(vector))
+
+    def weighed(self, vector: np.ndarray) -> np.ndarray:
+        """The residual (n,) as a share of the output's level, each sample by its trust."""
+        made: np.ndarray = self.residual(vector) * self.segment.weight
+        return made

@@ -1,0 +1,258 @@
+"""Cutting the chain at the signals that were logged: each segment is diagnosed on its own measured input."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from focgen.logs.between import Between, white_level
+from focgen.logs.experiment import Experiment
+from focgen.rig import kernels
+from focgen.rig.effects import Run
+from focgen.rig.rig import UNITY, Rig
+
+_ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
+_LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
+_TIMING = 0.3  # of a sample: what loggers leave open
+_FOLLOWED = 0.3  # correlation of an output with the reference that leads it
+_ORDER = ("command", "pressure", "curvature", "output")
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """The stages between two logged signals: input ``x`` and output ``y`` (n,), experiments one after the
+    other as in ``run``. ``between``: what the input does from one sample to the next. ``names`` of the
+    experiments. ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a
+    difference beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has
+    no part in: the reference in a closed loop, else the input; ``led``: whether it is a reference;
+    ``closed``: whether a loop was closed around the rig; ``wanted`` (n,): its reference where it was, else
+    the input, empty where none was. ``input_modes`` (n, k): ways in which an input that was simulated may be
+    off, a standard deviation each. ``loose`` (n, k): what the output would be off by, were experiments to
+    begin a little otherwise than ``run`` says, in the output's unit. ``pace``: s after which an error no
+    longer counts, of a rig that integrates; 0: none is forgotten.
+    """
+
+    entry: str
+    exit: str
+    stages: tuple[str, ...]
+    x: np.ndarray
+    y: np.ndarray
+    run: Run
+    between: Between | bool
+    names: tuple[str, ...]
+    trust: np.ndarray
+    asked: np.ndarray
+    led: bool
+    closed: bool
+    input_modes: np.ndarray
+    loose: np.ndarray
+    pace: float = 0.0
+    wanted: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    @cached_property
+    def level_in(self) -> float:
+        """The largest magnitude of the input, in its unit."""
+        return float(np.max(np.abs(self.x))) or 1.0
+
+    @cached_property
+    def level_out(self) -> float:
+        """The largest magnitude of the output, in its unit."""
+        return float(np.max(np.abs(self.y))) or 1.0
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """What residuals (n,) are multiplied by: the trust, by the output's level."""
+        return self.trust / self.level_out
+
+    @cached_property
+    def neighbours(self) -> tuple[np.ndarray, np.ndarray]:
+        """The input a sample earlier and a sample later (n,)."""
+        return _neighbours(self.bent, self.run.rest)
+
+    @cached_property
+    def bent(self) -> np.ndarray:
+        """The input (n,), where it was measured with its bends sharpened: straight lines between samples of
+        a smooth signal pass below its crests, by (2πfh)²/12 of them, which the second difference mends."""
+        if self.entry == "command" or self.between == Between.SMOOTH:
+            return self.x
+        before, after = _neighbours(self.x, self.run.rest)
+        made: np.ndarray = self.x - (before - 2 * self.x + after) / 12.0
+        return made
+
+    def thinned(self, factor: int) -> Segment:
+        """The same in means of ``factor`` samples at a time, for a rough run; what does not fill the last of
+        an experiment is left out."""
+        if factor == 1:
+            return replace(self, run=replace(self.run, rough=True))
+        counts = [(last - first) // factor for first, last in self.run.spans]
+        kept = np.concatenate(
+            [first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)]
+        )
+        x, y, trust, asked, clock, input_modes, loose = (
+            v[kept].reshape(sum(counts), factor, *v.shape[1:]).mean(axis=1)
+            for v in (self.x, self.y, self.trust, self.asked, self.run.clock, self.input_modes, self.loose)
+        )
+        rest = np.zeros(len(x), np.uint8)
+        rest[np.cumsum([0, *counts[:-1]])] = 1
+        run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock, rough=True)
+        thin = replace(self, x=x, y=y, trust=trust, asked=asked, run=run, between=False)
+        return replace(thin, input_modes=input_modes, loose=loose)
+
+    def recent(self, signal: np.ndarray) -> np.ndarray:
+        """``signal`` (n,), less what it was a ``pace`` ago."""
+        if not self.pace:
+            return signal
+        return signal - kernels.lag(signal, self.run.rest, self.run.h, self.pace, self.pace)
+
+    def parts(self, signal: np.ndarray) -> list[np.ndarray]:
+        """``signal`` (n, …) by experiment."""
+        return [signal[first:last] for first, last in self.run.spans]
+
+
+def _neighbours(x: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The sample before and the one after of every sample (n,), experiments apart."""
+    ends = np.r_[rest[1:], 1]
+    return np.where(rest, x, np.roll(x, 1)), np.where(ends, x, np.roll(x, -1))
+
+
+def stages_of(rig: Rig) -> tuple[str, ...]:
+    """The stages that the rig file gives; the others are 1."""
+    given = {
+        "regulator": rig.regulator != UNITY,
+        "actuator": rig.actuator is not None,
+        "sensor": rig.sensor != UNITY,
+    }
+    return tuple(stage for stage, there in given.items() if there or getattr(rig.delays, stage))
+
+
+def cuts(logs: Sequence[Experiment]) -> tuple[str, ...]:
+    """The roles logged in every experiment, in the order of the chain."""
+    return tuple(role for role in _ORDER if all(role in log for log in logs))
+
+
+def between(entry: str, exit: str) -> tuple[str, ...]:
+    """The stages between two signals."""
+    order = ("regulator", "actuator", "sensor")
+    return order[order.index(_ENTERS[entry]) : order.index(_LEAVES[exit]) + 1]
+
+
+def session(logs: Sequence[Experiment], entry: str) -> Run:
+    """The run that the logs are, where the signal ``entry`` is its input."""
+    begins = [log.before(entry) for log in logs]
+    return Run.of([len(log) for log in logs], [log.start for log in logs], logs[0].sample_time, begins)
+
+
+def joined(logs: Sequence[Experiment], role: str) -> np.ndarray:
+    """A signal of all experiments, one after the other."""
+    return np.concatenate([np.asarray(log[role], float) for log in logs])
+
+
+def make(
+    logs: Sequence[Experiment],
+    entry: str,
+    exit: str,
+    x: np.ndarray | None = None,
+    input_modes: np.ndarray | None = None,
+) -> Segment:
+    """The segment from ``entry`` to ``exit``, with the input as logged or as given; of the ways
+    ``input_modes`` in which that may be off, those that the output can show.
+    """
+    x, y = joined(logs, entry) if x is None else x, joined(logs, exit)
+    input_modes = np.zeros((len(x), 0)) if input_modes is None else input_modes
+    names = tuple(log.name for log in logs)
+    led = [exit == "output" and _is_led(log) for log in logs]
+    closed = [_is_closed(log) for log in logs]
+    trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
+    return Segment(
+        entry,
+        exit,
+        between(entry, exit),
+        x,
+        y,
+        session(logs, entry),
+        Between.HELD if entry == "command" else Between.STRAIGHT,
+        names,
+        trust,
+        _asked(logs, x, led),
+        any(led),
+        any(closed),
+        input_modes[:, _felt(input_modes, x, y)],
+        np.zeros((len(x), 0)),
+        wanted=_asked(logs, x, closed) if any(closed) else np.zeros(0),
+    )
+
+
+def _felt(input_modes: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Which ways of being off (k,) could gather a nat of evidence, were all of the noise white."""
+    off = np.mean(input_modes**2, axis=0) / (np.max(x**2) or 1.0)
+    noise = _noise(y) ** 2 / (np.max(y**2) or 1.0)
+    made: np.ndarray = 0.5 * len(y) * off > noise
+    return made
+
+
+def _asked(logs: Sequence[Experiment], x: np.ndarray, led: Sequence[bool]) -> np.ndarray:
+    """The reference of those that are ``led``, the input of the others: in a closed loop that carries the
+    output's noise, and would predict it."""
+    ends = np.cumsum([len(log) for log in logs])[:-1]
+    inputs = np.split(x / (float(np.max(np.abs(x))) or 1.0), ends)
+    top = max(
+        (float(np.max(np.abs(log["reference"]))) for log, is_led in zip(logs, led) if is_led), default=1
+    )
+    return np.concatenate(
+        [log["reference"] / top if is_led else i for log, i, is_led in zip(logs, inputs, led)]
+    )
+
+
+def _is_led(log: Experiment) -> bool:
+    """Whether the output follows a reference."""
+    reference = log["reference"] if "reference" in log else np.zeros(1)
+    if not np.all(np.isfinite(reference)) or min(np.ptp(reference), np.ptp(log["output"])) == 0.0:
+        return False
+    return bool(np.corrcoef(reference, log["output"])[0, 1] > _FOLLOWED)
+
+
+def _is_closed(log: Experiment) -> bool:
+    """Whether a loop was closed: the output follows a reference, or is held at one that never moves while
+    the command does."""
+    if _is_led(log):
+        return True
+    reference, inputs = (log[role] if role in log else np.zeros(1) for role in ("reference", "command"))
+    still = bool(np.all(np.isfinite(reference))) and np.ptp(reference) == 0.0 < np.ptp(inputs)
+    return still and len(reference) > 1 and abs(np.mean(log["output"]) - reference[0]) < np.std(log["output"])
+
+
+def _unsteadiness(log: Experiment) -> float:
+    """By how much of a sample the times of the samples are uncertain."""
+    if log.raw_time is None or len(log.raw_time) < 3:
+        return _TIMING
+    steps = np.diff(log.raw_time)
+    return _TIMING + min(2.0, float(np.std(steps) / max(float(np.median(steps)), 1e-300)))
+
+
+def _trust(y: np.ndarray, timing: float) -> np.ndarray:
+    """1/(the noise with that of timing, in units of the noise)."""
+    if len(y) < 5:
+        return np.ones(len(y))
+    noise = _noise(y)
+    slope = np.maximum(np.abs(np.diff(y, prepend=y[0])), np.abs(np.diff(y, append=y[-1])))
+    error = timing * np.maximum(slope - 3 * noise, 0.0) / noise
+    return 1.0 / np.sqrt(1.0 + error**2)
+
+
+def _noise(y: np.ndarray) -> float:
+    """The root mean square of what is white of a signal (n,), or a little of its span."""
+    return max(white_level(y), 2e-3 * float(np.ptp(y)), 1e-300)
+
+
+def is_single(rig: Rig) -> bool:
+    """Whether the rig has one stage only: then every effect sits in it."""
+    return len(stages_of(rig)) <= 1
+
+
+def owner(rig: Rig) -> str | None:
+    """The stage whose parameters are the rig's own."""
+    given = stages_of(rig)
+    return "actuator" if "actuator" in given or not given else given[0] if len(given) == 1 else None

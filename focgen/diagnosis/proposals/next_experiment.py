@@ -1,0 +1,223 @@
+"""The experiment that best tells the rivals apart, of those that the rig allows, per second of rig time.
+
+For rivals A and B the expected separation is the distance of their outputs in units of the noise, as far as
+B cannot take it up by moving its parameters (T-optimality, A. C. Atkinson and V. V. Fedorov, Biometrika 62,
+1975), with what the logs have already told about them. Every candidate rig makes the experiment in
+simulation, from the input to the output; where a signal of one of them would leave its range, the input is
+made smaller, until it stays inside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.control.units import unit_of_role
+from focgen.diagnosis.fitting.noise import whiten
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.rivals import Rival
+from focgen.diagnosis.model import Found, NextExperiment
+from focgen.diagnosis.problem.excitation import excitation
+from focgen.diagnosis.problem.segments import cuts
+from focgen.diagnosis.proposals.candidate_rigs import CandidateRig, candidate_rigs
+from focgen.diagnosis.proposals.menu import Choice, menu
+from focgen.diagnosis.proposals.reach import Bounds, bounds_of, reach_of
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import library
+from focgen.rig.rig import Rig
+
+NEXT = "next_experiment.csv"  # beside the diagnosis: the input that makes the experiment
+_ENOUGH = 3.0  # standard deviations
+_MOST = 99.0
+_RIVALS = 3  # of those tied, the likeliest
+_SHARES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1)  # of the way to the input's ends, until all stay in range
+_ROLES = {"regulator": "pressure", "actuator": "curvature"}
+
+
+def propose(
+    rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation], found: Sequence[Found]
+) -> tuple[NextExperiment, Choice] | None:
+    """The experiment for the least certain cause with rivals, in words and as the input that makes it; None
+    where nothing is tied, or the rig allows none that would tell."""
+    tied = [f for f in found if len(f.candidates) > 1 and f.stage != "controller"]
+    for least in sorted(tied, key=lambda f: f.candidates[0].confidence):
+        names = [c.effect for c in least.candidates]
+        for e in explanations:
+            for cause in e.causes:
+                rivals = [r for r in cause.rivals if r.effect in names]
+                if len(rivals) > 1 and cause.rivals[0].effect == names[0]:
+                    return _between(rig, logs, explanations, e, rivals[: 1 + _RIVALS])
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """An experiment asked for: the ``choice``, on the input ``entry``, with what leaves ``stage`` logged too,
+    within ``bounds``; ``rate``: the fastest so far, units of the input a second."""
+
+    choice: Choice
+    entry: str
+    stage: str | None
+    bounds: Bounds
+    rate: float
+
+    def said(self, rig: Rig) -> str:
+        """It in words, with the rig's units."""
+        reach, made, signals = self.choice.reach, self.choice.input, rig.signals
+        unit = unit_of_role(signals, self.entry)
+        ends = f"from {made.min():.4g} to {made.max():.4g} {unit}".strip()
+        parts = [f"{self.choice.what}, on the {self.entry} {ends}"]
+        if np.isfinite(self.rate):
+            faster = "no faster" if np.isfinite(reach.rate) else "faster"
+            parts.append(f"{faster} than {self.rate:.3g} {unit}/s")
+        parts.append(f"{self.choice.seconds:.0f} s")
+        if reach.integrates:
+            place = f"{self.bounds.stands:.3g} {unit_of_role(signals, 'output')}".strip()
+            left = self.bounds.left
+            parts.append(f"from where it stands at {place}" if left else f"brought to {place} first")
+        logged = f", with the {_ROLES[self.stage]} logged" if self.stage else ""
+        return ", ".join(parts) + logged
+
+
+@dataclass(frozen=True, eq=False)
+class _Option:
+    """A ``choice``, made as it is or with what leaves ``stage`` logged too: ``apart``, the expected
+    separation of the first rival from each of the others (k,)."""
+
+    choice: Choice
+    stage: str | None
+    apart: np.ndarray
+
+    def least(self, telling: np.ndarray) -> float:
+        """The separation from the rival that it tells least, of those that count (k,)."""
+        return float(np.min(self.apart[telling]))
+
+
+def _between(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    explanations: Sequence[Explanation],
+    e: Explanation,
+    rivals: Sequence[Rival],
+) -> tuple[NextExperiment, Choice] | None:
+    """The experiment that tells the first of ``rivals`` from the others. First asked is what the rig has done
+    before and the logs hold; steps where there were none, or a further signal, only where that does not
+    do."""
+    entry, bounds = cuts(logs)[0], bounds_of(rig, logs)
+    reach, rigs = reach_of(rig, logs, entry), candidate_rigs(explanations, e, rivals)
+    tiers: list[list[_Option]] = []
+    choices: list[tuple[Choice, list[CandidateRig]]] = []
+    for one in dict.fromkeys((reach, reach.faster)):
+        choices = _showing(_allowed(menu(one), rigs, bounds), e, rivals)
+        tiers.append([_Option(choice, None, _apart(e, made, None)) for choice, made in choices])
+    if not np.any([o.apart >= _ENOUGH for tier in tiers for o in tier]):
+        logged = [(c, made, stage) for c, made in choices[:4] for stage in e.segment.stages[:-1]]
+        tiers.append([_Option(c, stage, _apart(e, made, stage)) for c, made, stage in logged])
+    found = _best([tier for tier in tiers if tier])
+    if found is None:
+        return None
+    value, option = found
+    asked = _Asked(option.choice, entry, option.stage, bounds, reach.rate)
+    return _proposed(rig, e, rivals, float(min(value, _MOST)), asked), option.choice
+
+
+def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
+    """The most telling option a second of the first tier that tells enough, and what it tells. A rival that
+    none tells, as one that holds the other as a special case, does not count where others can be told: such
+    are told by needing more parameters for the same."""
+    options = [o for tier in tiers for o in tier]
+    if not options:
+        return None
+    told = np.any([o.apart >= _ENOUGH for o in options], axis=0)
+    telling = told if np.any(told) else np.ones(len(told), bool)
+    for tier in tiers:
+        good = [o for o in tier if o.least(telling) >= _ENOUGH]
+        if good:
+            best = max(good, key=lambda o: o.least(telling) / np.sqrt(o.choice.seconds))
+            return best.least(telling), best
+    plain = [o for o in options if o.stage is None] or options  # a further signal is asked for where it tells
+    best = max(plain, key=lambda o: o.least(telling))
+    return best.least(telling), best
+
+
+def _allowed(
+    choices: Sequence[Choice], rigs: Sequence[CandidateRig], bounds: Bounds
+) -> list[tuple[Choice, list[CandidateRig]]]:
+    """Each experiment as large as all candidate rigs stay within the bounds, and what they make of it; those
+    left out that do so at no size."""
+    found = []
+    for choice in choices:
+        for share in _SHARES:
+            smaller = replace(choice, share=share)
+            made = [one.making(smaller) for one in rigs]
+            if all(bounds.hold(one.signals) for one in made):
+                found.append((smaller, made))
+                break
+    return found
+
+
+def _showing(
+    choices: Sequence[tuple[Choice, list[CandidateRig]]], e: Explanation, rivals: Sequence[Rival]
+) -> list[tuple[Choice, list[CandidateRig]]]:
+    """The experiments that together with those at hand are made to show most of the rivals."""
+    needs = [library()[r.effect].needs for r in rivals]
+    before, response = e.segment.parts(e.segment.x), e.nominal.problem.references.clocks["response"]
+    hidden = []
+    for choice, made in choices:
+        entering = np.repeat(made[0].entering, choice.reach.coarse)
+        done = excitation([*before, entering], e.segment.run.h, response)
+        hidden.append(sum(need(done) is not None for need in needs))
+    return [c for c, count in zip(choices, hidden, strict=True) if count == min(hidden)]
+
+
+def _proposed(
+    rig: Rig, e: Explanation, rivals: Sequence[Rival], value: float, asked: _Asked
+) -> NextExperiment:
+    names, made = [r.effect for r in rivals], asked.choice.input
+    return NextExperiment(
+        f"telling {names[0]} from {' and '.join(names[1:])}{_lacking(e, names)}",
+        asked.said(rig),
+        value,
+        {
+            "seconds": asked.choice.seconds,
+            "at_most_s": asked.choice.reach.seconds,
+            "entry": asked.entry,
+            "low": float(made.min()),
+            "high": float(made.max()),
+            "also_log": _ROLES.get(asked.stage or ""),
+            "rivals": names,
+            "file": NEXT,
+        },
+    )
+
+
+def _lacking(e: Explanation, names: Sequence[str]) -> str:
+    """What the segment's experiments lack to show any of the effects."""
+    missing = dict.fromkeys(m for name in names if (m := e.nominal.problem.lacks(name)))
+    return f" (so far, {'; '.join(missing)})" if missing else ""
+
+
+def _apart(e: Explanation, made: Sequence[CandidateRig], stage: str | None) -> np.ndarray:
+    """The expected separation of the first rival from each of the others."""
+    return np.array([_separation(e, made[0], other, stage) for other in made[1:]])
+
+
+def _separation(e: Explanation, a: CandidateRig, b: CandidateRig, stage: str | None) -> float:
+    """Expected standard deviations between the two on what they made, seen at the segment's output or at what
+    leaves ``stage``."""
+    fit, base = b.rival.fit, b.left_by(stage)
+    level = e.segment.level_out if stage is None else max(float(np.max(np.abs(base))), 1e-300)
+    sigma2 = fit.sse / len(fit.innovations)
+
+    def seen(y: np.ndarray) -> np.ndarray:
+        return whiten(np.repeat(y, a.coarse) / level, e.ar)
+
+    difference = seen(a.left_by(stage) - base)
+    jacobian = np.stack([seen(column) for column in b.slopes(stage)], axis=1)
+    information = fit.information + jacobian.T @ jacobian
+    slope = jacobian.T @ difference
+    left = float(difference @ difference - slope @ np.linalg.pinv(information) @ slope)
+    # what tells them apart is not the size but its square over the spread of the likelihood ratio
+    return float(np.sqrt(max(left, 0.0) / max(sigma2, 1e-300)) / 2)

@@ -1,0 +1,98 @@
+"""The segments' findings put together into rigs: the refitted one, the augmented one, and their sessions
+simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import Fit
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.problem.segments import session
+from focgen.logs.experiment import Experiment
+from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.replay import effect_tables, simulate_session
+from focgen.rig.rig import Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Rigs:
+    """``refitted``: nominal parameters only; ``fitted`` with ``placed``: nominal parameters together with the
+    effects."""
+
+    refitted: Rig
+    fitted: Rig
+    placed: tuple[Placed, ...]
+
+    def augmented(self, logs: Sequence[Experiment], promise: float | None = None) -> Rig:
+        """The rig that carries its effects, what outlives this session, the outputs that they were learned
+        at, and the share that they ``promise`` to explain."""
+        left: list[dict[str, float]] = []
+        entry = "command" if all("command" in log for log in logs) else "pressure"
+        x = np.concatenate([np.asarray(log[entry], float) for log in logs])
+        first = "regulator" if entry == "command" else "actuator"
+        run = session(logs, entry)
+        Chain(self.fitted, self.placed).run(
+            x, first, "sensor", run, between_of(self.fitted, entry), left=left
+        )
+        clock = max(log.start + len(log) * log.sample_time for log in logs)
+        told: dict[str, Any] = {
+            "learned": [float(f([f(log["output"]) for log in logs])) for f in (np.min, np.max)]
+        }
+        told |= {"promise": float(promise)} if promise is not None else {}
+        tables = effect_tables(self.placed, left, clock)
+        return replace(self.fitted, effects=tuple(table | told for table in tables))
+
+
+def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> Rigs:
+    """Own parameters and effects from all segments. Each was fitted by itself: where the output of the whole
+    chain comes no closer by it, as where what one stage's refit makes up for is mended in another, segments
+    keep what was given; those with effects keep what was fitted beside them."""
+    given = replace(rig, effects=())
+    placed = tuple(p for e in explanations for p in e.best.problem.placed(e.best.vector))
+    beside = [e.best for e in explanations if e.best.problem.candidates]
+    alone = [e.best for e in explanations if not e.best.problem.candidates]
+    refitted = _closest(given, [e.nominal for e in explanations], (), logs)
+    fitted = _closest(_moved(given, beside), alone, placed, logs) if placed else refitted
+    return Rigs(refitted, fitted, placed)
+
+
+def _closest(rig: Rig, fits: Sequence[Fit], placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
+    """The rig with the nominal parameters of all ``fits`` where that brings the output closer, else of those
+    that bring it closest.
+    """
+    fits = [f for f in fits if len(f.problem.nominal_start)]
+    every = _moved(rig, fits)
+    if not fits or _gap(every, placed, logs) <= _gap(rig, placed, logs):
+        return every
+    some = [_moved(rig, part) for n in range(len(fits)) for part in combinations(fits, n)]
+    return min(some, key=lambda r: _gap(r, placed, logs))
+
+
+def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
+    for f in fits:
+        rig = f.problem.nominals.put(rig, f.vector[: len(f.problem.nominal_start)])
+    return rig
+
+
+def _gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> float:
+    return mean_square(logs, simulated(rig, placed, logs))
+
+
+def simulated(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> list[dict[str, np.ndarray]]:
+    """The session's signals from its first input, by experiment and role."""
+    return simulate_session(rig, logs, placed, continues=False)
+
+
+def mean_square(logs: Sequence[Experiment], made: Sequence[dict[str, np.ndarray]]) -> float:
+    """The output's mean square error, experiments counted alike."""
+    return float(np.mean(squares(logs, made)))
+
+
+def squares(logs: Sequence[Experiment], made: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
+    """The output's mean square error of every experiment."""
+    return np.array([np.mean((log["output"] - m["output"]) ** 2) for log, m in zip(logs, made)])

@@ -1,0 +1,33 @@
+"""The floor that noise sets: the mean square at the output that no model explains."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import problem_residual
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.rig.effects import library
+
+
+def floor(last: Explanation, explained: float) -> float:
+    """The noise's mean square at the output, its unit squared: what is left in the ``last`` segment, less
+    what inputs predict of it; at most the mean square that is left with all effects, ``explained``.
+
+    Noise is alike in all experiments: where most are explained better, the floor is theirs. A rounding in
+    steps of q turns noise of a root mean square s below q into errors of mean square q s √(2/π): that many
+    readings lie a step off. The floor is the noise, not what the rounding makes of it.
+    """
+    parts = [np.mean(p**2) for p in last.segment.parts(problem_residual(last.best))]
+    found = min(float(np.mean(parts)) * (1 - last.left.share), float(np.median(parts)), explained)
+    step = _step(last)
+    return min(found, (np.sqrt(np.pi / 2) * explained / step) ** 2) if step else found
+
+
+def _step(last: Explanation) -> float | None:
+    """The step of the rounding that was found, in units of the output."""
+    for cause in last.causes:
+        rival = cause.rivals[0]
+        if library()[rival.effect].noiselike:
+            candidates, values = rival.fit.problem.candidates, rival.fit.problem.values(rival.fit.vector)
+            return next(v[0] for c, v in zip(candidates, values) if c.effect == rival.effect)
+    return None

@@ -1,0 +1,63 @@
+"""The sizes of an effect that was found: its parameters with their intervals, in the units of the log."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.control.units import units_of_rig
+from focgen.diagnosis.fitting.fit import Fit
+from focgen.diagnosis.model import Estimate
+from focgen.rig.effects import Parameter
+from focgen.rig.engine import slot_in
+from focgen.rig.rig import Actuator, Rig
+
+_ROLES = {"command": "command", "supply": "pressure", "load": "pressure", "reading": "output"}
+
+
+def estimates(of: Fit, which: int, rig: Rig) -> dict[str, Estimate]:
+    """The parameters of candidate effect number ``which`` of a fit with 95 % intervals from its information,
+    by name.
+    """
+    problem, candidate = of.problem, of.problem.candidates[which]
+    place = problem.head + sum(len(c.form.parameters) for c in problem.candidates[:which])
+    sigma = of.sse / max(len(of.innovations) - len(of.vector), 1)
+    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(of.information)) * sigma, 0.0))
+    slot, found = slot_in(candidate.form, candidate.stage), {}
+    for i, parameter in enumerate(candidate.form.parameters):
+        v, s = of.vector[place + i], 1.96 * spread[place + i]
+        scale = problem.references.scale(parameter, slot)
+        ends = [
+            float(scale * (np.exp(np.clip(e, -60, 60)) if parameter.log else e)) for e in (v - s, v, v + s)
+        ]
+        found[parameter.name] = Estimate(ends[1], (ends[0], ends[2]), unit_of_parameter(parameter, slot, rig))
+    return found
+
+
+def unit_of_parameter(parameter: Parameter, slot: str, rig: Rig) -> str:
+    """The unit of a parameter of a form at ``slot``: "bar", "deg/s", "1/V", "" for a plain number.
+
+    Where the rig and its columns do not tell the unit of a signal, it is called after it: "pressure unit".
+    """
+    return _quotient({_level(parameter.at or slot, rig): parameter.level, "s": parameter.time})
+
+
+def _level(slot: str, rig: Rig) -> str:
+    """The unit of what passes ``slot``. What drives K(p) p is a curvature; a ``num``/``den`` is driven by its
+    input."""
+    direct = slot == "drive" and not isinstance(rig.actuator, Actuator)
+    role = "pressure" if direct else _ROLES.get(slot, "curvature")
+    return units_of_rig(rig)[role] or f"{role} unit"
+
+
+def _quotient(powers: dict[str, float]) -> str:
+    """The product of units to their powers as one fraction; those of the form "1/mm" are turned over."""
+    turned = [(u.removeprefix("1/"), -k if u.startswith("1/") else k) for u, k in powers.items()]
+    above = " ".join(_power(u, k) for u, k in turned if k > 0)
+    below = [_power(u, -k) for u, k in turned if k < 0]
+    if not below:
+        return above
+    return f"{above or 1}/" + (below[0] if len(below) == 1 else f"({' '.join(below)})")
+
+
+def _power(unit: str, power: float) -> str:
+    return unit if power == 1 else f"{unit}^{power:g}"

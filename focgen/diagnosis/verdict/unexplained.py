@@ -1,0 +1,72 @@
+"""Whether what the effects leave of a gap is more than noise: then no effect of the library is its cause."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.diagnosis.belief.unknown import is_none
+from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.verdict.outside import from_outside
+from focgen.rig.effects import library
+
+
+def is_unknown(e: Explanation) -> bool:
+    """Whether much of what inputs predict of the nominal residual is still there after the effects, or what
+    hardly any of them explains is not just noise; unless a coarse converter explains it."""
+    if e.converter is not None and e.converter.explains(e.best):
+        return False
+    left = disturbed(e)
+    if _is_disturbed(e, left) or (e.segment.closed and _hidden(e, left)):
+        return True
+    if e.causes and not is_rounded(e) and from_outside(e):
+        return True
+    if e.left.share < NUMBERS.left:
+        return False
+    if e.segment.closed and left.bursts and _rings(e):
+        return True
+    before, after = _squares(e)
+    return is_none(after * e.left.share, before - after)
+
+
+def disturbed(e: Explanation) -> Disturbance:
+    """What is left of a segment, as a disturbance."""
+    response = e.nominal.problem.references.clocks["response"]
+    return disturbance(e.segment.parts(e.best.weighed), e.segment.run.h, response)
+
+
+def is_rounded(e: Explanation) -> bool:
+    """Whether a rounding is among the effects found."""
+    return any(library()[c.rivals[0].effect].noiselike for c in e.causes)
+
+
+def _is_disturbed(e: Explanation, left: Disturbance) -> bool:
+    """Whether bursts, slow swings, a hum or what pushes the rig are there, and the effects found, if any,
+    take hardly any of the residual away. What a rounding leaves comes in bursts by nature."""
+    loud = left.bursts or left.low_frequency or left.tonal or left.pushed
+    if not e.causes:
+        return loud
+    before, after = _squares(e)
+    return after > NUMBERS.stays * before and loud and not is_rounded(e)
+
+
+def _hidden(e: Explanation, left: Disturbance) -> bool:
+    """Whether the effects leave much that no noise is, in a closed loop, which moves the input against it, so
+    that the reference predicts little of it."""
+    if not e.causes or is_rounded(e):
+        return False
+    before, after = _squares(e)
+    return after > NUMBERS.stays * before and (left.slow > NUMBERS.looped or left.bursts)
+
+
+def _rings(e: Explanation) -> bool:
+    """Whether a mode is among the effects found: it rings evenly, and what knocks about does not, though a
+    closed loop makes a tone of it."""
+    return any(library()[c.rivals[0].effect].tonal for c in e.causes)
+
+
+def _squares(e: Explanation) -> tuple[float, float]:
+    """The segment's mean squares without its effects and with them."""
+    before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
+    return before, after

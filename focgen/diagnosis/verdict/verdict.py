@@ -1,0 +1,303 @@
+"""The verdict: what the explanations of all segments amount to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.control.units import unit_of_role
+from focgen.diagnosis.controller.check import ControllerCheck, Departure
+from focgen.diagnosis.fitting.fit import Weighing, fit
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.rivals import Cause, Rival
+from focgen.diagnosis.hypotheses.search import evidence as nats
+from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.verdict import compose
+from focgen.diagnosis.verdict.confidence import tied
+from focgen.diagnosis.verdict.cross_validation import cross_validated_share
+from focgen.diagnosis.verdict.evidence import Evidence
+from focgen.diagnosis.verdict.floor import floor as noise_floor
+from focgen.diagnosis.verdict.improvement import Improvement
+from focgen.diagnosis.verdict.moves import far_moves
+from focgen.diagnosis.verdict.predicted_improvement import paths, promised
+from focgen.diagnosis.verdict.sizes import estimates
+from focgen.diagnosis.verdict.unexplained import disturbed, is_rounded, is_unknown
+from focgen.diagnosis.verdict.where import locate, stage_shares
+from focgen.logs.experiment import Experiment
+from focgen.logs.notes import notes_of
+from focgen.rig.replay import goodness
+from focgen.rig.rig import Rig
+
+_NEAR = 0.95  # of the error without any effect: with more a family is not near
+
+
+def reach(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    rigs: compose.Rigs,
+    explanations: Sequence[Explanation],
+    controller: ControllerCheck | None = None,
+    granted: bool = False,
+) -> tuple[compose.Rigs, Diagnosis, Evidence]:
+    """The rigs that the verdict stands for, the diagnosis without a next experiment, and what it rests on.
+    ``granted``: the effects are there, however little they explain."""
+    unknown = [e for e in explanations if is_unknown(e)]
+    summary = _summary(rig, logs, rigs, explanations, [*unknown, *_no_closer(rigs, logs, explanations[-1])])
+    if summary.in_vain and not granted and (vain := _in_vain(summary, logs, explanations)):
+        unknown += vain
+        summary = _summary(rig, logs, rigs, explanations, unknown)
+    made, squares, floor, total = summary.made, summary.squares, summary.floor, summary.total
+    found = _ordered([_found(e, c, summary.rigs, logs, squares, floor, total) for e, c in summary.causes])
+    found += _departures(controller)
+    word = _word(found, unknown, [e for e in explanations if e.kept_by(rig, summary.rigs.refitted)])
+    shares = stage_shares(found, unknown, explanations)
+    diagnosis = Diagnosis(
+        verdict=word,
+        where=locate(explanations, shares, found),
+        causes=found,
+        gap=_gap(rig, logs, made, squares, floor),
+        shrink=total.value if total else None,
+        shrink_interval=total.interval if total else None,
+        refitted_rig="refitted.toml",
+        augmented_rig="augmented.toml",
+        next_experiment=None,
+        unexplained=_description(unknown),
+        notes=(*notes_of(logs), *_cautions(rig, summary, unknown)),
+        fits=_plain_fits(explanations),
+    )
+    return summary.rigs, diagnosis, Evidence(made, tuple(explanations))
+
+
+def _cautions(rig: Rig, summary: _Summary, unknown: Sequence[Explanation]) -> Iterator[str]:
+    """What a refit moved far, what cannot be predicted, and what is unexplained beside what is named."""
+    yield from far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted)
+    for candidate in (candidate for e, _ in summary.causes for candidate in paths(e)):
+        yield (
+            f"the {candidate.effect} wanders: followed through this session, its next turn cannot be "
+            "predicted, and nothing of it is promised"
+        )
+    for e in unknown if summary.causes else ():
+        yield f"{e.segment.entry} to {e.segment.exit}: no effect explains what is left there{_nearest(e)}"
+
+
+def _nearest(e: Explanation) -> str:
+    """The family that would close most of a segment's gap, where one closes any."""
+    if min(e.errors.values(), default=1.0) > _NEAR:
+        return ""
+    name = min(e.errors, key=lambda k: e.errors[k])
+    return f"; nearest is {name}, with which its error is {e.errors[name]:.2g} of what it is without"
+
+
+@dataclass(frozen=True, eq=False)
+class _Summary:
+    """What explanations amount to: ``made`` the simulated logs by rig, ``squares`` their mean square errors,
+    ``floor`` the noise's, ``total`` the promise."""
+
+    rigs: compose.Rigs
+    causes: list[tuple[Explanation, Cause]]
+    made: dict[str, list[dict[str, np.ndarray]]]
+    squares: dict[str, np.ndarray]
+    floor: float
+    total: Improvement | None
+
+    @property
+    def in_vain(self) -> bool:
+        """Whether effects that claim a gap well above the noise promise next to nothing: they mend what
+        something else does. Steps of a rounding do not come twice, whoever knows of them."""
+        return (
+            self.total is not None
+            and self.total.value < NUMBERS.vain
+            and self.floor < NUMBERS.above**2 * float(np.mean(self.squares["refitted"]))
+            and not any(is_rounded(e) or paths(e) for e, _ in self.causes)
+        )
+
+
+def _summary(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    rigs: compose.Rigs,
+    explanations: Sequence[Explanation],
+    left_out: Sequence[Explanation],
+) -> _Summary:
+    causes = [(e, c) for e in explanations for c in e.causes]
+    rigs = _without(rigs, causes, left_out) if left_out else rigs
+    causes = [(e, c) for e, c in causes if e not in left_out]
+    made = {
+        "as given": compose.simulated(rig, (), logs),
+        "refitted": compose.simulated(rigs.refitted, (), logs),
+        "explained": compose.simulated(rigs.fitted, rigs.placed, logs),
+    }
+    squares = {name: compose.squares(logs, m) for name, m in made.items()}
+    floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
+    held = [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
+    total = promised(rig, logs, held, squares, floor) if causes else None
+    return _Summary(rigs, causes, made, squares, floor, total)
+
+
+def _in_vain(
+    summary: _Summary, logs: Sequence[Experiment], explanations: Sequence[Explanation]
+) -> list[Explanation]:
+    """Of the segments with effects those whose own gap they do not close on new experiments either: what one
+    leaves unexplained takes nothing away from what is clear in another."""
+    return [
+        e
+        for e in dict.fromkeys(e for e, _ in summary.causes)
+        if cross_validated_share(e, logs) < NUMBERS.vain
+    ]
+
+
+def _no_closer(rigs: compose.Rigs, logs: Sequence[Experiment], last: Explanation) -> list[Explanation]:
+    """The last segment, where its effects fit its measured input but bring the whole chain's output no
+    closer: what they mend is that input. A rounding leaves more, by nature."""
+    if not last.causes or is_rounded(last):
+        return []
+    without = _without(rigs, [(last, c) for c in last.causes], [last])
+    both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
+    found, bare = (compose.mean_square(logs, made) for made in both)
+    return [last] if found > bare else []
+
+
+def _plain_fits(explanations: Sequence[Explanation]) -> tuple[PlainFit, ...]:
+    """Every family's error alone, the lowest first."""
+    fits = [PlainFit(name, error) for e in explanations for name, error in e.errors.items()]
+    return tuple(sorted(fits, key=lambda f: f.error))
+
+
+def _departures(controller: ControllerCheck | None) -> tuple[Found, ...]:
+    """The running controller's causes as entries of the diagnosis."""
+    return tuple(_departed(tied) for tied in controller.causes) if controller else ()
+
+
+def _departed(tied: Sequence[Departure]) -> Found:
+    """One of them: those that may be it, as sure as they are many."""
+    share = tied[0].share
+    interval = (max(share - 0.1, 0.0), min(share + 0.1, 1.0))
+    sure = [NUMBERS.held * 2.0**-k / sum(2.0**-i for i in range(len(tied))) for k in range(len(tied))]
+    return Found("controller", tuple(_suspected(d, p) for d, p in zip(tied, sure)), share, interval)
+
+
+def _suspected(d: Departure, confidence: float) -> Candidate:
+    parameters = {d.parameter: Estimate(d.value, (d.value, d.value), d.unit)}
+    return Candidate(d.effect, confidence, "running", parameters, 0.0)
+
+
+def _without(
+    rigs: compose.Rigs, causes: Sequence[tuple[Explanation, Cause]], unknown: Sequence[Explanation]
+) -> compose.Rigs:
+    lost = {(c.rivals[0].effect, c.rivals[0].stage) for e, c in causes if e in unknown}
+    kept = tuple(p for p in rigs.placed if (p.effect, p.stage) not in lost)
+    return compose.Rigs(rigs.refitted, rigs.fitted if kept else rigs.refitted, kept)
+
+
+def _word(found: Sequence[Found], unknown: Sequence[Explanation], explanations: Sequence[Explanation]) -> str:
+    if found:
+        return "named" if all(len(f.candidates) == 1 for f in found) else "set"
+    if unknown:
+        return "unknown"
+    return "parameters" if any(_moved(e) for e in explanations) else "none"
+
+
+def _moved(e: Explanation) -> bool:
+    """Whether refitting the nominal parameters closed a gap beyond the noise."""
+    problem, weighing = e.nominal.problem, Weighing(e.ar)
+    own = len(problem.nominal_start)
+    if not own:
+        return False
+    held = replace(problem, nominals=replace(problem.nominals, held=True))
+    given = fit(held, np.r_[e.given[:own], e.nominal.vector[own:]], weighing, 6)
+    visible = np.mean(given.weighed**2) > 1.01 * np.mean(e.nominal.weighed**2)
+    return bool(
+        visible and nats(e.nominal, given) - 0.5 * own * np.log(len(given.innovations)) > NUMBERS.nats
+    )
+
+
+def _found(
+    e: Explanation,
+    cause: Cause,
+    rigs: compose.Rigs,
+    logs: Sequence[Experiment],
+    squares: dict[str, np.ndarray],
+    floor: float,
+    total: Improvement | None,
+) -> Found:
+    kept, sure = tied(cause.rivals)
+    sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
+    lost = _share_lost(cause, rigs, logs, squares, floor, total or Improvement(0.0, (0.0, 0.0)))
+    candidates = tuple(_candidate(r, float(p), rigs.fitted) for r, p in zip(kept, sure))
+    return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
+
+
+def _share_lost(
+    cause: Cause,
+    rigs: compose.Rigs,
+    logs: Sequence[Experiment],
+    squares: dict[str, np.ndarray],
+    floor: float,
+    total: Improvement,
+) -> Improvement:
+    """The part of the shrink that is lost without the cause, none for a wander; its interval is as wide as
+    the total's."""
+    best = cause.rivals[0]
+    others = tuple(p for p in rigs.placed if (p.effect, p.stage) != (best.effect, best.stage))
+    if not others:
+        return total
+    without = compose.squares(logs, compose.simulated(rigs.fitted, others, logs))
+    could = max(float(np.mean(squares["refitted"])) - floor, 1e-300)
+    lost = np.mean(np.minimum(without, squares["refitted"])) - np.mean(squares["explained"])
+    wanders = any(c.form.wanders and c.effect == best.effect for c in best.fit.problem.candidates)
+    value = 0.0 if wanders else float(np.clip(lost / could, 0, 1))
+    wide = (total.interval[1] - total.interval[0]) / 2
+    return Improvement(value, (max(value - wide, -1.0), min(value + wide, 1.0)))
+
+
+def _candidate(rival: Rival, confidence: float, rig: Rig) -> Candidate:
+    candidate = rival.fit.problem.candidates
+    places = [i for i, c in enumerate(candidate) if c.effect == rival.effect]
+    parameters: dict[str, Estimate] = {}
+    for i in places:
+        prefix = "" if i == places[0] else f"{candidate[i].form.name}."
+        parameters |= {prefix + k: v for k, v in estimates(rival.fit, i, rig).items()}
+    return Candidate(
+        rival.effect, confidence, candidate[places[0]].form.name, parameters, float(rival.separation)
+    )
+
+
+def _ordered(found: Sequence[Found]) -> tuple[Found, ...]:
+    return tuple(sorted(found, key=lambda f: -f.shrink))
+
+
+def _gap(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    made: dict[str, list[dict[str, np.ndarray]]],
+    squares: dict[str, np.ndarray],
+    floor: float,
+) -> Gap:
+    rms = {name: float(np.sqrt(np.mean(v))) for name, v in squares.items()}
+    gof = {
+        name: float(np.mean([goodness(log["output"], m["output"]) for log, m in zip(logs, parts)]))
+        for name, parts in made.items()
+    }
+    spread = [np.std(log["output"]) for log in logs]
+    gof["possible"] = float(np.mean([1 - np.sqrt(floor) / s for s in spread if s > 0] or [0.0]))
+    unit = unit_of_role(rig.signals, "output") or rig.signals.output
+    return Gap(rms["as given"], rms["refitted"], rms["explained"], float(np.sqrt(floor)), unit, gof)
+
+
+def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
+    """What the residual that no effect explains depends on."""
+    found: dict[str, object] = {}
+    for e in unknown:
+        parts, noise = {k: v for k, v in e.left_nominal.depends.items() if v > 0.02}, disturbed(e)
+        found[f"{e.segment.entry} to {e.segment.exit}"] = {
+            "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"],
+            "share": e.left_nominal.share,
+            "bursts": noise.bursts,
+            "low_frequency": noise.low_frequency,
+            "tonal": noise.tonal,
+            "pushed": noise.pushed,
+        }
+    return found

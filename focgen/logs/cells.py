@@ -1,0 +1,160 @@
+"""Columns of cells as they are read, row by row, in little memory: few texts as codes, numbers as numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, overload
+
+import numpy as np
+
+from focgen.arrays import Array, Ints
+from focgen.logs.dialect import MISSING
+
+PART = 400_000
+"""Cells that are held as texts before they are put away: of fewer, all stay as they stand in the file."""
+_LEVELS = 4096  # different texts that a column is kept as: names of runs, levels of a command
+
+
+class Levels(Sequence[str]):
+    """A column of few different ``texts``; ``codes`` (m,) says which of them each row has."""
+
+    def __init__(self, texts: Sequence[str], codes: Ints) -> None:
+        self.texts, self.codes = tuple(texts), codes
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    @overload
+    def __getitem__(self, at: int) -> str: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> list[str]: ...
+
+    def __getitem__(self, at: int | slice) -> str | list[str]:
+        return (
+            [self.texts[code] for code in self.codes[at]]
+            if isinstance(at, slice)
+            else self.texts[self.codes[at]]
+        )
+
+    def numbers(self, decimal: str) -> Array:
+        """The column (m,) as float64. Raises ValueError where a text is none."""
+        return np.array(parsed(self.texts, decimal))[self.codes]
+
+
+class Gathered:
+    """Rows put together to columns: ``add`` them one after the other, then take the ``columns``."""
+
+    def __init__(self, width: int, decimal: str) -> None:
+        self._columns = [_Growing(decimal) for _ in range(width)]
+        self._rows: list[Sequence[str]] = []
+        self._most = max(1, PART // max(width, 1))
+
+    def add(self, row: Sequence[str]) -> None:
+        """One row of as many cells as there are columns."""
+        self._rows.append(row)
+        if len(self._rows) >= self._most:
+            self._put_away()
+
+    def columns(self) -> list[Sequence[str] | Array]:
+        """Each column (m,): texts as they stand; of a long table few texts as :class:`Levels`, others as
+        numbers."""
+        if not any(column.begun for column in self._columns):
+            return [list(cells) for cells in zip(*self._rows)] or [[] for _ in self._columns]
+        self._put_away()
+        return [column.taken() for column in self._columns]
+
+    def _put_away(self) -> None:
+        for column, cells in zip(self._columns, zip(*self._rows)):
+            column.add(cells)
+        self._rows = []
+
+
+class _Growing:
+    """One column: levels while its texts are few, then numbers, and texts where it holds no numbers."""
+
+    def __init__(self, decimal: str) -> None:
+        self._decimal = decimal
+        self._parts: list[Any] = []  # codes, numbers or texts, as far as the column has come
+        self._codes: dict[str, int] | None = {}
+        self._numeric = True
+
+    @property
+    def begun(self) -> bool:
+        return bool(self._parts)
+
+    def add(self, cells: Sequence[str]) -> None:
+        if self._codes is not None and len(self._codes.keys() | set(cells)) > _LEVELS:
+            self._leave_levels()
+        part = self._part(cells)  # which may put the earlier ones in another form
+        self._parts.append(part)
+
+    def taken(self) -> Sequence[str] | Array:
+        parts, self._parts = self._parts, []
+        if not self._numeric and self._codes is None:
+            return [cell for part in parts for cell in part]
+        whole = np.concatenate(parts)
+        return whole if self._codes is None else Levels(tuple(self._codes), whole)
+
+    def _part(self, cells: Sequence[str]) -> Array | Ints | list[str]:
+        if self._codes is not None:
+            for cell in cells:
+                self._codes.setdefault(cell, len(self._codes))
+            return np.fromiter(map(self._codes.__getitem__, cells), np.int16, len(cells))
+        if self._numeric:
+            try:
+                return np.array(parsed(cells, self._decimal))
+            except ValueError:
+                self._leave_numbers()
+        return list(cells)
+
+    def _leave_levels(self) -> None:
+        levels, self._codes = tuple(self._codes or ()), None
+        try:
+            values = np.array(parsed(levels, self._decimal))
+            self._parts = [values[part] for part in self._parts]
+        except ValueError:
+            self._numeric = False
+            self._parts = [[levels[code] for code in part] for part in self._parts]
+
+    def _leave_numbers(self) -> None:
+        self._numeric = False
+        self._parts = [[f"{value:g}" for value in part] for part in self._parts]
+
+
+class Lines:
+    """The line of the file that each row comes from; rows that follow one another are not counted one by
+    one."""
+
+    def __init__(self) -> None:
+        self._rows, self._lines, self._count = list[int](), list[int](), 0
+
+    def add(self, line: int) -> None:
+        """The next row's, counted from 0."""
+        if not self._rows or line != self._lines[-1] + self._count - self._rows[-1]:
+            self._rows.append(self._count)
+            self._lines.append(line)
+        self._count += 1
+
+    def of(self, row: int) -> str:
+        """The words that find a row in the file."""
+        at = int(np.searchsorted(self._rows, row, side="right")) - 1
+        return f"line {self._lines[at] + row - self._rows[at] + 1}"
+
+
+def parsed(cells: Iterable[Any], decimal: str = ".") -> list[float]:
+    """Numbers of cells, NaN for those that are missing. Raises ValueError and TypeError for anything else."""
+    cells = list(cells)
+    if any(isinstance(cell, str) and "_" in cell for cell in cells):
+        raise ValueError  # Python reads 1_000 as a number, nobody else does
+    if decimal == ",":
+        cells = [cell.replace(",", ".") if isinstance(cell, str) else cell for cell in cells]
+    try:
+        return list(map(float, cells))  # most columns miss nothing
+    except (ValueError, TypeError):
+        return [math.nan if _is_missing(cell) else float(cell) for cell in cells]
+
+
+def _is_missing(cell: object) -> bool:
+    return cell is None or (isinstance(cell, str) and cell.lower() in MISSING)

@@ -1,0 +1,50 @@
+"""Units: those the project knows, and which of them a column's name ends in."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+SIZES = {  # what one of each unit is, in the first of its kind
+    "pressure": {"bar": 1.0, "kPa": 1e-2, "mbar": 1e-3, "psi": 0.0689476, "MPa": 10.0, "Pa": 1e-5},
+    "curvature": {"1/mm": 1.0, "1/cm": 0.1, "1/m": 1e-3},
+    "angle": {"rad": 1.0, "deg": np.pi / 180.0},
+    "voltage": {"V": 1.0, "mV": 1e-3},
+    "current": {"A": 1.0, "mA": 1e-3},
+}
+"""The kinds of unit that tell a role, and that are taken for one another."""
+_OTHERS = frozenset("mm cm m um N mN kN Nm s ms Hz rpm K C pct".split())  # these tell no role
+_SPELLED = {"permm": "1/mm", "percm": "1/cm", "perm": "1/m", "1pm": "1/m", "1pmm": "1/mm", "hpa": "mbar"}
+_ANY_CASE = ("bar", "kPa", "mbar", "psi", "rad", "deg", "1/mm", "1/cm", "1/m")  # a name in v is no voltage
+
+
+def unit_of(text: str) -> tuple[str, str] | None:
+    """(kind, unit) that a unit or a column's name ends in, or None where it is none of :data:`SIZES`.
+
+    >>> unit_of("p_kPa"), unit_of("kappa_cam_per_mm"), unit_of("angle")
+    (('pressure', 'kPa'), ('curvature', '1/mm'), None)
+    """
+    words = re.sub(r"_?per_?", "_per", text.replace("1/", "_per")).strip("]) ").split("_")
+    last = re.split(r"[\s\[(]+", words[-1])[-1]
+    last = _SPELLED.get(last.lower(), last)
+    for kind, sizes in SIZES.items():
+        for unit in sizes:
+            if unit == last or (unit in _ANY_CASE and unit.lower() == last.lower()):
+                return kind, unit
+    return None
+
+
+def unit_named(column: str | None) -> str:
+    """The unit of any kind that a column's name ends in, "" where none is recognised.
+
+    >>> unit_named("p_kPa"), unit_named("rate_per_s"), unit_named("force_N"), unit_named("N")
+    ('kPa', '1/s', 'N', '')
+    """
+    known = unit_of(column or "")
+    if known:
+        return known[1]
+    *before, last = (column or "").split("_")
+    if not before or last not in _OTHERS:
+        return ""  # a lone letter is a name
+    return f"1/{last}" if before[-1] == "per" else last

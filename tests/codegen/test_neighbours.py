@@ -1,0 +1,69 @@
+"""Two controllers in one folder: each is generated again without force and takes nothing of the other.
+
+Red when one controller replaces or removes a file of the other.
+"""
+
+import json
+
+import pytest
+
+from focgen.codegen.generate import generate
+from focgen.errors import InputError
+from focgen.verification.folder import read_folder
+from tests.controllers import seed_controller
+
+
+def pair(folder, **options):
+    generate(seed_controller(5), folder, "q15", name="one", **options)
+    generate(seed_controller(6), folder, "q31", name="two")
+
+
+def content(folder) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_each_can_be_generated_again_without_force(tmp_path):
+    pair(tmp_path)
+    first = content(tmp_path)
+    assert {"one.c", "two.c", "one.manifest.json", "one.controller.toml"} < first.keys()
+    generate(seed_controller(7), tmp_path, "q15", name="one")  # changed since
+    generate(seed_controller(5), tmp_path, "q15", name="one")
+    assert "two.manifest.json" in content(tmp_path) and "one.manifest.json" not in content(tmp_path)
+    generate(seed_controller(6), tmp_path, "q31", name="two")
+    assert content(tmp_path) == first
+
+
+def test_what_a_controller_keeps_generates_it_again(tmp_path):
+    pair(tmp_path)
+    before = (tmp_path / "one.c").read_bytes()
+    again = generate(tmp_path / "one.controller.toml", tmp_path / "alone", "q15", name="one")
+    assert (tmp_path / "alone" / "one.c").read_bytes() == before
+    assert json.loads((tmp_path / "one.manifest.json").read_text())["files"] == again.manifest["files"]
+
+
+def test_verify_tells_of_the_one_and_names_the_other(tmp_path):
+    pair(tmp_path)
+    read = read_folder(tmp_path)
+    assert read.plan.name == "two" and read.differences == ()
+    (note,) = read.notes
+    assert note.startswith("one: stands here as well")
+    (tmp_path / "stranger.c").write_text("mine")
+    assert any("stranger.c" in note for note in read_folder(tmp_path).notes)
+
+
+def test_what_the_other_needs_stays(tmp_path):
+    """A self-test goes with the controller that had it; a header of the runtime stays while one has it."""
+    pair(tmp_path, selftest=True)
+    shared = {name for name in content(tmp_path) if name.startswith("foc_")}
+    generate(seed_controller(5), tmp_path, "f32", name="one")
+    left = content(tmp_path)
+    assert "one_selftest.c" not in left and shared <= left.keys() and "two.c" in left
+
+
+@pytest.mark.parametrize("name", ("one.c", "one.controller.toml", "two.c"))
+def test_what_was_edited_of_either_stays(tmp_path, name):
+    pair(tmp_path)
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(InputError, match=name):
+        generate(seed_controller(7), tmp_path, "q15", name=name.partition(".")[0])
+    assert (tmp_path / name).read_text() == "mine"

@@ -1,0 +1,52 @@
+"""Numbers of the diagnosis that stand outside :mod:`focgen.diagnosis.numbers`, by file.
+
+None decides whether an effect is there, which one, or how sure that is. They are settings of fits, searches
+and experiments, priors of nuisances, what a path through the session has to show, the widths of the promise,
+and the checks of a running controller.
+"""
+
+CONSTANTS = {
+    "belief/standing.py": ["_SURE"],
+    "controller/quantisation.py": ["_DECIMAL", "_DIGITS", "_OFF", "_SAME"],
+    "controller/replayed.py": ["_SLOWER"],
+    "controller/check.py": ["_NEARLY", "_RESOLVED", "_ROUNDED", "_STEADY", "_TIED"],
+    "controller/stamps.py": ["LOST", "UNSTEADY", "_FOLLOWING"],
+    "fitting/fit.py": ["FIXED", "STEP", "_LAGGING"],
+    "fitting/integrating.py": ["_OF_RESPONSE"],
+    "fitting/jumps.py": ["_ABOUT", "_FINEST", "_STEP", "_WORTH"],
+    "fitting/predictability.py": ["_DAMPING", "_PERIODS", "_RIDGES", "_SAMPLES"],
+    "fitting/realign.py": ["_TAKEN"],
+    "fitting/repeats.py": ["_ALIKE", "_AS_WELL", "_CELL", "_CLOSES", "_LATER", "_MOVED", "_ONE_SENSE"],
+    "hypotheses/bootstrap.py": ["_RARE"],
+    "hypotheses/input_covariance.py": ["_FLAT"],
+    "hypotheses/disturbance.py": ["SLOWEST"],
+    "hypotheses/explain.py": ["_BELIEVED", "_GAUGE", "_KEPT", "_OUT_OF_STEP", "_SMOOTHER"],
+    "hypotheses/initial.py": ["_LEVEL", "_SEEN", "_TIME"],
+    "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK", "_QUICKEST"],
+    "problem/decimate.py": ["_WITHIN"],
+    "problem/excitation.py": ["_STEADY"],
+    "problem/factors.py": ["LEAST", "WITHIN"],
+    "problem/free.py": ["_SLACK", "_USUAL"],
+    "problem/problem.py": ["_BASELINE", "_FAR_OFF", "_OFF", "_ZERO"],
+    "problem/segments.py": ["_FOLLOWED", "_TIMING"],
+    "proposals/candidate_rigs.py": ["_STEP"],
+    "proposals/menu.py": ["_SHORTEST"],
+    "proposals/next_experiment.py": ["_ENOUGH", "_MOST", "_SHARES"],
+    "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_FINE", "_LONGEST"],
+    "proposals/reach.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
+    "verdict/evidence.py": ["_STILL"],
+    "verdict/moves.py": ["_SLACK"],
+    "verdict/outside.py": ["_ASKED", "_BAND"],
+    "verdict/improvement.py": ["_AHEAD", "_FITTED", "_FORM", "_LOST", "_LOUD", "_MOST", "_REST"],
+    "verdict/verdict.py": ["_NEAR"],
+}
+
+COMPARED = {
+    "controller/check.py": [0.0001, 0.002],  # of the range, of the command: limits and departures
+    "hypotheses/disturbance.py": [0.1, 8.0],  # ends of bands of frequency
+    "problem/decimate.py": [3.0],  # samples
+    "proposals/menu.py": [10.0],  # response times of a hold
+    "verdict/evidence.py": [0.002],  # of the largest rate, drawn
+    "verdict/improvement.py": [1.0001],  # nothing can shrink
+    "verdict/verdict.py": [1.01, 0.02],  # visibly; a share worth telling
+}

@@ -1,0 +1,126 @@
+"""The posterior over effects: what it says of fits whose misfit is known.
+
+Red when misfit counts as evidence for an effect, or a set is not the least that holds what it should.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.belief.choice import likeliest
+from focgen.diagnosis.belief.further import Ground, Surroundings
+from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
+from focgen.diagnosis.belief.standing import behind, least_set, probabilities, tied_within
+from focgen.diagnosis.belief.unknown import is_none
+from focgen.diagnosis.numbers import NUMBERS
+
+_COUNT = 10_000
+
+
+def _fit(square, effects=(), predictable_share=0.0, size=None):
+    """A fit that leaves the mean square ``square``, in units of the noise's."""
+    candidates = tuple(SimpleNamespace(effect=name) for name in effects)
+    return SimpleNamespace(
+        innovations=np.zeros(_COUNT),
+        sse=_COUNT * square,
+        weighed=np.full(4, np.sqrt(square)),
+        problem=SimpleNamespace(candidates=candidates),
+        size=len(effects) if size is None else size,
+        prior_penalty=0.0,
+        predictable_share=predictable_share,
+    )
+
+
+def _ground(base, tried, changed=0.0, **around):
+    """``base``, whose effects change a mean square of ``changed``, and what was tried beside it."""
+    bare = SimpleNamespace(**{**vars(base), "problem": SimpleNamespace(candidates=())})
+    ground = Ground.of(bare, bare, tried, None, Surroundings(**around))
+    return Ground(base, ground.floor, 0.5 * _COUNT * changed, ground.scale)
+
+
+def test_evidence_saturates_between_good_forms():
+    scale = Scale().of(1e6)
+    best = log_likelihood(0.0, scale)
+    near, far = (best - log_likelihood(part * scale, scale) for part in (0.1, 10.0))
+    assert 0.0 < near < 0.1 * NUMBERS.turns and far == pytest.approx(NUMBERS.turns * np.log(11.0))
+
+
+def test_below_its_scale_evidence_grows_like_the_likelihood():
+    scale = Scale().of(0.0)
+    assert log_likelihood(0.0, scale) - log_likelihood(0.01, scale) == pytest.approx(0.02, rel=0.01)
+
+
+@pytest.mark.parametrize("closed, there", [(0.003, False), (0.2, True)])
+def test_a_second_effect_is_more_than_the_misfit_of_the_first(closed, there):
+    """The first changes a hundred times the noise's mean square; a second closes a part of that gap."""
+    gap = 100.0
+    base, second = _fit(1.0 + closed * gap, ["leak"]), _fit(1.0, ["leak", "resonance"])
+    _, odds = likeliest(_ground(base, [second], gap), [second])
+    assert (odds > 0.0) == there
+    alone, only = _fit(1.0 + closed * gap), _fit(1.0, ["resonance"])
+    assert likeliest(_ground(alone, [only]), [only])[1] > 0.0
+
+
+def test_a_refit_that_is_strained_asks_for_no_effect():
+    """Own parameters closer to those given choose among two effects, and are no reason for either."""
+    base, tried = _fit(1.002), [_fit(1.0, ["leak"]), _fit(1.0, ["creep"])]
+    base.prior_penalty, tried[0].prior_penalty = 20.0, 20.0
+    best, odds = likeliest(_ground(base, tried), tried)
+    assert best is tried[1] and odds < 0.0
+
+
+def test_what_takes_nothing_but_noise_away_is_no_effect():
+    base = _fit(1.002)
+    tried = [_fit(1.0, ["leak"], size=size) for size in (1, 5)]
+    assert likeliest(_ground(base, tried), tried)[1] < 0.0
+
+
+def test_free_values_are_paid_for_and_the_less_the_more_the_form_is_wrong():
+    right, wrong = (paid(2, 1e5, misfit, Scale().of(1e5)) for misfit in (0.0, 1e5))
+    assert paid(1, 1e5, 0.0, Scale().of(1e5)) == pytest.approx(right / 2) and 0 < wrong < right
+    assert paid(2, 0.0, 0.0, Scale().of(0.0)) == 0.0
+
+
+def test_free_values_that_the_experiments_cannot_show_are_not_counted():
+    base, simple, rich = _fit(2.0), _fit(1.0, ["leak"]), _fit(1.0, ["softening"], size=5)
+    ground = _ground(base, [simple, rich])
+    assert ground.odds(rich) < ground.odds(simple) - 2.0
+    assert ground.odds(rich, 1) == pytest.approx(ground.odds(simple))
+
+
+@pytest.mark.parametrize("around", [{"hidden": 0.05}, {"trusted": False}])
+def test_an_uneven_converter_and_a_noisy_input_hide_small_effects(around):
+    base, better = _fit(1.03), _fit(1.0, ["leak"])
+    assert likeliest(_ground(base, [better]), [better])[1] > 0.0
+    assert likeliest(_ground(base, [better], **around), [better])[1] < 0.0
+
+
+def test_the_set_is_the_least_that_holds_what_is_asked():
+    sure = probabilities([20.0, 19.0, 12.0, -3.0])
+    assert list(least_set(sure)) == [0, 1] and np.sum(sure) == pytest.approx(1.0 - NUMBERS.elsewhere)
+    assert sure[0] / sure[1] == pytest.approx(np.e)
+    assert list(least_set(probabilities([9.0, 30.0]))) == [1]
+
+
+def test_of_two_families_the_second_is_in_the_set_within_what_the_pictures_show():
+    for nearer, held in ((0.99, [0, 1]), (1.01, [0])):
+        nats = 0.5 * (nearer * tied_within()) ** 2
+        assert behind(30.0 - nats, 30.0) == pytest.approx(nearer * tied_within())
+        assert list(least_set(probabilities([30.0, 30.0 - nats]))) == held
+
+
+def test_an_effect_that_may_not_be_there_is_less_sure():
+    assert probabilities([0.0])[0] == pytest.approx(0.5 * (1.0 - NUMBERS.elsewhere))
+    assert probabilities([np.inf])[0] == pytest.approx(1.0 - NUMBERS.elsewhere)
+
+
+def test_nats_behind_are_squares_of_standard_deviations():
+    assert behind(3.0, 5.0) == pytest.approx(2.0) and behind(5.0, 3.0) == pytest.approx(-2.0)
+
+
+def test_what_no_form_makes_is_none_of_the_library():
+    """The bound on the misfit, a part of what the effects change, solved by hand."""
+    bound = NUMBERS.form * NUMBERS.rare ** (-1.0 / NUMBERS.turns) - NUMBERS.form**2
+    assert is_none(1.01 * bound, 1.0) and not is_none(0.99 * bound, 1.0)
+    assert is_none(0.1, 0.0) and not is_none(0.0, 0.0)

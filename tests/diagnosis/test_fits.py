@@ -1,0 +1,70 @@
+"""Fits do no work twice, and none that could change nothing.
+
+Red when work is done twice, or what is left out to save it changes an answer.
+"""
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.fitting.fit import WHITE, fit, innovations, jacobian
+from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.segments import make
+from focgen.rig.effects import library
+from tests.diagnosis_rig import RIG, session
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """The actuator's, of a rig whose actuator has dry friction."""
+    logs = session(4, slip=0.3)
+    return problem_of(RIG, make(logs, "pressure", "curvature"), logs)
+
+
+def beside(problem, effect, form):
+    """``problem`` with one form, and its first start values."""
+    candidate = next(
+        CandidateEffect(effect, f, "actuator") for f in library()[effect].forms if f.name == form
+    )
+    found = problem.with_candidates([candidate])
+    return found, np.r_[found.nominal(), found.starts(candidate)[0]]
+
+
+def counted(monkeypatch):
+    """A list that grows by every simulation's vector."""
+    found, plain = [], Problem.simulate
+    monkeypatch.setattr(
+        Problem, "simulate", lambda self, v, *more: (found.append(v), plain(self, v, *more))[1]
+    )
+    return found
+
+
+def test_a_derivatives_steps_leave_in_memory_what_they_set_out_from(problem):
+    whole, vector = beside(problem, "hysteresis", "play")
+    now = innovations(whole, vector, WHITE)
+    before = {place: [id(made) for *_, made in kept] for place, kept in whole.memory.items()}
+    jacobian(whole, vector, now, WHITE, *whole.bounds())
+    chain = [place for place in before if place not in ("rigs", "entered")]
+    assert chain and all([id(m) for *_, m in whole.memory[place]] == before[place] for place in chain)
+
+
+def test_a_unit_is_not_moved_for_its_derivative(problem, monkeypatch):
+    whole, vector = beside(problem, "gain_nonlinearity", "cubic")  # its scale is a unit
+    now = innovations(whole, vector, WHITE)
+    simulated = counted(monkeypatch)
+    rows = jacobian(whole, vector, now, WHITE, *whole.bounds())
+    low, high = whole.bounds()
+    assert len(simulated) == np.sum(high - low > 1e-6) < len(vector)
+    assert not np.any(rows[-1]) and np.any(rows[-2])
+
+
+def test_a_fit_far_behind_is_left_early_within_a_hundredth_of_what_it_is_behind(problem, monkeypatch):
+    leader = fit(*beside(problem, "hysteresis", "play"), WHITE)
+    other, start = beside(problem, "gain_drift", "bending")
+    simulated = counted(monkeypatch)
+    ended = fit(other, start, WHITE)
+    whole = len(simulated)
+    left = fit(other, start, WHITE, leader=leader)
+    nats = 0.5 * len(left.innovations) * np.log([left.cost / ended.cost, left.cost / leader.cost])
+    assert len(simulated) - whole < 0.8 * whole
+    assert nats[1] > 1000.0 and nats[0] < 0.02 * nats[1]

@@ -1,0 +1,179 @@
+"""Proposed experiments: what they do to the rig, and which of them is chosen.
+
+Red when an experiment is proposed that leaves the rig's ranges, or that would not tell the rivals apart.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.segments import make
+from focgen.diagnosis.proposals.candidate_rigs import CandidateRig, Part
+from focgen.diagnosis.proposals.menu import Choice, menu
+from focgen.diagnosis.proposals.next_experiment import _allowed, _best, _Option, _showing
+from focgen.diagnosis.proposals.reach import Bounds, Reach, bounds_of, reach_of
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import library
+from focgen.rig.response import integrations, response_time
+from focgen.rig.rig import LinearActuator, Ranges, Rig, Signals
+from tests.diagnosis_rig import RIG, session
+
+AXIS = Rig(
+    "axis",
+    0.01,
+    Signals("t_s", "q_m", "F_N"),
+    LinearActuator(TransferFunction([(1.0, 0.0)], [(95.0, 2.0), (203.0, 1.0)])),
+)
+
+
+def axis_log(force, seconds=25.0, low=0.0, high=0.25):
+    """A carriage that was moved between ``low`` and ``high`` m, by at most ``force`` N."""
+    t = np.arange(0.0, seconds, 0.01)
+    place = low + (high - low) * (0.5 - 0.5 * np.cos(2.0 * np.pi * t / seconds * 3))
+    return Experiment("there and back", 0.01, {"command": force * np.sin(2.0 * np.pi * t), "output": place})
+
+
+def test_an_axis_is_as_fast_as_its_speed_and_integrates_once():
+    assert integrations(AXIS) == 1 and integrations(RIG) == 0
+    assert response_time(AXIS, 0.01, 25.0) == pytest.approx(95.0 / 203.0, abs=0.02)
+
+
+def test_the_input_stays_where_the_logs_and_the_ranges_have_it():
+    logs = session(2)
+    assert reach_of(RIG, logs, "command").high == pytest.approx(1.8)
+    tight = replace(RIG, ranges=Ranges((0.0, 1.5), None, None))
+    assert (reach_of(tight, logs, "command").low, reach_of(tight, logs, "command").high) == (0.0, 1.5)
+
+
+@pytest.mark.parametrize("change", [0.09, 0.11])
+def test_steps_are_proposed_where_there_were_steps(change):
+    ramp, steps = np.clip(np.arange(2000) * change / 10.0, 0.0, 1.0), np.repeat([0.0, change, 1.0], 700)
+    u = ramp if change < 0.1 else steps
+    log = Experiment("up", 0.05, {"command": u, "pressure": u, "output": u})
+    reach = reach_of(RIG, [log], "command")
+    assert np.isinf(reach.rate) == (change > 0.1)
+    fastest = max(np.max(np.abs(np.diff(c.input))) for c in menu(reach))
+    assert fastest == pytest.approx(change / 10.0 if change < 0.1 else 1.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("seconds", [600.0, 45.0, 22.0])
+@pytest.mark.parametrize("low", [0.0, -1.0])
+def test_no_experiment_is_longer_than_the_session_was(seconds, low):
+    reach = Reach(low, 2.0, 0.0, np.inf, seconds, 1.5, 0.01)
+    found = menu(reach)
+    assert found and all(c.seconds <= seconds and c.input[0] == 0.0 for c in found)
+    assert all(low <= c.input.min() and c.input.max() <= 2.0 for c in found)
+    assert any(c.input.min() < 0.5 * low for c in found) if low else all(c.input.min() == 0.0 for c in found)
+
+
+def candidate_rigs(rig, log, effect="friction"):
+    """The rig as given, a candidate for whatever effect."""
+    problem = problem_of(rig, make([log], "command", "output"), [log])
+    found = fit(problem, problem.nominal(), WHITE, 0)
+    return CandidateRig(SimpleNamespace(effect=effect, fit=found), Part.of(found), (), ())
+
+
+@pytest.mark.parametrize("force, share", [(2.0, 1.0), (150.0, None)])
+def test_an_axis_is_pushed_no_further_than_its_stroke(force, share):
+    log = axis_log(force)
+    reach, bounds = reach_of(AXIS, [log], "command"), bounds_of(AXIS, [log])
+    assert bounds.stands == pytest.approx(0.125, abs=1e-3) and not bounds.left
+    allowed = [choice for choice, _ in _allowed(menu(reach), [candidate_rigs(AXIS, log)], bounds)]
+    assert allowed and all(c.share == share or (share is None and c.share < 1.0) for c in allowed)
+    for choice in allowed:
+        t = np.arange(len(choice.input)) * reach.h
+        _, place, _ = lsim(([1.0], [95.0, 203.0, 0.0]), choice.input, t)
+        assert 0.02 < 0.125 + place.min() and 0.125 + place.max() < 0.23
+        smaller = next((s for s in (0.1, 0.15, 0.25, 0.35, 0.5, 0.7, 1.0) if s > choice.share), None)
+        if smaller:  # it is as large as it may be
+            assert np.ptp(place) * smaller / choice.share > 0.19 * 0.5
+
+
+def test_pushes_there_and_back_bring_a_free_mass_back_to_where_it_stood():
+    reach = Reach(-1.0, 1.0, 0.0, np.inf, 100.0, 1.0, 0.01, 1, 2)
+    for choice in menu(reach):
+        if "push" in choice.what:
+            speed = np.cumsum(choice.input) * reach.h
+            place = np.cumsum(speed) * reach.h
+            assert abs(place[-1]) < 0.02 * np.abs(place).max() and abs(speed[-1]) < 0.02 * np.abs(speed).max()
+
+
+def test_a_pressure_is_kept_below_its_range_by_a_smaller_input():
+    logs, bounds = session(2, roles=()), Bounds({"pressure": (-1.0, 0.1)})
+    problem = problem_of(RIG, make(logs, "command", "output"), logs)
+    found = fit(problem, problem.nominal(), WHITE, 0)
+    rig = CandidateRig(SimpleNamespace(effect="leak", fit=found), Part.of(found), (), ())
+    steps = Choice("a step", np.repeat([0.0, 1.0], 100), Reach(0.0, 1.8, 0.0, np.inf, 60.0, 1.0, 0.05))
+    [(choice, [made])] = _allowed([steps], [rig], bounds)
+    assert choice.share == 0.5 and made.signals["pressure"].max() == pytest.approx(0.09, rel=1e-3)
+    assert not _allowed([steps], [rig], Bounds({"pressure": (-1.0, 0.01)}))
+
+
+def test_what_outlives_a_rest_is_carried_into_the_experiment():
+    logs = session(2)
+    bare = problem_of(RIG, make(logs, "pressure", "curvature"), logs)
+    form = library()["softening"].forms[0]
+    problem = bare.with_candidates([CandidateEffect("softening", form, "actuator")])
+    found = fit(problem, np.r_[bare.nominal(), problem.starts(problem.candidates[0])[0]], WHITE, 0)
+    part = Part.of(found)
+    largest = RIG.actuator.drive(0.18)  # of the session: what softening acts on is K(p) p
+    assert max(part.left[0].values()) == pytest.approx(largest, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "rivals, left_out",
+    [
+        (("softening", "gain_drift"), ("staircase", "hold at", "small steps")),
+        (("creep", "sensor_relaxation"), ("mixed", "triangle", "staircase", "sines")),
+        (("slow_regulator", "transport_delay"), ("triangle",)),
+    ],
+)
+def test_only_experiments_that_show_the_rivals_are_proposed(rivals, left_out):
+    asked = [SimpleNamespace(effect=name) for name in rivals]
+    problem = SimpleNamespace(references=SimpleNamespace(clocks={"response": 2.0}))
+    nothing = SimpleNamespace(
+        segment=SimpleNamespace(parts=lambda x: [], x=None, run=SimpleNamespace(h=0.02)),
+        nominal=SimpleNamespace(problem=problem),
+    )
+    choices = menu(Reach(0.0, 1.0, 0.0, np.inf, 1200.0, 2.0, 0.02))
+    made = [(c, [SimpleNamespace(entering=c.input)]) for c in choices]
+    shown = [c.what for c, _ in _showing(made, nothing, asked)]
+    assert len(shown) == len(choices) - len(left_out)
+    assert not [what for what in shown if any(word in what for word in left_out)]
+
+
+def option(apart, seconds=100.0):
+    return _Option(SimpleNamespace(seconds=seconds), None, np.asarray(apart, float))
+
+
+@pytest.mark.parametrize(
+    "tiers, chosen",
+    [
+        ([[([4.0, 9.0], 100), ([20.0, 3.5], 100)]], 0),  # the least counts
+        ([[([4.0], 100), ([5.0], 400)]], 0),  # by the second
+        ([[([4.0], 100)], [([90.0], 100)]], 0),  # what has been done before comes first
+        ([[([2.0], 100)], [([90.0], 100)]], 1),  # unless it does not tell
+        ([[([9.0, 0.2], 100), ([5.0, 0.3], 100)]], 0),  # what none tells does not count
+        ([[([0.2, 0.9], 100), ([0.4, 0.5], 100)]], 1),  # the best of a bad lot
+    ],
+)
+def test_the_most_telling_experiment_is_chosen(tiers, chosen):
+    made = [[option(*o) for o in tier] for tier in tiers]
+    assert _best(made)[1] is [o for tier in made for o in tier][chosen]
+
+
+@pytest.mark.parametrize("apart, asked", [(2.9, False), (3.1, True)])
+def test_a_further_signal_is_asked_for_where_it_tells_enough(apart, asked):
+    plain, logged = option([1.0]), replace(option([apart]), stage="regulator")
+    assert (_best([[plain], [logged]])[1] is logged) == asked
+
+
+def test_nothing_is_proposed_where_nothing_is_allowed():
+    assert _best([]) is None

@@ -1,0 +1,306 @@
+"""Diagnoses of rigs simulated apart from the library.
+
+Red when a simulated effect is missed or called another name, or a sound rig is called faulty.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+
+from focgen.diagnosis.diagnose import diagnose, explain_all
+from focgen.diagnosis.hypotheses.bootstrap import threshold
+from focgen.diagnosis.hypotheses.explain import candidates_for, explain
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.verdict import compose, verdict
+from focgen.diagnosis.verdict import predicted_improvement as promise
+from focgen.diagnosis.verdict.cross_validation import cross_validated_share
+from focgen.diagnosis.verdict.improvement import Improvement
+from focgen.errors import FocgenError
+from focgen.rig.files import read_rig
+from focgen.rig.replay import replay
+from focgen.rig.rig import UNITY
+from tests.diagnosis_rig import RIG, H, session
+
+
+def named(diagnosis):
+    return [[c.effect for c in f.candidates] for f in diagnosis.causes]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_gap(seed):
+    found = diagnose(RIG, session(seed))
+    assert found.verdict in ("none", "parameters") and not found.causes
+    assert found.shrink is None and found.where.stage is None
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_parameters_only(seed):
+    found = diagnose(RIG, session(seed, T=1.6, alpha=0.55, gain=(0.0025, 0.3)))
+    assert found.verdict == "parameters"
+    assert found.gap.refitted < 0.6 * found.gap.as_given
+
+
+@pytest.mark.parametrize(
+    "effect, stage, case",
+    [
+        ("transport_delay", "regulator", {"delay": 4}),
+        ("valve_asymmetry", "regulator", {"vent": 0.8}),
+        ("dead_zone", "actuator", {"zone": 0.045}),
+        ("hysteresis", "actuator", {"slip": 0.35}),
+        ("gain_drift", "actuator", {"drift": 6e-4}),
+        ("sensor_nonlinearity", "sensor", {"bend": 20.0}),
+    ],
+)
+def test_one_effect_is_named_in_its_stage(effect, stage, case):
+    found = diagnose(RIG, session(11, **case))
+    assert found.verdict == "named" and named(found) == [[effect]]
+    assert found.where.stage == stage and not found.where.inferred
+    assert found.gap.explained < found.gap.refitted <= found.gap.as_given * 1.02
+    assert found.shrink > 0.8
+
+
+@pytest.mark.long
+def test_a_gain_that_ends_is_seen_though_own_parameters_bend_to_make_up_for_it():
+    """From parameters so bent a dead zone mends more than the gain's own forms do."""
+    found = diagnose(RIG, session(1, cap=0.1, roles=("pressure",)))
+    assert found.verdict == "named" and named(found) == [["gain_nonlinearity"]]
+
+
+@pytest.mark.parametrize("camera", [5.0, 12.0])
+def test_a_noisy_camera_makes_no_fault_of_the_sensor_behind_it(camera):
+    """What the actuator's refit leaves open of the curvature is no effect of the sensor that reads it."""
+    found = explain_all(RIG, session(1, camera=camera, noise=0.003), NUMBERS.nats)
+    assert not any(e.causes for e in found) and found[-1].left.share < 0.01
+
+
+def test_a_fault_of_the_sensor_behind_a_noisy_camera_is_found():
+    found = diagnose(RIG, session(1, camera=5.0, noise=0.003, bend=20.0))
+    assert named(found) == [["sensor_nonlinearity"]] and found.shrink > 0.8
+
+
+@pytest.mark.parametrize("role", ["pressure", "curvature"])
+@pytest.mark.parametrize("off", [0.008, 0.03])
+def test_gauges_that_disagree_by_a_little_are_no_fault(role, off):
+    logs = [replace(log, signals={**log.signals, role: log[role] * (1 + off)}) for log in session(1, T=1.45)]
+    found = diagnose(RIG, logs)
+    assert found.verdict == "parameters" and not found.causes
+
+
+@pytest.mark.parametrize("off, fault", [(0.008, False), (0.03, True)])
+def test_gauges_of_a_stage_that_is_absent_agree_to_a_percent(off, fault):
+    """Without a sensor the rig says that the output is the curvature; another camera reads it."""
+    bare = replace(RIG, sensor=UNITY)
+    read = [log["curvature"] * (1 + off) for log in session(2)]
+    logs = [replace(a, signals={**a.signals, "output": y}) for a, y in zip(session(1), read, strict=True)]
+    assert bool(diagnose(bare, logs).causes) == fault
+
+
+def test_the_promise_holds_on_new_experiments(tmp_path):
+    found = diagnose(RIG, session(3, slip=0.35)[:4], tmp_path / "out")
+    unseen = session(3, slip=0.35)[4:]
+    floor = session(3, slip=0.35, noise=0.0)[4:]
+    noise = np.mean((unseen[0]["output"] - floor[0]["output"]) ** 2)
+    squares = [
+        next(iter(replay(tmp_path / "out" / name, unseen).logs.values())).rmse ** 2
+        for name in (found.refitted_rig, found.augmented_rig)
+    ]
+    achieved = (squares[0] - squares[1]) / (squares[0] - noise)
+    assert abs(achieved - found.shrink) < 0.1
+    assert found.shrink_interval[0] <= achieved <= found.shrink_interval[1] + 0.02
+    carried = [
+        replay(rig, unseen).logs[unseen[0].name].rmse ** 2 for rig in (found.refitted, found.augmented)
+    ]
+    assert carried == pytest.approx(squares, rel=1e-9)  # the rigs as objects are those of the files
+
+
+def test_the_floor_under_a_coarse_reading_is_its_noise():
+    logs, step = session(2), 6e-4
+    coarse = [
+        replace(log, signals={**log.signals, "output": step * np.round(log["output"] / step)}) for log in logs
+    ]
+    found = diagnose(RIG, coarse)
+    assert named(found) == [["sensor_quantization"]]
+    assert found.gap.floor == pytest.approx(0.006 * 0.011, rel=0.2)
+    assert found.gap.explained > 2.0 * found.gap.floor
+
+
+def _converted(log, step, uneven, lazy):
+    """A log read by a converter whose thresholds lie ``uneven`` off and that comes back ``lazy`` late, of a
+    step."""
+    y, code, codes = log["output"] / step, 0.0, []
+    for value in y:
+        if abs(value - code) > 0.5 + lazy / 2:
+            code = np.floor(value + 0.5 + uneven * np.sin(11.3 * np.floor(value + 0.5)))
+        codes.append(code)
+    return replace(log, signals={**log.signals, "output": step * np.array(codes)})
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("uneven, lazy", [(0.15, 0.0), (0.0, 0.25), (0.1, 0.1)])
+def test_uneven_and_sluggish_steps_are_no_effect_of_their_own(uneven, lazy):
+    coarse = [_converted(log, 9e-4, uneven, lazy) for log in session(4, roles=("pressure",))]
+    assert named(diagnose(RIG, coarse)) == [["sensor_quantization"]]
+
+
+@pytest.mark.long
+def test_an_effect_beside_a_converter_is_found():
+    coarse = [_converted(log, 4e-4, 0.1, 0.1) for log in session(5, vent=0.8, roles=())]
+    found = named(diagnose(RIG, coarse))
+    assert ["sensor_quantization"] in found and any("valve_asymmetry" in names for names in found)
+
+
+@pytest.mark.long
+def test_a_curve_that_stands_for_two_effects_is_told_apart():
+    logs = session(6, zone=0.03, roles=())
+    clipped = [
+        replace(log, signals={**log.signals, "output": np.minimum(log["output"], 0.0045)}) for log in logs
+    ]
+    found = named(diagnose(RIG, clipped))
+    assert len(found) == 2
+    assert any("dead_zone" in names for names in found) and any(
+        "sensor_saturation" in names for names in found
+    )
+
+
+def test_what_brings_the_whole_output_no_closer_is_not_named():
+    """A bend that the sensor has is kept, the opposite one is not."""
+    logs = session(11, bend=20.0)
+    explanations = explain_all(RIG, logs, NUMBERS.nats, ["sensor_nonlinearity"])
+    rigs = compose.compose(RIG, explanations, logs)
+    (found,) = rigs.placed
+    turned = replace(found, values=(-found.values[0], *found.values[1:]))
+    assert found.values[0] > 0
+    assert verdict._no_closer(rigs, logs, explanations[-1]) == []
+    assert verdict._no_closer(replace(rigs, placed=(turned,)), logs, explanations[-1]) == [explanations[-1]]
+
+
+@pytest.mark.parametrize("hum, trusted", [(0.0, True), (0.01, False)])
+def test_behind_a_stage_that_hums_small_effects_are_not_believed(hum, trusted, monkeypatch):
+    tone = [hum * np.sin(2 * np.pi * 1.3 * H * np.arange(len(log))) for log in session()]
+    logs = tuple(
+        replace(log, signals={**log.signals, "pressure": log["pressure"] + t})
+        for log, t in zip(session(), tone, strict=True)
+    )
+    told = []
+
+    def explained(*given):
+        told.append(given[-1])
+        return explain(*given)
+
+    monkeypatch.setattr("focgen.diagnosis.diagnose.explain", explained)
+    explain_all(RIG, logs, NUMBERS.nats, ["transport_delay"])
+    assert told[:2] == [True, trusted]
+
+
+def test_of_a_promise_of_next_to_nothing_segments_that_close_their_own_gap_are_not_in_vain(monkeypatch):
+    """Of several as of one."""
+    shares = {"clear": 0.9, "vain": 0.1}
+    monkeypatch.setattr(verdict, "cross_validated_share", lambda e, logs: shares[e])
+    told = SimpleNamespace(causes=[("clear", None), ("vain", None), ("vain", None)])
+    assert verdict._in_vain(told, (), ["clear", "vain"]) == ["vain"]
+    assert verdict._in_vain(SimpleNamespace(causes=[("clear", None)]), (), ["clear"]) == []
+    assert verdict._in_vain(SimpleNamespace(causes=[("vain", None)]), (), ["vain"]) == ["vain"]
+
+
+@pytest.mark.parametrize("share, causes", [(0.9, [["valve_asymmetry"]]), (0.1, [])])
+def test_what_is_clear_in_one_segment_stands_whatever_is_left_in_another(share, causes, monkeypatch):
+    """The output promises next to nothing; the pressure, logged, closes its own gap, or not even that."""
+    monkeypatch.setattr(promise, "predict", lambda *given: Improvement(0.15, (0.0, 0.5)))
+    monkeypatch.setattr(verdict, "cross_validated_share", lambda *given: share)
+    found = diagnose(RIG, session(11, vent=0.8, roles=("pressure",)), to=40.0)
+    assert named(found) == causes
+
+
+def test_effects_close_their_own_gap_on_parts_not_seen():
+    logs = [log.between(0.0, 40.0) for log in session(11, vent=0.8)]
+    first, *_ = explain_all(RIG, logs, NUMBERS.nats, ["valve_asymmetry"])
+    assert cross_validated_share(first, logs) > 0.95
+    parted = [log.between(0.0, 40.0) for log in session(11, vent=0.8)[:2] + session(11)[2:]]
+    second, *_ = explain_all(RIG, parted, NUMBERS.nats, ["valve_asymmetry"])
+    assert cross_validated_share(second, parted) < 0.8
+
+
+def test_a_push_that_no_input_predicts_is_unknown_beside_what_is_clear():
+    """Pushes of random size and sign reach the output at the pace of the rig, far above its noise."""
+    rng, logs = np.random.default_rng(5), []
+    for log in session(3, vent=0.8, roles=("pressure",)):
+        push = gaussian_filter1d(rng.normal(size=len(log)), 12.0)
+        output = log["output"] + 0.0006 * push / np.std(push)
+        logs.append(replace(log, signals={**log.signals, "output": output}).between(0.0, 40.0))
+    found = diagnose(RIG, logs)
+    assert named(found) == [["valve_asymmetry"]]
+    assert found.unexplained["pressure to output"]["pushed"]
+    assert any("pressure to output: no effect explains" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("noise, in_vain", [(0.8, True), (0.84, False)])
+def test_of_a_gap_little_above_the_noise_little_can_be_promised(noise, in_vain):
+    squares = {"refitted": np.array([1.0, 1.0])}
+    told = verdict._Summary(None, [], {}, squares, noise**2, Improvement(0.1, (0.0, 0.5)))
+    assert told.in_vain == in_vain
+
+
+def test_told_the_effect_it_considers_nothing_else():
+    found = diagnose(RIG, session(11, vent=0.8), only=("sensor_lag", "valve_asymmetry"))
+    assert {c.effect for f in found.causes for c in f.candidates} <= {"sensor_lag", "valve_asymmetry"}
+    assert found.causes[0].candidates[0].effect == "valve_asymmetry"
+    assert {f.effect for f in found.fits} <= {"sensor_lag", "valve_asymmetry"}
+    with pytest.raises(FocgenError, match="valve_asymetry"):
+        diagnose(RIG, session(11, vent=0.8), only=("valve_asymetry",))
+
+
+@pytest.mark.long
+def test_told_two_effects_it_takes_the_small_one_too():
+    """A dead zone so small that it is not believed beside a loop."""
+    logs = session(11, slip=0.35, zone=0.006)
+    blind = explain_all(RIG, logs, NUMBERS.nats)[1]
+    told = explain_all(RIG, logs, NUMBERS.nats, ["hysteresis", "dead_zone"])[1]
+    assert [c.rivals[0].effect for c in blind.causes] == ["hysteresis"]
+    assert {c.effect for c in told.best.problem.candidates} == {"hysteresis", "dead_zone"}
+    assert told.best.sse < blind.best.sse
+
+
+def test_the_plain_fits_rank_the_true_effect_first():
+    found = diagnose(RIG, session(11, drift=6e-4))
+    assert found.fits[0].effect == "gain_drift" and found.fits[0].error < 0.7
+    assert [f.error for f in found.fits] == sorted(f.error for f in found.fits)
+
+
+def test_missing_signals_make_the_stage_an_inference():
+    found = diagnose(RIG, session(5, vent=0.8, roles=()))
+    assert found.where.inferred
+    assert "valve_asymmetry" in {c.effect for f in found.causes for c in f.candidates}
+
+
+def test_units_do_not_matter():
+    logs = session(11, zone=0.045)
+    from focgen.rig.rig import Actuator
+
+    rig = replace(
+        RIG,
+        actuator=Actuator(1.3, 0.6, (2e-5, 3.4e-5)),
+        regulator=type(RIG.regulator)([(10.0, 0.0)], RIG.regulator.den),
+    )  # p in mbar·10, curvature as before
+    scaled = [
+        replace(log, signals={r: s * {"pressure": 100.0}.get(r, 1.0) for r, s in log.signals.items()})
+        for log in logs
+    ]
+    assert named(diagnose(rig, scaled)) == [["dead_zone"]]
+
+
+def test_session_state_carries_on(tmp_path):
+    diagnose(RIG, session(11, drift=6e-4), tmp_path)
+    rig = read_rig(tmp_path / "augmented.toml")
+    assert [e["name"] for e in rig.effects] == ["gain_drift"]
+    assert rig.effects[0]["clock"] > 300
+
+
+def test_noise_alone_gathers_little_evidence():
+    explained = explain_all(RIG, session(11, zone=0.045), NUMBERS.nats)[1]
+    candidates = [c for c in candidates_for(explained.segment, RIG) if c.form.seen is None]
+    asked = threshold(explained, candidates, 3, 0.0)
+    assert 0 <= asked < 40 < explained.causes[0].gain
+    assert threshold(explained, candidates, 2, 1e6) == 1e6

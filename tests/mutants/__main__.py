@@ -1,0 +1,73 @@
+"""``python -m tests.mutants``: measure the tests once, then try changes; what was tried is kept."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+
+from tests.mutants.change import read
+from tests.mutants.known import Known, copy_to, known, measure
+from tests.mutants.sample import ROOMS, all_changes, drawn
+from tests.mutants.table import table
+from tests.mutants.trying import restored, tried, warm
+
+
+def main() -> None:
+    asked = _asked()
+    place, folder = asked.folder / "sources", asked.folder
+    if asked.again or not (folder / "seen.jsonl").exists():
+        measure(copy_to(place), folder)
+        (folder / "tried.jsonl").unlink(missing_ok=True)
+    if not asked.report:
+        warm()
+        _try_all(place, folder, asked)
+    weights = {room: len({(c.file, c.begin) for c in all_changes(place, room)}) for room in asked.rooms}
+    text = table(_results(folder), weights)
+    (folder / "table.md").write_text(text + "\n", encoding="utf-8")
+    print(text)
+
+
+def _asked() -> argparse.Namespace:
+    given = argparse.ArgumentParser(prog="make mutants")
+    given.add_argument("--count", type=int, default=320, help="changes in all, the rooms in turn")
+    given.add_argument("--seed", type=int, default=1)
+    given.add_argument("--rooms", nargs="+", default=list(ROOMS), choices=list(ROOMS))
+    given.add_argument("--folder", type=Path, default=Path("build/mutants"), help="kept from run to run")
+    given.add_argument("--again", action="store_true", help="measure the tests and begin anew")
+    given.add_argument("--report", action="store_true", help="only print what was tried")
+    asked = given.parse_args()
+    asked.folder = asked.folder.resolve()
+    return asked
+
+
+def _results(folder: Path) -> list[dict]:
+    path = folder / "tried.jsonl"
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def _try_all(place: Path, folder: Path, asked: argparse.Namespace) -> None:
+    restored(place)
+    tests, done = known(folder), {r["key"] for r in _results(folder)}
+    for room, change in drawn(place, asked.seed, asked.count, tuple(asked.rooms)):
+        text = read(place, change.file)
+        if change.key(text) not in done:
+            line = _tried(place, tests, room, change, text)
+            with open(folder / "tried.jsonl", "a", encoding="utf-8") as out:
+                out.write(json.dumps(line) + "\n")
+            print(f"{line['outcome']:10} {line['seconds']:6.1f} s  {line['file']}:{line['line']}", flush=True)
+    shutil.rmtree(place / "scratch", ignore_errors=True)
+
+
+def _tried(place: Path, tests: Known, room: str, change, text: str) -> dict:
+    chosen = tests.tests(change, text)
+    patience = 60.0 + 4.0 * sum(tests.seconds[t] for t in chosen)
+    found = tried(place, change, chosen, patience)
+    line = {"key": change.key(text), "room": room, **asdict(change), "line": change.line(text)}
+    return {**line, **asdict(found), "tests": len(chosen)}
+
+
+if __name__ == "__main__":
+    main()

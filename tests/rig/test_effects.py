@@ -1,0 +1,155 @@
+"""Every effect of the library is complete, and nested in the nominal chain.
+
+Red when an effect is incomplete, does not vanish at zero, or is named outside of its file.
+"""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import focgen
+from focgen.rig import plant
+from focgen.rig.dynamics import UNCHANGED
+from focgen.rig.effects import SLOTS, STAGES, Excitation, Run, form_of, library
+from focgen.rig.engine import slot_in
+from focgen.rig.modes import respond
+from focgen.rig.plant import Plant
+
+NAMES = sorted(library())
+RICH = Excitation(10, 0.1, 20, 20, 100.0, 0.01, 8, 5, 5, 500.0, 100.0)
+POOR = Excitation(1, 1.0, 0, 0, 0.5, 10.0, 1, 0, 0, 2.0, 100.0)
+CONTRACT = """transport_delay slow_regulator valve_asymmetry valve_stiction flow_limit supply_saturation
+leak hysteresis friction creep unloading_asymmetry softening gain_nonlinearity dead_zone contact resonance
+gain_drift sensor_nonlinearity sensor_hysteresis sensor_relaxation sensor_lag sensor_drift sensor_quantization
+sensor_saturation""".split()
+
+
+def forms():
+    return [pytest.param(e, f, id=f"{e.name}-{f.name}") for e in library().values() for f in e.forms]
+
+
+def session(seed: int = 0):
+    rng = np.random.default_rng(seed)
+    lengths = (400, 300)
+    x = np.concatenate([np.abs(np.cumsum(rng.normal(0, 0.05, n))) for n in lengths])
+    return x / np.max(x), Run.of(lengths, [0.0, 30.0], 0.05)
+
+
+def test_the_vocabulary_is_all_there():
+    assert set(CONTRACT) <= set(NAMES)  # which others rely on; a further one is no line here
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_says_what_it_is(name):
+    effect = library()[name]
+    assert effect.stage in STAGES
+    assert len(effect.meaning) > 10 and len(effect.reveals) > 10
+    assert effect.confused_with and set(effect.confused_with) <= set(NAMES) - {name}
+    assert len(effect.forms) == 1 if effect.single else len(effect.forms) >= 2
+    assert len({f.name for f in effect.forms}) == len(effect.forms)
+
+
+def test_only_a_lightly_damped_mode_rings_with_one_tone():
+    assert [name for name in NAMES if library()[name].tonal] == ["resonance"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_knows_what_shows_it(name):
+    check = library()[name].needs
+    assert check(RICH) is None
+    told = check(POOR)
+    assert told is None if library()[name].noiselike else isinstance(told, str) and len(told) > 10
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_is_one_documented_file(name):
+    path = Path(focgen.__file__).parent / "rig" / "effects" / f"{name}.py"
+    text = path.read_text(encoding="utf-8")
+    assert ast.get_docstring(ast.parse(text))
+    assert len(text.splitlines()) < 110
+
+
+def test_nothing_else_names_an_effect():
+    root = Path(focgen.__file__).parent
+    for path in root.rglob("*.py"):
+        inside = path.relative_to(root).parts
+        if inside[:2] == ("rig", "effects") or inside[0] in ("trials", "demonstration.py"):
+            continue
+        found = {
+            n
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            if isinstance(node, ast.Constant) and isinstance(n := node.value, str)
+        } & set(NAMES)
+        assert not found, f"{path} names {found}"
+
+
+@pytest.mark.parametrize("effect, form", forms())
+def test_a_form_stands_where_it_may(effect, form):
+    assert form.slot in SLOTS[effect.stage]
+    for stage in STAGES:
+        assert slot_in(form, stage) in SLOTS[stage]
+    for p in form.parameters:
+        assert all(p.lower <= s <= p.upper for s in p.starts)
+        assert not p.log or p.lower > 0
+
+
+def _answers(form, x, run):
+    """What a lag, or a mass on a spring where the form is of a plant's, answers: nominal, as the form's zero
+    leaves it, and changed."""
+
+    def made(dynamics):
+        if "spring" in changed.changed:
+            return plant.respond(Plant(2, 0.2, 0.3, 1.0), x, run.rest, run.h, dynamics)
+        return respond(x, run.rest, run.h, 0.3, 0.7, run.duration, dynamics)
+
+    starts = tuple(p.starts[0] for p in form.parameters)
+    changed = form.act(UNCHANGED, starts, None)
+    zero = tuple(s if p.zero is None else p.zero for s, p in zip(starts, form.parameters))
+    return made(UNCHANGED), made(form.act(UNCHANGED, zero, None)), made(changed)
+
+
+@pytest.mark.parametrize("effect, form", forms())
+def test_a_form_is_nested_in_the_nominal_chain(effect, form):
+    if form.slot == "dynamics":
+        x, run = session()
+        nominal, zero, _ = _answers(form, x, run)
+        np.testing.assert_allclose(zero, nominal, rtol=0.0, atol=1e-9)
+        return
+    assert any(p.zero is not None for p in form.parameters) or effect.name == "resonance"
+    x, run = session()
+    values = tuple(p.starts[0] if p.zero is None else p.zero for p in form.parameters)
+    if effect.name == "resonance" and form.name == "series":
+        values = (form.parameters[0].lower, 0.5)  # a mode far above the samples
+    np.testing.assert_allclose(form.act(x, values, run), x, atol=2e-2 if form.name == "soft" else 2e-3)
+
+
+@pytest.mark.parametrize("effect, form", forms())
+def test_a_form_changes_something_and_stays_finite(effect, form):
+    if form.slot == "dynamics":
+        x, run = session(1)
+        nominal, _, changed = _answers(form, x, run)
+        assert np.max(np.abs(changed - nominal)) > 1e-3
+        return
+    x, run = session(1)
+    x = np.where(np.arange(len(x)) > 550, -x, x)
+    rows = [
+        tuple(p.starts[min(i, len(p.starts) - 1)] for p in form.parameters)
+        for i in range(max(len(p.starts) for p in form.parameters))
+    ]
+    found = [form.act(x.copy(), values, run) for values in rows]
+    assert all(y.shape == x.shape and np.all(np.isfinite(y)) for y in found)
+    assert max(np.max(np.abs(y - x)) for y in found) > 1e-6
+
+
+@pytest.mark.parametrize("levels", [2, 3, 5, 40])
+def test_the_steps_of_a_converter_are_read_off_its_levels(levels):
+    rng, step = np.random.default_rng(levels), 0.37
+    fine = step * np.interp(np.arange(4000), [0, 1500, 2500, 4000], [0.1, levels - 0.6, levels - 0.9, 0.2])
+    fine += 0.01 * step * rng.standard_normal(4000)
+    seen = form_of("sensor_quantization", "rounding").seen
+    found, phase = seen(step * np.floor(fine / step))
+    assert found == pytest.approx(step, rel=1e-3) and abs(phase) < 1e-2 * step
+    assert seen(fine) is None
+    assert seen(np.repeat(fine[::500], 500) + np.interp(np.arange(4000) % 500, [0, 60], [-step, 0.0])) is None

@@ -1,0 +1,222 @@
+"""Experiments that do not begin at rest: the state told by the input's past, and how it is estimated.
+
+Red when a past gives another state than the simulation that had it.
+"""
+
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+
+import focgen
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.begin import REST, Begin
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run, library
+from focgen.rig.engine import Chain, Placed, slot_in
+from focgen.rig.initial import NOTE, begun
+from focgen.rig.rig import Actuator, Delays, LinearActuator, Rig, Signals
+from tests.diagnosis_rig import RIG, H, session
+
+N = 400
+
+
+def actuator_alone(actuator):
+    return Rig("actuator", H, Signals("t", "y", pressure="p"), actuator)
+
+
+def answer(rig, x, begin=REST, first="actuator", held=False):
+    run = Run.of([len(x)], [0.0], H, [begin])
+    return Chain(rig).run(np.asarray(x, float), first, "sensor", run, held)
+
+
+def relaxation(t, T, alpha):
+    """1 − S(t): what a step t ago still lacks, by inversion of its Laplace transform."""
+    f = lambda s: 1 / s - 1 / (s * (T * s**alpha + 1))
+    return float(mpmath.invertlaplace(f, t, method="talbot"))
+
+
+# -------------------------------------------------------------------------------------- the past as samples
+
+
+def test_a_past_as_samples():
+    assert Begin((0.3,)).samples(0.1).tolist() == [0.3]
+    assert Begin((0.0, 2.0), (0.3,)).samples(0.1).tolist() == pytest.approx([0.0, 1.0, 2.0, 2.0])
+    two = Begin((1.0, 3.0, 2.0), (0.45, 0.25)).samples(0.1)
+    assert two.tolist() == pytest.approx([1.0, 3.0, 3.0, 2.0, 2.0])
+
+
+def test_a_step_moves_evenly_between_samples():
+    ends = [Begin((0.0, 1.0), (ago,)).samples(0.1).sum() for ago in (0.30, 0.34, 0.38)]
+    assert np.diff(ends) == pytest.approx([0.4, 0.4])
+
+
+# -------------------------------------------------------------------------------------------- the responses
+
+
+@pytest.mark.parametrize("T, alpha", [(1.3, 0.6), (1.0, 0.3), (2.0, 0.9), (1.5, 1.0), (1.0, 1.5)])
+def test_a_step_before_the_log_relaxes_as_mittag_leffler(T, alpha):
+    rig = actuator_alone(Actuator(T, alpha, (0.5,)))
+    ago = 60 * H
+    y = answer(rig, np.full(N, 2.0), Begin((1.2, 2.0), (ago,)))
+    for k in (0, 7, 60, 399):
+        exact = 0.5 * (2.0 - 0.8 * relaxation(ago + k * H, T, alpha))
+        assert y[k] == pytest.approx(exact, abs=5e-5)
+
+
+def test_a_first_order_stage_goes_on_from_where_it_was():
+    lag = LinearActuator(TransferFunction([(3.0, 0.0)], [(0.7, 1.0), (1.0, 0.0)]))
+    y = answer(actuator_alone(lag), np.zeros(N), Begin((2.0,)))
+    t = np.arange(N) * H
+    # the input falls on a straight line over the sample before the first
+    exact = 6.0 * 0.7 / H * np.exp(-t / 0.7) * -np.expm1(-H / 0.7)
+    np.testing.assert_allclose(y, exact, atol=1e-12)
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_second_order_stage_held_for_ever_stays(held):
+    den = [(1.0, 2.0), (1.4, 1.0), (4.0, 0.0)]
+    rig = replace(actuator_alone(None), regulator=TransferFunction([(8.0, 0.0)], den))
+    y = answer(rig, np.full(N, 0.4), Begin((0.4,)), "regulator", held)
+    np.testing.assert_allclose(y, 0.8, rtol=1e-12)
+
+
+def test_a_stage_that_integrates_starts_from_zero():
+    lag = LinearActuator(TransferFunction([(2.0, 0.0)], [(1.0, 1.0)]))
+    y = answer(actuator_alone(lag), np.ones(N), Begin((1.0,)))
+    np.testing.assert_allclose(y, 2.0 * H * (1.5 + np.arange(N)), rtol=1e-9)  # the ramp from 0 to 1 first
+
+
+def every_form():
+    clocks = {"response": 0.8, "record": 50.0, "session": 4000.0, "sample": H}
+    for effect in library().values():
+        for form in (f for f in effect.forms if not f.seen):
+            slot = slot_in(form, effect.stage)
+            size = {"command": 1.8, "supply": 0.2, "load": 0.2}.get(slot, 0.02)
+            values = [p.starts[0] * size**p.level * clocks[p.clock] ** p.time for p in form.parameters]
+            yield pytest.param(
+                Placed(effect.name, form, effect.stage, tuple(values)), id=f"{effect.name}-{form.name}"
+            )
+
+
+@pytest.mark.parametrize("placed", list(every_form()))
+def test_every_effect_begins_as_its_past_left_it(placed):
+    """A cut log with its past told against the whole one, which begins at rest long before."""
+    before = np.r_[np.full(60_000, 0.5), np.full(140, 1.5)]
+    u = np.r_[before, 1.5 + 0.3 * np.sin(0.05 * np.arange(N))]
+    chain, cut = Chain(RIG, (placed,)), len(before)
+    whole = chain.run(u, "regulator", "sensor", Run.of([len(u)], [0.0], H), True)[cut:]
+    part = Run.of([N], [cut * H], H, [Begin((0.5, 1.5), (140 * H,))])
+    again = chain.run(u[cut:], "regulator", "sensor", part, True)
+    assert np.max(np.abs(again - whole)) < 2e-3 * np.max(np.abs(whole))
+    rested = chain.run(u[cut:], "regulator", "sensor", Run.of([N], [cut * H], H), True)
+    assert np.max(np.abs(rested - whole)) > 0.3 * np.max(np.abs(whole))
+
+
+def test_experiments_at_rest_are_not_touched_by_those_beside_them():
+    u = np.r_[np.zeros(20), np.ones(N - 20)]
+    alone = answer(RIG, u, first="regulator")
+    run = Run.of([N, N, N], [0.0, 100.0, 200.0], H, [REST, Begin((0.5, 1.0), (3.0,)), REST])
+    taps = {}
+    y = Chain(RIG).run(np.tile(u, 3), "regulator", "sensor", run, tap=taps)
+    np.testing.assert_array_equal(y[:N], alone)
+    np.testing.assert_array_equal(y[2 * N :], alone)
+    assert y[N] > 0.3 * y.max() and taps["actuator"].shape == y.shape
+
+
+# --------------------------------------------------------------------------------------------- the estimate
+
+
+def cut(log, seconds):
+    return log.between(seconds, None)
+
+
+def test_sessions_at_rest_stay_at_rest():
+    for effect in ({}, {"drift": 2e-3}, {"zone": 0.05}, {"slip": 0.2}, {"vent": 0.8}):
+        logs = session(seed=3, **effect)
+        assert not any(log.begins for log in begun(RIG, logs))
+
+
+def test_a_transient_cut_is_told():
+    logs = session(seed=1)
+    steps = cut(logs[0], 8.0 + 2.5)  # the step to 1.2 V came 2.5 s earlier
+    told, still = begun(RIG, [steps, logs[2]])
+    begin = told.before("command")
+    assert NOTE in told.notes and not still.begins and NOTE not in still.notes
+    assert begin.levels[-1] == pytest.approx(1.2)
+    rms = [np.sqrt(np.mean((steps["output"] - answer_of(log)) ** 2)) for log in (told, steps)]
+    assert rms[0] < 1.3 * 0.006 * 0.011 and rms[1] > 3 * rms[0]
+
+
+def answer_of(log):
+    run = Run.of([len(log)], [0.0], H, [log.before("command")])
+    return Chain(RIG).run(log["command"], "regulator", "sensor", run, True)
+
+
+def test_a_held_level_is_told():
+    n = 600
+    p = np.full(n, 0.1)
+    p[200:] = 0.18
+    rig = actuator_alone(Actuator(1.3, 0.6, (0.002, 0.34)))
+    y = answer(rig, p, Begin((0.1,))) + 2e-5 * np.random.default_rng(0).normal(size=n)
+    log = Experiment("held", H, {"pressure": p, "output": y})
+    (told,) = begun(rig, [log])
+    assert told.before("pressure") == Begin((pytest.approx(0.1),))
+
+
+def test_an_offset_or_a_drift_is_no_past():
+    logs = session(seed=5, noise=0.004)
+    moved = [shifted(log, 0.0015 * (1 + i / 5)) for i, log in enumerate(logs)]
+    assert not any(log.begins for log in begun(RIG, moved))
+
+
+def shifted(log, by):
+    return replace(log, signals={**log.signals, "output": log["output"] + by})
+
+
+def test_a_moment_at_zero_tells_nothing():
+    """A triangle that rises from the first sample on, on an output that falls back to where it rests."""
+    log = session(seed=3, noise=0.01)[4]
+    fading = 0.0022 * np.exp(-log.time / 0.4)
+    (told,) = begun(
+        RIG, [Experiment("rise", H, {"command": log["command"], "output": log["output"] + fading})]
+    )
+    assert told.begins == {}
+
+
+def test_a_rig_that_integrates_is_left_alone():
+    rig = replace(RIG, actuator=LinearActuator(TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])))
+    logs = [cut(session(seed=1)[0], 10.0)]
+    assert begun(rig, logs)[0].begins == {}
+
+
+def test_a_window_of_a_log_forgets_the_begin_of_the_whole():
+    log = replace(session(seed=1)[0], begins={"command": Begin((0.5,))})
+    assert log.between(None, 10.0).begins and not log.between(1.0, None).begins
+
+
+def test_replay_says_where_it_did_not_begin_at_rest(tmp_path):
+    logs = session(seed=2, noise=0.004)
+    found = focgen.replay(RIG, [cut(logs[0], 9.5), logs[1]])
+    whole = focgen.replay(RIG, [logs[0], logs[1]])
+    assert any(NOTE in note and logs[0].name in note for note in found.notes)
+    assert not any(NOTE in note for note in whole.notes)
+    assert found.logs[logs[0].name].gof > whole.logs[logs[0].name].gof - 0.01
+
+
+def test_a_large_offset_of_a_log_that_begins_with_its_step_is_no_past():
+    u = np.r_[np.full(300, 1.2), np.full(300, 0.6)]
+    y = Chain(RIG).run(u, "regulator", "sensor", Run.of([600], [0.0], H), True)
+    y = y + 0.5 * y.max() + 4e-5 * np.random.default_rng(1).normal(size=600)
+    (told,) = begun(RIG, [Experiment("offset", H, {"command": u, "output": y})])
+    assert told.begins == {}
+
+
+@pytest.mark.parametrize("delay", [3 * H, 2.4 * H])
+@pytest.mark.parametrize("held", [False, True])
+def test_a_dead_time_shows_what_was_before(delay, held):
+    rig = replace(RIG, delays=Delays(delay, delay, delay))
+    y = answer(rig, np.full(N, 1.4), Begin((1.4,)), "regulator", held)
+    np.testing.assert_allclose(y, y[-1], rtol=1e-9)
+    assert y[0] == pytest.approx(RIG.actuator.drive(0.14), rel=1e-9)

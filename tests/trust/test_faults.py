@@ -1,0 +1,206 @@
+"""Unusable input and a machine that has run out of something: one line, exit 2, nothing half-written.
+
+Red when bad input or a full disk brings a traceback, another exit status, or half a folder.
+"""
+
+import gzip
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from focgen.cli import generate as command
+from focgen.cli.main import main
+from focgen.codegen.generate import generate
+from focgen.errors import InputError, LogError
+from focgen.logs.table import read_table
+from focgen.plan.formats import exponent_for
+from focgen.textfile import read_regular
+from tests.controllers import seed_controller
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+LEAD = """name = "lead"
+sample_time = 0.01
+length = 50
+gain = 1.0
+integrator = false
+[transfer]
+num = [[{coefficient}, {order}], [1.0, 0.0]]
+[ranges]
+reference = [0.0, 1.0]
+measurement = [0.0, 1.0]
+output = [-10.0, 10.0]
+"""
+
+
+@pytest.fixture
+def scratch(tmp_path, monkeypatch) -> Path:
+    """A temporary folder of one's own, to find what a fault has left in."""
+    import tempfile
+
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
+    return place
+
+
+def line(capsys) -> str:
+    """The one line on stderr, and nothing on stdout."""
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and err.startswith("focgen: error: "), err
+    return err
+
+
+def raising(monkeypatch, error):
+    def fails(*arguments, **options):
+        raise error
+
+    monkeypatch.setattr(command, "generate", fails)
+    return main(["generate", "secret.toml", "--out", "out"])
+
+
+def test_a_fault_that_nobody_foresaw_is_a_line_and_a_file(scratch, monkeypatch, capsys):
+    assert raising(monkeypatch, KeyError("the cause")) == 2
+    (left,) = scratch.iterdir()
+    said, text = line(capsys), left.read_text()
+    assert str(left) in said and "KeyError" in said and "send in" in said
+    assert "KeyError: 'the cause'" in text and "secret.toml" in text and "Python" in text
+    assert left.stat().st_mode & 0o077 == 0
+
+
+def test_a_fault_on_a_full_disk_still_is_a_line(scratch, monkeypatch, capsys):
+    scratch.rmdir()
+    assert raising(monkeypatch, KeyError("the cause")) == 2
+    assert "test_faults.py:" in line(capsys)
+
+
+@pytest.mark.parametrize(
+    "error, said",
+    [
+        (MemoryError(), "more memory"),
+        (RecursionError(), "nested too deeply"),
+        (OSError(28, "No space left on device", "out/x.c"), "out/x.c: cannot be written"),
+        (OSError(28, "No space left on device"), "make room"),
+        (OSError(24, "Too many open files"), "ulimit"),
+        (PermissionError(13, "Permission denied", "/etc/x"), "/etc/x: cannot be used"),
+    ],
+)
+def test_what_a_machine_runs_out_of_is_foreseen(scratch, monkeypatch, capsys, error, said):
+    assert raising(monkeypatch, error) == 2
+    assert said in line(capsys) and not list(scratch.iterdir())
+
+
+def run(shell: str) -> subprocess.CompletedProcess:
+    program = f"{sys.executable} -m focgen generate {EXAMPLES / 'controller.toml'} --length 5 --json --out"
+    return subprocess.run(shell.replace("FOCGEN", program), shell=True, capture_output=True, text=True)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_result_that_cannot_be_written_is_no_success(tmp_path):
+    done = run(f"FOCGEN {tmp_path}/fw >/dev/full")
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "No space left" in done.stderr
+    assert run(f"FOCGEN {tmp_path}/fw >&- 2>&-").returncode == 2
+
+
+def test_a_closed_stdout_is_said(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdout", None)
+    assert main([]) == 2
+    assert "stdout: is closed" in capsys.readouterr().err
+
+
+def test_a_pipe_that_goes_away_hides_no_failed_check(monkeypatch, tmp_path):
+    """What did not hold does not hold, whoever reads of it."""
+    from focgen.cli.outcome import Outcome
+
+    reader, writer = os.pipe()
+    os.close(reader)
+    with open(writer, "w") as gone:
+        monkeypatch.setattr(sys, "stdout", gone)
+        monkeypatch.setattr(command, "run", lambda args: Outcome({}, "no", False))
+        assert main(["generate", "c.toml", "--out", "x"]) == 1
+
+
+# ------------------------------------------------------------------------------------ input of any size
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    ["length = " + "9" * 5000 + "\n", "a = " + "[" * 3000, "a\0b", "\ufeff", "length = 1e999\n", "[" * 70000],
+)
+def test_no_toml_is_a_traceback(tmp_path, scratch, spoilt, capsys):
+    path = tmp_path / "c.toml"
+    path.write_text(spoilt + LEAD.format(coefficient=1.0, order=0.5))
+    assert main(["generate", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert str(path) in line(capsys) and not list(scratch.iterdir()) and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("arithmetic", ("f64", "f32", "q31", "q15"))
+@pytest.mark.parametrize(
+    "coefficient, order", [("1e308", 0.6), ("1e-320", 0.6), (1.0, 1e-300), (1.0, 1e300), (-1e308, 7.9)]
+)
+def test_no_coefficient_is_a_traceback(tmp_path, scratch, coefficient, order, arithmetic, capsys):
+    path = tmp_path / "c.toml"
+    path.write_text(LEAD.format(coefficient=coefficient, order=order))
+    status = main(["generate", str(path), "--arithmetic", arithmetic, "--out", str(tmp_path / "out")])
+    assert status in (0, 2) and not list(scratch.iterdir())
+    if status == 2:
+        line(capsys)
+
+
+@pytest.mark.parametrize("largest", (float("inf"), 1e308, 5e-324, 1e-320))
+def test_no_format_reaches_the_ends_of_float64(largest):
+    from focgen.errors import PlanError
+
+    with pytest.raises(PlanError, match="which no fixed-point format covers"):
+        exponent_for(largest, 32767, "here", "a weight")
+
+
+def test_pipes_are_refused_not_waited_for(tmp_path, capsys):
+    for name in ("p.csv", "p.toml", "p.mat", "p.csv.gz"):
+        os.mkfifo(tmp_path / name)
+    for asked in (["init", "p.csv"], ["init", "p.csv.gz"], ["init", "p.mat"]):
+        assert main([asked[0], str(tmp_path / asked[1])]) == 2
+        assert "is no regular file" in line(capsys)
+    assert main(["generate", str(tmp_path / "p.toml"), "--out", str(tmp_path / "fw")]) == 2
+    assert "is no regular file" in line(capsys)
+
+
+def test_what_is_small_when_packed_is_bounded_unpacked(tmp_path, monkeypatch):
+    import focgen.textfile as module
+
+    monkeypatch.setattr(module, "LARGEST_LOG", 1 << 20)
+    for size, fits in ((1 << 20, True), ((1 << 20) + 1, False)):
+        for name, opened in (("log.csv.gz", gzip.open), ("log.csv", open)):
+            with opened(tmp_path / name, "wb") as file:
+                file.write((b"t,u,y\n" + b"0,1,2\n" * (1 << 18))[: size - 1] + b"\n")
+            if fits:
+                assert len(module.read_log_bytes(tmp_path / name)) == size
+                continue
+            with pytest.raises(LogError, match="more than 1 MiB"):
+                read_table(tmp_path / name)
+
+
+def test_a_setting_is_bounded(tmp_path):
+    (tmp_path / "r.toml").write_bytes(b"#" * 101)
+    with pytest.raises(InputError, match="has more than 0 MiB"):
+        read_regular(tmp_path / "r.toml", 100)
+
+
+def test_columns_are_bounded_and_cost_alike(tmp_path):
+    for count in (4096, 4097):
+        names = ",".join(f"c{i} (V)" for i in range(count))
+        rows = "\n".join(",".join(["1.5"] * count) for _ in range(3))
+        (tmp_path / "wide.csv").write_text(f"{names}\n{rows}\n")
+        if count == 4096:
+            assert len(read_table(tmp_path / "wide.csv").columns) == count
+            continue
+        with pytest.raises(LogError, match="has 4097 columns, of which 4096 can be read"):
+            read_table(tmp_path / "wide.csv")
+
+
+def test_samples_that_no_memory_holds_are_refused_at_once(tmp_path, capsys):
+    generate(seed_controller(5), tmp_path / "fw", "q15")
+    assert main(["verify", str(tmp_path / "fw"), "--samples", "1" + "0" * 11]) == 2
+    assert "--samples" in line(capsys)
