@@ -16,7 +16,7 @@ from pathlib import Path
 
 from tests.mutants.change import Change, read
 
-_MEMORY = 6 << 30
+_MEMORY = 6 << 30  # bytes a try may take beside what the warm process has mapped
 _WAIT = 40.0
 _WARM = ("numpy", "scipy.signal", "scipy.optimize", "scipy.linalg", "scipy.special", "cffi", "jinja2",
          "tomlkit", "pint", "hypothesis", "mpmath")  # fmt: skip
@@ -101,7 +101,8 @@ def _forked(place: Path, tests: list[str], log: Path, patience: float) -> int:
 def _pytest(place: Path, tests: list[str]) -> int:
     import pytest
 
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    most = _mapped() + _MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     os.chdir(place)
     for name in [n for n in sys.modules if n.split(".")[0] in ("focgen", "tests")]:
         del sys.modules[name]
@@ -121,6 +122,11 @@ def _pytest(place: Path, tests: list[str]) -> int:
         "no:randomly",
     ]
     return int(pytest.main([*options, *tests]))
+
+
+def _mapped() -> int:
+    """Bytes of address space that the process takes already; a worker of a long suite takes gigabytes."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 
 def _own() -> Path:
