@@ -1,5 +1,6 @@
 """What every test may use: the rig and the controller of the paper, and the folder of open logs."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -76,3 +77,9 @@ def _paper_rig() -> Rig:
 @pytest.fixture(name="paper_controller")
 def _paper_controller() -> Controller:
     return paper_controller()
+
+
+def pytest_collection_finish():
+    """What was collected lives to the end: looking for garbage passes it by."""
+    gc.collect()
+    gc.freeze()
