@@ -121,11 +121,11 @@ def _placed_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
 
 
 def _place(effect: Effect, segment: Segment) -> str | None:
-    """Where a family is looked for: at home, or where it may be anywhere in the first stage: logs of stages
-    that are merged do not tell which."""
+    """Where a family is looked for: at home, or a dead time in the first stage, for logs of stages that are
+    merged do not tell which has it."""
     if effect.stage in segment.stages:
         return effect.stage
-    return segment.stages[0] if effect.anywhere else None
+    return segment.stages[0] if effect.delays else None
 
 
 def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import problem_residual
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.rig.effects import library
+from focgen.rig.effects import STEP, library
 
 
 def floor(last: Explanation, explained: float) -> float:
@@ -27,7 +27,7 @@ def _step(last: Explanation) -> float | None:
     """The step of the rounding that was found, in units of the output."""
     for cause in last.causes:
         rival = cause.rivals[0]
-        if library()[rival.effect].noiselike:
-            candidates, values = rival.fit.problem.candidates, rival.fit.problem.values(rival.fit.vector)
-            return next(v[0] for c, v in zip(candidates, values) if c.effect == rival.effect)
+        if library()[rival.effect].rounds:
+            placed = rival.fit.problem.placed(rival.fit.vector)
+            return next(p.named[STEP] for p in placed if p.effect == rival.effect)
     return None

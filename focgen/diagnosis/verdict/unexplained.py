@@ -38,7 +38,7 @@ def disturbed(e: Explanation) -> Disturbance:
 
 def is_rounded(e: Explanation) -> bool:
     """Whether a rounding is among the effects found."""
-    return any(library()[c.rivals[0].effect].noiselike for c in e.causes)
+    return any(library()[c.rivals[0].effect].rounds for c in e.causes)
 
 
 def _is_disturbed(e: Explanation, left: Disturbance) -> bool:
