@@ -1,7 +1,7 @@
 """Prints what in ``c_runtime/`` is the same but for a type: ``make headers``.
 
-``foc_ahead_q31.h`` is printed from ``foc_ahead_q15.h``, and the functions of ``FUNCTIONS`` stand in the place of
-those that were there. Edit the source of a pair only. Users get both as C, which stays readable without a
+``foc_ahead_q31.h`` is printed from ``foc_ahead_q15.h``, and each function of ``FUNCTIONS`` in the place of
+the one that was there. Edit the source of a pair only. Users get both as C, which stays readable without a
 preprocessor's help.
 """
 

@@ -44,7 +44,8 @@ _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyo
 class Explanation:
     """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects;
     ``errors``: by family, the root-mean-square residual with that effect alone, as a share of the refitted
-    nominal's; ``converter``: the coarse one that the output shows.
+    nominal's; ``predictability``: what inputs predict of the residual of ``best``, and of that of
+    ``nominal``; ``converter``: the coarse one that the output shows.
     """
 
     segment: Segment
@@ -53,8 +54,8 @@ class Explanation:
     best: Fit
     ar: np.ndarray
     causes: tuple[Cause, ...]
-    left: Predictability
-    left_nominal: Predictability
+    predictability: Predictability
+    nominal_predictability: Predictability
     errors: dict[str, float]
     converter: Converter | None = None
 
@@ -78,7 +79,7 @@ class Explanation:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
 
-    def told(self, rig: Rig) -> Rig:
+    def with_intersample(self, rig: Rig) -> Rig:
         """``rig`` with what its command does between samples, where that is not as usual."""
         between = self.segment.between
         usual = self.segment.entry != "command" or between == between_of(rig, "command")
@@ -180,7 +181,7 @@ def explain(
         kept = replace(problem, segment=segment, memory={})
         other = _explained(rig, kept, threshold, only, trusted)
         problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
-    if not found.strained or problem.nominals.far or found.left.share < NUMBERS.left:
+    if not found.strained or problem.nominals.far or found.predictability.share < NUMBERS.left:
         return found
     freed, asked = (
         replace(problem, nominals=replace(problem.nominals, far=True), memory={}),

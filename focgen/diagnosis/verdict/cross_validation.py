@@ -58,7 +58,7 @@ def cross_validated_share(e: Explanation, logs: Sequence[Experiment]) -> float:
         without = _fitted(e.best, e.ar, fold != part)
         error[fold == part] = e.best.problem.weighed(without.vector)[fold == part]
     before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
-    noise = after * (1.0 - e.left.share)
+    noise = after * (1.0 - e.predictability.share)
     return float((before - np.mean(error**2)) / max(before - noise, 1e-300))
 
 

@@ -18,7 +18,7 @@ def floor(last: Explanation, explained: float) -> float:
     readings lie a step off. The floor is the noise, not what the rounding makes of it.
     """
     parts = [np.mean(p**2) for p in last.segment.parts(problem_residual(last.best))]
-    found = min(float(np.mean(parts)) * (1 - last.left.share), float(np.median(parts)), explained)
+    found = min(float(np.mean(parts)) * (1 - last.predictability.share), float(np.median(parts)), explained)
     step = _step(last)
     return min(found, (np.sqrt(np.pi / 2) * explained / step) ** 2) if step else found
 

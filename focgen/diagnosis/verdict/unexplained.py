@@ -22,12 +22,12 @@ def is_unknown(e: Explanation) -> bool:
         return True
     if e.causes and not is_rounded(e) and from_outside(e):
         return True
-    if e.left.share < NUMBERS.left:
+    if e.predictability.share < NUMBERS.left:
         return False
     if e.segment.closed and left.bursts and _rings(e):
         return True
     before, after = _squares(e)
-    return is_none(after * e.left.share, before - after)
+    return is_none(after * e.predictability.share, before - after)
 
 
 def disturbed(e: Explanation) -> Disturbance:
