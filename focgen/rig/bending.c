@@ -6,6 +6,7 @@
  */
 #include <math.h>
 #include "bent.h"
+#include "modes.h"
 
 enum { BALANCED = 2, TURNS = 40 };
 static const double FLAT = 0.05, CLOSE = 1e-7; /* Newton's step squares what is missing */
@@ -60,12 +61,10 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
             zr = zi = past = last = 0.0, moving = 0;
         }
         if (rest[k] == BALANCED) {
-            double dr = 1.0 - pair[0], di = -pair[1], br = pair[2] + pair[4], bi = pair[3] + pair[5], size = dr * dr + di * di;
-            double gr = (br * dr + bi * di) / size, gi = (bi * dr - br * di) / size, gain = through + gr;
-            for (int i = 0; i < m; i++) gain += (b0[i] + b1[i]) / (1.0 - a[i]);
+            double gr, gi, gain = gain_at_rest(m, a, b0, b1, pair, through, &gr, &gi);
             last = solved(spring, 0.0, gain, came(spring, x[k]), 0.0);
             past = came(spring, x[k]) - pull(spring, last, &slope);
-            for (int i = 0; i < m; i++) z[i] = (b0[i] + b1[i]) / (1.0 - a[i]) * past;
+            settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
         int down = switching && fabs(x[k]) < fabs(last);
@@ -79,9 +78,7 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
         last = y[k] = moved(spring, still, gain, x[k], last, &moving, &taken);
         double now = x[k] - taken;
         for (int i = 0; i < m; i++) z[i] += B1[i] * now;
-        double re = P[0] * zr - P[1] * zi + P[2] * past + P[4] * now;
-        zi = P[0] * zi + P[1] * zr + P[3] * past + P[5] * now;
-        zr = re;
+        turn(P, past, now, &zr, &zi);
         past = now;
     }
 }

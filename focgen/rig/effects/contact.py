@@ -6,6 +6,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.rig.dynamics import Dynamics
+from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _PLACE = Parameter("curvature", level=1, lower=0.1, upper=1.3, starts=(0.8, 0.5, 0.95), zero=1.3)
@@ -26,7 +27,7 @@ def _gradual(x: Array, values: Values, run: Run) -> Array:
 
 def _soft(x: Array, values: Values, run: Run) -> Array:
     place, slope, width = values
-    beyond = width * (np.logaddexp(0.0, (x - place) / width) - np.logaddexp(0.0, -place / width))
+    beyond = softly_beyond(x, place, width)
     made: Array = x - (1.0 - slope) * beyond
     return made
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _LEVEL = Parameter("threshold", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.25), zero=0.0)
@@ -13,12 +14,7 @@ def _hard(x: Array, values: Values, run: Run) -> Array:
 
 
 def _soft(x: Array, values: Values, run: Run) -> Array:
-    threshold, width = values
-    size = width * (
-        np.logaddexp(0.0, (np.abs(x) - threshold) / width) - np.logaddexp(0.0, -threshold / width)
-    )
-    made: Array = np.sign(x) * size
-    return made
+    return np.sign(x) * softly_beyond(np.abs(x), *values)
 
 
 EFFECT = Effect(
