@@ -12,15 +12,15 @@ from focgen.rig.effects import library
 
 
 def foretelling(best: Fit, weighing: Weighing) -> Fit:
-    """``best`` without the effects that, on parts of the session which a fit does not see, close less than
-    :attr:`~focgen.diagnosis.numbers.Numbers.vain` of what they close where it does; the vainest is left out
+    """``best`` without the effects that, on parts of the session which a fit does not see, leave
+    :attr:`~focgen.diagnosis.numbers.Numbers.stays` of what they close where it does; the vainest is left out
     first, and one is kept. What a rounding or a wander does is foretold by nothing."""
     while len(names := _asked(best)) > 1 or (names and len(_families(best)) > 1):
         fold = folds([last - first for first, last in best.problem.segment.run.spans])
         both = foreseen(best, weighing, fold)
         tried = [_kept(name, best, both, weighing, fold) for name in names]
         least, without = min(tried, key=lambda pair: pair[0])
-        if least >= NUMBERS.vain:
+        if least >= 1.0 - NUMBERS.stays:
             break
         best = without
     return best
@@ -42,4 +42,5 @@ def _kept(name: str, best: Fit, both: float, weighing: Weighing, fold: np.ndarra
     own = [c for c in best.problem.candidates if c.effect == name]
     without = left_out(best, own, weighing)
     fitted = float(np.mean(without.weighed**2)) - float(np.mean(best.weighed**2))
-    return (foreseen(without, weighing, fold) - both) / max(fitted, 1e-300), without
+    share = (foreseen(without, weighing, fold) - both) / fitted if fitted > 0.0 else 0.0
+    return share, without
