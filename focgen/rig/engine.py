@@ -31,6 +31,11 @@ class Placed:
     values: tuple[float, ...]
     carried: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def named(self) -> dict[str, float]:
+        """Its parameters by name."""
+        return {p.name: float(v) for p, v in zip(self.form.parameters, self.values)}
+
     def act(self, x: Array, run: Run) -> Array:
         """What leaves it when ``x`` (n,) enters."""
         made: Array = self.form.act(x, self.values, self._own(run))

@@ -34,12 +34,12 @@ CONSTANTS = {
     "proposals/menu.py": ["_SHORTEST"],
     "proposals/next_experiment.py": ["_ENOUGH", "_MOST", "_SHARES"],
     "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_FINE", "_LONGEST"],
-    "proposals/reach.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
+    "proposals/limits.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],
     "verdict/improvement.py": ["_AHEAD", "_FITTED", "_FORM", "_LOST", "_LOUD", "_MOST", "_REST"],
-    "verdict/verdict.py": ["_NEAR"],
+    "verdict/conclude.py": ["_NEAR"],
 }
 
 COMPARED = {
@@ -49,5 +49,5 @@ COMPARED = {
     "proposals/menu.py": [10.0],  # response times of a hold
     "verdict/evidence.py": [0.002],  # of the largest rate, drawn
     "verdict/improvement.py": [1.0001],  # nothing can shrink
-    "verdict/verdict.py": [1.01, 0.02],  # visibly; a share worth telling
+    "verdict/conclude.py": [1.01, 0.02],  # visibly; a share worth telling
 }

@@ -227,7 +227,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
     return SimpleNamespace(
         segment=SimpleNamespace(pace=0.0, closed=closed),
         converter=None,
-        left=SimpleNamespace(share=share),
+        predictability=SimpleNamespace(share=share),
         nominal=nominal,
         best=best,
         causes=[SimpleNamespace(rivals=[SimpleNamespace(effect=effect)]) for effect in effects],

@@ -55,12 +55,19 @@ def test_only_a_lightly_damped_mode_rings_with_one_tone():
     assert [name for name in NAMES if library()[name].tonal] == ["resonance"]
 
 
+def test_what_an_effect_is_follows_from_its_parameters():
+    assert [name for name in NAMES if library()[name].delays] == ["transport_delay"]
+    assert [name for name in NAMES if library()[name].rounds] == ["sensor_quantization"]
+    begun = {name for name in NAMES for form in library()[name].forms if form.begun}
+    assert begun == {"valve_stiction"}
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_an_effect_knows_what_shows_it(name):
     check = library()[name].needs
     assert check(RICH) is None
     told = check(POOR)
-    assert told is None if library()[name].noiselike else isinstance(told, str) and len(told) > 10
+    assert told is None if library()[name].rounds else isinstance(told, str) and len(told) > 10
 
 
 @pytest.mark.parametrize("name", NAMES)

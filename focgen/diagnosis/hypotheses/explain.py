@@ -37,7 +37,8 @@ _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyo
 class Explanation:
     """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects;
     ``errors``: by family, the root-mean-square residual with that effect alone, as a share of the refitted
-    nominal's; ``converter``: the coarse one that the output shows.
+    nominal's; ``predictability``: what inputs predict of the residual of ``best``, and of that of
+    ``nominal``; ``converter``: the coarse one that the output shows.
     """
 
     segment: Segment
@@ -46,8 +47,8 @@ class Explanation:
     best: Fit
     ar: np.ndarray
     causes: tuple[Cause, ...]
-    left: Predictability
-    left_nominal: Predictability
+    predictability: Predictability
+    nominal_predictability: Predictability
     errors: dict[str, float]
     converter: Converter | None = None
 
@@ -71,7 +72,7 @@ class Explanation:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
 
-    def told(self, rig: Rig) -> Rig:
+    def with_intersample(self, rig: Rig) -> Rig:
         """``rig`` with what its command does between samples, where that is not as usual."""
         between = self.segment.between
         usual = self.segment.entry != "command" or between == between_of(rig, "command")
@@ -114,11 +115,11 @@ def _placed_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
 
 
 def _place(effect: Effect, segment: Segment) -> str | None:
-    """Where a family is looked for: at home, or where it may be anywhere in the first stage: logs of stages
-    that are merged do not tell which."""
+    """Where a family is looked for: at home, or a dead time in the first stage, for logs of stages that are
+    merged do not tell which has it."""
     if effect.stage in segment.stages:
         return effect.stage
-    return segment.stages[0] if effect.anywhere else None
+    return segment.stages[0] if effect.delays else None
 
 
 def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
@@ -161,7 +162,7 @@ def explain(
         kept = replace(problem, segment=segment, memory={})
         other = _explained(rig, kept, threshold, only, trusted)
         problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
-    if not found.strained or problem.nominals.far or found.left.share < NUMBERS.left:
+    if not found.strained or problem.nominals.far or found.predictability.share < NUMBERS.left:
         return found
     freed, asked = (
         replace(problem, nominals=replace(problem.nominals, far=True), memory={}),

@@ -33,7 +33,7 @@ def _families(best: Fit) -> list[str]:
 def _asked(best: Fit) -> list[str]:
     """The families that may be asked to foretell."""
     wandering = {c.effect for c in best.problem.candidates if c.form.wanders}
-    return [n for n in _families(best) if n not in wandering and not library()[n].noiselike]
+    return [n for n in _families(best) if n not in wandering and not library()[n].rounds]
 
 
 def _kept(name: str, best: Fit, both: float, weighing: Weighing, fold: np.ndarray) -> tuple[float, Fit]:

@@ -35,7 +35,7 @@ def cross_validated_share(e: Explanation, logs: Sequence[Experiment]) -> float:
     simulated by a fit to the others."""
     error = foreseen(e.best, Weighing(e.ar), folds([len(log) for log in logs]))
     before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
-    noise = after * (1.0 - e.left.share)
+    noise = after * (1.0 - e.predictability.share)
     return float((before - error) / max(before - noise, 1e-300))
 
 
