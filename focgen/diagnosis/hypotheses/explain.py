@@ -188,18 +188,18 @@ def _borne_out(kept: Explanation, usual: Explanation) -> bool:
 def _explained(
     rig: Rig, problem: Problem, threshold: float, only: Sequence[str] | None, trusted: bool
 ) -> Explanation:
-    segment = problem.segment
-    candidates, guests = candidates_for(segment, rig), guests_in(segment, rig)
+    candidates, guests = candidates_for(problem.segment, rig), guests_in(problem.segment, rig)
     if only is not None:
         candidates, guests, threshold = [c for c in candidates if c.effect in only], [], 0.0
-    segment, given, converter = problem.segment, problem.nominal(), converter_of(problem, candidates)
+    given, converter = problem.nominal(), converter_of(problem, candidates)
     asked = AcceptanceCriteria(threshold, trusted, converter, only is not None)
     rankings, candidates = _grown(problem, given, candidates, guests, asked)
     weighing = Weighing(rankings[-1].ar)
     best = _dropped(rankings[-1].base, weighing, threshold)
     best = realigned(best if only is not None else foretelling(best, weighing), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
-    best, causes = reexamined(best, Beside(nominal, rankings, candidates, weighing, asked.surroundings))
+    beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted)
+    best, causes = reexamined(best, beside)
     if converter is not None:
         best, causes = converter.beside(best, nominal, causes, weighing)
     found, (best, nominal) = best, map(settled, _between_anew(rig, best, nominal, weighing))
