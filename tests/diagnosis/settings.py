@@ -38,7 +38,16 @@ CONSTANTS = {
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],
-    "verdict/improvement.py": ["_AHEAD", "_FITTED", "_FORM", "_LOST", "_LOUD", "_MOST", "_REST"],
+    "verdict/improvement.py": [
+        "_AHEAD",
+        "_FITTED",
+        "_FORM",
+        "_LOST",
+        "_LOST_IN_DOUBT",
+        "_LOUD",
+        "_MOST",
+        "_REST",
+    ],
     "verdict/conclude.py": ["_NEAR"],
 }
 
