@@ -34,8 +34,8 @@ def mended(time: Array, values: Mapping[str, Array]) -> tuple[dict[str, Array], 
 
 def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Array, list[str]]:
     gone, notes = np.isnan(y), []
-    there = np.flatnonzero(~gone) if gone.any() else slice(0, len(y))
-    rows = there
+    there: Ints | slice = np.flatnonzero(~gone) if gone.any() else slice(0, len(y))
+    rows: Ints | slice = there
     if role not in HELD:
         slow = fresh_rows(y[there])
         if slow:

@@ -17,7 +17,7 @@ _MOVES = 0.1  # of its span: by as much another signal moves meanwhile
 _INSIDE = 0.02  # of the span: nearer to an end a signal rests or saturates
 
 
-def fresh_rows(y: Array) -> tuple[float, Array] | None:
+def fresh_rows(y: Array) -> tuple[float, Ints] | None:
     """(rows per reading, the rows with a fresh one) where ``y`` (n,) is updated at a steady lower rate than
     it is logged, or None.
 
@@ -51,7 +51,7 @@ def _coarse(sizes: Array) -> bool:
     return bool(np.mean(sizes < 1.5 * sizes.min()) > _FINE)
 
 
-def _slots(changes: Ints, periods: Array, gaps: Array) -> Array:
+def _slots(changes: Ints, periods: Ints, gaps: Ints) -> Ints:
     """The changes, and in longer gaps the rows where a reading came and equalled the last."""
     whole, begins = np.repeat(periods, periods), np.repeat(np.cumsum(periods) - periods, periods)
     later = np.round((np.arange(len(whole)) - begins) * np.repeat(gaps, periods) / whole).astype(int)
