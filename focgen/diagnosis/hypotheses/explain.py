@@ -35,10 +35,9 @@ _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyo
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects;
-    ``errors``: by family, the root-mean-square residual with that effect alone, as a share of the refitted
-    nominal's; ``predictability``: what inputs predict of the residual of ``best``, and of that of
-    ``nominal``; ``converter``: the coarse one that the output shows.
+    """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects. Each has
+    a ``predictability`` of its residual from the inputs. ``errors``: by family, the root-mean-square
+    residual with that effect alone, as a share of the refitted nominal's; ``converter``: the coarse one.
     """
 
     segment: Segment
