@@ -222,13 +222,14 @@ def _linear(
     if dynamics == UNCHANGED:
         return [_transfer(actuator.dynamics, between, delay)]
     plant, changed = plants.plant_of(actuator.dynamics), dynamics.changed
-    if plant is not None and (changed == {"drag"} or changed & {"spring", "rise"}):
+    if plant is not None and (changed == {"drag"} or (plant.order == 2 and changed & _IN_STEPS)):
         return [_plant(plant, dynamics, between, delay)]
     lag = linear.single_lag(actuator.dynamics)
     if not lag:
         return [_bent(actuator.dynamics, dynamics, between, delay)]
     gain, T, alpha = lag
-    return [_lag(gain, T, alpha, replace(dynamics, drag=dynamics.drag * abs(gain)), delay)]
+    borne = replace(dynamics, drag=dynamics.drag * abs(gain), preload=dynamics.preload * abs(gain))
+    return [_lag(gain, T, alpha, borne, delay)]
 
 
 def _plant(plant: plants.Plant, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:
@@ -255,7 +256,9 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
     )
 
 
-_OF_LAGS = frozenset({"unloading", "place", "stiffness", "bend", "drag"})  # what effects may change of a lag
+# what effects may change of a lag; of a mass on a spring, beside bend and drag, and run in steps
+_OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "bend", "drag"})
+_IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload"})
 
 
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
@@ -272,12 +275,13 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
 
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
     """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
-    spring that bends where there is one; dry friction on what moves, and on a mass the hysteretic one."""
+    spring that bends where there is one; dry friction on what moves; of a mass on a spring also a hysteretic
+    one, an obstacle and a preload."""
     if isinstance(actuator, Actuator) or linear.single_lag(actuator.dynamics):
         return _OF_LAGS
     plant = plants.plant_of(actuator.dynamics)
     found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
     if plant is not None:
         found |= {"drag"} | ({"rise"} if plant.order == 2 else set())
-        found |= {"spring"} if plant.order == 2 and not plant.integrates else set()
+        found |= _IN_STEPS if plant.order == 2 and not plant.integrates else set()
     return frozenset(found)

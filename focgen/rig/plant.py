@@ -73,7 +73,7 @@ def respond(
     rough: bool = False,
 ) -> Array:
     """The output (n,) for the input ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is not
-    0; of ``dynamics`` the drag, the hysteretic spring and the bend count.
+    0; of ``dynamics`` the drag, the springs and, for order 2, the preload count.
 
     ``between``: what the input does from one sample to the next. In straight lines it comes from 0 within the
     sample ahead of an experiment, as in :func:`~focgen.rig.linear.run`; else it jumps at the first sample.
@@ -86,6 +86,7 @@ def respond(
     numbers += [spring.loading, spring.unloading, spring.power, spring.scale]
     numbers += [dynamics.rise.size, dynamics.rise.speed]
     numbers += [plant.k * bend.first, plant.k * bend.second, bend.scale]
+    numbers += [dynamics.place, plant.k * dynamics.stiffness, dynamics.preload]
     x = np.ascontiguousarray(x, float)
     moves, levels = course(x, rest, between), (plant.order, base, last)
     return kernels.plant(x, rest, moves, levels, np.array(numbers), tables)
@@ -95,9 +96,9 @@ def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> 
     """How often a sample is halved: for the motion, and at most, for an event."""
     spring, bend = dynamics.spring, dynamics.bend
     steepest = 1.0 + spring.share * max(abs(spring.loading), abs(spring.unloading)) * spring.scale
-    steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second)
+    steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second) + dynamics.stiffness
     pace = np.sqrt(plant.k * steepest / plant.m) if plant.order == 2 else plant.k * steepest / plant.m
-    short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend"} else _SWING
+    short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend", "stiffness"} else _SWING
     short *= 1.0 if spring.power == 1.0 else 0.5
     base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
     base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _MOST))

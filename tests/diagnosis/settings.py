@@ -20,8 +20,9 @@ CONSTANTS = {
     "hypotheses/bootstrap.py": ["_RARE"],
     "hypotheses/input_covariance.py": ["_FLAT"],
     "hypotheses/disturbance.py": ["SLOWEST"],
-    "hypotheses/explain.py": ["_BELIEVED", "_GAUGE", "_KEPT", "_OUT_OF_STEP", "_SMOOTHER"],
+    "hypotheses/explain.py": ["_BELIEVED", "_KEPT"],
     "hypotheses/initial.py": ["_LEVEL", "_SEEN", "_TIME"],
+    "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK", "_QUICKEST"],
     "problem/decimate.py": ["_WITHIN"],
     "problem/excitation.py": ["_STEADY"],
@@ -37,7 +38,16 @@ CONSTANTS = {
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],
-    "verdict/improvement.py": ["_AHEAD", "_FITTED", "_FORM", "_LOST", "_LOUD", "_MOST", "_REST"],
+    "verdict/improvement.py": [
+        "_AHEAD",
+        "_FITTED",
+        "_FORM",
+        "_LOST",
+        "_LOST_IN_DOUBT",
+        "_LOUD",
+        "_MOST",
+        "_REST",
+    ],
     "verdict/conclude.py": ["_NEAR"],
 }
 

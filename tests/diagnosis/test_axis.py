@@ -119,8 +119,8 @@ def test_what_a_command_does_between_samples_is_asked_of_the_file(tmp_path):
 
 
 def test_more_samples_than_the_response_needs_are_looked_at_in_fewer():
-    n = 40_000
-    u = np.sin(np.arange(n) / 3000.0)
+    n = 200_000
+    u = np.sin(np.arange(n) / 15000.0)
     log = Experiment("fast", 1e-3, {"command": u, "output": np.cumsum(u)})
     rig, (few,) = decimated(AXIS, [log])
     every = n // len(few) | 1

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from focgen.diagnosis.fitting.fit import WHITE, fit
 from focgen.diagnosis.fitting.predictability import predictable_share
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
-from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.scales import references

@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lsim
 
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.proposals.candidate_rigs import CandidateRig, Part

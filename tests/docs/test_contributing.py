@@ -1,4 +1,4 @@
-"""What CONTRIBUTING adds is added by its steps alone: effect, arithmetic, log format, core, template.
+"""What CONTRIBUTING adds, by its steps alone: an effect, an arithmetic, a log format, a core, a template.
 
 Red when a step of the page is missing or no longer fits the code: its blocks are written into a copy
 of the package, and nothing else is.

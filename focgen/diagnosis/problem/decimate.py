@@ -17,7 +17,7 @@ from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Rig
 
-_ENOUGH = 4000  # samples of a session that tell as much as more do
+_ENOUGH = 20000  # samples of a session that tell as much as more do; a fit to fewer is not the fit to all
 _WITHIN = 100.0  # samples of a response that are kept
 
 

@@ -12,7 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from focgen.diagnosis.hypotheses.explain import candidates_for, problem_of
+from focgen.diagnosis.hypotheses.explain import candidates_for
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.segments import cuts, make
 from focgen.diagnosis.proposals.limits import InputLimits
