@@ -62,7 +62,8 @@ STRAIGHT, NO_FRICTION, LINEAR, LEVEL = Bend(), Friction(), Spring(), Rise()
 class Dynamics:
     """What effects change of an actuator's own equation.
 
-    Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response;
+    Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response,
+    and a mass has a damper weaker by that factor while it falls back to 0;
     beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place). Of that and of any other
     spring y follows ``bend``, and dry friction, the ``drag``, takes away from x, in its unit.
     So does a ``preload``, which presses the spring against a seat at 0. Of a

@@ -258,7 +258,7 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
 
 # what effects may change of a lag; of a mass on a spring, beside bend and drag, and run in steps
 _OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "bend", "drag"})
-_IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload"})
+_IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unloading"})
 
 
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
@@ -276,7 +276,7 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
     """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
     spring that bends where there is one; dry friction on what moves; of a mass on a spring also a hysteretic
-    one, an obstacle and a preload."""
+    one, an obstacle, a preload and its damper."""
     if isinstance(actuator, Actuator) or linear.single_lag(actuator.dynamics):
         return _OF_LAGS
     plant = plants.plant_of(actuator.dynamics)

@@ -5,7 +5,8 @@
  * spring takes away from the linear one: dq/dy = 1 - K |p|^power scale^(1 - power), p = q in the direction of motion, with K = `loading`
  * where p > 0 and -`unloading` where it is not (Bouc and Wen). Beside it the spring may bend, and an obstacle push, as in bent.h: w
  * holds that, too. A `preload` presses a plant of second order against a seat at y = 0, which catches what comes back to it: there
- * nothing moves until more than the preload pushes, and on either side that much is lost.
+ * nothing moves until more than the preload pushes, and on either side that much is lost. A damper may be `falling` as strong as the
+ * plant falls back to 0, where it is of second order: it has tables of its own, behind the others.
  *
  * Between events the equation is linear, and a step is exact for an input that is a cubic: `tables` hold, for steps of h/2^level from
  * `level` = base on, what the state and the four coefficients of the input count. w is a cubic through its values and slopes at the
@@ -25,7 +26,7 @@ typedef struct {
     double h, m, c, k, slide, stick, soft, loading, unloading, power, scale, rise, speed;
     const double *bend, *tables;
     int bends, curved; /* whether the spring bends or meets an obstacle; whether there is a w, or friction that depends on the speed */
-    double preload;
+    double preload, falling;
 } Plant;
 
 typedef struct {
@@ -33,6 +34,11 @@ typedef struct {
     double speed, spared;  /* a magnitude of the velocity and exp(-|v|/speed) there */
     int moving, side;      /* the sign of the velocity, 0: stuck; the side of the seat, 0: on it */
 } State;
+
+/* Whether it moves towards 0 under a damper that is another there. */
+static int falls(const Plant *p, const State *s) { return p->falling != p->c && s->moving * s->y < 0.0; }
+
+static double damper(const Plant *p, const State *s) { return falls(p, s) ? p->falling : p->c; }
 
 static double taken(const Plant *p, const State *s)
 {
@@ -83,7 +89,7 @@ static double yielded(const Plant *p, State *s, int sign, double u, double span,
     if (p->rise != 0.0) {
         double left = spared(p, s);
         held += sign * p->rise * (1.0 - left);
-        gained = (u - p->k * s->y - p->c * s->v - held - sign * p->slide - s->side * p->preload) / p->m * p->rise / p->speed * left;
+        gained = (u - p->k * s->y - damper(p, s) * s->v - held - sign * p->slide - s->side * p->preload) / p->m * p->rise / p->speed * left;
     }
     *rate = span * (s->v * slope + gained);
     return held;
@@ -149,7 +155,7 @@ static void wind(const Plant *p, State *s, double move)
 /* The state after a step of `level` with the input `d` (4 coefficients over the step), friction at `sign` times `slide`. */
 static State stepped(const Plant *p, State s, const double *d, int level, int sign)
 {
-    const double *t = p->tables + 12 * (level - p->base);
+    const double *t = p->tables + 12 * (level - p->base + (falls(p, &s) ? p->last - p->base + 1 : 0));
     double borne = sign * p->slide + s.side * p->preload;
     double span = p->h / (double)(1 << level), f[4] = {d[0] - borne, d[1], d[2], d[3]};
     double at_end = d[0] + d[1] + d[2] + d[3] - borne, slope = 0.0;
@@ -212,9 +218,9 @@ static int dips(const Plant *p, State *s, State *to, const double *d)
 {
     if (p->order == 1) return 0;
     int sign = s->moving;
-    double first = push(p, s, d[0]) - p->c * s->v - sign * p->slide - risen(p, s, sign);
+    double first = push(p, s, d[0]) - damper(p, s) * s->v - sign * p->slide - risen(p, s, sign);
     if (sign * first >= 0.0) return 0;
-    return sign * (push(p, to, d[0] + d[1] + d[2] + d[3]) - p->c * to->v - sign * p->slide - risen(p, to, sign)) > 0.0;
+    return sign * (push(p, to, d[0] + d[1] + d[2] + d[3]) - damper(p, to) * to->v - sign * p->slide - risen(p, to, sign)) > 0.0;
 }
 
 /* The input's coefficients over the step that begins at `at` and is `part` of the sample. */
@@ -302,7 +308,7 @@ void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, 
     const double *a = numbers;
     int bends = a[13] != 0.0 || a[14] != 0.0 || a[17] != 0.0;
     Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a + 13, tables,
-               bends, bends || a[6] != 0.0 || a[11] != 0.0, a[18]};
+               bends, bends || a[6] != 0.0 || a[11] != 0.0, a[18], a[19]};
     State s = come(&p, 0.0);
     for (int k = 0; k < n; k++) {
         double c[4] = {0.0, 0.0, 0.0, 0.0};

@@ -136,3 +136,19 @@ def test_what_is_taken_along_lags_behind_by_the_play():
     np.testing.assert_allclose(seen[:top], np.maximum(plain[:top] - 0.1, 0.0), atol=1e-9)
     np.testing.assert_allclose(hung, np.sign(plain) * np.maximum(np.abs(plain) - 0.1, 0.0), atol=1e-9)
     assert np.all(np.abs(seen - plain) < 0.1 + 1e-9)
+
+
+@pytest.mark.parametrize("speed", [0.2, 2.0])
+def test_a_damper_that_is_another_on_the_way_back(speed):
+    t = H * np.arange(900)
+    x, m, c = 0.6 - 0.6 * np.cos(2.3 * t) + 0.2 * np.sin(5.1 * t), 0.02, 0.7
+
+    def slope(now, state):
+        damper = c / speed if state[0] * state[1] < 0 else c
+        return [state[1], (np.interp(now, t, x) - state[0] - damper * state[1]) / m]
+
+    exact = solve_ivp(slope, (0, t[-1]), [0, 0], t_eval=t, method="LSODA", rtol=1e-9, atol=1e-12, max_step=H)
+    made = respond(Plant(2, m, c, 1.0), x, rest(900), H, Dynamics(unloading=speed))
+    np.testing.assert_allclose(made, exact.y[0], atol=1e-3 * np.max(exact.y[0]))
+    plain = respond(Plant(2, m, c, 1.0), x, rest(900), H)
+    assert np.max(np.abs(plain - made)) > 0.03

@@ -82,11 +82,11 @@ EFFECT = Effect(
             ),
             _knee,
         ),
-        # it pushes the actuator itself, which comes to rest the sooner
+        # it pushes the actuator itself, which comes to rest the sooner; a wall is as stiff as it likes
         Form(
             "spring",
             "dynamics",
-            (_PLACE, Parameter("stiffness", lower=0.0, upper=50.0, starts=(1.0, 1.0), zero=0.0)),
+            (_PLACE, Parameter("stiffness", lower=0.02, upper=200.0, starts=(1.0, 1.0, 10.0), log=True)),
             _spring,
         ),
         Form("gradual", "response", (_PLACE, _STIFFNESS), _gradual),
