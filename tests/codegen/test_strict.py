@@ -66,9 +66,9 @@ def test_not_a_warning(plans, folder, tmp_path):
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_not_a_warning_by_clang(arithmetic, plans, folder, tmp_path):
-    """All of an arithmetic in one file: to start the compiler takes longer than what it compiles. What it warns
-    of does
-    not depend on optimisation; what gcc does, may.
+    """All of an arithmetic in one file: to start the compiler takes longer than what it compiles.
+
+    What it warns of does not depend on optimisation; what gcc does, may.
     """
     sources = [folder / f"{plan.name}.c" for plan in plans if plan.arithmetic == arithmetic]
     (tmp_path / "all.c").write_text("".join(f'#include "{source}"\n' for source in sources))
