@@ -66,7 +66,7 @@ class Dynamics:
     and a mass has a damper weaker by that factor while it falls back to 0;
     beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place). Of that and of any other
     spring y follows ``bend``, and dry friction, the ``drag``, takes away from x, in its unit.
-    So does a ``preload``, which presses the spring against a seat at 0. Of a
+    So does a ``preload``, which presses the spring against a seat at 0. A ``mass`` in s² adds mass·D² y. Of a
     :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag.
     """
 
@@ -75,6 +75,7 @@ class Dynamics:
     stiffness: float = 0.0
     drag: Friction = NO_FRICTION
     preload: float = 0.0
+    mass: float = 0.0
     bend: Bend = STRAIGHT
     spring: Spring = LINEAR
     rise: Rise = LEVEL

@@ -152,3 +152,29 @@ def test_a_damper_that_is_another_on_the_way_back(speed):
     np.testing.assert_allclose(made, exact.y[0], atol=1e-3 * np.max(exact.y[0]))
     plain = respond(Plant(2, m, c, 1.0), x, rest(900), H)
     assert np.max(np.abs(plain - made)) > 0.03
+
+
+def test_a_mass_on_the_spring_of_either_kind():
+    """M y'' + T y' + y = K x, whichever way the rig says T y' + y = K x, and beside a mass that it has."""
+    run, period = Run.of([1500], [0.0], H), 3.0
+    M, x = (period / (2.0 * np.pi)) ** 2, np.where(np.arange(1500) % 700 < 350, 1.0, 0.0)
+    placed = (Placed("resonance", form_of("resonance", "mass"), "actuator", (period,)),)
+
+    def of(*den):
+        return TransferFunction([(2.0, 0.0)], [(c, len(den) - 1.0 - i) for i, c in enumerate(den)])
+
+    given = {
+        "order 1": (Actuator(0.7, 1.0, (2.0,)), of(M, 0.7, 1.0), 2e-4),
+        "a lag": (LinearActuator(of(0.7, 1.0)), of(M, 0.7, 1.0), 1e-9),
+        "order 2": (MASS, of(M + 0.05, 0.7, 1.0), 1e-9),
+    }
+    for name, (actuator, exact, apart) in given.items():
+        rig = Rig(name, H, Signals("c", "y"), actuator)
+        assert fits_in(placed[0].form, "actuator", rig)
+        made = Chain(rig, placed).run(x, "regulator", "sensor", run)
+        plain = Chain(rig).run(x, "regulator", "sensor", run)
+        wanted = Chain(Rig("e", H, Signals("c", "y"), LinearActuator(exact))).run(
+            x, "regulator", "sensor", run
+        )
+        np.testing.assert_allclose(made, wanted, atol=apart)
+        assert np.max(np.abs(plain - wanted)) > 0.1

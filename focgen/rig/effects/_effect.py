@@ -170,7 +170,6 @@ Check = Callable[[Excitation], str | None]
 @dataclass(frozen=True)
 class Effect:
     """A family. ``stage`` is the usual one, ``also`` others it may sit in, where those at home leave much.
-    ``single``: nature has one form only.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
     ``bends``: its curves leave the gain at zero as it is, and change it elsewhere.
@@ -184,7 +183,6 @@ class Effect:
     needs: Check
     forms: Sequence[Form]
     also: tuple[str, ...] = ()
-    single: bool = False
     bends: bool = False
 
     @property

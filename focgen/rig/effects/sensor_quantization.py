@@ -39,7 +39,6 @@ EFFECT = Effect(
     reveals="slow ramps: the reading moves in steps of one size",
     confused_with=("valve_stiction",),
     needs=lambda e: None,
-    single=True,
     forms=[
         Form(
             "rounding",

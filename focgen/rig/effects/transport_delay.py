@@ -18,7 +18,6 @@ EFFECT = Effect(
     reveals="steps and fast sines: a phase that falls in proportion to frequency, with no loss of amplitude",
     confused_with=("slow_regulator", "sensor_lag", "valve_asymmetry"),
     needs=lambda e: None if e.fastest < 0.25 else "no change of the input is fast beside the rig's response",
-    single=True,
     forms=[
         Form(
             "delay",
