@@ -22,6 +22,13 @@ class Levels(Sequence[str]):
     def __init__(self, texts: Sequence[str], codes: Ints) -> None:
         self.texts, self.codes = tuple(texts), codes
 
+    @classmethod
+    def of(cls, cells: Sequence[str]) -> Levels:
+        """A column of ``cells`` (m,)."""
+        known: dict[str, int] = {}
+        codes = [known.setdefault(cell, len(known)) for cell in cells]
+        return cls(tuple(known), np.array(codes, dtype=int))
+
     def __len__(self) -> int:
         return len(self.codes)
 

@@ -21,7 +21,7 @@ _TICKING = 0.75  # of the steps within half of their median: holes are told from
 _IRREGULAR = 0.95  # quantile of the steps that stands for the pace of an irregular clock
 _SAME_RATE = 1e-4  # relative
 _PLAUSIBLE = 99.0  # a log is recorded at a rate within this factor of the rig's
-_LONGEST = 5_000_000  # samples
+_LONGEST = 5_000_000  # samples that few rows may be resampled to; many rows, twice as many as they are
 _COUNTABLE = 2**53  # ticks that float64 tells apart
 
 Line = Callable[[int], str]
@@ -73,10 +73,10 @@ def counted(time: Array) -> Array | None:
     where the stamps are not those of a clock with a few samples lost.
     """
     steps = np.diff(time)
-    if (steps < 0).any() or not (steps > 0).any() or (steps.min() > 0 and _few_lost(time)):
+    if steps.min() < 0 or not steps.max() > 0 or (steps.min() > 0 and _few_lost(time)):
         return None
     rows = np.arange(len(time))
-    step, begin = np.polyfit(rows, time, 1)
+    step, begin = _line(rows, time)
     off = time - (begin + step * rows)
     resolution = float(steps[steps > 1e-6 * step].min())
     whole = np.abs(steps / resolution - np.round(steps / resolution)).max() < 1e-3
@@ -94,8 +94,19 @@ def _few_lost(time: Array) -> bool:
 def uniform_step(time: Array) -> float | None:
     """The sample time in s where the stamps are uniform up to rounding, else None."""
     step = (time[-1] - time[0]) / (len(time) - 1)
-    off = np.abs(time - time[0] - step * np.arange(len(time))).max()
-    return step if off <= _JITTER * step else None
+    grid = np.arange(len(time), dtype=float)  # in place: a log may have ten million rows
+    grid *= step
+    off = time - time[0]
+    off -= grid
+    return step if np.abs(off, out=off).max() <= _JITTER * step else None
+
+
+def _line(x: Ints, y: Array) -> tuple[float, float]:
+    """Slope and value at 0 of the line that is nearest to ``y`` (m,) over ``x`` (m,)."""
+    middle, mean = float(np.mean(x)), float(np.mean(y))
+    off = x - middle
+    slope = float(off @ (y - mean)) / float(off @ off)
+    return slope, mean - slope * middle
 
 
 def check_unit(time: Array, sample_time: float, where: str) -> None:
@@ -120,7 +131,8 @@ def pace(steps: Array) -> float:
     """The usual step (s) of a clock that may have holes: the median, or of an irregular one nearly the
     longest."""
     usual = float(np.median(steps))
-    ticks = np.mean(np.abs(steps - usual) <= 0.5 * usual) >= _TICKING
+    off = steps - usual
+    ticks = np.mean(np.abs(off, out=off) <= 0.5 * usual) >= _TICKING
     return usual if ticks else float(np.quantile(steps, _IRREGULAR))
 
 
@@ -140,7 +152,7 @@ def on_grid(
     missing = int(ticks[-1]) + 1 - len(ticks)
     if not missing:
         return step, dict(signals), notes
-    _check_length(ticks[-1] + 1, step, where)
+    _check_length(ticks[-1] + 1, step, where, len(time))
     grid = np.arange(ticks[-1] + 1)
     full = {role: between(role, grid, ticks, values) for role, values in signals.items()}
     row = int(np.argmax(np.diff(ticks) > 1))
@@ -159,18 +171,17 @@ def between(role: str, grid: Array | Ints, at: Array | Ints, values: Array) -> A
 def _ticks(time: Array) -> tuple[Ints | None, float]:
     """Which sample of a uniform clock each row (m,) is, and its step in s; None where there is no such
     clock."""
-    rows = np.arange(len(time))
     step = uniform_step(time)
     if step is not None:
-        return rows, step
+        return np.arange(len(time)), step
     steps = np.diff(time)
     with np.errstate(all="ignore"):  # of steps that are no clock's
         counts = np.round(steps / np.median(steps))
     if not (counts >= 1).all() or counts.sum() > _COUNTABLE:
         return None, 0.0
     ticks = np.concatenate([[0], np.cumsum(counts.astype(int))])
-    step, begin = np.polyfit(ticks, time, 1)
-    if ticks[-1] == rows[-1] or np.abs(time - begin - step * ticks).max() > _JITTER * step:
+    step, begin = _line(ticks, time)
+    if ticks[-1] == len(time) - 1 or np.abs(time - begin - step * ticks).max() > _JITTER * step:
         return None, 0.0
     return ticks, float(step)
 
@@ -188,14 +199,14 @@ def _resampled(
     time: Array, signals: Mapping[str, Array], sample_time: float, where: str
 ) -> tuple[float, dict[str, Array], tuple[str, ...]]:
     count = int((time[-1] - time[0]) / sample_time + 1e-6) + 1
-    _check_length(count, sample_time, where)
+    _check_length(count, sample_time, where, len(time))
     grid = time[0] + sample_time * np.arange(count)
     resampled = {role: between(role, grid, time, values) for role, values in signals.items()}
     return sample_time, resampled, (f"time stamps not uniform: resampled every {sample_time:g} s",)
 
 
-def _check_length(count: int, step: float, where: str) -> None:
-    if count > _LONGEST:
+def _check_length(count: int, step: float, where: str, rows: int) -> None:
+    if count > max(_LONGEST, 2 * rows):
         raise LogError(
             where, f"would take {count} samples of {step:g} s", "shorten the log or set sample_time"
         )

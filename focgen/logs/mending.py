@@ -33,21 +33,20 @@ def mended(time: Array, values: Mapping[str, Array]) -> tuple[dict[str, Array], 
 
 
 def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Array, list[str]]:
-    there = np.flatnonzero(~np.isnan(y))
-    rows, notes = there, []
+    gone, notes = np.isnan(y), []
+    there: Ints | slice = np.flatnonzero(~gone) if gone.any() else slice(0, len(y))
+    rows: Ints | slice = there
     if role not in HELD:
         slow = fresh_rows(y[there])
         if slow:
-            rows = there[slow[1]]
-            notes.append(_slow_note(role, slow[0] * len(time) / len(there), time))
+            rows = slow[1] if isinstance(there, slice) else there[slow[1]]
+            notes.append(_slow_note(role, slow[0] * len(time) / np.sum(~gone), time))
         barred = None if drive is None else barred_by(drive)[rows]
         wrong = outliers(y[rows], barred)
         if wrong.any():
             what = f"outliers of {role} replaced by the straight line between their neighbours"
-            notes.append(Note(what, int(wrong.sum()), f"at {time[rows[np.argmax(wrong)]]:g} s"))
-            y = y.copy()
-            y[rows] = straightened(time[rows], y[rows], wrong)
-    gone = np.isnan(y)
+            notes.append(Note(what, int(wrong.sum()), f"at {time[rows][np.argmax(wrong)]:g} s"))
+            y = _with(y, rows, straightened(time[rows], y[rows], wrong))
     if gone.any():
         how = "held" if role in HELD else "bridged by straight lines"
         notes.append(
@@ -56,11 +55,22 @@ def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Arra
     return _filled(role, time, y, rows, there), notes
 
 
-def _filled(role: str, time: Array, y: Array, rows: Ints, there: Ints) -> Array:
-    """All rows of a signal from its fresh ``rows``, those of an output held where it was logged."""
-    if len(rows) == len(y):
+def _with(y: Array, rows: Ints | slice, straight: Array) -> Array:
+    """``y`` (m,) with other readings in ``rows``, which a slice names all of."""
+    if isinstance(rows, slice):
+        return straight
+    y = y.copy()
+    y[rows] = straight
+    return y
+
+
+def _filled(role: str, time: Array, y: Array, rows: Ints | slice, there: Ints | slice) -> Array:
+    """All rows of a signal from its fresh ``rows``, those of an output held where it was logged; a slice is
+    all of them."""
+    if isinstance(rows, slice):
         return y
-    if len(rows) < len(there) and role == "output":
+    if rows is not there and role == "output":
+        there = np.arange(len(y)) if isinstance(there, slice) else there
         held = y[rows[np.searchsorted(rows, there, side="right") - 1]]
         return np.interp(time, time[there], held)
     return between(role, time, time[rows], y[rows])

@@ -54,12 +54,14 @@ def long_stretches(y: Array) -> Bools:
     More than ``SHORT`` of its own periods without a reading are long, and so is what has no reading on one
     side.
     """
-    there = np.flatnonzero(~np.isnan(y))
+    mask = np.isnan(y)
+    if not mask.any():
+        return mask
+    there = np.flatnonzero(~mask)
     if len(there) < 2:
-        return np.isnan(y)
+        return mask
     gaps = np.diff(there)
     longest = (SHORT + 1) * float(np.median(gaps))
-    mask = np.isnan(y)
     for begin, gap in zip(there[:-1][gaps > 1], gaps[gaps > 1]):
         mask[begin + 1 : begin + gap] = gap > longest
     return mask

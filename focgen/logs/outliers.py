@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -16,6 +18,8 @@ _EVEN = 0.6  # of the farthest of several in a row is the nearest: they come and
 _BLOCK = 128  # readings over which the noise is taken as even
 _RARE = 0.01  # of the readings: more of them are the signal's own
 _FEWEST = 20  # readings
+_AHEAD, _AFTER = 3, 10  # readings around a jump of the command that are left alone
+_PART = 1 << 16  # windows that are looked at side by side
 _FINE = 1e-3  # of the span: what noise there is at least
 
 
@@ -40,13 +44,18 @@ def outliers(y: Array, barred: Bools | None = None) -> Bools:
 
 def barred_by(command: Array) -> Bools:
     """Where ``command`` (n,) jumps, and shortly after: a signal may move fast there."""
-    jumps = np.abs(np.diff(command, prepend=command[0])) > 0.05 * (float(np.ptp(command)) or np.inf)
-    return np.convolve(jumps, np.ones(14), "full")[3 : 3 + len(command)] > 0.5
+    jumps = np.abs(np.diff(command)) > 0.05 * (float(np.ptp(command)) or np.inf)
+    barred = np.zeros(len(command), bool)
+    for late in range(1 - _AHEAD, 2 + _AFTER):  # of a change, after the reading ahead of it
+        barred[max(late, 0) : len(jumps) + late] |= jumps[max(-late, 0) : len(command) - late]
+    return barred
 
 
 def straightened(time: Array, y: Array, wrong: Bools) -> Array:
     """``y`` (n,) with the readings that are ``wrong`` (n,) on the straight line between their neighbours."""
-    return np.where(wrong, np.interp(time, time[~wrong], y[~wrong]), y)
+    made = y.copy()
+    made[wrong] = np.interp(time[wrong], time[~wrong], y[~wrong])
+    return made
 
 
 def _pulses(y: Array, barred: Bools, width: int, least: float) -> Ints:
@@ -54,6 +63,30 @@ def _pulses(y: Array, barred: Bools, width: int, least: float) -> Ints:
     whole = 2 * _SIDE + width
     if len(y) < whole:
         return np.zeros(0, int)
+    found, sizes, off = [], [], np.empty(len(y) - whole + 1)
+    for begin, part in _parts(y, whole):
+        first, size, hit = _standing_out(part, width)
+        hit &= ~sliding_window_view(barred[begin : begin + len(part)], whole).any(axis=1)
+        off[begin : begin + len(first)] = first
+        found.append(begin + np.flatnonzero(hit))
+        sizes.append(size[hit])
+    at, size = np.concatenate(found), np.concatenate(sizes)
+    far = size > _FAR * np.maximum(_noise(off, at), least)
+    if width > 1 and far.any():  # pulses as high as the jumps of the signal itself are its own
+        far &= size > 2.0 * _jumps(y)
+    return at[far] + _SIDE
+
+
+def _parts(y: Array, width: int) -> Iterator[tuple[int, Array]]:
+    """Yield (where it begins, part): all windows of ``y`` (n,), each in one part."""
+    for begin in range(0, len(y) - width + 1, _PART):
+        yield begin, y[begin : begin + _PART + width - 1]
+
+
+def _standing_out(y: Array, width: int) -> tuple[Array, Array, Bools]:
+    """For each window of ``y`` (n,): how far its first reading inside is off the line through the neighbours,
+    how far the nearest of ``width`` is, and whether these stand out as an outlier does."""
+    whole = 2 * _SIDE + width
     windows = sliding_window_view(y, whole)
     beside = np.r_[:_SIDE, _SIDE + width : whole]
     places = np.arange(whole) - (whole - 1) / 2.0
@@ -64,22 +97,21 @@ def _pulses(y: Array, barred: Bools, width: int, least: float) -> Ints:
     size = np.abs(inside).min(axis=1)
     differ = np.abs(windows[:, :_SIDE].mean(axis=1) - windows[:, -_SIDE:].mean(axis=1))
     hit = (np.abs(np.sign(inside).sum(axis=1)) == width) & (size > _CLEAR * rough) & (size > _LEVEL * differ)
-    hit &= size > _FAR * np.maximum(_noise(np.abs(inside[:, 0])), least)
-    hit &= ~sliding_window_view(barred, whole).any(axis=1)
-    if width > 1:  # pulses that swell, or are as high as the jumps of the signal itself, are its own
-        hit &= (size > _EVEN * np.abs(inside).max(axis=1)) & (size > 2.0 * _jumps(y))
-    return np.flatnonzero(hit) + _SIDE
+    if width > 1:  # pulses that swell are the signal's own
+        hit &= size > _EVEN * np.abs(inside).max(axis=1)
+    return np.abs(inside[:, 0]), size, hit
 
 
-def _noise(off: Array) -> Array:
-    """The robust standard deviation at each place of what is ``off`` (m,): its median over the noisiest of
-    the blocks around, or over all."""
+def _noise(off: Array, at: Ints) -> Array:
+    """The robust standard deviation ``at`` places (k,) of what is ``off`` (m,): its median over the noisiest
+    of the blocks around, or over all."""
     count = max(1, len(off) // _BLOCK)
-    medians = np.array([np.median(part) for part in np.array_split(off, count)])
+    parts = np.array_split(off, count)
+    medians = np.array([np.median(part) for part in parts])
     padded = np.concatenate([medians[:1], medians, medians[-1:]])
     near = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
-    sizes = [len(part) for part in np.array_split(off, count)]
-    made: Array = 1.4826 * np.maximum(np.repeat(near, sizes), np.median(off))
+    block = np.searchsorted(np.cumsum([len(part) for part in parts]), at, side="right")
+    made: Array = 1.4826 * np.maximum(near[block], np.median(off))
     return made
 
 
@@ -87,15 +119,18 @@ def _least_noise(y: Array) -> float:
     """Half a step of a quantised signal, or a little of the span: the median of steps that mostly stay away
     is 0."""
     steps = np.abs(np.diff(y))
-    middle = np.median(sliding_window_view(y, 3), axis=1)
-    moved = steps[steps > 1e-9 * np.ptp(y)]
-    return max(0.5 * float(moved.min()), _FINE * float(np.ptp(middle)))
+    finest = float(np.min(steps, where=steps > 1e-9 * np.ptp(y), initial=np.inf))
+    middles = [np.median(sliding_window_view(part, 3), axis=1) for _, part in _parts(y, 3)]
+    span = max(float(m.max()) for m in middles) - min(float(m.min()) for m in middles)
+    return max(0.5 * finest, _FINE * span)
 
 
 def _jumps(y: Array) -> float:
     """The largest change from one reading to the next that lasts."""
-    if len(y) < 16:
-        return np.inf
+    return max((_largest_jump(part) for _, part in _parts(y, 14)), default=np.inf) if len(y) >= 16 else np.inf
+
+
+def _largest_jump(y: Array) -> float:
     middle = np.median(sliding_window_view(y, 7), axis=1)
     lasting = np.abs(middle[7:] - middle[:-7])
     return float(np.minimum(lasting, np.abs(np.diff(y))[6 : 6 + len(lasting)]).max())

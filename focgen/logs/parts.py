@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -35,10 +36,17 @@ class Raw:
         return len(self.time)
 
     def part(self, kept: slice | Bools | Ints) -> Raw:
-        """The rows ``kept``: a slice, a mask (m,) or row numbers."""
-        rows = np.arange(len(self))[kept]
-        values = {role: y[rows] for role, y in self.values.items()}
-        return replace(self, time=self.time[rows], values=values, line=lambda row: self.line(int(rows[row])))
+        """The rows ``kept``: of a slice views, of a mask (m,) or of row numbers copies."""
+        values = {role: y[kept] for role, y in self.values.items()}
+        return replace(self, time=self.time[kept], values=values, line=self._line_of(kept))
+
+    def _line_of(self, kept: slice | Bools | Ints) -> clock.Line:
+        line = self.line
+        if isinstance(kept, slice):
+            first = kept.indices(len(self))[0]
+            return lambda row: line(first + row)
+        rows = np.flatnonzero(kept) if kept.dtype == bool else kept
+        return lambda row: line(int(rows[row]))
 
     def with_notes(self, *notes: str) -> Raw:
         """The same, with more to be said of it."""
@@ -73,10 +81,12 @@ def _long_enough(sittings: list[slice], run: Raw) -> list[slice]:
 
 def _counted(run: Raw) -> Raw:
     """The run on time stamps that increase: rows logged twice once, rounded stamps counted."""
-    twice = np.flatnonzero(_repeats(run))
-    if len(twice):
-        note = Note("rows logged twice, taken once", len(twice), f"in {run.line(int(twice[0]))}")
-        run = run.part(np.setdiff1d(np.arange(len(run)), twice)).with_notes(note)
+    twice = _repeats(run)
+    if twice.any():
+        note = Note(
+            "rows logged twice, taken once", int(twice.sum()), f"in {run.line(int(np.argmax(twice)))}"
+        )
+        run = run.part(~twice).with_notes(note)
     even = clock.counted(run.time)
     if even is not None:
         step = even[1] - even[0]
@@ -86,15 +96,17 @@ def _counted(run: Raw) -> Raw:
     return run
 
 
-def _repeats(run: Raw) -> Array:
+def _repeats(run: Raw) -> Bools:
     """Which rows (m,) repeat the one before, time stamp and all."""
-    same = np.diff(run.time) == 0
+    same = run.time[1:] == run.time[:-1]
     for y in run.values.values():
         same &= (y[1:] == y[:-1]) | (np.isnan(y[1:]) & np.isnan(y[:-1]))
     return np.concatenate([[False], same])
 
 
 def _windowed(run: Raw, window: Window) -> Raw:
+    if window == (None, None):
+        return run
     first, last = (edge if edge is not None else way * np.inf for edge, way in zip(window, (-1, 1)))
     since = run.time - run.time[0]
     kept = (since >= first - 1e-9) & (since <= last + 1e-9)
@@ -113,17 +125,24 @@ def _uncut(run: Raw, sample_time: float) -> Iterator[tuple[Raw, bool]]:
     _check_present(run, kept)
     run = replace(run, values={role: run.values[role] for role in kept.roles})
     holes = clock.holes(run.time)
-    begins = np.union1d(holes, np.flatnonzero(np.diff(kept.rows.astype(int), prepend=0) == 1))
-    spans = [rows[kept.rows[rows]] for rows in np.split(np.arange(len(run)), begins)]
-    spans = [rows for rows in spans if len(rows)]
-    long = [rows for rows in spans if len(rows) >= FEWEST]
+    spans = _spans(kept.rows, holes)
+    long = [rows for rows in spans if rows.stop - rows.start >= FEWEST]
     if not long:
         raise LogError(run.where, f"has no {FEWEST} samples in a row without a hole", "log it again")
     notes = (*kept.notes, *_hole_notes(run.time, holes), *_short_notes(run.time, spans))
     for rows in long:
         part = run.part(rows)
-        unseen = rows[0] > clock.SHORT or rows[0] in holes
+        unseen = rows.start > clock.SHORT or rows.start in holes
         yield (part.with_notes(*notes) if rows is long[0] else part), bool(unseen)
+
+
+def _spans(kept: Bools, holes: Ints) -> list[slice]:
+    """The rows that are kept (m,), in a row and without a hole. A span begins at a hole, or where rows are
+    kept again: so what it keeps stands at its front."""
+    begins = np.union1d(holes, np.flatnonzero(kept[1:] & ~kept[:-1]) + 1)
+    edges = [0, *begins.tolist(), len(kept)]
+    counts = [int(kept[a:b].sum()) for a, b in pairwise(edges)]
+    return [slice(a, a + count) for a, count in zip(edges, counts) if count]
 
 
 def _hole_notes(time: Array, holes: Ints) -> list[Note]:
@@ -134,10 +153,10 @@ def _hole_notes(time: Array, holes: Ints) -> list[Note]:
     return [Note(what, len(holes), f"of {after - before:g} s at {before:g} s")]
 
 
-def _short_notes(time: Array, spans: Sequence[Ints]) -> list[Note]:
-    short = [rows for rows in spans if len(rows) < FEWEST]
+def _short_notes(time: Array, spans: Sequence[slice]) -> list[Note]:
+    short = [rows for rows in spans if rows.stop - rows.start < FEWEST]
     what = f"parts of fewer than {FEWEST} samples left out"
-    return [Note(what, len(short), f"at {time[short[0][0]]:g} s")] if short else []
+    return [Note(what, len(short), f"at {time[short[0].start]:g} s")] if short else []
 
 
 def _check_present(run: Raw, kept: missing.Kept) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
+from focgen.logs.cells import Levels
 from focgen.logs.experiment import Experiment
 from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
@@ -114,8 +115,9 @@ def _experiments(
     time, said = _time(table, signals)
     notes = (*table.notes, *said, *notes)
     for name, rows in _runs(table, signals.run):
-        where = f"{table.path}" if len(rows) == len(table) else f"{table.path} run {name}"
-        run = Raw(name, where, f"{where} [{signals.time}]", time, columns, table.line, notes).part(rows)
+        run = Raw(name, table.path, "", time, columns, table.line, notes).part(rows)
+        where = table.path if len(run) == len(table) else f"{table.path} run {name}"
+        run = replace(run, where=where, stamps=f"{where} [{signals.time}]")
         for experiment in experiments_of(run, sample_time, window):
             yield table.path, experiment
 
@@ -179,22 +181,20 @@ def _absence(table: LogTable, role: str, name: str, taken: set[str]) -> str:
     return f"no column {name!r}: {role} taken as not logged" + (f" (is it {near!r}?)" if near else "")
 
 
-def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, Ints]]:
-    """Yield (name, row numbers) in the order of appearance."""
+def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, slice | Ints]]:
+    """Yield (name, rows) in the order of appearance."""
     if run is not None and run in table:
-        labels = np.array(table.texts(run))
+        labels = table.levels(run)
     elif table.runs is not None:
-        labels = np.array(table.runs)
+        labels = Levels.of(table.runs)
     else:
-        yield stem(table.path), np.arange(len(table))
+        yield stem(table.path), slice(0, len(table))
         return
-    names, firsts, codes = np.unique(labels, return_index=True, return_inverse=True)
-    for code in np.argsort(firsts):
-        if not names[code]:
-            raise LogError(
-                f"{table.path} [{run}]", f"is empty in {table.line(int(firsts[code]))}", "name the run"
-            )
-        yield str(names[code]), np.flatnonzero(codes == code)
+    codes, firsts = np.unique(labels.codes, return_index=True)
+    for code, first in sorted(zip(codes.tolist(), firsts.tolist()), key=lambda pair: pair[1]):
+        if not labels.texts[code]:
+            raise LogError(f"{table.path} [{run}]", f"is empty in {table.line(first)}", "name the run")
+        yield labels.texts[code], np.flatnonzero(labels.codes == code)
 
 
 def _check_limits(found: list[tuple[str, Experiment]], limits: Limits, columns: Mapping[str, str]) -> None:

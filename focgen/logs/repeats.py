@@ -17,18 +17,18 @@ _MOVES = 0.1  # of its span: by as much another signal moves meanwhile
 _INSIDE = 0.02  # of the span: nearer to an end a signal rests or saturates
 
 
-def fresh_rows(y: Array) -> tuple[float, Array] | None:
+def fresh_rows(y: Array) -> tuple[float, Ints] | None:
     """(rows per reading, the rows with a fresh one) where ``y`` (n,) is updated at a steady lower rate than
     it is logged, or None.
 
     A coarse converter repeats values as well: its changes come at any row, or nearly all are by one count.
     """
-    changes = np.flatnonzero(np.diff(y) != 0.0) + 1
+    changes = _changes(y)
     if len(changes) < _CHANGES:
         return None
-    gaps, sizes = np.diff(changes), np.abs(np.diff(y)[changes - 1])
+    gaps = np.diff(changes)
     period = float(np.median(gaps))
-    if not 2.0 <= period <= _SLOWEST or _coarse(sizes):
+    if not 2.0 <= period <= _SLOWEST or _coarse(np.abs(y[changes] - y[changes - 1])):
         return None
     for _ in range(3):
         periods = np.maximum(1, np.round(gaps / period))
@@ -39,18 +39,23 @@ def fresh_rows(y: Array) -> tuple[float, Array] | None:
     return period, _slots(changes, periods.astype(int), gaps)
 
 
+def _changes(y: Array) -> Ints:
+    """The rows that differ from the one before."""
+    rows = np.flatnonzero(y[1:] != y[:-1])
+    rows += 1
+    return rows
+
+
 def _coarse(sizes: Array) -> bool:
     """Whether most changes are by one count of a converter."""
     return bool(np.mean(sizes < 1.5 * sizes.min()) > _FINE)
 
 
-def _slots(changes: Ints, periods: Array, gaps: Array) -> Array:
+def _slots(changes: Ints, periods: Ints, gaps: Ints) -> Ints:
     """The changes, and in longer gaps the rows where a reading came and equalled the last."""
-    between = [
-        row + np.round(np.arange(count) * gap / count).astype(int)
-        for row, count, gap in zip(changes, periods, gaps)
-    ]
-    return np.unique(np.concatenate([[0], *between, changes[-1:]]))
+    whole, begins = np.repeat(periods, periods), np.repeat(np.cumsum(periods) - periods, periods)
+    later = np.round((np.arange(len(whole)) - begins) * np.repeat(gaps, periods) / whole).astype(int)
+    return np.unique(np.concatenate([[0], np.repeat(changes[:-1], periods) + later, changes[-1:]]))
 
 
 def frozen(y: Array, others: list[Array]) -> tuple[int, int] | None:
@@ -60,18 +65,18 @@ def frozen(y: Array, others: list[Array]) -> tuple[int, int] | None:
     A value at either end of the signal's span is rest or saturation; a converter so coarse that values
     repeat anyway proves nothing.
     """
-    ends = np.concatenate([[0], np.flatnonzero(np.diff(y) != 0.0) + 1, [len(y)]])
+    ends = np.concatenate([[0], _changes(y), [len(y)]])
     lengths = np.diff(ends)
-    if len(lengths) < _CHANGES or _coarse(np.abs(np.diff(y[ends[:-1]]))):
+    if len(lengths) < _CHANGES:
         return None
-    span = float(np.ptp(y))
-    inside = np.abs(y[ends[:-1]] - (y.min() + y.max()) / 2) < (0.5 - _INSIDE) * span
-    usual = float(np.median(lengths))
-    for run in np.argsort(-lengths):
+    long = np.flatnonzero(lengths >= max(_LONG, _UNUSUAL * float(np.median(lengths))))
+    if not len(long) or _coarse(np.abs(np.diff(y[ends[:-1]]))):
+        return None
+    low, high = float(y.min()), float(y.max())
+    for run in long[np.argsort(-lengths[long], kind="stable")]:
         first, rows = int(ends[run]), int(lengths[run])
-        if rows < max(_LONG, _UNUSUAL * usual):
-            return None
+        inside = abs(y[first] - (low + high) / 2) < (0.5 - _INSIDE) * (high - low)
         stretch = slice(first, first + rows)
-        if inside[run] and any(np.ptp(other[stretch]) > _MOVES * np.ptp(other) > 0 for other in others):
+        if inside and any(np.ptp(other[stretch]) > _MOVES * np.ptp(other) > 0 for other in others):
             return first, rows
     return None

@@ -99,6 +99,11 @@ class LogTable:
         """A column as text, numbers in their shortest form."""
         return [cell if isinstance(cell, str) else f"{cell:g}" for cell in _plain(self.column(name))]
 
+    def levels(self, name: str) -> Levels:
+        """A column of names, each different one once."""
+        column = self.column(name)
+        return column if isinstance(column, Levels) else Levels.of(self.texts(name))
+
     def seconds(self, name: str) -> Array:
         """A column of time (m,): numbers as they are, ISO dates and times of day in s. Raises LogError for a
         cell that is none of these.

@@ -4,15 +4,19 @@ Red when a long log gives another number, text or line than a short one, or take
 its numbers.
 """
 
+import subprocess
+import sys
 import tracemalloc
 
 import numpy as np
 import pytest
 
 from focgen.errors import LogError
-from focgen.logs import cells
+from focgen.logs import cells, outliers
 from focgen.logs.cells import Levels, Lines
+from focgen.logs.read import read_logs
 from focgen.logs.table import read_table
+from focgen.rig.rig import Signals
 from tests.logs.test_dialects import TEXTS
 
 
@@ -83,3 +87,79 @@ def test_it_takes_the_memory_of_its_numbers(tmp_path, monkeypatch):
     finally:
         tracemalloc.stop()
     assert len(table) == count and kept < 21 * count and peak < 100 * count
+
+
+SIGNALS = Signals("t", "y", "u", None, None, None, None)
+
+
+def measured(count: int) -> dict[str, np.ndarray]:
+    """A log of steps whose every reading is another number."""
+    row, rng = np.arange(count), np.random.default_rng(1)
+    noise = rng.normal(0.0, 0.01, count)
+    return {"t": 0.01 * row, "u": 0.5 * (row // 500 % 7), "y": np.cos(1e-3 * row) + noise}
+
+
+ODD = {  # what is to be done to a log, and bytes a row that it may take beside the three columns
+    "nothing": (lambda log: log, 34),
+    "outliers": (lambda log: {**log, "y": log["y"] + 3.0 * (np.arange(len(log["y"])) % 5003 == 9)}, 42),
+    "a slow sensor": (lambda log: {**log, "y": np.repeat(log["y"][::4], 4)}, 62),
+    "lost rows": (lambda log: {k: v[np.arange(len(v)) % 5003 != 9] for k, v in log.items()}, 66),
+    "an uneven clock": (
+        lambda log: {**log, "t": log["t"] + 0.003 * np.sin(1.7 * np.arange(len(log["t"])))},
+        58,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ODD)
+def test_experiments_take_little_beside_their_columns(monkeypatch, what):
+    """Ten million rows of three columns: 0.24 GB, and so much again and more while they are looked at."""
+    monkeypatch.setattr(outliers, "_PART", 512)
+    change, most = ODD[what]
+    count = 60_000
+    read_logs(change(measured(6000)), SIGNALS, 0.01)  # what is loaded and kept once
+    log = change(measured(count))
+    tracemalloc.start()
+    try:
+        (found,) = read_logs(log, SIGNALS, 0.01)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(found) == pytest.approx(count, abs=2)
+    assert peak < (24 + most) * count
+
+
+def test_parts_of_a_signal_show_the_same_outliers(monkeypatch):
+    """However long the parts are; one lies across two of them."""
+    y = measured(3000)["y"]
+    y[[400, 1023, 1024, 2000]] += 3.0
+    barred = outliers.barred_by(np.where(np.arange(3000) < 1990, 0.0, 1.0))
+    whole = outliers.outliers(y, barred)
+    assert np.flatnonzero(whole).tolist() == [400, 1023, 1024]
+    for part in (1, 7, 1024):
+        monkeypatch.setattr(outliers, "_PART", part)
+        assert np.array_equal(outliers.outliers(y, barred), whole)
+
+
+READ = """
+import resource, sys
+from focgen.logs.read import read_logs
+from focgen.rig.rig import Signals
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+(found,) = read_logs(sys.argv[1], Signals("t", "y", "u", None, None, None, None), 0.01)
+print(len(found), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+"""
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems count in other units")
+def test_a_million_rows_open_in_a_tenth_of_a_gigabyte(tmp_path):
+    """And so ten million in one: what does not grow with the rows, 20 MB and more, is counted in."""
+    log = measured(1_000_000)
+    with open(tmp_path / "log.csv", "w") as file:
+        file.write("t,u,y\n")
+        file.writelines(f"{t:.2f},{u:.1f},{y:.5f}\n" for t, u, y in zip(*log.values()))
+    command = [sys.executable, "-c", READ, str(tmp_path / "log.csv")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    rows, kilobytes = map(int, done.stdout.split())
+    assert rows == 1_000_000 and kilobytes < 100_000

@@ -61,7 +61,7 @@ def check(seeds, folder: Path, samples: int) -> Counter[str]:
 
 @pytest.mark.parametrize("batch", [0, *(pytest.param(b, marks=pytest.mark.long) for b in range(1, BATCHES))])
 def test_random_controllers_agree_in_every_bit(batch, tmp_path):
-    """200 controllers in four arithmetics, 10⁴ samples each; seven eighths of them in the long suite."""
+    """200 controllers in four arithmetics, 10⁴ samples each; an eighth here, the rest in the long suite."""
     found = check(range(batch * SEEDS, (batch + 1) * SEEDS), tmp_path, 10_000)
     assert min(found[arithmetic] for arithmetic in ARITHMETICS) >= WANTED // BATCHES
 
