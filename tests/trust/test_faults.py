@@ -204,3 +204,27 @@ def test_samples_that_no_memory_holds_are_refused_at_once(tmp_path, capsys):
     generate(seed_controller(5), tmp_path / "fw", "q15")
     assert main(["verify", str(tmp_path / "fw"), "--samples", "1" + "0" * 11]) == 2
     assert "--samples" in line(capsys)
+
+
+@pytest.mark.parametrize("name", ("log.csv", "log.csv.gz", "log.lvm"))
+@pytest.mark.parametrize("line", (b"1,", b"1", b'"1,', b" "))
+def test_a_line_without_end_is_refused_before_it_is_taken_apart(tmp_path, name, line):
+    """Packed to a few kilobytes, its cells would take gigabytes, and hours to be told from another kind."""
+    with (gzip.open if name.endswith("gz") else open)(tmp_path / name, "wb") as file:
+        file.write(b"t,u,y\n" + line * (3 << 18))
+    with pytest.raises(LogError, match="has a line of more than 256 KiB"):
+        read_table(tmp_path / name)
+
+
+def test_many_long_lines_are_looked_at_in_a_few(tmp_path):
+    """Each below the limit, all of them beyond what the dialect is looked for in."""
+    with open(tmp_path / "log.csv", "wb") as file:
+        for _ in range(100):
+            file.write(b"1," * (1 << 16) + b"\n")
+    with pytest.raises(LogError, match="starts with numbers|columns, of which 4096"):
+        read_table(tmp_path / "log.csv")
+
+
+def test_cases_beyond_counting_are_refused_at_once(tmp_path, capsys):
+    assert main(["trial", "make", str(tmp_path / "t"), "--cases", "9" * 20, "--suite", "short"]) == 2
+    assert "at most 1000000 cases" in line(capsys) and not (tmp_path / "t").exists()
