@@ -46,7 +46,7 @@ NAV = {
     ),
     "Look up": ("commands", "python", "reference", "c-interface", "targets", "glossary"),
     "Why": tuple(f"design/{page.stem}" for page in sorted((ROOT / "docs" / "design").glob("*.md"))),
-    "About": ("limits", "trust", "comparison", "architecture", "contributing", "changelog"),
+    "About": ("limits", "trust", "attacks", "comparison", "architecture", "contributing", "changelog"),
 }
 CONF = f"""
 project = "focgen"

@@ -53,15 +53,32 @@ def _version_73(path: Path) -> dict[str, Any]:
         raise MissingExtra.of("h5py", "mat", str(path)) from None
     try:
         with h5py.File(path, "r") as file:
-            return {name: _of_hdf5(item) for name, item in file.items()}
+            return _of_group(file, path)
     except OSError:
         raise LogError(str(path), "is not a whole MAT file", _REMEDY) from None
 
 
-def _of_hdf5(item: Any) -> Any:
+def _of_group(group: Any, path: Path) -> dict[str, Any]:
+    """The parts of a group by name. Raises LogError for one that lies in another file: HDF5 can name any."""
+    found = {}
+    for name in group:
+        elsewhere = hasattr(group.get(name, getlink=True), "filename")
+        item = None if elsewhere else group.get(name)
+        if elsewhere or (item is not None and _lies_elsewhere(item, group)):
+            raise LogError(f"{path} [{name}]", "lies in another file", "save all of it in one")
+        found[name] = _of_hdf5(item, path)
+    return found
+
+
+def _lies_elsewhere(item: Any, group: Any) -> bool:
+    stored = getattr(item, "external", None) or getattr(item, "is_virtual", False)
+    return bool(stored) or item.file.filename != group.file.filename
+
+
+def _of_hdf5(item: Any, path: Path) -> Any:
     """A group as a dictionary; an array, whose axes HDF5 has in reverse, as MATLAB has it; else None."""
-    if hasattr(item, "items"):
-        return {name: _of_hdf5(part) for name, part in item.items()}
+    if item is None or not hasattr(item, "dtype"):
+        return _of_group(item, path) if hasattr(item, "items") else None
     values = item[()] if item.dtype.kind in "fiub" else None
     if values is None or item.attrs.get("MATLAB_empty", 0):
         return None

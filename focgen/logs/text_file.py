@@ -25,6 +25,8 @@ from focgen.textfile import log_parts, open_log
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 MOST_COLUMNS = 4096
+_LONGEST_LINE = 1 << 18  # characters: of 4096 columns, 64 each
+_LOOKED_AT = 1 << 22  # characters
 _IN_BRACKETS = re.compile(r"(.+?)\s*[\[(]([^\[\]()]*)[\])]")
 
 
@@ -44,7 +46,7 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
     """A text as a table; ``lines`` gives its lines anew whenever it is asked, ``guessed`` is the encoding
     where the text does not say so itself. Raises LogError naming the line."""
     try:
-        sample = "".join(islice(lines(), SAMPLE))
+        sample = "".join(_first(lines()))
         dialect = sniffed(sample)
         if not any(rows_of(lines_of(sample), dialect.delimiter)):
             raise LogError(str(path), "is empty", "give a log with a header and one row a sample")
@@ -64,6 +66,16 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
         aliases=aliases,
         notes=_taken(ahead, dialect, guessed),
     )
+
+
+def _first(lines: Iterable[str]) -> Iterator[str]:
+    """Yield the first lines, as far as the dialect is looked for in them."""
+    size = 0
+    for line in islice(lines, SAMPLE):
+        yield line
+        size += len(line)
+        if size > _LOOKED_AT:
+            return
 
 
 def _taken(rows: list[list[str]], dialect: Dialect, encoding: str) -> tuple[str, ...]:
@@ -101,11 +113,21 @@ def _encoding_of(parts: Iterable[bytes], path: Path) -> tuple[str, str]:
             text = decoder.decode(part)
         if text is None or "\0" in text:
             raise LogError(str(path), "is not text", "save it as UTF-8")
+        _check_lines(text, path)
     if _decoded_part(decoder, b"", True) is None:  # ends within a character
         if codec != "utf-8":
             raise LogError(str(path), "is not text", "save it as UTF-8")
         codec = "cp1252"
     return codec or "utf-8", "Windows-1252" if codec == "cp1252" else ""
+
+
+def _check_lines(text: str, path: Path) -> None:
+    """Raise LogError for a line that no log has: taken apart it would take all memory and time."""
+    for at in range(0, len(text) - _LONGEST_LINE + 1, _LONGEST_LINE):
+        part = text[at : at + _LONGEST_LINE]
+        if "\n" not in part and "\r" not in part:
+            what = f"has a line of more than {_LONGEST_LINE >> 10} KiB"
+            raise LogError(str(path), what, "give one row a sample, in a line of its own")
 
 
 def _decoded_part(decoder: codecs.IncrementalDecoder, part: bytes, final: bool) -> str | None:

@@ -48,6 +48,10 @@ DEFAULT_KINDS = {
 }
 
 
+MOST_CASES = 1_000_000
+_POSITIVE = f"give positive numbers, at most {MOST_CASES} cases"
+
+
 @dataclass(frozen=True)
 class Made:
     """What ``trial make`` wrote: the folder, how many cases, and the commitment of each by its number."""
@@ -134,8 +138,8 @@ def _made(assignment: Assignment, signals: str, suite: str, rng: np.random.Gener
 def _check(folder: Path, cases: int, seed: int, signals: str, suite: str) -> None:
     if (folder / "trial.json").exists():
         raise InputError(str(folder), "already holds a trial", "choose another folder")
-    if cases < 1 or seed < 0:
-        raise InputError("trial make", f"cannot make {cases} cases from seed {seed}", "give positive numbers")
+    if not 1 <= cases <= MOST_CASES or seed < 0:
+        raise InputError("trial make", f"cannot make {cases} cases from seed {seed}", _POSITIVE)
     if signals not in SIGNALS:
         raise InputError("--signals", f"is {signals!r}", "choose C, B or A")
     if suite not in SUITES:

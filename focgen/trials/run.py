@@ -6,9 +6,11 @@ has failed.
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -110,6 +112,7 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
     case, target = trial / "cases" / number, trial / kind / number
     with tempfile.TemporaryDirectory(prefix="focgen-trial-") as scratch:
         blind, out = Path(scratch) / "case", Path(scratch) / "out"
+        _check_plain(case, trial)
         try:
             shutil.copytree(case, blind)
         except OSError as reason:
@@ -117,6 +120,19 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
             raise InputError(str(case), what, "make the cases anew") from None
         blind_diagnosis(blind, out, limit, effects)
         replace_folder(out, target, trial)
+
+
+def _check_plain(case: Path, trial: Path) -> None:
+    """Raise InputError where copying a case would lead out of its trial, or would never end."""
+    found = [case, *(Path(at, name) for at, *names in os.walk(case) for name in itertools.chain(*names))]
+    for path in found:
+        mode = path.lstat().st_mode
+        if not (stat.S_ISDIR(mode) or stat.S_ISREG(mode)) or not _is_in(path, trial):
+            raise InputError(str(path), "is neither a file nor a folder of the trial", "make the cases anew")
+
+
+def _is_in(path: Path, trial: Path) -> bool:
+    return path.resolve().is_relative_to(trial.resolve())
 
 
 def blind_diagnosis(blind: Path, out: Path, limit: float, effects: tuple[str, ...] = ()) -> None:

@@ -53,3 +53,17 @@ def test_readme_begins_with_what_it_is_and_how_to_start():
     screen = "\n".join((ROOT / "README.md").read_text(encoding="utf-8").splitlines()[:30])
     for piece in ("make demo", "make test", "What it does not do", ".png", "microcontroller"):
         assert piece in screen
+
+
+def test_every_attack_names_a_test_that_is_there():
+    """And says so where it is no part of the short suite."""
+    page = (ROOT / "docs" / "attacks.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("|") and not set(line) <= set("|- ")]
+    named = [re.search(r"`(tests/[\w/]+\.py)::(\w+)`( \(long\))? \|$", row) for row in rows]
+    assert len(named) > 60 and [row for row, found in zip(rows, named) if not found] == [
+        "| attack | ends as | test |"
+    ] * page.count("\n## ")
+    for file, test, long in filter(None, (found and found.groups() for found in named)):
+        marks = re.search(rf"((?:^@.*\n)*)^def {test}\(", (ROOT / file).read_text("utf-8"), re.MULTILINE)
+        assert marks, f"{file} has no {test}"
+        assert ("mark.long" in marks[1]) == bool(long), test

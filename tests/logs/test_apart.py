@@ -200,3 +200,65 @@ def test_damaged_files_never_reach_the_caller(tmp_path):
             assert "\n" not in str(error)
             refused += 1
     assert read + refused == 10 and refused > 2
+
+
+# ------------------------------------------------------------------------------------- what HDF5 can name
+
+
+def seventy_three(path: Path, fill) -> Path:
+    """A MAT file of version 7.3: HDF5 behind MATLAB's header."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["t"] = TIME
+        fill(file, h5py)
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    return path
+
+
+def _virtual(file, h5py):
+    layout = h5py.VirtualLayout((20,), "f8")
+    layout[:] = h5py.VirtualSource("secret.mat", "u", (20,))
+    file.create_virtual_dataset("y", layout)
+
+
+def _linked(file, h5py):
+    file["out"] = h5py.ExternalLink("secret.mat", "/")
+    file["y"] = h5py.SoftLink("/out/u")
+
+
+ELSEWHERE = {
+    "an external link": lambda file, h5py: file.__setitem__("y", h5py.ExternalLink("secret.mat", "/u")),
+    "a link to that": _linked,
+    "raw numbers of any file": lambda file, h5py: file.create_dataset(
+        "y", (20,), "f8", external=[("secret.bin", 0, 160)]
+    ),
+    "a virtual array": _virtual,
+}
+
+
+@pytest.mark.parametrize("what", ELSEWHERE)
+def test_a_log_holds_nothing_of_other_files(tmp_path, what, monkeypatch):
+    """Sent on, a result would hold numbers of a file that nobody has named."""
+    monkeypatch.chdir(tmp_path)
+    seventy_three(tmp_path / "secret.mat", lambda file, h5py: file.__setitem__("u", TIME))
+    TIME.tofile(tmp_path / "secret.bin")
+    path = seventy_three(tmp_path / "log.mat", ELSEWHERE[what])
+    with pytest.raises(LogError, match="lies in another file"):
+        read_table(path)
+
+
+def test_links_within_a_log_lead_where_they_lead(tmp_path):
+    def fill(file, h5py):
+        file["group/u"] = TIME
+        file["again"], file["nowhere"] = h5py.SoftLink("/group/u"), h5py.SoftLink("/nothing")
+
+    found = read_table(seventy_three(tmp_path / "log.mat", fill))
+    assert np.array_equal(found.numbers("again"), TIME) and "nowhere" not in found
+
+    def circular(file, h5py):
+        file["group/u"] = TIME
+        file["group/group"] = file["group"]
+
+    with pytest.raises(LogError, match="RecursionError"):
+        read_table(seventy_three(tmp_path / "loop.mat", circular))

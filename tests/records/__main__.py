@@ -1,12 +1,14 @@
 """``python -m tests.records``: diagnose each benchmark's training record, replay what was found on the test.
 
 The data are looked for in ``--data`` or in the folder that FOCGEN_DATA names; what is absent is skipped. The
-test is read only for the last column of the table.
+test is read only for the last column of the table. Rows are kept in ``--out``: an interrupted run goes on,
+with ``--again`` all are measured anew.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import time
 from dataclasses import replace
@@ -14,8 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
+import focgen
+from focgen.custody import sha256_of
 from focgen.diagnosis.diagnose import diagnose
 from focgen.logs.experiment import Experiment
+from focgen.output import write_file
 from focgen.rig.files import read_rig
 from focgen.rig.replay import experiments, replay
 from focgen.rig.rig import Rig
@@ -39,6 +44,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(os.environ.get("FOCGEN_DATA", "data")))
     parser.add_argument("--out", type=Path, default=Path("build/records"))
     parser.add_argument("names", nargs="*", help="only those whose name begins so")
+    parser.add_argument("--again", action="store_true", help="measure what was measured before, too")
     given = parser.parse_args()
     print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|", flush=True)
     for benchmark in BENCHMARKS:
@@ -46,7 +52,23 @@ def main() -> None:
             continue
         missing = [f for f in (benchmark.train, benchmark.test) if not (given.data / f).exists()]
         row = [benchmark.name, f"skipped: {given.data} has no {missing[0]}"] if missing else None
-        print("| " + " | ".join(row or measured(benchmark, given.data, given.out)) + " |", flush=True)
+        print(
+            "| " + " | ".join(row or _row(benchmark, given.data, given.out, given.again)) + " |", flush=True
+        )
+
+
+def _row(benchmark: Benchmark, data: Path, out: Path, again: bool) -> list[str]:
+    """The row that was kept of the same benchmark, data and version of focgen; else measured."""
+    place = out / benchmark.name / "row.json"
+    digests = [sha256_of(data / file) for file in (benchmark.train, benchmark.test)]
+    made_from = [repr(benchmark), *digests, focgen.__version__]
+    if not again and place.is_file():
+        kept = json.loads(place.read_text(encoding="utf-8"))
+        if kept["made_from"] == made_from:
+            return kept["row"]
+    row = measured(benchmark, data, out)
+    write_file(place, json.dumps({"made_from": made_from, "row": row}) + "\n")
+    return row
 
 
 def measured(benchmark: Benchmark, data: Path, out: Path) -> list[str]:

@@ -5,6 +5,7 @@ Red when a file of a stranger's trial is believed unread, or one outside of it g
 
 import copy
 import json
+import os
 import random
 import shutil
 from pathlib import Path
@@ -75,6 +76,23 @@ def test_links_do_not_lead_out_of_a_trial(trial, precious, linked, capsys):
     assert "leads out of" in capsys.readouterr().err
     kept = outside / "data.txt" if linked == "runs/0001" else outside / "0001" / "data.txt"
     assert kept.read_text() == "years of work"
+
+
+@pytest.mark.parametrize("how", ("a device", "a pipe", "a link", "a linked folder", "a linked case"))
+def test_a_case_is_copied_from_within_its_trial_only(trial, precious, how, capsys):
+    """A log that is /dev/zero would fill the disk, a link to / would copy it all."""
+    case = trial / "cases" / "0001"
+    if how == "a pipe":
+        os.mkfifo(case / "logs" / "more.csv")
+    elif how == "a linked case":
+        shutil.rmtree(case)
+        case.symlink_to(precious)
+    else:
+        to = {"a device": "/dev/zero", "a link": precious / "data.txt", "a linked folder": precious}[how]
+        (case / "logs" / "more.csv").symlink_to(to)
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 2
+    assert "is neither a file nor a folder of the trial" in capsys.readouterr().err
+    assert not (trial / "runs" / "0001").exists()
 
 
 def test_a_folder_is_replaced_within_its_root_only(tmp_path, precious):

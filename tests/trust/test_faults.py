@@ -3,13 +3,19 @@
 Red when bad input or a full disk brings a traceback, another exit status, or half a folder.
 """
 
+import copy
+import functools
 import gzip
+import json
+import operator
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+import tomlkit
 
 from focgen.cli import generate as command
 from focgen.cli.main import main
@@ -19,6 +25,7 @@ from focgen.logs.table import read_table
 from focgen.plan.formats import exponent_for
 from focgen.textfile import read_regular
 from tests.controllers import seed_controller
+from tests.fuzz import seeds
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LEAD = """name = "lead"
@@ -204,3 +211,89 @@ def test_samples_that_no_memory_holds_are_refused_at_once(tmp_path, capsys):
     generate(seed_controller(5), tmp_path / "fw", "q15")
     assert main(["verify", str(tmp_path / "fw"), "--samples", "1" + "0" * 11]) == 2
     assert "--samples" in line(capsys)
+
+
+@pytest.mark.parametrize("name", ("log.csv", "log.csv.gz", "log.lvm"))
+@pytest.mark.parametrize("line", (b"1,", b"1", b'"1,', b" "))
+def test_a_line_without_end_is_refused_before_it_is_taken_apart(tmp_path, name, line):
+    """Packed to a few kilobytes, its cells would take gigabytes, and hours to be told from another kind."""
+    with (gzip.open if name.endswith("gz") else open)(tmp_path / name, "wb") as file:
+        file.write(b"t,u,y\n" + line * (3 << 18))
+    with pytest.raises(LogError, match="has a line of more than 256 KiB"):
+        read_table(tmp_path / name)
+
+
+def test_many_long_lines_are_looked_at_in_a_few(tmp_path):
+    """Each below the limit, all of them beyond what the dialect is looked for in."""
+    with open(tmp_path / "log.csv", "wb") as file:
+        file.writelines(b"1," * (1 << 16) + b"\n" for _ in range(100))
+    with pytest.raises(LogError, match="starts with numbers|columns, of which 4096"):
+        read_table(tmp_path / "log.csv")
+
+
+def test_cases_beyond_counting_are_refused_at_once(tmp_path, capsys):
+    assert main(["trial", "make", str(tmp_path / "t"), "--cases", "9" * 20, "--suite", "short"]) == 2
+    assert "at most 1000000 cases" in line(capsys) and not (tmp_path / "t").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no pipes with names")
+@pytest.mark.parametrize("how", ("a pipe", "a device"))
+@pytest.mark.parametrize(
+    "name", ("manifest.json", "spba.c", "controller.toml", "README.md", "b.manifest.json")
+)
+def test_no_file_of_a_folder_is_waited_for(tmp_path, name, how, capsys):
+    """Nor read for ever: by verify, by report, by generate of another controller."""
+    folder = tmp_path / "fw"
+    generate(seed_controller(5), folder, "q15")
+    (folder / name).unlink(missing_ok=True)
+    os.mkfifo(folder / name) if how == "a pipe" else (folder / name).symlink_to("/dev/zero")
+    assert main(["verify", str(folder), "--samples", "10"]) in (0, 2)
+    assert main(["report", str(folder), "--out", str(tmp_path / "page.html")]) in (0, 2)
+    other = ["generate", str(EXAMPLES / "controller.toml"), "--name", "other", "--length", "5", "--out"]
+    assert main([*other, str(folder)]) in (0, 2)
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_the_folder_one_stands_in_is_no_fault(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    controller, log = str(EXAMPLES / "controller.toml"), str(EXAMPLES / "logs" / "steps.csv")
+    for asked in (["init", log], ["report", controller]):
+        assert main([*asked, "--out", "."]) == 2
+        assert line(capsys).startswith("focgen: error: .: cannot be written")
+    assert main(["generate", controller, "--length", "5", "--out", "."]) == 0
+    assert (tmp_path / "spba.c").is_file() and capsys.readouterr().err == ""
+
+
+RIG = tomllib.loads(seeds.rig()[0].decode())
+EXTREMES = (1e308, 1e60, 1e-60, 5e-324, -1e60, 0.0)
+
+
+def numbers_of(table, way=()):
+    """Yield the way to each number of a TOML file."""
+    entries = (
+        table.items() if isinstance(table, dict) else enumerate(table) if isinstance(table, list) else ()
+    )
+    for key, value in entries:
+        if isinstance(value, float):
+            yield (*way, key)
+        yield from numbers_of(value, (*way, key))
+
+
+@pytest.mark.parametrize("way", list(numbers_of(RIG)), ids=lambda way: ".".join(map(str, way)))
+def test_no_number_of_a_rig_ends_as_nan(tmp_path, way, capsys):
+    """Each of a rig's numbers as large and as small as can be: replayed, and used for a design."""
+    (tmp_path / "log.csv").write_bytes(seeds.text(60)[0])
+    for number in EXTREMES:
+        rig = copy.deepcopy(RIG)
+        holder = functools.reduce(operator.getitem, way[:-1], rig)
+        holder[way[-1]] = number
+        (tmp_path / "rig.toml").write_text(tomlkit.dumps(rig))
+        for asked in (["replay", "rig.toml", "log.csv"], ["report", "rig.toml", "--out", "page.html"]):
+            words = [str(tmp_path / word) if "." in word else word for word in asked]
+            status = main([*words, "--json"])
+            out, err = capsys.readouterr()
+            assert status in (0, 1, 2), err
+            if status == 2:
+                assert err.startswith("focgen: error: ") and err.count("\n") == 1
+                continue
+            json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} at exit {status}"))
