@@ -17,6 +17,7 @@ from focgen.rig.dynamics import UNCHANGED, Dynamics
 from focgen.rig.effects import SLOTS, Form, Run
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
+from focgen.rig.weak import weakened
 
 STAGES = ("regulator", "actuator", "sensor")
 
@@ -206,16 +207,18 @@ def _actuator(
     drive = [_effect(p) for p in here if p.slot == "drive"]
     if actuator is None:
         return [*drive, _transfer(UNITY, between, delay)] if delay else drive
+    weak = [p for p in here if p.slot == "spring"]
     dynamics = UNCHANGED
     for p in here:
         if p.slot == "dynamics":
             dynamics = p.form.act(dynamics, p.values, None)
     if isinstance(actuator, LinearActuator):
         zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
-        return [*zero, *drive, *_linear(actuator, dynamics, between, delay)]
+        steps = _linear(actuator, dynamics, between, delay)
+        return [*zero, *drive, *weakened(steps, weak, actuator.dynamics.dc_gain)]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
     lag = _lag(1.0, actuator.T, actuator.alpha, replace(dynamics, mass=0.0), delay)
-    return [line, *drive, lag, *_swung(actuator.T, dynamics.mass)]
+    return [line, *drive, *weakened([lag, *_swung(actuator.T, dynamics.mass)], weak, 1.0)]
 
 
 def _linear(
@@ -291,6 +294,12 @@ _IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unloa
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     """Whether a form can act in a stage of this rig: what it changes of the actuator's own equation has to be
     in that equation."""
+    if form.slot == "spring":
+        return (
+            stage == "actuator"
+            and rig.actuator is not None
+            and not getattr(rig.actuator, "integrates", False)
+        )
     if form.slot != "dynamics":
         return True
     if stage != "actuator" or rig.actuator is None:

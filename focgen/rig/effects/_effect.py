@@ -18,11 +18,12 @@ from focgen.logs.begin import Begin
 STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
     "regulator": ("command", "supply"),
-    "actuator": ("load", "drive", "dynamics", "response"),
+    "actuator": ("load", "drive", "spring", "dynamics", "response"),
     "sensor": ("strain", "reading"),
 }
 """Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the
-pressure entering the actuator; ``drive``: K(p) p; ``dynamics``: the actuator's own equation; ``response``:
+pressure entering the actuator; ``drive``: K(p) p; ``spring``: by what the drive is larger for a spring that
+gives way, and is the slower for it; ``dynamics``: the actuator's own equation; ``response``:
 what leaves it; ``strain``: into the sensor; ``reading``: what leaves it."""
 
 
