@@ -295,11 +295,7 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     """Whether a form can act in a stage of this rig: what it changes of the actuator's own equation has to be
     in that equation."""
     if form.slot == "spring":
-        return (
-            stage == "actuator"
-            and rig.actuator is not None
-            and not getattr(rig.actuator, "integrates", False)
-        )
+        return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
     if form.slot != "dynamics":
         return True
     if stage != "actuator" or rig.actuator is None:
@@ -307,6 +303,14 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
     made: bool = changed <= _changeable(rig.actuator)
     return made
+
+
+def _has_spring(actuator: Actuator | LinearActuator) -> bool:
+    """Whether a spring pulls it back, and what drives it pulls at that."""
+    if isinstance(actuator, Actuator):
+        return True
+    num, den = actuator.dynamics.num, actuator.dynamics.den
+    return len(num) == 1 and num[0].order == 0.0 and len(den) > 1 and den[-1].order == 0.0
 
 
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:

@@ -22,14 +22,14 @@ _MOST = 1.8  # of it
 
 
 class Weak(Protocol):
-    """An effect that gives by what the drive is larger for the weaker spring."""
+    """An effect that gives how much further a weaker spring is bent at rest."""
 
     @property
     def values(self) -> tuple[float, ...]:
         """Its parameters."""
 
     def act(self, x: Array, run: Run) -> Array:
-        """The drive (n,) that would bend a nominal spring as far."""
+        """Where the spring would be with what bends a nominal one by ``x`` (n,)."""
 
 
 def weakened(steps: Sequence[Any], weak: Sequence[Any], gain: float) -> list[Any]:
@@ -37,9 +37,9 @@ def weakened(steps: Sequence[Any], weak: Sequence[Any], gain: float) -> list[Any
     nothing is, the same steps."""
     if not weak:
         return list(steps)
-    kept = [(("weak", p.effect, p.form.name, p.values), lambda x, run: x, p) for p in weak]
-    keys: tuple[Hashable, ...] = tuple(key for key, *_ in (*kept, *steps))
-    return [*kept, (keys, _bent([act for _, act, _ in steps], weak, gain), None)]
+    kept = [(("weak", p.effect, p.form.name, p.values), lambda y, run: y, p) for p in weak]
+    keys: tuple[Hashable, ...] = tuple(key for key, *_ in (*steps, *kept))
+    return [(keys, _bent([act for _, act, _ in steps], weak, gain), None), *kept]
 
 
 def _bent(
@@ -51,10 +51,9 @@ def _bent(
         return x
 
     def respond(x: Array, run: Run) -> Array:
-        lost = 1.0 - stiffness(x, weak, run)
         y = nominal(x, run)
         for _ in range(_TURNS):
-            before, y = y, nominal(x + lost * y / gain, run)
+            before, y = y, nominal(x + (1.0 - stiffness(y, weak, run)) * y / gain, run)
             if np.max(np.abs(y - before)) <= _CLOSE * np.max(np.abs(y)):
                 break
         return y
@@ -62,13 +61,11 @@ def _bent(
     return respond
 
 
-def stiffness(x: Array, weak: Sequence[Weak], run: Run) -> Array:
-    """Of the spring (n,), in units of the nominal one, under the drive ``x`` (n,): where that is 0, as it was
-    last."""
-    held = np.ones(len(x))
-    place = np.maximum.accumulate(np.where(x != 0.0, np.arange(len(x)), 0))
+def stiffness(y: Array, weak: Sequence[Weak], run: Run) -> Array:
+    """Of the spring (n,), in units of the nominal one, as it is bent by ``y`` (n,): at 0 as it was last."""
+    held = np.ones(len(y))
+    place = np.maximum.accumulate(np.where(y != 0.0, np.arange(len(y)), 0))
     for effect in weak:
-        driven = effect.act(x, run)
-        size = np.divide(driven, x, out=np.ones(len(x)), where=x != 0.0)[place]
-        held = held / np.maximum(size, 1e-3)
+        further = effect.act(y, run)
+        held = held / np.maximum(np.divide(further, y, out=np.ones(len(y)), where=y != 0.0)[place], 1e-3)
     return np.clip(held, _LEAST, _MOST)

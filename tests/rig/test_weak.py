@@ -52,7 +52,7 @@ def test_a_spring_that_weakens_with_time_against_an_integrator(mass):
 
 def test_what_a_spring_has_lost_outlives_the_session():
     y, left = made(Actuator(0.7, 0.8, (2.0,)), "softening", "worn", 0.5, 1.0)
-    assert left == {"largest": pytest.approx(2.0)}
+    assert left == {"largest": pytest.approx(np.max(y))}
     fresh = Chain(Rig("a", H, Signals("c", "y"), Actuator(0.7, 0.8, (2.0,))))
     assert y[290] > 1.2 * fresh.run(X, "regulator", "sensor", RUN)[290]
 

@@ -44,7 +44,7 @@ def unit_of_parameter(parameter: Parameter, slot: str, rig: Rig) -> str:
 def _level(slot: str, rig: Rig) -> str:
     """The unit of what passes ``slot``. What drives K(p) p is a curvature; a ``num``/``den`` is driven by its
     input."""
-    direct = slot in ("drive", "spring") and not isinstance(rig.actuator, Actuator)
+    direct = slot == "drive" and not isinstance(rig.actuator, Actuator)
     role = "pressure" if direct else _ROLES.get(slot, "curvature")
     return units_of_rig(rig)[role] or f"{role} unit"
 

@@ -22,8 +22,8 @@ SLOTS = {
     "sensor": ("strain", "reading"),
 }
 """Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the
-pressure entering the actuator; ``drive``: K(p) p; ``spring``: by what the drive is larger for a spring that
-gives way, and is the slower for it; ``dynamics``: the actuator's own equation; ``response``:
+pressure entering the actuator; ``drive``: K(p) p; ``spring``: how much further a spring that gives way is
+bent at rest, as a function of how far it was; ``dynamics``: the actuator's own equation; ``response``:
 what leaves it; ``strain``: into the sensor; ``reading``: what leaves it."""
 
 

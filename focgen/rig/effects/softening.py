@@ -53,11 +53,6 @@ def _worked(x: Array, values: Values, run: Run) -> Array:
     return _work(x, values, run)
 
 
-def _slowly_worn(x: Array, values: Values, run: Run) -> Array:
-    growth, scale = values
-    return x * (1.0 + growth * np.log1p(_done(x, run) / scale))
-
-
 def _leaves_peak(x: Array, values: Values, run: Run) -> dict[str, float]:
     return {"largest": float(_peak(x, run)[-1])}
 
@@ -87,8 +82,6 @@ EFFECT = Effect(
         # the spring itself gives way, and what it pulls back is the slower
         Form("worn", "spring", (_GROWTH, _scale(0.3, 1.0)), _worn, leaves=_leaves_peak),
         Form("worn_by_work", "spring", (_GROWTH, _scale(1.0, 5.0)), _worked, leaves=_leaves_work),
-        # by as much with each tenfold of the work, as rubbers do from cycle to cycle
-        Form("slowly_worn", "spring", (_GROWTH, _scale(0.5, 5.0)), _slowly_worn, leaves=_leaves_work),
         _curves.spline("drive", _peak, _leaves_peak),
     ],
 )
