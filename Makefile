@@ -172,7 +172,7 @@ lock:                          ## requirements/dev.lock anew: versions and hashe
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \
 	  --no-header --no-annotate --upgrade --quiet --output-file requirements/dev.lock
 
-headers: $(VENV)/ready         ## the runtime's header of 32-bit sums, printed from that of 16-bit ones
+headers: $(VENV)/ready         ## what in the runtime is the same but for a type, printed from one source
 	$(RUN) tools/twin_headers.py
 
 clean:                         ## remove everything that was built

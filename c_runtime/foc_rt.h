@@ -239,9 +239,9 @@ static inline int16_t foc_schedule_q15(int16_t x, const FOC_ROM int16_t *points,
     return (int16_t)(gains[i] + foc_shift32(slopes[i] * ((int32_t)x - points[i]), shifts[i]));
 }
 
-static inline int32_t foc_schedule_q31(int32_t x, const FOC_ROM int32_t *points,
-                                       const FOC_ROM int32_t *gains, const FOC_ROM int32_t *slopes,
-                                       const FOC_ROM uint8_t *shifts, uint16_t count)
+static inline int32_t foc_schedule_q31(int32_t x, const FOC_ROM int32_t *points, const FOC_ROM int32_t *gains,
+                                       const FOC_ROM int32_t *slopes, const FOC_ROM uint8_t *shifts,
+                                       uint16_t count)
 {
     uint16_t i = 0;
 
@@ -388,9 +388,8 @@ static inline float foc_schedule_f32(float x, const FOC_ROM float *points, const
     return gains[i] + slopes[i] * (x - points[i]);
 }
 
-static inline double foc_schedule_f64(double x, const FOC_ROM double *points,
-                                      const FOC_ROM double *gains, const FOC_ROM double *slopes,
-                                      uint16_t count)
+static inline double foc_schedule_f64(double x, const FOC_ROM double *points, const FOC_ROM double *gains,
+                                      const FOC_ROM double *slopes, uint16_t count)
 {
     uint16_t i = 0;
 

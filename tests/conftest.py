@@ -1,5 +1,7 @@
 """What every test may use: the rig and the controller of the paper, and the folder of open logs."""
 
+import gc
+import os
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,17 @@ def pytest_addoption(parser):
     parser.addoption(
         "--update-golden", action="store_true", help="write tests/golden anew from what is generated"
     )
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_test_waits_for_the_disk():
+    """No test takes the machine's power away. That a file is synced, and when, shows by the call
+    (`trust/test_lost.py`); some thousand times a test would wait for the disk and see nothing of it.
+    """
+    own = os.fsync
+    os.fsync = lambda handle: os.fstat(handle) and None  # which still refuses a handle that is none
+    yield
+    os.fsync = own
 
 
 _OPEN_DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "open"
@@ -64,3 +77,9 @@ def _paper_rig() -> Rig:
 @pytest.fixture(name="paper_controller")
 def _paper_controller() -> Controller:
     return paper_controller()
+
+
+def pytest_collection_finish():
+    """What was collected lives to the end: looking for garbage passes it by."""
+    gc.collect()
+    gc.freeze()

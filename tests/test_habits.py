@@ -5,6 +5,7 @@ public name without a docstring, or a public function that raises an error of ou
 """
 
 import ast
+import functools
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -19,7 +20,6 @@ from focgen import errors
 PACKAGE = Path(focgen.__file__).parent
 ROOT = PACKAGE.parent
 FILES = sorted(PACKAGE.rglob("*.py"))
-TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in FILES}
 ERRORS = {
     name
     for name, one in vars(errors).items()
@@ -29,8 +29,14 @@ LONGEST = 65  # lines of a function, its docstring with it; `identify` tells sev
 FORKS = (ast.If, ast.For, ast.While, ast.ExceptHandler, ast.match_case)
 
 
+@functools.cache
+def _trees():
+    """Read by who needs them: every process of the suite collects this file, one runs it."""
+    return {file: ast.parse(file.read_text(encoding="utf-8")) for file in FILES}
+
+
 def _functions():
-    for file, tree in TREES.items():
+    for file, tree in _trees().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef):
                 yield f"{file.relative_to(ROOT)}:{node.lineno} {node.name}", node
@@ -100,7 +106,7 @@ def _raised(function):
 def test_public_functions_name_the_errors_that_they_raise():
     silent = [
         f"{file.relative_to(ROOT)}:{function.lineno} {function.name}: {error}"
-        for file, tree in TREES.items()
+        for file, tree in _trees().items()
         for function, above in _public(tree)
         for error in _raised(function)
         if error not in f"{ast.get_docstring(function)} {above}"
@@ -113,7 +119,7 @@ def test_public_names_say_what_they_are():
     """But for what every command has, `add_arguments` and `run`."""
     silent = [
         f"{file.relative_to(ROOT)}:{node.lineno} {node.name}"
-        for file, tree in TREES.items()
+        for file, tree in _trees().items()
         for node in (*(n for n in tree.body if isinstance(n, ast.ClassDef)), *(f for f, _ in _public(tree)))
         if not node.name.startswith("_")
         and not ast.get_docstring(node)

@@ -66,7 +66,7 @@ def _add_variants(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="of exponential memory, samples at the controller's sample time (default: the controller's)",
     )
-    parser.add_argument("--arithmetic", nargs="+", choices=ARITHMETICS, help="default: all four")
+    parser.add_argument("--arithmetic", nargs="+", choices=ARITHMETICS, help="default: all")
     parser.add_argument(
         "--sample-times",
         nargs="+",

@@ -139,6 +139,7 @@ def _quantity(value: float, unit: str) -> UserText:
 
 def _signals(plan: Plan) -> list[Signal]:
     ranges, units = plan.controller.ranges, plan.controller.units
+    prefix = plan.name.upper()
     rows = [
         ("ref", "reference", ranges.reference, units.measurement, plan.reference, "REF_LSB"),
         ("meas", "measurement", ranges.measurement, units.measurement, plan.measurement, "REF_LSB"),
@@ -150,7 +151,7 @@ def _signals(plan: Plan) -> list[Signal]:
             2, ("sched", "scheduling signal", present(ranges.schedule), units.schedule, signal, "SCHED_LSB")
         )
     return [
-        Signal(name, what, f"{ends[0]:g}", f"{ends[1]:g}", UserText(unit), f"{plan.name}_{lsb}", form.bits)
+        Signal(name, what, f"{ends[0]:g}", f"{ends[1]:g}", UserText(unit), f"{prefix}_{lsb}", form.bits)
         for name, what, ends, unit, form, lsb in rows
     ]
 

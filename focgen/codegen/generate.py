@@ -150,9 +150,7 @@ def folder_files(
     inputs = {"controller.toml": digest, **{name: sha256(content) for name, content in runtime.items()}}
     manifest = manifest_of(plan, inputs, selftest, kernels, floats)
     if package != PLAIN:
-        added = {name: sha256(text) for name, text in files.items() if name not in (*compiled, *beside)}
-        added.pop("controller.toml")
-        manifest["package"] = {**package.entry, "files": added}
+        manifest["package"] = package.entry
     manifest["files"] = {name: sha256(content) for name, content in sorted(files.items())}
     return {**files, "manifest.json": _json(manifest)}
 

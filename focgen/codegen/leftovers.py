@@ -38,9 +38,9 @@ def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tupl
 
 
 def _packaged(manifest: dict[str, Any], name: str) -> Iterator[tuple[str, str]]:
-    """Yield file and digest of what a package added, where these are its own names: a manifest from elsewhere
+    """Yield file and digest of what a package added, known by its own names: a manifest from elsewhere
     leads to no other file."""
-    listed = _of(manifest.get("package"), "files")
+    listed = manifest.get("files")
     for file, digest in listed.items() if isinstance(listed, dict) else ():
         if package_file(file, name) and isinstance(digest, str):
             yield file, digest

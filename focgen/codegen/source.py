@@ -335,7 +335,7 @@ def _integral(plan: Plan) -> IntegralText | None:
     return IntegralText(
         ctype=state.ctype,
         clamp=f"{CLAMP[state.ctype]}({total}, {ends})",
-        about=_proved(plan, "integrator sum", state.bits),
+        about="; ".join(filter(None, (_proved(plan, "integrator sum", state.bits), _ends_about(plan)))),
         start=literal(start, state.ctype),
         start_about=quantity(start * state.lsb, plan.controller.units.output),
         zero=literal(0, plan.increment.ctype),
@@ -345,6 +345,15 @@ def _integral(plan: Plan) -> IntegralText | None:
         else converted("u", u.ctype, state.ctype) + scaled_up(state.ctype, by),
         starting=starts(plan),
     )
+
+
+def _ends_about(plan: Plan) -> str:
+    """What the integral's ends stand for, where they are written as counts."""
+    state = present(plan.integrator).state
+    if state.floating or plan.tuning:
+        return ""
+    span = quantity(state.high * state.lsb, plan.controller.units.output)
+    return f"clamped to {state.low * state.lsb:g} ... {span}, in counts of {scale(state.lsb, state.unit)}"
 
 
 def _change(plan: Plan) -> str:

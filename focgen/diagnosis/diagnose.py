@@ -21,7 +21,8 @@ from focgen.diagnosis.problem.decimate import decimated
 from focgen.diagnosis.problem.segments import cuts, make
 from focgen.diagnosis.problem.smooth import freed
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
-from focgen.diagnosis.verdict import compose, verdict
+from focgen.diagnosis.verdict import compose
+from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
 from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.errors import FocgenError, LogError
@@ -73,10 +74,10 @@ def diagnose(
     nominal, session = decimated(nominal, session)
     session = begun_session(nominal, session)
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
-    nominal = explanations[0].told(nominal)
+    nominal = explanations[0].with_intersample(nominal)
     rigs = compose.compose(nominal, explanations, session)
     session = begun_with(rigs.fitted, rigs.placed, session)
-    rigs, diagnosis, evidence = verdict.reach(nominal, session, rigs, explanations, ran, only is not None)
+    rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
     proposed = propose(nominal, session, explanations, diagnosis.causes)
     diagnosis = replace(
         diagnosis,
@@ -134,8 +135,8 @@ def explain_all(
                 e = explain(rig, segment, logs, asked, only, trusted)
         found.append(e)
         problem, unknown = e.best.problem, is_unknown(e)
-        trusted = e.left.share < NUMBERS.much and not e.causes and not unknown
+        trusted = e.predictability.share < NUMBERS.much and not e.causes and not unknown
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
-        x = freed(segment, made, response, e.left.share, not unknown)
+        x = freed(segment, made, response, e.predictability.share, not unknown)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)

@@ -184,7 +184,7 @@ class Numbers:
     )
     stays: float = _number(
         0.5,
-        "left of a disturbance beside effects that do not explain it",
+        "left by effects that do not explain it: of a disturbance, or of a gap on parts not seen",
         "of the mean square",
         "tuning cases",
         "not measured",

@@ -20,7 +20,7 @@ from focgen.identification.identification import ExperimentFit, Identification, 
 from focgen.identification.known_actuator import answer_from_its_past
 from focgen.identification.past import worth_it
 from focgen.identification.quality import bic, effective_samples, gof
-from focgen.identification.reach import seen_ranges
+from focgen.identification.ranges import seen_ranges
 from focgen.identification.remarks import remarks_of
 from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage

@@ -13,8 +13,8 @@ import numpy as np
 
 from focgen.identification.projected import Problem, Solved, mean_square
 from focgen.identification.rational import Record, responses
+from focgen.logs.between import white_level
 
-_NORMAL = 0.6745  # median of |x| of a standard normal x
 _PULSE = 4096  # samples
 
 
@@ -25,8 +25,7 @@ def input_noise(records: Sequence[Record]) -> float:
     """
     if records[0].hold == "zero":
         return 0.0
-    bends = [np.median(np.abs(np.diff(r.drive, 2))) / _NORMAL for r in records]
-    return float(np.mean(np.square(bends))) / 6.0
+    return float(np.mean([white_level(r.drive) ** 2 for r in records]))
 
 
 def passed(problem: Problem, solved: Solved) -> float:

@@ -1,21 +1,16 @@
 /* Plants whose spring bends: what they take from the input depends on the response itself, which is solved for at every sample.
  * `spring` = {first, second, scale, place, stiffness}: the spring takes y (first q + second q^2), q = |y|/scale, from the input, and
  * beyond q = FAR no more than its slope there; an obstacle beyond y = `place` takes stiffness (y - place).
- * Two more numbers, `slide` and `stick`, are of dry friction, as in kernels.c.
+ * Two more numbers, `slide` and `stick`, are of dry friction, as in kernels.c. The last, `preload`, presses the spring against a seat at
+ * y = 0: what is there stays until more than that pushes it, and what moves back comes to rest there.
  * `rest` is as in kernels.c.
  */
 #include <math.h>
 #include "bent.h"
+#include "modes.h"
 
 enum { BALANCED = 2, TURNS = 40 };
 static const double FLAT = 0.05, CLOSE = 1e-7; /* Newton's step squares what is missing */
-
-static double pull(const double *spring, double y, double *slope)
-{
-    double taken = bent(spring, y, slope);
-    if (y > spring[3]) taken += spring[4] * (y - spring[3]), *slope += spring[4];
-    return taken;
-}
 
 /* y = still + gain (x - pull(y)), by Newton's rule from `y`; a spring that gives way altogether is kept from it. */
 static double solved(const double *spring, double still, double gain, double x, double y)
@@ -28,25 +23,42 @@ static double solved(const double *spring, double still, double gain, double x, 
     return y;
 }
 
-/* The same with dry friction, from the place `last` of the sample before; `taken` is what spring and friction take from x. */
+/* What a preload of this size takes at y = 0 of what pushes there, `most` at most, and beyond to the side of `y`. */
+static double seated(double preload, double y, double pushed)
+{
+    if (y == 0.0 && fabs(pushed) <= preload) return pushed;
+    return (y == 0.0 ? pushed : y) < 0.0 ? -preload : preload;
+}
+
+/* The same with dry friction and a preload, from the place `last` of the sample before; `taken` is what all of them take from x. */
 static double moved(const double *spring, double still, double gain, double x, double last, int *moving, double *taken)
 {
-    double slope, drag = 0.0, slide = spring[5], stick = spring[6];
+    double slope, drag = 0.0, slide = spring[5], stick = spring[6], preload = spring[7];
     if (stick > 0.0) {
-        double pulled = pull(spring, last, &slope), borne = x - pulled - (last - still) / gain;
-        if (fabs(borne) <= (*moving ? slide : stick)) {
-            *moving = 0, *taken = pulled + borne;
+        double pushed = x - (last - still) / gain, pulled = pull(spring, last, &slope);
+        pulled += seated(preload, last, pushed - pulled);
+        if (fabs(pushed - pulled) <= (*moving ? slide : stick)) {
+            *moving = 0, *taken = pushed;
             return last;
         }
-        *moving = 1, drag = borne < 0.0 ? -slide : slide;
+        *moving = 1, drag = pushed < pulled ? -slide : slide;
     }
-    double y = solved(spring, still, gain, x - drag, last);
-    *taken = pull(spring, y, &slope) + drag;
+    double held = seated(preload, 0.0, x - drag + still / gain); /* all that pushes at the seat, or the preload */
+    if (preload > 0.0 && fabs(held) < preload) {
+        *taken = x + still / gain;
+        return 0.0;
+    }
+    double y = solved(spring, still, gain, x - drag - held, last);
+    *taken = pull(spring, y, &slope) + drag + held;
     return y;
 }
 
 /* What is left of x for what has come to rest from 0. */
-static double came(const double *spring, double x) { return fabs(x) > spring[5] ? x - (x < 0.0 ? -spring[5] : spring[5]) : 0.0; }
+static double came(const double *spring, double x)
+{
+    double most = spring[5] + spring[7];
+    return fabs(x) > most ? x - (x < 0.0 ? -most : most) : 0.0;
+}
 
 /* As focgen_modes of kernels.c. */
 void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
@@ -60,12 +72,10 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
             zr = zi = past = last = 0.0, moving = 0;
         }
         if (rest[k] == BALANCED) {
-            double dr = 1.0 - pair[0], di = -pair[1], br = pair[2] + pair[4], bi = pair[3] + pair[5], size = dr * dr + di * di;
-            double gr = (br * dr + bi * di) / size, gi = (bi * dr - br * di) / size, gain = through + gr;
-            for (int i = 0; i < m; i++) gain += (b0[i] + b1[i]) / (1.0 - a[i]);
+            double gr, gi, gain = gain_at_rest(m, a, b0, b1, pair, through, &gr, &gi);
             last = solved(spring, 0.0, gain, came(spring, x[k]), 0.0);
             past = came(spring, x[k]) - pull(spring, last, &slope);
-            for (int i = 0; i < m; i++) z[i] = (b0[i] + b1[i]) / (1.0 - a[i]) * past;
+            settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
         int down = switching && fabs(x[k]) < fabs(last);
@@ -79,9 +89,7 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
         last = y[k] = moved(spring, still, gain, x[k], last, &moving, &taken);
         double now = x[k] - taken;
         for (int i = 0; i < m; i++) z[i] += B1[i] * now;
-        double re = P[0] * zr - P[1] * zi + P[2] * past + P[4] * now;
-        zi = P[0] * zi + P[1] * zr + P[3] * past + P[5] * now;
-        zr = re;
+        turn(P, past, now, &zr, &zi);
         past = now;
     }
 }

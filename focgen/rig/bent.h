@@ -12,3 +12,11 @@ static double bent(const double *spring, double y, double *slope)
     double size = spring[2] * ((spring[0] + spring[1] * near) * near * near + *slope * (q - near));
     return y < 0.0 ? -size : size;
 }
+
+/* The same with an obstacle: `spring` goes on with {place, stiffness}, and beyond y = place it takes stiffness (y - place). */
+static double pull(const double *spring, double y, double *slope)
+{
+    double taken = bent(spring, y, slope);
+    if (y > spring[3]) taken += spring[4] * (y - spring[3]), *slope += spring[4];
+    return taken;
+}

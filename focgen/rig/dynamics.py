@@ -62,17 +62,20 @@ STRAIGHT, NO_FRICTION, LINEAR, LEVEL = Bend(), Friction(), Spring(), Rise()
 class Dynamics:
     """What effects change of an actuator's own equation.
 
-    Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response;
+    Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response,
+    and a mass has a damper weaker by that factor while it falls back to 0;
     beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place). Of that and of any other
-    spring y follows ``bend``, and dry friction, the ``drag``, takes away from x, in its unit. Of a
-    :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``,
-    and the ``rise`` of its drag.
+    spring y follows ``bend``, and dry friction, the ``drag``, takes away from x, in its unit.
+    So does a ``preload``, which presses the spring against a seat at 0. A ``mass`` in s² adds mass·D² y. Of a
+    :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag.
     """
 
     unloading: float = 1.0
     place: float = 0.0
     stiffness: float = 0.0
     drag: Friction = NO_FRICTION
+    preload: float = 0.0
+    mass: float = 0.0
     bend: Bend = STRAIGHT
     spring: Spring = LINEAR
     rise: Rise = LEVEL
@@ -84,10 +87,10 @@ class Dynamics:
 
     def bending(self, gain: float = 1.0) -> tuple[float, ...]:
         """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, and
-        of the drag."""
+        of what bears a part of the input."""
         bend = self.bend
         obstacle = self.place, self.stiffness / gain
-        return bend.first / gain, bend.second / gain, bend.scale, *obstacle, *self.drag.held
+        return bend.first / gain, bend.second / gain, bend.scale, *obstacle, *self.drag.held, self.preload
 
 
 UNCHANGED = Dynamics()

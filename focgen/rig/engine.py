@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
+from focgen.present import present
 from focgen.rig import linear
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
@@ -16,6 +17,7 @@ from focgen.rig.dynamics import UNCHANGED, Dynamics
 from focgen.rig.effects import SLOTS, Form, Run
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
+from focgen.rig.weak import weakened
 
 STAGES = ("regulator", "actuator", "sensor")
 
@@ -30,6 +32,11 @@ class Placed:
     stage: str
     values: tuple[float, ...]
     carried: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def named(self) -> dict[str, float]:
+        """Its parameters by name."""
+        return {p.name: float(v) for p, v in zip(self.form.parameters, self.values)}
 
     def act(self, x: Array, run: Run) -> Array:
         """What leaves it when ``x`` (n,) enters."""
@@ -200,15 +207,18 @@ def _actuator(
     drive = [_effect(p) for p in here if p.slot == "drive"]
     if actuator is None:
         return [*drive, _transfer(UNITY, between, delay)] if delay else drive
+    weak = [p for p in here if p.slot == "spring"]
     dynamics = UNCHANGED
     for p in here:
         if p.slot == "dynamics":
             dynamics = p.form.act(dynamics, p.values, None)
     if isinstance(actuator, LinearActuator):
         zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
-        return [*zero, *drive, *_linear(actuator, dynamics, between, delay)]
+        steps = _linear(actuator, dynamics, between, delay)
+        return [*zero, *drive, *weakened(steps, weak, actuator.dynamics.dc_gain)]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
-    return [line, *drive, _lag(1.0, actuator.T, actuator.alpha, dynamics, delay)]
+    lag = _lag(1.0, actuator.T, actuator.alpha, replace(dynamics, mass=0.0), delay)
+    return [line, *drive, *weakened([lag, *_swung(actuator.T, dynamics.mass)], weak, 1.0)]
 
 
 def _linear(
@@ -216,14 +226,40 @@ def _linear(
 ) -> list[Step]:
     if dynamics == UNCHANGED:
         return [_transfer(actuator.dynamics, between, delay)]
+    if dynamics.mass:
+        return _massive(actuator, dynamics, between, delay)
     plant, changed = plants.plant_of(actuator.dynamics), dynamics.changed
-    if plant is not None and (changed == {"drag"} or changed & {"spring", "rise"}):
+    if plant is not None and (changed == {"drag"} or (plant.order == 2 and changed & _IN_STEPS)):
         return [_plant(plant, dynamics, between, delay)]
     lag = linear.single_lag(actuator.dynamics)
     if not lag:
         return [_bent(actuator.dynamics, dynamics, between, delay)]
     gain, T, alpha = lag
-    return [_lag(gain, T, alpha, replace(dynamics, drag=dynamics.drag * abs(gain)), delay)]
+    borne = replace(dynamics, drag=dynamics.drag * abs(gain), preload=dynamics.preload * abs(gain))
+    return [_lag(gain, T, alpha, borne, delay)]
+
+
+def _massive(
+    actuator: LinearActuator, dynamics: Dynamics, between: Between | bool, delay: float
+) -> list[Step]:
+    """With a further mass: of whole orders one more term in the equation, of a fractional lag as of that."""
+    light, of = replace(dynamics, mass=0.0), actuator.dynamics
+    if plants.plant_of(of) is None:
+        _, T, _ = present(linear.single_lag(of))
+        return [*_linear(actuator, light, between, delay), *_swung(T, dynamics.mass)]
+    den = {t.order: t.coefficient for t in of.den}
+    den[2.0] = den.get(2.0, 0.0) + dynamics.mass * den[0.0]
+    heavy = TransferFunction(of.num, [(c, order) for order, c in sorted(den.items(), reverse=True)])
+    return _linear(replace(actuator, dynamics=heavy), light, between, delay)
+
+
+def _swung(T: float, mass: float) -> list[Step]:
+    """What a mass makes of a lag's response: exactly that of mass D² y + T D y + y where the lag is of order
+    1; from one sample to the next the response runs in a line."""
+    if not mass:
+        return []
+    swing = TransferFunction([(T, 1.0), (1.0, 0.0)], [(mass, 2.0), (T, 1.0), (1.0, 0.0)])
+    return [_transfer(swing, Between.STRAIGHT, 0.0)]
 
 
 def _plant(plant: plants.Plant, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:
@@ -250,12 +286,16 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
     )
 
 
-_OF_LAGS = frozenset({"unloading", "place", "stiffness", "bend", "drag"})  # what effects may change of a lag
+# what effects may change of a lag; of a mass on a spring, beside bend and drag, and run in steps
+_OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "mass", "bend", "drag"})
+_IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unloading", "mass"})
 
 
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     """Whether a form can act in a stage of this rig: what it changes of the actuator's own equation has to be
     in that equation."""
+    if form.slot == "spring":
+        return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
     if form.slot != "dynamics":
         return True
     if stage != "actuator" or rig.actuator is None:
@@ -265,14 +305,23 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     return made
 
 
+def _has_spring(actuator: Actuator | LinearActuator) -> bool:
+    """Whether a spring pulls it back, and what drives it pulls at that."""
+    if isinstance(actuator, Actuator):
+        return True
+    num, den = actuator.dynamics.num, actuator.dynamics.den
+    return len(num) == 1 and num[0].order == 0.0 and len(den) > 1 and den[-1].order == 0.0
+
+
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
     """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
-    spring that bends where there is one; dry friction on what moves, and on a mass the hysteretic one."""
+    spring that bends where there is one; dry friction on what moves; of a mass on a spring also a hysteretic
+    one, an obstacle, a preload, its damper and its mass."""
     if isinstance(actuator, Actuator) or linear.single_lag(actuator.dynamics):
         return _OF_LAGS
     plant = plants.plant_of(actuator.dynamics)
     found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
     if plant is not None:
         found |= {"drag"} | ({"rise"} if plant.order == 2 else set())
-        found |= {"spring"} if plant.order == 2 and not plant.integrates else set()
+        found |= _IN_STEPS if plant.order == 2 and not plant.integrates else set()
     return frozenset(found)

@@ -3,6 +3,7 @@
  * or, where it is BALANCED, in equilibrium with x[k] as if that had been held for ever; a loop of friction comes to it from 0.
  */
 #include <math.h>
+#include "modes.h"
 
 enum { BALANCED = 2 };
 
@@ -23,13 +24,11 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
             for (int i = 0; i < m; i++) z[i] = 0.0;
             zr = zi = past = last = 0.0, moving = 0;
             if (rest[k] == BALANCED) {
-                double dr = 1.0 - pair[0], di = -pair[1], br = pair[2] + pair[4], bi = pair[3] + pair[5], size = dr * dr + di * di;
-                double gr = (br * dr + bi * di) / size, gi = (bi * dr - br * di) / size, gain = through + gr;
-                for (int i = 0; i < m; i++) gain += (b0[i] + b1[i]) / (1.0 - a[i]);
+                double gr, gi, gain = gain_at_rest(m, a, b0, b1, pair, through, &gr, &gi);
                 double left = fabs(x[k]) > slide ? x[k] - (x[k] < 0.0 ? -slide : slide) : 0.0;
                 double beyond = (gain * left - place) / (1.0 + gain * stiffness);
                 past = stiffness > 0.0 && beyond > 0.0 ? left - stiffness * beyond : left;
-                for (int i = 0; i < m; i++) z[i] = (b0[i] + b1[i]) / (1.0 - a[i]) * past;
+                settle(m, a, b0, b1, past, z);
                 zr = gr * past, zi = gi * past, last = gain * past;
             }
         }
@@ -56,9 +55,7 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
             z[i] = A[i] * z[i] + B0[i] * past + B1[i] * now;
             sum += z[i];
         }
-        double re = P[0] * zr - P[1] * zi + P[2] * past + P[4] * now;
-        zi = P[0] * zi + P[1] * zr + P[3] * past + P[5] * now;
-        zr = re;
+        turn(P, past, now, &zr, &zi);
         past = now;
         last = y[k] = through * now + sum + zr;
     }

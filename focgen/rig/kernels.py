@@ -213,7 +213,7 @@ def bent_modes(
     switching: bool,
     spring: Sequence[float],
 ) -> Array:
-    """As :func:`modes`, with the input less what ``spring`` (7,) takes: see ``bending.c``."""
+    """As :func:`modes`, with the input less what ``spring`` (8,) takes: see ``bending.c``."""
     ffi, _ = _library()
     tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
     scratch = np.empty(tables[0].shape[1])
@@ -234,7 +234,7 @@ def bent_modes(
 
 
 def bent_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, spring: Sequence[float]) -> Array:
-    """As :func:`rational`, with ``c`` the numerator for what ``spring`` (7,) takes from the input."""
+    """As :func:`rational`, with ``c`` the numerator for what ``spring`` (8,) takes from the input."""
     ffi, _ = _library()
     order = max(len(a), len(b), len(c)) - 1
     scratch, *tables = np.zeros((4, order + 1))

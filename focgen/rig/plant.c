@@ -3,7 +3,10 @@
  * F is Coulomb's: `slide` against the velocity, up to `stick` where nothing moves; of a plant of second order it rises by `rise`
  * (1 - exp(-|y'|/speed)) as it moves. w = soft (q - y) is what a hysteretic
  * spring takes away from the linear one: dq/dy = 1 - K |p|^power scale^(1 - power), p = q in the direction of motion, with K = `loading`
- * where p > 0 and -`unloading` where it is not (Bouc and Wen). Beside it the spring may bend, as in bent.h: w holds that, too.
+ * where p > 0 and -`unloading` where it is not (Bouc and Wen). Beside it the spring may bend, and an obstacle push, as in bent.h: w
+ * holds that, too. A `preload` presses a plant of second order against a seat at y = 0, which catches what comes back to it: there
+ * nothing moves until more than the preload pushes, and on either side that much is lost. A damper may be `falling` as strong as the
+ * plant falls back to 0, where it is of second order: it has tables of its own, behind the others.
  *
  * Between events the equation is linear, and a step is exact for an input that is a cubic: `tables` hold, for steps of h/2^level from
  * `level` = base on, what the state and the four coefficients of the input count. w is a cubic through its values and slopes at the
@@ -22,19 +25,25 @@ typedef struct {
     int order, base, last;
     double h, m, c, k, slide, stick, soft, loading, unloading, power, scale, rise, speed;
     const double *bend, *tables;
-    int bends, curved; /* whether the spring bends; whether there is a w, or friction that depends on the speed */
+    int bends, curved; /* whether the spring bends or meets an obstacle; whether there is a w, or friction that depends on the speed */
+    double preload, falling;
 } Plant;
 
 typedef struct {
     double y, v, q, grown; /* grown: |q|^power scale^(1 - power) */
     double speed, spared;  /* a magnitude of the velocity and exp(-|v|/speed) there */
-    int moving;            /* the sign of the velocity, 0: stuck */
+    int moving, side;      /* the sign of the velocity, 0: stuck; the side of the seat, 0: on it */
 } State;
+
+/* Whether it moves towards 0 under a damper that is another there. */
+static int falls(const Plant *p, const State *s) { return p->falling != p->c && s->moving * s->y < 0.0; }
+
+static double damper(const Plant *p, const State *s) { return falls(p, s) ? p->falling : p->c; }
 
 static double taken(const Plant *p, const State *s)
 {
     double slope;
-    return (p->soft != 0.0 ? p->soft * (s->q - s->y) : 0.0) + (p->bends ? bent(p->bend, s->y, &slope) : 0.0);
+    return (p->soft != 0.0 ? p->soft * (s->q - s->y) : 0.0) + (p->bends ? pull(p->bend, s->y, &slope) : 0.0);
 }
 
 /* |q|^power scale^(1 - power), from `then` where it was so at `old`: near there by the binomial series. */
@@ -72,7 +81,7 @@ static double risen(const Plant *p, State *s, int sign) { return p->rise != 0.0 
  * `span`. */
 static double yielded(const Plant *p, State *s, int sign, double u, double span, double *rate)
 {
-    double slope = 0.0, held = p->bends ? bent(p->bend, s->y, &slope) : 0.0, gained = 0.0;
+    double slope = 0.0, held = p->bends ? pull(p->bend, s->y, &slope) : 0.0, gained = 0.0;
     if (p->soft != 0.0) {
         held += p->soft * (s->q - s->y);
         slope += p->soft * (steepness(p, sign * s->q, s->grown) - 1.0);
@@ -80,7 +89,7 @@ static double yielded(const Plant *p, State *s, int sign, double u, double span,
     if (p->rise != 0.0) {
         double left = spared(p, s);
         held += sign * p->rise * (1.0 - left);
-        gained = (u - p->k * s->y - p->c * s->v - held - sign * p->slide) / p->m * p->rise / p->speed * left;
+        gained = (u - p->k * s->y - damper(p, s) * s->v - held - sign * p->slide - s->side * p->preload) / p->m * p->rise / p->speed * left;
     }
     *rate = span * (s->v * slope + gained);
     return held;
@@ -146,9 +155,10 @@ static void wind(const Plant *p, State *s, double move)
 /* The state after a step of `level` with the input `d` (4 coefficients over the step), friction at `sign` times `slide`. */
 static State stepped(const Plant *p, State s, const double *d, int level, int sign)
 {
-    const double *t = p->tables + 12 * (level - p->base);
-    double span = p->h / (double)(1 << level), f[4] = {d[0] - sign * p->slide, d[1], d[2], d[3]};
-    double at_end = d[0] + d[1] + d[2] + d[3] - sign * p->slide, slope = 0.0;
+    const double *t = p->tables + 12 * (level - p->base + (falls(p, &s) ? p->last - p->base + 1 : 0));
+    double borne = sign * p->slide + s.side * p->preload;
+    double span = p->h / (double)(1 << level), f[4] = {d[0] - borne, d[1], d[2], d[3]};
+    double at_end = d[0] + d[1] + d[2] + d[3] - borne, slope = 0.0;
     double before = p->curved ? yielded(p, &s, sign, d[0], span, &slope) : 0.0;
     double then = before + slope, steep = slope;
     State to = s;
@@ -160,14 +170,17 @@ static State stepped(const Plant *p, State s, const double *d, int level, int si
         if (!p->curved) break;
         to.q = s.q, to.grown = s.grown;
         wind(p, &to, to.y - s.y);
-        then = yielded(p, &to, sign, at_end + sign * p->slide, span, &steep);
+        then = yielded(p, &to, sign, at_end + borne, span, &steep);
     }
     if (p->order == 1) to.v = (at_end - p->k * to.y - taken(p, &to)) / p->m;
     return to;
 }
 
 /* What pushes a plant at rest when the input is `u`. */
-static double push(const Plant *p, const State *s, double u) { return u - p->k * s->y - taken(p, s); }
+static double push(const Plant *p, const State *s, double u) { return u - p->k * s->y - taken(p, s) - s->side * p->preload; }
+
+/* What it takes to move a plant at rest. */
+static double holds(const Plant *p, const State *s) { return s->side ? p->stick : p->stick + p->preload; }
 
 /* Stuck, moving on, or turned round, by what pushes it. */
 static void decide(const Plant *p, State *s, double u)
@@ -179,7 +192,8 @@ static void decide(const Plant *p, State *s, double u)
         s->v = (pushed - s->moving * p->slide) / p->m;
         return;
     }
-    s->moving = fabs(pushed) > p->stick ? (pushed > 0.0 ? 1 : -1) : 0;
+    s->moving = fabs(pushed) > holds(p, s) ? (pushed > 0.0 ? 1 : -1) : 0;
+    if (!s->side) s->side = s->moving;
     s->v = s->moving && p->order == 1 ? (pushed - s->moving * p->slide) / p->m : 0.0;
 }
 
@@ -204,9 +218,9 @@ static int dips(const Plant *p, State *s, State *to, const double *d)
 {
     if (p->order == 1) return 0;
     int sign = s->moving;
-    double first = push(p, s, d[0]) - p->c * s->v - sign * p->slide - risen(p, s, sign);
+    double first = push(p, s, d[0]) - damper(p, s) * s->v - sign * p->slide - risen(p, s, sign);
     if (sign * first >= 0.0) return 0;
-    return sign * (push(p, to, d[0] + d[1] + d[2] + d[3]) - p->c * to->v - sign * p->slide - risen(p, to, sign)) > 0.0;
+    return sign * (push(p, to, d[0] + d[1] + d[2] + d[3]) - damper(p, to) * to->v - sign * p->slide - risen(p, to, sign)) > 0.0;
 }
 
 /* The input's coefficients over the step that begins at `at` and is `part` of the sample. */
@@ -229,17 +243,23 @@ static void sample(const Plant *p, State *s, const double *c)
         decide(p, s, d[0]);
         double u = d[0] + d[1] + d[2] + d[3], span = p->h / (double)(1 << level);
         State to = s->moving ? stepped(p, *s, d, level, s->moving) : *s;
-        double ahead = s->moving ? s->moving * to.v : p->stick - fabs(push(p, s, u));
+        double ahead = s->moving ? s->moving * to.v : holds(p, s) - fabs(push(p, s, u));
         if (p->order == 1 && s->moving) ahead = s->moving * push(p, &to, u) - p->slide;
-        int again = ahead < 0.0 || (s->moving && level < p->base + DIPS && dips(p, s, &to, d));
+        int seats = p->preload > 0.0 && s->side * to.y < 0.0;
+        int again = ahead < 0.0 || seats || (s->moving && level < p->base + DIPS && dips(p, s, &to, d));
         if (again && level < p->last) {
             level++;
             continue;
         }
-        if (again && ahead < 0.0 && p->order == 2 && p->stick == 0.0) { /* nothing holds it: it turns round */
-            *s = to, s->moving = to.v < 0.0 ? -1 : 1;
+        if (seats) {
+            double part = s->side * s->y > 0.0 ? s->y / (s->y - to.y) : 0.0;
+            rolled(s, p, -s->y);
+            s->v = 0.0, s->moving = s->side = 0;
+            started(p, s, d[0] + part * (u - d[0]), u, (1.0 - part) * span);
+        } else if (again && ahead < 0.0 && p->order == 2 && p->stick == 0.0 && (s->moving || p->preload == 0.0)) {
+            *s = to, s->moving = to.v < 0.0 ? -1 : 1; /* nothing holds it: it turns round */
         } else if (again && ahead < 0.0) { /* the event is in this short step: what is left of it, by lines */
-            double was = s->moving ? s->moving * s->v : p->stick - fabs(push(p, s, d[0]));
+            double was = s->moving ? s->moving * s->v : holds(p, s) - fabs(push(p, s, d[0]));
             if (p->order == 1 && s->moving) was = s->moving * push(p, s, d[0]) - p->slide;
             double part = was > 0.0 ? was / (was - ahead) : 0.0;
             if (s->moving) {
@@ -259,16 +279,16 @@ static void sample(const Plant *p, State *s, const double *c)
 /* The plant at `y`, come there from 0 in one go. */
 static State come(const Plant *p, double y)
 {
-    State s = {0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0};
+    State s = {0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0, 0};
     for (int j = 0; j < 32; j++) wind(p, &s, y / 32.0);
-    s.y = y;
+    s.y = y, s.side = (y > 0.0) - (y < 0.0);
     return s;
 }
 
 /* Where the plant rests under `u` when it has come there from 0. */
 static State balanced(const Plant *p, double u)
 {
-    double left = fabs(u) - p->slide, side = u < 0.0 ? -1.0 : 1.0;
+    double left = fabs(u) - p->slide - p->preload, side = u < 0.0 ? -1.0 : 1.0;
     if (left <= 0.0 || p->k <= 0.0) return come(p, 0.0);
     double low = 0.0, high = p->curved ? 20.0 * left / p->k : left / p->k;
     for (int i = 0; i < 60 && p->curved; i++) {
@@ -286,9 +306,9 @@ void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, 
                   int order, int base, int last, const double *numbers, const double *tables)
 {
     const double *a = numbers;
-    int bends = a[13] != 0.0 || a[14] != 0.0;
+    int bends = a[13] != 0.0 || a[14] != 0.0 || a[17] != 0.0;
     Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a + 13, tables,
-               bends, bends || a[6] != 0.0 || a[11] != 0.0};
+               bends, bends || a[6] != 0.0 || a[11] != 0.0, a[18], a[19]};
     State s = come(&p, 0.0);
     for (int k = 0; k < n; k++) {
         double c[4] = {0.0, 0.0, 0.0, 0.0};

@@ -5,7 +5,9 @@ m y'' + c y' + k y = u − F − w, or m y' + k y = u − F − w, in units of t
 takes away from the linear one (R. Bouc, 1967; Y.-K. Wen, J. Eng. Mech. Div. 102, 1976): a ``share`` of the
 stiffness k holds by q instead of y, with dq/dy = 1 − K |p|^power, p = q in the direction of motion, K =
 ``loading`` where the motion winds the spring further, −``unloading`` where it lets it go. With α = share·k,
-z = α q, power 1: z' = α y' − β (γ |y'| z + δ y' |z|), loading = β (γ + δ) and unloading = β (γ − δ).
+z = α q, power 1: z' = α y' − β (γ |y'| z + δ y' |z|), loading = β (γ + δ) and unloading = β (γ − δ). An
+obstacle pushes back beyond its place, a preload presses the plant against a seat at 0, which catches it, and
+the damper may be another while y falls back to 0.
 
 Between two events (a velocity of 0, a friction that gives way) a plant with friction alone is linear, and a
 step over a whole sample is exact; events are found by halving it. The hysteretic spring is integrated by
@@ -14,7 +16,7 @@ steps so small that its own error is below 1e-6 of its force.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -73,7 +75,8 @@ def respond(
     rough: bool = False,
 ) -> Array:
     """The output (n,) for the input ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is not
-    0; of ``dynamics`` the drag, the hysteretic spring and the bend count.
+    0; of ``dynamics`` the drag, the springs and, for order 2, the preload and the damper of
+    ``unloading`` count.
 
     ``between``: what the input does from one sample to the next. In straight lines it comes from 0 within the
     sample ahead of an experiment, as in :func:`~focgen.rig.linear.run`; else it jumps at the first sample.
@@ -81,11 +84,15 @@ def respond(
     motion.
     """
     base, last = _levels(plant, dynamics, h, rough)
+    falling = replace(plant, c=plant.c / dynamics.unloading)
     tables, spring, bend = _tables(plant, h, base, last), dynamics.spring, dynamics.bend
+    if falling != plant:
+        tables = np.concatenate([tables, _tables(falling, h, base, last)])
     numbers = [h, plant.m, plant.c, plant.k, *dynamics.drag.held, spring.share * plant.k]
     numbers += [spring.loading, spring.unloading, spring.power, spring.scale]
     numbers += [dynamics.rise.size, dynamics.rise.speed]
     numbers += [plant.k * bend.first, plant.k * bend.second, bend.scale]
+    numbers += [dynamics.place, plant.k * dynamics.stiffness, dynamics.preload, falling.c]
     x = np.ascontiguousarray(x, float)
     moves, levels = course(x, rest, between), (plant.order, base, last)
     return kernels.plant(x, rest, moves, levels, np.array(numbers), tables)
@@ -95,9 +102,9 @@ def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> 
     """How often a sample is halved: for the motion, and at most, for an event."""
     spring, bend = dynamics.spring, dynamics.bend
     steepest = 1.0 + spring.share * max(abs(spring.loading), abs(spring.unloading)) * spring.scale
-    steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second)
+    steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second) + dynamics.stiffness
     pace = np.sqrt(plant.k * steepest / plant.m) if plant.order == 2 else plant.k * steepest / plant.m
-    short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend"} else _SWING
+    short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend", "stiffness"} else _SWING
     short *= 1.0 if spring.power == 1.0 else 0.5
     base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
     base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _MOST))

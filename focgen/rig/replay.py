@@ -173,7 +173,7 @@ def effect_tables(
             "name": p.effect,
             "form": p.form.name,
             "stage": p.stage,
-            **{q.name: float(v) for q, v in zip(p.form.parameters, p.values)},
+            **p.named,
             "clock": float(clock),
         }
         tables.append(table | ({"carried": carried} if carried else {}))

@@ -22,8 +22,8 @@ import tomlkit
 
 from focgen.arrays import Array
 from focgen.diagnosis.problem.segments import cuts
+from focgen.diagnosis.proposals.limits import limits_of
 from focgen.diagnosis.proposals.menu import menu
-from focgen.diagnosis.proposals.reach import reach_of
 from focgen.errors import InputError
 from focgen.output import replace_folder
 from focgen.present import present
@@ -112,8 +112,8 @@ def _experiments(folder: Path, number: str) -> Iterator[_Asked]:
     yield _Asked(PROPOSED, table[:, 1], told["inputs"]["also_log"])
     rig = read_rig(case / "rig.toml")
     logs = experiments(rig, sorted((case / "logs").iterdir()))
-    for i, choice in enumerate(menu(reach_of(rig, logs, cuts(logs)[0]).faster)):
-        yield _Asked(f"menu{i}", np.repeat(choice.input, choice.reach.coarse))
+    for i, choice in enumerate(menu(limits_of(rig, logs, cuts(logs)[0]).faster)):
+        yield _Asked(f"menu{i}", np.repeat(choice.input, choice.limits.coarse))
 
 
 def _lay_out(given: Path, blind: Path, case: Case, asked: _Asked, columns: dict[str, Any]) -> None:

@@ -20,8 +20,9 @@ CONSTANTS = {
     "hypotheses/bootstrap.py": ["_RARE"],
     "hypotheses/input_covariance.py": ["_FLAT"],
     "hypotheses/disturbance.py": ["SLOWEST"],
-    "hypotheses/explain.py": ["_BELIEVED", "_GAUGE", "_KEPT", "_OUT_OF_STEP", "_SMOOTHER"],
+    "hypotheses/explain.py": ["_BELIEVED", "_KEPT"],
     "hypotheses/initial.py": ["_LEVEL", "_SEEN", "_TIME"],
+    "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK", "_QUICKEST"],
     "problem/decimate.py": ["_WITHIN"],
     "problem/excitation.py": ["_STEADY"],
@@ -33,12 +34,21 @@ CONSTANTS = {
     "proposals/menu.py": ["_SHORTEST"],
     "proposals/next_experiment.py": ["_ENOUGH", "_MOST", "_SHARES"],
     "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_FINE", "_LONGEST"],
-    "proposals/reach.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
+    "proposals/limits.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],
-    "verdict/improvement.py": ["_AHEAD", "_FITTED", "_FORM", "_LOST", "_LOUD", "_MOST", "_REST"],
-    "verdict/verdict.py": ["_NEAR"],
+    "verdict/improvement.py": [
+        "_AHEAD",
+        "_FITTED",
+        "_FORM",
+        "_LOST",
+        "_LOST_IN_DOUBT",
+        "_LOUD",
+        "_MOST",
+        "_REST",
+    ],
+    "verdict/conclude.py": ["_NEAR"],
 }
 
 COMPARED = {
@@ -48,5 +58,5 @@ COMPARED = {
     "proposals/menu.py": [10.0],  # response times of a hold
     "verdict/evidence.py": [0.002],  # of the largest rate, drawn
     "verdict/improvement.py": [1.0001],  # nothing can shrink
-    "verdict/verdict.py": [1.01, 0.02],  # visibly; a share worth telling
+    "verdict/conclude.py": [1.01, 0.02],  # visibly; a share worth telling
 }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.fitting.fit import WHITE, fit, innovations, jacobian
-from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import make
 from focgen.rig.effects import library

@@ -10,7 +10,7 @@ import pytest
 
 from focgen.diagnosis.diagnose import diagnose, explain_all
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.factors import factors
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters

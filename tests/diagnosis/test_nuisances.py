@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.hypotheses.explain import _zeroed, problem_of
+from focgen.diagnosis.hypotheses.nuisances import _zeroed, problem_of
 from focgen.diagnosis.problem.segments import make
 from focgen.logs.experiment import Experiment
 from tests.diagnosis_rig import RIG, H, session

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from focgen.diagnosis.fitting.fit import WHITE, fit
 from focgen.diagnosis.fitting.predictability import predictable_share
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
-from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.scales import references
@@ -227,7 +227,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
     return SimpleNamespace(
         segment=SimpleNamespace(pace=0.0, closed=closed),
         converter=None,
-        left=SimpleNamespace(share=share),
+        predictability=SimpleNamespace(share=share),
         nominal=nominal,
         best=best,
         causes=[SimpleNamespace(rivals=[SimpleNamespace(effect=effect)]) for effect in effects],

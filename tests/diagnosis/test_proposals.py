@@ -11,13 +11,13 @@ import pytest
 from scipy.signal import lsim
 
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.proposals.candidate_rigs import CandidateRig, Part
+from focgen.diagnosis.proposals.limits import Bounds, InputLimits, bounds_of, limits_of
 from focgen.diagnosis.proposals.menu import Choice, menu
 from focgen.diagnosis.proposals.next_experiment import _allowed, _best, _Option, _showing
-from focgen.diagnosis.proposals.reach import Bounds, Reach, bounds_of, reach_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
@@ -47,9 +47,9 @@ def test_an_axis_is_as_fast_as_its_speed_and_integrates_once():
 
 def test_the_input_stays_where_the_logs_and_the_ranges_have_it():
     logs = session(2)
-    assert reach_of(RIG, logs, "command").high == pytest.approx(1.8)
+    assert limits_of(RIG, logs, "command").high == pytest.approx(1.8)
     tight = replace(RIG, ranges=Ranges((0.0, 1.5), None, None))
-    assert (reach_of(tight, logs, "command").low, reach_of(tight, logs, "command").high) == (0.0, 1.5)
+    assert (limits_of(tight, logs, "command").low, limits_of(tight, logs, "command").high) == (0.0, 1.5)
 
 
 @pytest.mark.parametrize("change", [0.09, 0.11])
@@ -57,17 +57,17 @@ def test_steps_are_proposed_where_there_were_steps(change):
     ramp, steps = np.clip(np.arange(2000) * change / 10.0, 0.0, 1.0), np.repeat([0.0, change, 1.0], 700)
     u = ramp if change < 0.1 else steps
     log = Experiment("up", 0.05, {"command": u, "pressure": u, "output": u})
-    reach = reach_of(RIG, [log], "command")
-    assert np.isinf(reach.rate) == (change > 0.1)
-    fastest = max(np.max(np.abs(np.diff(c.input))) for c in menu(reach))
+    limits = limits_of(RIG, [log], "command")
+    assert np.isinf(limits.rate) == (change > 0.1)
+    fastest = max(np.max(np.abs(np.diff(c.input))) for c in menu(limits))
     assert fastest == pytest.approx(change / 10.0 if change < 0.1 else 1.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("seconds", [600.0, 45.0, 22.0])
 @pytest.mark.parametrize("low", [0.0, -1.0])
 def test_no_experiment_is_longer_than_the_session_was(seconds, low):
-    reach = Reach(low, 2.0, 0.0, np.inf, seconds, 1.5, 0.01)
-    found = menu(reach)
+    limits = InputLimits(low, 2.0, 0.0, np.inf, seconds, 1.5, 0.01)
+    found = menu(limits)
     assert found and all(c.seconds <= seconds and c.input[0] == 0.0 for c in found)
     assert all(low <= c.input.min() and c.input.max() <= 2.0 for c in found)
     assert any(c.input.min() < 0.5 * low for c in found) if low else all(c.input.min() == 0.0 for c in found)
@@ -83,12 +83,12 @@ def candidate_rigs(rig, log, effect="friction"):
 @pytest.mark.parametrize("force, share", [(2.0, 1.0), (150.0, None)])
 def test_an_axis_is_pushed_no_further_than_its_stroke(force, share):
     log = axis_log(force)
-    reach, bounds = reach_of(AXIS, [log], "command"), bounds_of(AXIS, [log])
+    limits, bounds = limits_of(AXIS, [log], "command"), bounds_of(AXIS, [log])
     assert bounds.stands == pytest.approx(0.125, abs=1e-3) and not bounds.left
-    allowed = [choice for choice, _ in _allowed(menu(reach), [candidate_rigs(AXIS, log)], bounds)]
+    allowed = [choice for choice, _ in _allowed(menu(limits), [candidate_rigs(AXIS, log)], bounds)]
     assert allowed and all(c.share == share or (share is None and c.share < 1.0) for c in allowed)
     for choice in allowed:
-        t = np.arange(len(choice.input)) * reach.h
+        t = np.arange(len(choice.input)) * limits.h
         _, place, _ = lsim(([1.0], [95.0, 203.0, 0.0]), choice.input, t)
         assert 0.02 < 0.125 + place.min() and 0.125 + place.max() < 0.23
         smaller = next((s for s in (0.1, 0.15, 0.25, 0.35, 0.5, 0.7, 1.0) if s > choice.share), None)
@@ -97,11 +97,11 @@ def test_an_axis_is_pushed_no_further_than_its_stroke(force, share):
 
 
 def test_pushes_there_and_back_bring_a_free_mass_back_to_where_it_stood():
-    reach = Reach(-1.0, 1.0, 0.0, np.inf, 100.0, 1.0, 0.01, 1, 2)
-    for choice in menu(reach):
+    limits = InputLimits(-1.0, 1.0, 0.0, np.inf, 100.0, 1.0, 0.01, 1, 2)
+    for choice in menu(limits):
         if "push" in choice.what:
-            speed = np.cumsum(choice.input) * reach.h
-            place = np.cumsum(speed) * reach.h
+            speed = np.cumsum(choice.input) * limits.h
+            place = np.cumsum(speed) * limits.h
             assert abs(place[-1]) < 0.02 * np.abs(place).max() and abs(speed[-1]) < 0.02 * np.abs(speed).max()
 
 
@@ -110,7 +110,7 @@ def test_a_pressure_is_kept_below_its_range_by_a_smaller_input():
     problem = problem_of(RIG, make(logs, "command", "output"), logs)
     found = fit(problem, problem.nominal(), WHITE, 0)
     rig = CandidateRig(SimpleNamespace(effect="leak", fit=found), Part.of(found), (), ())
-    steps = Choice("a step", np.repeat([0.0, 1.0], 100), Reach(0.0, 1.8, 0.0, np.inf, 60.0, 1.0, 0.05))
+    steps = Choice("a step", np.repeat([0.0, 1.0], 100), InputLimits(0.0, 1.8, 0.0, np.inf, 60.0, 1.0, 0.05))
     [(choice, [made])] = _allowed([steps], [rig], bounds)
     assert choice.share == 0.5 and made.signals["pressure"].max() == pytest.approx(0.09, rel=1e-3)
     assert not _allowed([steps], [rig], Bounds({"pressure": (-1.0, 0.01)}))
@@ -142,7 +142,7 @@ def test_only_experiments_that_show_the_rivals_are_proposed(rivals, left_out):
         segment=SimpleNamespace(parts=lambda x: [], x=None, run=SimpleNamespace(h=0.02)),
         nominal=SimpleNamespace(problem=problem),
     )
-    choices = menu(Reach(0.0, 1.0, 0.0, np.inf, 1200.0, 2.0, 0.02))
+    choices = menu(InputLimits(0.0, 1.0, 0.0, np.inf, 1200.0, 2.0, 0.02))
     made = [(c, [SimpleNamespace(entering=c.input)]) for c in choices]
     shown = [c.what for c, _ in _showing(made, nothing, asked)]
     assert len(shown) == len(choices) - len(left_out)

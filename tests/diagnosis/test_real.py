@@ -140,9 +140,6 @@ def test_pump_vents_slowly(tmp_path):
     assert asked[0].parameters["vent"].value > asked[0].parameters["fill"].value + 1.0
 
 
-@pytest.mark.xfail(
-    strict=True, reason="an obstacle is named beside the dead zone, whose threshold then moves to 2.6 V"
-)
 def test_pump_does_nothing_below_a_volt_or_two(tmp_path):
     """2 V give 2.9 kPa and each volt from 3 V on 10 more: a line that meets zero at 1.8 V."""
     rig, log = rig_and_log("tank", tmp_path)

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.fitting.repeats import repeats_of
 from focgen.diagnosis.hypotheses.disturbance import disturbance
-from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.search import rank
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.segments import make

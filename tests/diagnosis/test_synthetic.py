@@ -14,7 +14,7 @@ from focgen.diagnosis.diagnose import diagnose, explain_all
 from focgen.diagnosis.hypotheses.bootstrap import threshold
 from focgen.diagnosis.hypotheses.explain import candidates_for, explain
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.verdict import compose, verdict
+from focgen.diagnosis.verdict import compose, conclude
 from focgen.diagnosis.verdict import predicted_improvement as promise
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.improvement import Improvement
@@ -73,7 +73,7 @@ def test_a_gain_that_ends_is_seen_though_own_parameters_bend_to_make_up_for_it()
 def test_a_noisy_camera_makes_no_fault_of_the_sensor_behind_it(camera):
     """What the actuator's refit leaves open of the curvature is no effect of the sensor that reads it."""
     found = explain_all(RIG, session(1, camera=camera, noise=0.003), NUMBERS.nats)
-    assert not any(e.causes for e in found) and found[-1].left.share < 0.01
+    assert not any(e.causes for e in found) and found[-1].predictability.share < 0.01
 
 
 def test_a_fault_of_the_sensor_behind_a_noisy_camera_is_found():
@@ -173,8 +173,8 @@ def test_what_brings_the_whole_output_no_closer_is_not_named():
     (found,) = rigs.placed
     turned = replace(found, values=(-found.values[0], *found.values[1:]))
     assert found.values[0] > 0
-    assert verdict._no_closer(rigs, logs, explanations[-1]) == []
-    assert verdict._no_closer(replace(rigs, placed=(turned,)), logs, explanations[-1]) == [explanations[-1]]
+    assert conclude._no_closer(rigs, logs, explanations[-1]) == []
+    assert conclude._no_closer(replace(rigs, placed=(turned,)), logs, explanations[-1]) == [explanations[-1]]
 
 
 @pytest.mark.parametrize("hum, trusted", [(0.0, True), (0.01, False)])
@@ -198,18 +198,18 @@ def test_behind_a_stage_that_hums_small_effects_are_not_believed(hum, trusted, m
 def test_of_a_promise_of_next_to_nothing_segments_that_close_their_own_gap_are_not_in_vain(monkeypatch):
     """Of several as of one."""
     shares = {"clear": 0.9, "vain": 0.1}
-    monkeypatch.setattr(verdict, "cross_validated_share", lambda e, logs: shares[e])
+    monkeypatch.setattr(conclude, "cross_validated_share", lambda e, logs: shares[e])
     told = SimpleNamespace(causes=[("clear", None), ("vain", None), ("vain", None)])
-    assert verdict._in_vain(told, (), ["clear", "vain"]) == ["vain"]
-    assert verdict._in_vain(SimpleNamespace(causes=[("clear", None)]), (), ["clear"]) == []
-    assert verdict._in_vain(SimpleNamespace(causes=[("vain", None)]), (), ["vain"]) == ["vain"]
+    assert conclude._in_vain(told, (), ["clear", "vain"]) == ["vain"]
+    assert conclude._in_vain(SimpleNamespace(causes=[("clear", None)]), (), ["clear"]) == []
+    assert conclude._in_vain(SimpleNamespace(causes=[("vain", None)]), (), ["vain"]) == ["vain"]
 
 
 @pytest.mark.parametrize("share, causes", [(0.9, [["valve_asymmetry"]]), (0.1, [])])
 def test_what_is_clear_in_one_segment_stands_whatever_is_left_in_another(share, causes, monkeypatch):
     """The output promises next to nothing; the pressure, logged, closes its own gap, or not even that."""
     monkeypatch.setattr(promise, "predict", lambda *given: Improvement(0.15, (0.0, 0.5)))
-    monkeypatch.setattr(verdict, "cross_validated_share", lambda *given: share)
+    monkeypatch.setattr(conclude, "cross_validated_share", lambda *given: share)
     found = diagnose(RIG, session(11, vent=0.8, roles=("pressure",)), to=40.0)
     assert named(found) == causes
 
@@ -239,7 +239,7 @@ def test_a_push_that_no_input_predicts_is_unknown_beside_what_is_clear():
 @pytest.mark.parametrize("noise, in_vain", [(0.8, True), (0.84, False)])
 def test_of_a_gap_little_above_the_noise_little_can_be_promised(noise, in_vain):
     squares = {"refitted": np.array([1.0, 1.0])}
-    told = verdict._Summary(None, [], {}, squares, noise**2, Improvement(0.1, (0.0, 0.5)))
+    told = conclude._Summary(None, [], {}, squares, noise**2, Improvement(0.1, (0.0, 0.5)))
     assert told.in_vain == in_vain
 
 

@@ -1,4 +1,4 @@
-"""What CONTRIBUTING adds is added by its steps alone: an effect, an arithmetic and a log format.
+"""What CONTRIBUTING adds, by its steps alone: an effect, an arithmetic, a log format, a core, a template.
 
 Red when a step of the page is missing or no longer fits the code: its blocks are written into a copy
 of the package, and nothing else is.
@@ -13,12 +13,14 @@ import sys
 
 import pytest
 
+from focgen.codegen.kernels import TARGETS
 from focgen.logs.table import read_table
 from focgen.rig.effects import library
 from tests.pages import ROOT, blocks
 
 RUN = """
 import json, sys
+from pathlib import Path
 import numpy as np
 import focgen
 from focgen.logs.table import read_table
@@ -27,11 +29,14 @@ echo = library()["sensor_echo"]
 run = Run.of([300], [0.0], 0.1)
 steps = [form.act(np.ones(300), (0.25, 2.0), run)[[0, -1]].tolist() for form in echo.forms]
 made = focgen.generate(sys.argv[1], "made", arithmetic="q15_too", length=100)
+verified = focgen.verify("made", 500, target="cortex-m33").targets["cortex-m33"]
 table = read_table("log.jsonl")
 print(json.dumps({
     "package": focgen.__file__, "effect": steps, "arithmetic": made.manifest["arithmetic"],
     "fits": all(proof["worst"] <= proof["limit"] for proof in made.manifest["proofs"]),
-    "log": table.numbers("y").tolist(),
+    "log": table.numbers("y").tolist(), "samples": verified.samples, "mismatches": verified.mismatches,
+    "template": Path("made/proofs.csv").read_text().splitlines(), "files": list(made.manifest["files"]),
+    "nodes": len(made.manifest["proofs"]),
 }))
 """
 
@@ -41,10 +46,10 @@ def added(tmp_path_factory):
     """What a copy of the package does that has the page's blocks in it."""
     copy = tmp_path_factory.mktemp("copy")
     shutil.copytree(ROOT / "focgen", copy / "focgen", ignore=shutil.ignore_patterns("__pycache__"))
-    for folder in ("templates", "c_runtime"):
-        (copy / folder).symlink_to(ROOT / folder)
+    shutil.copytree(ROOT / "templates", copy / "templates")
+    (copy / "c_runtime").symlink_to(ROOT / "c_runtime")
     for block in blocks(ROOT / "CONTRIBUTING.md"):
-        if name := re.match(r"# (focgen/\S+\.py)\n", block.text):
+        if name := re.match(r"# ((?:focgen|templates)/\S+)\n", block.text):
             put(copy / name.group(1), block.text[name.end() :], block.language)
     (copy / "log.jsonl").write_text('{"t": 0.0, "y": 1.5}\n{"t": 0.1, "y": 2.5}\n', encoding="utf-8")
     here = {**os.environ, "PYTHONPATH": str(copy)}
@@ -56,7 +61,7 @@ def added(tmp_path_factory):
 
 def put(file, text, language):
     """A new file, or lines of one that are there exchanged for others."""
-    if language == "python":
+    if language != "diff":
         assert not file.exists(), file
         file.write_text(text, encoding="utf-8")
         return
@@ -81,3 +86,12 @@ def test_a_log_format_is_a_file_and_a_line(added, tmp_path):
     with pytest.raises(Exception, match="not a kind of log"):
         read_table(tmp_path / "log.jsonl")
     assert added["log"] == [1.5, 2.5]
+
+
+def test_a_core_is_an_entry_and_a_name(added):
+    assert "cortex-m33" not in TARGETS and added["samples"] >= 500 and added["mismatches"] == 0
+
+
+def test_a_template_is_three_places(added):
+    head, *rows = added["template"]
+    assert head == "node,worst,limit" and len(rows) == added["nodes"] and "proofs.csv" in added["files"]

@@ -170,8 +170,8 @@ def test_what_a_diagnosis_writes_is_known_beforehand(tmp_path):
     """The names that are looked at before the work, and those that are written after it."""
     from focgen.diagnosis.diagnose import NEXT, WRITTEN
     from focgen.diagnosis.drawn import Drawn
+    from focgen.diagnosis.proposals.limits import InputLimits
     from focgen.diagnosis.proposals.menu import Choice
-    from focgen.diagnosis.proposals.reach import Reach
     from focgen.diagnosis.write import write
     from tests.conftest import paper_rig
     from tests.report_samples import diagnosis
@@ -179,7 +179,7 @@ def test_what_a_diagnosis_writes_is_known_beforehand(tmp_path):
     rig = paper_rig()
     drawn = Drawn("command", {}, 0, 0, (), (), ("command", "output"), (), ())
     found = replace(diagnosis(), refitted=rig, augmented=rig, drawn=drawn)
-    asked = Choice("a step", np.array([0.0, 1.0]), Reach(0.0, 2.0, 0.0, np.inf, 9.0, 1.0, 0.1, 2))
+    asked = Choice("a step", np.array([0.0, 1.0]), InputLimits(0.0, 2.0, 0.0, np.inf, 9.0, 1.0, 0.1, 2))
     write(tmp_path, found, asked, pictures=False)
     assert {path.name for path in tmp_path.iterdir()} == {*WRITTEN, NEXT}
     assert (tmp_path / NEXT).read_text().splitlines() == ["time_s,input", "0,0", "0.05,0", "0.1,2", "0.15,2"]

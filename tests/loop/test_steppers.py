@@ -63,8 +63,10 @@ def cases(arithmetic, count, **memory):
 
 @pytest.mark.parametrize("memory", [{}, EXPONENTIAL], ids=["short", "exponential"])
 @pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])
-def test_plan_stepper_is_the_bit_true_reference(arithmetic, memory):
-    for rng, controller, plan in cases(arithmetic, 20, **memory):
+@pytest.mark.parametrize("count", [10, pytest.param(30, marks=pytest.mark.long)])
+def test_plan_stepper_is_the_bit_true_reference(count, arithmetic, memory):
+    """About one controller of each kind here; more in the long suite."""
+    for rng, controller, plan in cases(arithmetic, count, **memory):
         ref, meas, sched = signals(rng, controller, LANES, 150)
         start, resets = rest_of(controller, rng)
         scenario = Scenario(ref, meas, sched if controller.scheduled else None, resets)

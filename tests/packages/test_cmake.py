@@ -92,12 +92,12 @@ def test_build_files_are_the_users_to_change(tmp_path):
 
 
 UNUSABLE = {
-    "[package]: is 'zephyr'": {"for": "zephyr", "files": {}},
-    "[package]: belongs to --for fmu": {"for": "cmake", "fmi": 3, "files": {}},
-    "[package]: is 4": {"for": "fmu", "fmi": 4, "files": {}},
+    "[package]: is 'zephyr'": {"for": "zephyr"},
+    "[package]: belongs to --for fmu": {"for": "cmake", "fmi": 3},
+    "[package]: is 4": {"for": "fmu", "fmi": 4},
     "lacks 'package'": ["cmake"],
-    "lacks fmu/spba_fmi2.c": {"for": "fmu", "fmi": 2, "files": {}},
-    "lacks src/spba.h": {"for": "arduino", "files": {}},
+    "lacks fmu/spba_fmi2.c": {"for": "fmu", "fmi": 2},
+    "lacks src/spba.h": {"for": "arduino"},
 }
 
 
@@ -110,8 +110,8 @@ def test_manifests_of_packages_that_there_are_not(tmp_path, capsys):
         assert main(["verify", str(tmp_path)]) == 2
         line = capsys.readouterr().err
         assert says in line and line.count("\n") == 1, line
-    path.write_text(json.dumps({**sound, "package": {**sound["package"], "files": {}}}))
-    assert any("package.files" in line for line in read_folder(tmp_path).differences)
+    path.write_text(json.dumps({**sound, "files": {**sound["files"], "CMakeLists.txt": "0"}}))
+    assert any("files.CMakeLists.txt" in line for line in read_folder(tmp_path).differences)
 
 
 def test_a_manifest_leads_to_no_file_outside_and_to_none_of_the_users(tmp_path):
@@ -125,7 +125,7 @@ def test_a_manifest_leads_to_no_file_outside_and_to_none_of_the_users(tmp_path):
     for path in kept:
         path.write_text("mine")
     manifest = json.loads((folder / "manifest.json").read_text())
-    manifest["package"]["files"] |= dict.fromkeys(kept.values(), sha256("mine"))
+    manifest["files"] |= dict.fromkeys(kept.values(), sha256("mine"))
     (folder / "manifest.json").write_text(json.dumps(manifest))
     focgen.generate(seed_controller(9), folder, "q15")
     assert all(path.read_text() == "mine" for path in kept) and not (folder / "CMakeLists.txt").exists()

@@ -99,8 +99,9 @@ def test_only_what_a_spring_holds_has_one_that_bends():
     zero = LinearActuator(TransferFunction([(1.0, 1.0), (1.0, 0.0)], [(0.1, 2.0), (1.0, 1.0), (1.0, 0.0)]))
     free = LinearActuator(TransferFunction([(1.0, 0.0)], [(1.0, 2.0), (1.0, 1.0)]))
     wall = form_of("contact", "spring")
-    assert fits_in(FORM, "actuator", rig_of(SECOND)) and not fits_in(wall, "actuator", rig_of(SECOND))
-    assert not fits_in(FORM, "actuator", rig_of(zero)) and not fits_in(FORM, "actuator", rig_of(free))
+    for form in (FORM, wall, form_of("softening", "worn")):
+        assert fits_in(form, "actuator", rig_of(SECOND))
+        assert not fits_in(form, "actuator", rig_of(zero)) and not fits_in(form, "actuator", rig_of(free))
 
 
 @pytest.mark.parametrize("actuator", [FIRST, SECOND, Actuator(0.5, 0.7, (2.0,))])

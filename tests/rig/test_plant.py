@@ -253,7 +253,7 @@ def test_what_a_plant_can_bear():
     )
     fits = {
         "axis": (True, False, False),
-        "mass": (True, True, False),
+        "mass": (True, True, True),
         "lag": (True, False, True),
         "finger": (True, False, True),
         "third": (False, False, False),

@@ -37,7 +37,7 @@ import focgen
 from focgen.studies import write
 from tests.studies.test_sweep import SMALL
 
-write._shown = lambda study: {}
+write.files_of = lambda study: {}
 focgen.study("memory", "controller.toml", "out", jobs=1, **SMALL)
 """
 CONTROLLER = paper_controller(sample_time=0.02, length=80, arithmetic="q15")

@@ -5,6 +5,7 @@ Red when a count, a size or a stack is not what slow counting or the compiler sa
 
 from __future__ import annotations
 
+import functools
 import json
 import subprocess
 from dataclasses import replace
@@ -43,6 +44,12 @@ def folders(tmp_path_factory):
         generate(paper_controller(length), path, arithmetic, name=f"c{arithmetic}{length}")
         made[arithmetic, length] = read_folder(path)
     return made
+
+
+@pytest.fixture(scope="module")
+def costs(folders):
+    """What a folder costs on a core, by folder and core; counted once."""
+    return functools.cache(lambda key, name: cost_on(core(name), ZIG, folders[key].plan, folders[key].path))
 
 
 def library_of(read, name: str, chain=ZIG) -> TargetLibrary:
@@ -120,13 +127,12 @@ def test_a_tap_costs_the_slope_between_two_lengths(folders):
     assert per_tap(reads, "cortex-m7", 4)[1] is None
 
 
-def test_bytes_of_26_more_taps(folders):
+def test_bytes_of_26_more_taps(costs):
     """In float each is a word of flash and a word of RAM; the code stays within what unrolling changes."""
-    reads = folders["f32", 12], folders["f32", 38]
-    short, long = (cost_on(core("cortex-m4"), ZIG, read.plan, read.path) for read in reads)
+    short, long = (costs(("f32", length), "cortex-m4") for length in (12, 38))
     assert long.ram_bytes - short.ram_bytes == 104
     assert long.flash["constants"] - short.flash["constants"] == 104
-    whole = cost_on(core("cortex-m4"), ZIG, folders["q15", 12].plan, folders["q15", 12].path)
+    whole = costs(("q15", 12), "cortex-m4")
     assert whole.flash["compiler"] == 0 and whole.flash_bytes == sum(whole.flash.values())
     assert (
         0 < short.flash["compiler"] == long.flash["compiler"] < 500
@@ -153,13 +159,13 @@ def test_flash_is_what_the_toolchain_says(folders):
 
 
 @pytest.mark.parametrize("name", [one.name for one in CORES])
-def test_the_stack_that_is_used_is_the_stack_that_is_told(folders, name):
+def test_the_stack_that_is_used_is_the_stack_that_is_told(folders, costs, name):
     """Painted memory against paths through machine code: never more, and not much less but for the call that
     mends a damaged state, which these steps do not make.
     """
     for key in (("q15", 12), ("f32", 12)):
         read = folders[key]
-        found = cost_on(core(name), ZIG, read.plan, read.path)
+        found = costs(key, name)
         told = Stack(library_of(read, name).program).depth(f"{read.plan.name}_step")
         mending = [int(part.split()[-1]) for part in told.path if "_recover " in part]
         assert told.bytes - 16 - sum(mending) <= found.stack_seen <= told.bytes <= found.stack_bytes

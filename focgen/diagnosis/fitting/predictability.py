@@ -82,15 +82,15 @@ def _jumps(x: np.ndarray, rest: np.ndarray) -> list[np.ndarray]:
 
 
 def predictable_share(segment: Segment, residual: np.ndarray, response: float) -> float:
-    """Only the share of :func:`predictability`, from all regressors together."""
-    return max(0.0, _Regression.of(segment, residual, response).whole)
+    """Only the share of :func:`predictability`."""
+    return _Regression.of(segment, residual, response).most
 
 
 def predictability(segment: Segment, residual: np.ndarray, response: float) -> Predictability:
     """What of ``residual`` (n,), weighed by trust, the segment's input predicts; ``response`` in s."""
     regression = _Regression.of(segment, residual, response)
     depends = {name: max(0.0, regression.share([name])) for name in regression.groups}
-    return Predictability(max(regression.whole, *depends.values(), 0.0), depends)
+    return Predictability(max(regression.whole, *depends.values()), depends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +114,12 @@ class _Regression:
     def whole(self) -> float:
         """What all groups predict, be it with or without those that ring: they are many."""
         return max(self.share(self.groups), self.share(self.groups, self.ringing))
+
+    @property
+    def most(self) -> float:
+        """What all groups predict, or one of them: what bends a little with the level alone is lost among
+        the coefficients of all."""
+        return max(self.whole, 0.0, *(self.share([name]) for name in self.groups))
 
     def share(self, names: Iterable[str], *more: np.ndarray) -> float:
         """What the groups ``names`` predict."""

@@ -8,18 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
-from focgen.diagnosis.fitting.integrating import pace, settled
+from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.fitting.predictability import Predictability, predictability
 from focgen.diagnosis.fitting.realign import realigned
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria, select
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
-from focgen.diagnosis.hypotheses.disturbance import disturbance
+from focgen.diagnosis.hypotheses.foretelling import foretelling
+from focgen.diagnosis.hypotheses.nuisances import seems_more, uncertain, ways
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
-from focgen.diagnosis.problem.scales import references
 from focgen.diagnosis.problem.segments import Segment, is_single, owner
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
@@ -29,12 +28,6 @@ from focgen.rig.engine import between_of, fits_in
 from focgen.rig.rig import Rig
 
 _DEPTH = 4
-# of the rig's response, and a sample at most: what columns may be out of step by; more is a delay
-_OUT_OF_STEP = 0.05
-_GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
-_WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
-_SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
-_RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
 _KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
 # force the path shows more above the sensor's noise the longer it is kept
 _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
@@ -42,9 +35,9 @@ _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyo
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects;
-    ``errors``: by family, the root-mean-square residual with that effect alone, as a share of the refitted
-    nominal's; ``converter``: the coarse one that the output shows.
+    """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects. Each has
+    a ``predictability`` of its residual from the inputs. ``errors``: by family, the root-mean-square
+    residual with that effect alone, as a share of the refitted nominal's; ``converter``: the coarse one.
     """
 
     segment: Segment
@@ -53,8 +46,8 @@ class Explanation:
     best: Fit
     ar: np.ndarray
     causes: tuple[Cause, ...]
-    left: Predictability
-    left_nominal: Predictability
+    predictability: Predictability
+    nominal_predictability: Predictability
     errors: dict[str, float]
     converter: Converter | None = None
 
@@ -78,7 +71,7 @@ class Explanation:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
 
-    def told(self, rig: Rig) -> Rig:
+    def with_intersample(self, rig: Rig) -> Rig:
         """``rig`` with what its command does between samples, where that is not as usual."""
         between = self.segment.between
         usual = self.segment.entry != "command" or between == between_of(rig, "command")
@@ -121,11 +114,11 @@ def _placed_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
 
 
 def _place(effect: Effect, segment: Segment) -> str | None:
-    """Where a family is looked for: at home, or where it may be anywhere in the first stage: logs of stages
-    that are merged do not tell which."""
+    """Where a family is looked for: at home, or a dead time in the first stage, for logs of stages that are
+    merged do not tell which has it."""
     if effect.stage in segment.stages:
         return effect.stage
-    return segment.stages[0] if effect.anywhere else None
+    return segment.stages[0] if effect.delays else None
 
 
 def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
@@ -148,18 +141,6 @@ def _much_left(base: Fit) -> bool:
     return base.predictable_share > NUMBERS.much
 
 
-def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
-    """The segment's problem without effects."""
-    scales = references(rig, segment, logs)
-    freely = owner(rig) if owner(rig) in segment.stages else None
-    load, response = (scales.levels["load"], scales.levels["response"])
-    segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
-    slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
-    return Problem(
-        segment, NominalParameters(rig, segment.stages, freely, load, response), scales, slack=slack
-    )
-
-
 def explain(
     rig: Rig,
     segment: Segment,
@@ -173,14 +154,14 @@ def explain(
     ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``:
     whether the input could be freed of its noise.
     """
-    problem = _widened(_gauged(_zeroed(_held(rig, segment, logs))))
+    problem = uncertain(rig, segment, logs)
     found = _explained(rig, problem, threshold, only, trusted)
     if problem.segment.pace and not found.causes:
         segment = replace(problem.segment, pace=_KEPT * problem.segment.pace)
         kept = replace(problem, segment=segment, memory={})
         other = _explained(rig, kept, threshold, only, trusted)
         problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
-    if not found.strained or problem.nominals.far or found.left.share < NUMBERS.left:
+    if not found.strained or problem.nominals.far or found.predictability.share < NUMBERS.left:
         return found
     freed, asked = (
         replace(problem, nominals=replace(problem.nominals, far=True), memory={}),
@@ -206,17 +187,18 @@ def _borne_out(kept: Explanation, usual: Explanation) -> bool:
 def _explained(
     rig: Rig, problem: Problem, threshold: float, only: Sequence[str] | None, trusted: bool
 ) -> Explanation:
-    segment = problem.segment
-    candidates, guests = candidates_for(segment, rig), guests_in(segment, rig)
+    candidates, guests = candidates_for(problem.segment, rig), guests_in(problem.segment, rig)
     if only is not None:
         candidates, guests, threshold = [c for c in candidates if c.effect in only], [], 0.0
-    segment, given, converter = problem.segment, problem.nominal(), converter_of(problem, candidates)
+    given, converter = problem.nominal(), converter_of(problem, candidates)
     asked = AcceptanceCriteria(threshold, trusted, converter, only is not None)
     rankings, candidates = _grown(problem, given, candidates, guests, asked)
     weighing = Weighing(rankings[-1].ar)
-    best = realigned(_dropped(rankings[-1].base, weighing, threshold), weighing)
+    best = _dropped(rankings[-1].base, weighing, threshold)
+    best = realigned(best if only is not None else foretelling(best, weighing), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
-    best, causes = reexamined(best, Beside(nominal, rankings, candidates, weighing, asked.surroundings))
+    beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted)
+    best, causes = reexamined(best, beside)
     if converter is not None:
         best, causes = converter.beside(best, nominal, causes, weighing)
     found, (best, nominal) = best, map(settled, _between_anew(rig, best, nominal, weighing))
@@ -244,7 +226,7 @@ def _between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tupl
     segment = best.problem.segment
     if rig.between is not None or segment.entry != "command" or not best.problem.candidates:
         return best, nominal
-    others = [replace(segment, between=way) for way in _ways(segment) if way != segment.between]
+    others = [replace(segment, between=way) for way in ways(segment) if way != segment.between]
     tried = [_moved_to(best, other, weighing) for other in others]
     closest = min([best, *tried], key=lambda f: f.sse)
     if closest.sse > NUMBERS.unlikely * best.sse:
@@ -303,87 +285,11 @@ def _widened_beside(best: Fit, threshold: float) -> Fit:
     return then if evidence(then, now) > threshold and np.max(away) < _BELIEVED else best
 
 
-def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
-    """The problem with the command as a staircase, as a polygon or as a smooth curve, whichever the log was,
-    where the rig does not say it: loggers differ."""
-    ways = [segment.between] if segment.entry != "command" else _ways(segment)
-    if rig.between is not None:
-        ways = [rig.between]
-    problems = [problem_of(rig, replace(segment, between=way), logs) for way in ways]
-    if len(problems) == 1:
-        return problems[0]
-    *plain, last = [fit(p, p.nominal(), WHITE, 6) for p in problems]
-    closest = min(plain, key=lambda f: f.sse)
-    if ways[-1] == Between.SMOOTH and last.sse > _SMOOTHER * closest.sse:
-        return closest.problem
-    return min(closest, last, key=lambda f: f.sse).problem
-
-
-def _ways(segment: Segment) -> list[Between]:
-    """What a command may do between its samples."""
-    rests = np.mean(np.diff(segment.x) == 0.0) > _RESTS
-    return [way for way in _WAYS if not (rests and way == Between.SMOOTH)]
-
-
-def _zeroed(problem: Problem) -> Problem:
-    """The problem with a zero of the readings for each experiment, where that is all there is: a gauge is
-    zeroed anew, or its room is warmer. Where errors add up, a zero is lost among them."""
-    if problem.segment.pace or len(problem.segment.run.spans) < 2:
-        return problem
-    return _where_all(problem, replace(problem, uneven=True, memory={}))
-
-
-def _where_all(problem: Problem, more: Problem) -> Problem:
-    """``problem``, or ``more``, which has further nuisances, where these explain all that there is."""
-    if not _seems_more(problem, problem.nominal()):
-        return problem
-    return problem if _seems_more(more, more.nominal()) else more
-
-
-def _gauged(problem: Problem) -> Problem:
-    """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. Where
-    a stage has a gain of its own, that is part of it."""
-    return problem if problem.nominals.has_gain else _where_all(problem, replace(problem, gauge=_GAUGE))
-
-
-def _widened(problem: Problem) -> Problem:
-    """The problem with a stage faster, or of another gain, than three times the uncertainty of what was given
-    allows, and an actuator of any numbers, where that is all there is: then no effect stands for it."""
-    ground = _ground(problem, problem.nominal())
-    if not problem.nominals.beyond(ground.vector) or not _shows_more(ground):
-        return problem
-    wide = replace(problem, nominals=replace(problem.nominals, wide=True, far=True))
-    return problem if _seems_more(wide, wide.nominal()) else wide
-
-
 def _worth_trying(
     base: Problem, vector: np.ndarray, candidates: list[CandidateEffect]
 ) -> list[CandidateEffect]:
     """All candidate effects where there seems to be more than noise; else none."""
-    return candidates if _seems_more(base, vector) else []
-
-
-def _seems_more(base: Problem, vector: np.ndarray) -> bool:
-    """Whether inputs predict something of the residual, or it is slower or less steady than noise is."""
-    return _shows_more(_ground(base, vector))
-
-
-def _ground(base: Problem, vector: np.ndarray) -> Fit:
-    return fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
-
-
-def _shows_more(ground: Fit) -> bool:
-    base = ground.problem
-    left, response = ground.residual(), base.references.clocks["response"]
-    found = disturbance(left, base.segment.run.h, response)
-    kept = base.segment.pace > 0.0 and found.pushed  # an integral of what inputs do shows little of them
-    return (
-        found.low_frequency
-        or found.tonal
-        or found.bursts
-        or kept
-        or ground.predictable_share > NUMBERS.chance
-    )
+    return candidates if seems_more(base, vector) else []
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:

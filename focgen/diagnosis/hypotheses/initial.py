@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.hypotheses.explain import problem_of
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment

@@ -44,24 +44,33 @@ class Cause:
 @dataclass(frozen=True, eq=False)
 class Beside:
     """What every effect is doubted with: the fit without any, the ``rankings`` made, which those made anew
-    join, the ``candidates`` to try, the ``weighing`` of residuals, and the ``surroundings``."""
+    join, the ``candidates`` to try, the ``weighing`` of residuals, the ``surroundings``, and whether effects
+    are ``granted`` to be there."""
 
     nominal: Fit
     rankings: list[Ranking]
     candidates: Sequence[CandidateEffect]
     weighing: Weighing
     surroundings: Surroundings
+    granted: bool = False
 
 
 def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
     """Every effect held against its rivals beside the others; where one of them does better, it takes the
-    place."""
+    place, and where none is likelier than that nothing more is there, as what came later may make it, all
+    leave it."""
     for _ in range(_SWAPS):
         causes = _causes(best, beside)
-        usurper = min((r for c in causes for r in c.rivals), key=lambda r: r.separation, default=None)
-        if usurper is None or usurper.separation >= 0:
+        first = [c.rivals[0] for c in causes]
+        usurper = min(first, key=lambda r: r.separation, default=None)
+        if usurper is not None and usurper.separation < 0:
+            best = usurper.fit
+            continue
+        needless = min(first, key=lambda r: r.odds, default=None)
+        if needless is None or needless.odds >= 0.0 or beside.granted:
             return best, causes
-        best = usurper.fit
+        own = [c for c in best.problem.candidates if c.effect == needless.effect]
+        best = left_out(best, own, beside.weighing)
     return best, _causes(best, beside)
 
 

@@ -168,7 +168,7 @@ class Problem:
         """Whether a candidate effect says how late the output is: two numbers for one thing would share it at
         random.
         """
-        return any(library()[candidate.effect].shifts for candidate in self.candidates)
+        return any(library()[candidate.effect].delays for candidate in self.candidates)
 
     def _least(self, p: Parameter) -> float:
         """The lower bound: a time constant of less than two samples is nothing that samples could show."""

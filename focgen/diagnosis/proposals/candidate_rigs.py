@@ -70,8 +70,8 @@ class CandidateRig:
         """The same having made the experiment."""
         clock = float(self.part.problem.segment.run.clock[-1])
         x = np.asarray(choice.input, float)
-        run = Run.of([len(x)], [clock], choice.reach.h)
-        if choice.reach.rest != 0.0 and not choice.reach.integrates:
+        run = Run.of([len(x)], [clock], choice.limits.h)
+        if choice.limits.rest != 0.0 and not choice.limits.integrates:
             run.rest[0] = BALANCED
         taps: dict[str, np.ndarray] = {}
         for part in self.before:

@@ -12,11 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from focgen.diagnosis.hypotheses.explain import candidates_for, problem_of
+from focgen.diagnosis.hypotheses.explain import candidates_for
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.segments import cuts, make
+from focgen.diagnosis.proposals.limits import InputLimits
 from focgen.diagnosis.proposals.menu import menu
-from focgen.diagnosis.proposals.reach import Reach
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import Logs, each_of
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
@@ -82,22 +83,22 @@ def _menu(rig: Rig) -> tuple[Experiment, ...]:
     """The menu's experiments on the nominal rig."""
     response = response_time(rig, rig.sample_time, 2e4 * rig.sample_time)
     start, found = 0.0, []
-    for choice in menu(_reach(rig, response)):
-        run = Run.of([len(choice.levels)], [start], choice.reach.h)
+    for choice in menu(_limits(rig, response)):
+        run = Run.of([len(choice.levels)], [start], choice.limits.h)
         tap: dict[str, np.ndarray] = {}
         Chain(rig).run(choice.input, "regulator", "sensor", run, tap=tap)
         logged = {role for role in ("pressure", "curvature") if getattr(rig.signals, role)} | {"output"}
         signals = {"command": choice.input} | {_ROLES[s]: y for s, y in tap.items() if _ROLES[s] in logged}
-        found.append(Experiment(choice.what, choice.reach.h, signals, start))
+        found.append(Experiment(choice.what, choice.limits.h, signals, start))
         start += choice.seconds
     return tuple(found)
 
 
-def _reach(rig: Rig, response: float) -> Reach:
+def _limits(rig: Rig, response: float) -> InputLimits:
     """What the rig file says of the command: from 0 to 10 where it is silent."""
     low, high = rig.ranges.command or (0.0, 10.0)
     h = max(rig.sample_time, response / _FINE)
-    return Reach(
+    return InputLimits(
         low, high, min(max(0.0, low), high), np.inf, _LONGEST * response, response, h, 1, integrations(rig)
     )
 

@@ -22,8 +22,8 @@ from focgen.diagnosis.model import Found, NextExperiment
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.segments import cuts
 from focgen.diagnosis.proposals.candidate_rigs import CandidateRig, candidate_rigs
+from focgen.diagnosis.proposals.limits import Bounds, bounds_of, limits_of
 from focgen.diagnosis.proposals.menu import Choice, menu
-from focgen.diagnosis.proposals.reach import Bounds, bounds_of, reach_of
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
 from focgen.rig.rig import Rig
@@ -65,15 +65,15 @@ class _Asked:
 
     def said(self, rig: Rig) -> str:
         """It in words, with the rig's units."""
-        reach, made, signals = self.choice.reach, self.choice.input, rig.signals
+        limits, made, signals = self.choice.limits, self.choice.input, rig.signals
         unit = unit_of_role(signals, self.entry)
         ends = f"from {made.min():.4g} to {made.max():.4g} {unit}".strip()
         parts = [f"{self.choice.what}, on the {self.entry} {ends}"]
         if np.isfinite(self.rate):
-            faster = "no faster" if np.isfinite(reach.rate) else "faster"
+            faster = "no faster" if np.isfinite(limits.rate) else "faster"
             parts.append(f"{faster} than {self.rate:.3g} {unit}/s")
         parts.append(f"{self.choice.seconds:.0f} s")
-        if reach.integrates:
+        if limits.integrates:
             place = f"{self.bounds.stands:.3g} {unit_of_role(signals, 'output')}".strip()
             left = self.bounds.left
             parts.append(f"from where it stands at {place}" if left else f"brought to {place} first")
@@ -106,10 +106,10 @@ def _between(
     before and the logs hold; steps where there were none, or a further signal, only where that does not
     do."""
     entry, bounds = cuts(logs)[0], bounds_of(rig, logs)
-    reach, rigs = reach_of(rig, logs, entry), candidate_rigs(explanations, e, rivals)
+    limits, rigs = limits_of(rig, logs, entry), candidate_rigs(explanations, e, rivals)
     tiers: list[list[_Option]] = []
     choices: list[tuple[Choice, list[CandidateRig]]] = []
-    for one in dict.fromkeys((reach, reach.faster)):
+    for one in dict.fromkeys((limits, limits.faster)):
         choices = _showing(_allowed(menu(one), rigs, bounds), e, rivals)
         tiers.append([_Option(choice, None, _apart(e, made, None)) for choice, made in choices])
     if not np.any([o.apart >= _ENOUGH for tier in tiers for o in tier]):
@@ -119,7 +119,7 @@ def _between(
     if found is None:
         return None
     value, option = found
-    asked = _Asked(option.choice, entry, option.stage, bounds, reach.rate)
+    asked = _Asked(option.choice, entry, option.stage, bounds, limits.rate)
     return _proposed(rig, e, rivals, float(min(value, _MOST)), asked), option.choice
 
 
@@ -166,7 +166,7 @@ def _showing(
     before, response = e.segment.parts(e.segment.x), e.nominal.problem.references.clocks["response"]
     hidden = []
     for choice, made in choices:
-        entering = np.repeat(made[0].entering, choice.reach.coarse)
+        entering = np.repeat(made[0].entering, choice.limits.coarse)
         done = excitation([*before, entering], e.segment.run.h, response)
         hidden.append(sum(need(done) is not None for need in needs))
     return [c for c, count in zip(choices, hidden, strict=True) if count == min(hidden)]
@@ -182,7 +182,7 @@ def _proposed(
         value,
         {
             "seconds": asked.choice.seconds,
-            "at_most_s": asked.choice.reach.seconds,
+            "at_most_s": asked.choice.limits.seconds,
             "entry": asked.entry,
             "low": float(made.min()),
             "high": float(made.max()),

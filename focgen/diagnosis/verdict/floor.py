@@ -6,7 +6,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import problem_residual
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.rig.effects import library
+from focgen.rig.effects import STEP, library
 
 
 def floor(last: Explanation, explained: float) -> float:
@@ -18,7 +18,7 @@ def floor(last: Explanation, explained: float) -> float:
     readings lie a step off. The floor is the noise, not what the rounding makes of it.
     """
     parts = [np.mean(p**2) for p in last.segment.parts(problem_residual(last.best))]
-    found = min(float(np.mean(parts)) * (1 - last.left.share), float(np.median(parts)), explained)
+    found = min(float(np.mean(parts)) * (1 - last.predictability.share), float(np.median(parts)), explained)
     step = _step(last)
     return min(found, (np.sqrt(np.pi / 2) * explained / step) ** 2) if step else found
 
@@ -27,7 +27,7 @@ def _step(last: Explanation) -> float | None:
     """The step of the rounding that was found, in units of the output."""
     for cause in last.causes:
         rival = cause.rivals[0]
-        if library()[rival.effect].noiselike:
-            candidates, values = rival.fit.problem.candidates, rival.fit.problem.values(rival.fit.vector)
-            return next(v[0] for c, v in zip(candidates, values) if c.effect == rival.effect)
+        if library()[rival.effect].rounds:
+            placed = rival.fit.problem.placed(rival.fit.vector)
+            return next(p.named[STEP] for p in placed if p.effect == rival.effect)
     return None

@@ -12,7 +12,8 @@ _LOUD = 0.12  # what the noise adds to it, in root mean squares of the gap,
 _REST = 0.35  # and the part of what is left unexplained that may come or go
 _FITTED = 0.04  # share of noise that the best of many fits has taken along, in root mean squares of the gap
 _DOUBTED = 0.5  # of what fits lose on parts of the session they did not see: not promised, and doubted, too;
-_LOST = (0.3, 0.15)  # a greater loss counts as this in either: a session's parts see less than the session
+_LOST = 0.3  # a greater loss counts as this in what is promised: a session's parts see less than the session,
+_LOST_IN_DOUBT = 0.15  # and as this in the doubt
 _AHEAD = 0.1  # share that a drift may cost that goes on as no log can show
 _MOST = 1.02  # measured on few experiments, noise may make it more than all
 
@@ -44,8 +45,8 @@ def predict(
     picks = rng.integers(0, len(refitted), (_DRAWS, len(refitted)))
     draws = [_share(refitted[p], explained[p], floor) for p in picks]
     low, high = np.quantile([d for d in draws if np.isfinite(d)] or [value], [0.05, 0.95])
-    value -= min(lost, _LOST[0]) + _FITTED * noise
-    wide = _FORM + _LOUD * noise + _REST * (1.0 - value) + _DOUBTED * min(lost, _LOST[1])
+    value -= min(lost, _LOST) + _FITTED * noise
+    wide = _FORM + _LOUD * noise + _REST * (1.0 - value) + _DOUBTED * min(lost, _LOST_IN_DOUBT)
     low, high = min(low, value - wide - _AHEAD * drifts), max(high, value + 0.5 * wide)
     return Improvement(value, (float(max(low, -1.0)), float(min(high, _MOST))))
 

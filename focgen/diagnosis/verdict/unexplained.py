@@ -22,12 +22,12 @@ def is_unknown(e: Explanation) -> bool:
         return True
     if e.causes and not is_rounded(e) and from_outside(e):
         return True
-    if e.left.share < NUMBERS.left:
+    if e.predictability.share < NUMBERS.left:
         return False
     if e.segment.closed and left.bursts and _rings(e):
         return True
     before, after = _squares(e)
-    return is_none(after * e.left.share, before - after)
+    return is_none(after * e.predictability.share, before - after)
 
 
 def disturbed(e: Explanation) -> Disturbance:
@@ -38,7 +38,7 @@ def disturbed(e: Explanation) -> Disturbance:
 
 def is_rounded(e: Explanation) -> bool:
     """Whether a rounding is among the effects found."""
-    return any(library()[c.rivals[0].effect].noiselike for c in e.causes)
+    return any(library()[c.rivals[0].effect].rounds for c in e.causes)
 
 
 def _is_disturbed(e: Explanation, left: Disturbance) -> bool:

@@ -32,7 +32,7 @@ def stage_shares(
 
 def _predictable_share(e: Explanation) -> float:
     """What inputs predict of the nominal residual: mean square, as a share of the level's."""
-    return float(np.mean(e.nominal.weighed**2)) * e.left_nominal.share
+    return float(np.mean(e.nominal.weighed**2)) * e.nominal_predictability.share
 
 
 def locate(explanations: Sequence[Explanation], share: dict[str, float], found: Sequence[Found]) -> Where:
@@ -68,7 +68,7 @@ def regimes(e: Explanation) -> dict[str, object]:
             name: float(square[third == i].sum()) for i, name in enumerate(("first third", "second", "last"))
         },
         "frequency": _bands(e, residual),
-        "depends_on": e.left_nominal.depends,
+        "depends_on": e.nominal_predictability.depends,
     }
 
 

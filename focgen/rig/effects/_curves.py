@@ -13,6 +13,12 @@ _BEYOND = 1.2  # of the largest level seen: the bend grows no further there
 _KNOTS = np.linspace(0.0, 1.0, 6)  # of the largest level seen
 
 
+def softly_beyond(x: Array, place: float, width: float) -> Array:
+    """What of ``x`` (n,) is beyond ``place`` > 0, 0 at 0, with the knee rounded over ``width``."""
+    made: Array = width * (np.logaddexp(0.0, (x - place) / width) - np.logaddexp(0.0, -place / width))
+    return made
+
+
 def _quartic(x: Array, values: Values, run: Run) -> Array:
     *sizes, scale = values
     place = np.minimum(np.abs(x) / scale, _BEYOND)

@@ -18,11 +18,12 @@ from focgen.logs.begin import Begin
 STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
     "regulator": ("command", "supply"),
-    "actuator": ("load", "drive", "dynamics", "response"),
+    "actuator": ("load", "drive", "spring", "dynamics", "response"),
     "sensor": ("strain", "reading"),
 }
 """Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the
-pressure entering the actuator; ``drive``: K(p) p; ``dynamics``: the actuator's own equation; ``response``:
+pressure entering the actuator; ``drive``: K(p) p; ``spring``: how much further a spring that gives way is
+bent at rest, as a function of how far it was; ``dynamics``: the actuator's own equation; ``response``:
 what leaves it; ``strain``: into the sensor; ``reading``: what leaves it."""
 
 
@@ -54,6 +55,15 @@ LARGEST = Parameter("scale", level=1, lower=1.0, upper=1.0 + 1e-9, starts=(1.0,)
 
 PERIOD = "period"
 """The name of a parameter that is the period of a form's own tone."""
+
+DELAY = "delay"
+"""The name of a parameter that is a dead time."""
+
+STEP = "step"
+"""The name of a parameter that is the step between two levels, of those that a signal is rounded to."""
+
+PLACE = "place"
+"""The name of a parameter that says where something lay when an experiment began elsewhere than at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +118,6 @@ class Form:
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is
     linear, None where not. ``wanders``: it follows the session's time through free values, so that it
     predicts nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
-    ``begun``: it says where something lay that was held when an experiment began elsewhere than at rest.
     """
 
     name: str
@@ -120,7 +129,15 @@ class Form:
     response: Callable[[Values, Complex], Complex] | None = None
     wanders: bool = False
     jumps: bool = False
-    begun: bool = False
+
+    @property
+    def begun(self) -> bool:
+        """Whether it says where something lay when an experiment began elsewhere than at rest."""
+        return self.has(PLACE)
+
+    def has(self, name: str) -> bool:
+        """Whether a parameter has this name."""
+        return any(p.name == name for p in self.parameters)
 
 
 @dataclass(frozen=True)
@@ -153,13 +170,10 @@ Check = Callable[[Excitation], str | None]
 
 @dataclass(frozen=True)
 class Effect:
-    """A family. ``stage`` is the usual one, ``also`` others it may sit in, where those at home leave much;
-    ``anywhere``: it is at home in all. ``single``: nature has one form only.
+    """A family. ``stage`` is the usual one, ``also`` others it may sit in, where those at home leave much.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
-    ``noiselike``: what it does cannot be predicted from the input, as rounding; ``shifts``: it does what
-    columns out of step do, which then are a part of it. ``bends``: its curves leave the gain at zero as it
-    is, and change it elsewhere.
+    ``bends``: its curves leave the gain at zero as it is, and change it elsewhere.
     """
 
     name: str
@@ -170,13 +184,21 @@ class Effect:
     needs: Check
     forms: Sequence[Form]
     also: tuple[str, ...] = ()
-    anywhere: bool = False
-    single: bool = False
-    noiselike: bool = False
-    shifts: bool = False
     bends: bool = False
 
     @property
     def tonal(self) -> bool:
         """Whether it rings with one tone: each of its forms has a period of its own."""
-        return all(any(p.name == PERIOD for p in form.parameters) for form in self.forms)
+        return all(form.has(PERIOD) for form in self.forms)
+
+    @property
+    def delays(self) -> bool:
+        """Whether it is a dead time. That is at home in every stage, for a chain does not show where it lies,
+        and columns out of step do the same."""
+        return all(form.has(DELAY) for form in self.forms)
+
+    @property
+    def rounds(self) -> bool:
+        """Whether it rounds to levels. Which way a sample is rounded cannot be predicted from the input, so
+        what it leaves looks like noise."""
+        return all(form.has(STEP) for form in self.forms)

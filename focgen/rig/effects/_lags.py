@@ -31,6 +31,21 @@ def _partial_response(values: Values, s: Complex) -> Complex:
     return 1.0 + share * (lag_response(tau, s) - 1.0)
 
 
+def _unequal(x: Array, values: Values, run: Run) -> Array:
+    tau, ratio = values
+    return _one(_one(x, (tau,), run), (ratio * tau,), run)
+
+
+def _unequal_response(values: Values, s: Complex) -> Complex:
+    tau, ratio = values
+    return lag_response(tau, s) * lag_response(ratio * tau, s)
+
+
+def _unequal_form(slot: str) -> Form:
+    ratio = Parameter("ratio", lower=0.02, upper=1.0, starts=(0.3,), log=True)
+    return Form("unequal_lags", slot, (*_LAG, ratio), _unequal, response=_unequal_response)
+
+
 def _spread(x: Array, values: Values, run: Run) -> Array:
     tau, order = values
     return respond(x, run.rest, run.h, max(tau, 1e-9 * run.h) ** order, order, run.duration)
@@ -48,8 +63,9 @@ def _partial_form(slot: str) -> Form:
 
 
 def slower_forms(slot: str) -> list[Form]:
-    """Besides, a lag of a part of the signal: what makes a lag of a longer one."""
-    return [*forms(slot), _partial_form(slot)]
+    """Besides, two lags of which one is the longer, as of a valve and its line, and a lag of a part of the
+    signal: what makes a lag of a longer one."""
+    return [*forms(slot), _unequal_form(slot), _partial_form(slot)]
 
 
 def forms(slot: str) -> list[Form]:

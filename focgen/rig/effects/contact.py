@@ -6,6 +6,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.rig.dynamics import Dynamics
+from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _PLACE = Parameter("curvature", level=1, lower=0.1, upper=1.3, starts=(0.8, 0.5, 0.95), zero=1.3)
@@ -26,7 +27,7 @@ def _gradual(x: Array, values: Values, run: Run) -> Array:
 
 def _soft(x: Array, values: Values, run: Run) -> Array:
     place, slope, width = values
-    beyond = width * (np.logaddexp(0.0, (x - place) / width) - np.logaddexp(0.0, -place / width))
+    beyond = softly_beyond(x, place, width)
     made: Array = x - (1.0 - slope) * beyond
     return made
 
@@ -81,11 +82,11 @@ EFFECT = Effect(
             ),
             _knee,
         ),
-        # it pushes the actuator itself, which comes to rest the sooner
+        # it pushes the actuator itself, which comes to rest the sooner; a wall is as stiff as it likes
         Form(
             "spring",
             "dynamics",
-            (_PLACE, Parameter("stiffness", lower=0.0, upper=50.0, starts=(1.0, 1.0), zero=0.0)),
+            (_PLACE, Parameter("stiffness", lower=0.02, upper=200.0, starts=(1.0, 1.0, 10.0), log=True)),
             _spring,
         ),
         Form("gradual", "response", (_PLACE, _STIFFNESS), _gradual),

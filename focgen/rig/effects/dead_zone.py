@@ -1,8 +1,12 @@
 """Nothing moves below a threshold: slack, a seal, static friction overcome only once."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.rig.dynamics import Dynamics
+from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _LEVEL = Parameter("threshold", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.25), zero=0.0)
@@ -13,13 +17,19 @@ def _hard(x: Array, values: Values, run: Run) -> Array:
 
 
 def _soft(x: Array, values: Values, run: Run) -> Array:
-    threshold, width = values
-    size = width * (
-        np.logaddexp(0.0, (np.abs(x) - threshold) / width) - np.logaddexp(0.0, -threshold / width)
-    )
-    made: Array = np.sign(x) * size
-    return made
+    return np.sign(x) * softly_beyond(np.abs(x), *values)
 
+
+def _slack(x: Array, values: Values, run: Run) -> Array:
+    return _hard(x, values, run)
+
+
+def _preloaded(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, preload=x.preload + values[0])
+
+
+# what drives the actuator is below it at first: K(p) p, or the input of a num/den actuator
+_PRELOAD = Parameter("preload", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.25), zero=0.0, at="drive")
 
 EFFECT = Effect(
     name="dead_zone",
@@ -40,5 +50,9 @@ EFFECT = Effect(
             ),
             _soft,
         ),
+        # the spring itself is pressed against a seat, and stops there as it comes back
+        Form("preloaded", "dynamics", (_PRELOAD,), _preloaded),
+        # what is seen is taken along by what moves, which comes through the slack first
+        Form("slack", "response", (_LEVEL,), _slack),
     ],
 )

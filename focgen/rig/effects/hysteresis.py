@@ -3,9 +3,11 @@ a mass, of the spring that pulls it back."""
 
 from dataclasses import replace
 
+from focgen.arrays import Array
+from focgen.rig import kernels
 from focgen.rig.dynamics import Dynamics, Spring
 from focgen.rig.effects import _loops
-from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Values
+from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 
 
 def _spring(x: Dynamics, values: Values, run: None) -> Dynamics:
@@ -18,12 +20,17 @@ def _sharp_spring(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, spring=Spring(share, loading / scale, unloading / scale, power, scale))
 
 
+def _lost_motion(x: Array, values: Values, run: Run) -> Array:
+    return kernels.play(x, run.rest, values[0])
+
+
 # of the stiffness: Bouc and Wen's spring takes it over, and is as stiff where a motion begins
 _SHARE = Parameter("share", lower=0.0, upper=1.0, starts=(0.2, 0.5), zero=0.0)
 # of its stiffness: what a spring wound to the largest displacement has lost; below 0 it stiffens
 _LOADING = Parameter("loading", lower=-3.0, upper=30.0, starts=(0.5, 0.0))
 _UNLOADING = Parameter("unloading", lower=-3.0, upper=30.0, starts=(0.5, 1.0))
 _POWER = Parameter("power", lower=0.5, upper=4.0, starts=(1.0, 1.0))
+_LOST = Parameter("width", level=1, lower=0.0, upper=0.6, starts=(0.02, 0.1), zero=0.0)
 
 EFFECT = Effect(
     name="hysteresis",
@@ -42,5 +49,7 @@ EFFECT = Effect(
         *_loops.forms("drive"),
         Form("spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, LARGEST), _spring),
         Form("sharp_spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, _POWER, LARGEST), _sharp_spring),
+        # what is seen is taken along with play by what moves
+        Form("lost_motion", "response", (_LOST,), _lost_motion),
     ],
 )

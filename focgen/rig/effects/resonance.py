@@ -1,10 +1,12 @@
 """A lightly damped mode of the actuator: it rings after fast changes."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from focgen.arrays import Array, Complex
+from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._effect import PERIOD, Effect, Form, Parameter, Run, Values
 from focgen.rig.linear import oscillator
 
@@ -19,6 +21,10 @@ def _beside(x: Array, values: Values, run: Run) -> Array:
     place = oscillator(x, run.rest, run.h, period, damping)
     speed = oscillator(x, run.rest, run.h, period, damping, speed=True)
     return x + share * (place - x) + quarter * speed
+
+
+def _mass(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, mass=x.mass + (values[0] / (2.0 * np.pi)) ** 2)
 
 
 def _mode_response(period: float, damping: float, s: Complex) -> Complex:
@@ -65,6 +71,13 @@ EFFECT = Effect(
             ),
             _beside,
             response=_beside_response,
+        ),
+        # the actuator's own spring swings a mass, against the damping that it has
+        Form(
+            "mass",
+            "dynamics",
+            (Parameter(PERIOD, time=1, lower=0.002, upper=30.0, starts=(1.0, 3.0, 6.0), log=True),),
+            _mass,
         ),
     ],
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._effect import STEP, Effect, Form, Parameter, Run, Values
 
 _COARSE = 0.006  # of the range: finer steps are the resolution of any converter
 _COVERED = 0.6  # of the samples lie on a few levels
@@ -39,15 +39,13 @@ EFFECT = Effect(
     reveals="slow ramps: the reading moves in steps of one size",
     confused_with=("valve_stiction",),
     needs=lambda e: None,
-    single=True,
-    noiselike=True,
     forms=[
         Form(
             "rounding",
             "reading",
             (
                 Parameter(
-                    "step", level=1, lower=0.0, upper=0.9, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0
+                    STEP, level=1, lower=0.0, upper=0.9, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0
                 ),
                 Parameter("phase", level=1, lower=-0.5, upper=0.5, starts=(0.0,)),
             ),

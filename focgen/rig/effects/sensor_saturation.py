@@ -3,6 +3,7 @@
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _LIMIT = Parameter("limit", level=1, lower=0.1, upper=1.3, starts=(0.9, 0.6), zero=1.3)
@@ -13,11 +14,7 @@ def _hard(x: Array, values: Values, run: Run) -> Array:
 
 
 def _soft(x: Array, values: Values, run: Run) -> Array:
-    limit, width = values
-    made: Array = (
-        x - width * np.logaddexp(0.0, (x - limit) / width) + width * np.logaddexp(0.0, -limit / width)
-    )
-    return made
+    return x - softly_beyond(x, *values)
 
 
 EFFECT = Effect(

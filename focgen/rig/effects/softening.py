@@ -45,6 +45,14 @@ def _reloading(x: Array, values: Values, run: Run) -> Array:
     return made
 
 
+def _worn(x: Array, values: Values, run: Run) -> Array:
+    return _saturating(x, values, run)
+
+
+def _worked(x: Array, values: Values, run: Run) -> Array:
+    return _work(x, values, run)
+
+
 def _leaves_peak(x: Array, values: Values, run: Run) -> dict[str, float]:
     return {"largest": float(_peak(x, run)[-1])}
 
@@ -71,6 +79,9 @@ EFFECT = Effect(
         Form("saturating", "drive", (_GROWTH, _scale(0.3, 1.0)), _saturating, leaves=_leaves_peak),
         Form("reloading", "drive", (_GROWTH, _scale(0.1, 0.5)), _reloading, leaves=_leaves_peak),
         Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
+        # the spring itself gives way, and what it pulls back is the slower
+        Form("worn", "spring", (_GROWTH, _scale(0.3, 1.0)), _worn, leaves=_leaves_peak),
+        Form("worn_by_work", "spring", (_GROWTH, _scale(1.0, 5.0)), _worked, leaves=_leaves_work),
         _curves.spline("drive", _peak, _leaves_peak),
     ],
 )

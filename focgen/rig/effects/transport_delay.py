@@ -4,7 +4,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.rig.delay import delayed
-from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._effect import DELAY, Effect, Form, Parameter, Run, Values
 
 
 def _shift(x: Array, values: Values, run: Run) -> Array:
@@ -18,14 +18,11 @@ EFFECT = Effect(
     reveals="steps and fast sines: a phase that falls in proportion to frequency, with no loss of amplitude",
     confused_with=("slow_regulator", "sensor_lag", "valve_asymmetry"),
     needs=lambda e: None if e.fastest < 0.25 else "no change of the input is fast beside the rig's response",
-    anywhere=True,
-    single=True,
-    shifts=True,
     forms=[
         Form(
             "delay",
             "supply",
-            (Parameter("delay", time=1, lower=0.0, upper=5.0, starts=(0.01, 0.05, 0.3), zero=0.0),),
+            (Parameter(DELAY, time=1, lower=0.0, upper=5.0, starts=(0.01, 0.05, 0.3), zero=0.0),),
             _shift,
             response=lambda values, s: np.exp(-values[0] * s),
         )

@@ -5,7 +5,7 @@ from itertools import product
 
 from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._effect import PLACE, Effect, Form, Parameter, Run, Values
 
 _BANDS = tuple(0.003 * 1.3**k for k in range(17))  # of the largest command, far above whose swing it may lie
 _LEFTS, _PLACES = (0.0, 0.35, 0.7), (0.0,)
@@ -16,7 +16,7 @@ def _parameters(*further: Sequence[float]) -> tuple[Parameter, ...]:
     starts = zip(*product(_BANDS, _LEFTS, *further))
     band = Parameter("band", level=1, lower=0.0, upper=0.5, starts=next(starts), zero=0.0)
     left = Parameter("left", lower=0.0, upper=0.95, starts=next(starts))
-    return (band, left, *(Parameter("place", lower=-1.0, upper=1.0, starts=s, zero=0.0) for s in starts))
+    return (band, left, *(Parameter(PLACE, lower=-1.0, upper=1.0, starts=s, zero=0.0) for s in starts))
 
 
 def _play(x: Array, values: Values, run: Run) -> Array:
@@ -53,7 +53,7 @@ EFFECT = Effect(
         Form("stick_slip", "command", _parameters(), _slip, jumps=True),
         Form("slips", "command", _parameters(), _slips, jumps=True),
         # a valve that is in use lies anywhere in its band
-        Form("stick_slip_begun", "command", _parameters(_PLACES), _slip, jumps=True, begun=True),
-        Form("slips_begun", "command", _parameters(_PLACES), _slips, jumps=True, begun=True),
+        Form("stick_slip_begun", "command", _parameters(_PLACES), _slip, jumps=True),
+        Form("slips_begun", "command", _parameters(_PLACES), _slips, jumps=True),
     ],
 )

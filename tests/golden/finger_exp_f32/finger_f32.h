@@ -20,7 +20,7 @@ extern "C" {
 #define FINGER_F32_SAMPLE_TIME 0.01f  /* s: call step this often */
 #define FINGER_F32_PERIOD_US   10000u /* the same in microseconds */
 
-/* Every signal is in its physical unit: a count is 1. */
+/* Every signal is in its physical unit: one count is 1. */
 typedef float finger_f32_sig;
 
 #define FINGER_F32_REF_LSB   1.0f /* 1/mm, of reference and measurement */
@@ -80,8 +80,8 @@ void finger_f32_reset(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig me
 finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f32_sig meas,
                                finger_f32_sig sched);
 
-/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling
-   step. */
+/* The plant got u_applied instead of u (manual mode, an outer limiter): the controller goes on from there.
+   Keep calling step. */
 void finger_f32_track(finger_f32_state *s, finger_f32_sig u_applied);
 
 /* FINGER_F32_FLAG_... of the latest step, 0 after init and reset (to usable values). */

@@ -308,7 +308,7 @@ finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q
         s->increment = finger_q31_increment(gain, s->resting);
         s->starting = 0;
     }
-    /* |sum| <= 8646911282940739584 < 2^63 */
+    /* |sum| <= 8646911282940739584 < 2^63; clamped to 0 ... 10 V, in counts of 2^-58 V */
     s->integral = foc_clamp64(s->integral + (d + s->increment), 0, 2882303761517117440);
     s->increment = d;
     u = foc_sat32(foc_shift64(s->integral, 31));

@@ -189,7 +189,7 @@ static void finger_f32_settle(finger_f32_state *s, float e)
     s->flags = 0;
 }
 
-/* Whether an output is one that a step can have left: NaN is not. */
+/* Whether the state is one that a step can have left: its slot in the ring, its integral. */
 static uint8_t finger_f32_within(const finger_f32_state *s)
 {
     const int64_t now = s->integral;
@@ -264,7 +264,7 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
     if (!foc_held(d) || !foc_held(s->increment)) {
         return finger_f32_recover(s, ref - meas);
     }
-    /* |sum| <= 6052837899185946624 < 2^63 */
+    /* |sum| <= 6052837899185946624 < 2^63; clamped to 0 ... 10 V, in counts of 2^-57 V */
     s->integral = foc_clamp64(s->integral + (d + s->increment), 0, 1441151880758558720);
     s->increment = d;
     u = foc_value_f32(s->integral, 6.9388939039072284e-18f);

@@ -181,7 +181,7 @@ static void finger_f64_settle(finger_f64_state *s, double e)
     s->flags = 0;
 }
 
-/* Whether an output is one that a step can have left: NaN is not. */
+/* Whether the output is one that a step can have left: NaN is not. */
 static uint8_t finger_f64_within(const finger_f64_state *s)
 {
     const double now = s->integral;

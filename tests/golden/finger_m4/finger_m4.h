@@ -20,8 +20,8 @@ extern "C" {
 #define FINGER_M4_SAMPLE_TIME 0.01f  /* s: call step this often */
 #define FINGER_M4_PERIOD_US   10000u /* the same in microseconds */
 
-/* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest
-   integer. */
+/* Signals are integers. To convert a physical value, divide it by the size of one count, below, and round to
+   the nearest integer. */
 typedef int16_t finger_m4_sig;
 
 #define FINGER_M4_REF_LSB   9.5367431640625e-07f /* 1/mm, of reference and measurement */
@@ -79,8 +79,8 @@ void finger_m4_reset(finger_m4_state *s, finger_m4_sig ref, finger_m4_sig meas, 
 finger_m4_sig finger_m4_step(finger_m4_state *s, finger_m4_sig ref, finger_m4_sig meas,
                              finger_m4_sig sched);
 
-/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling
-   step. */
+/* The plant got u_applied instead of u (manual mode, an outer limiter): the controller goes on from there.
+   Keep calling step. */
 void finger_m4_track(finger_m4_state *s, finger_m4_sig u_applied);
 
 /* FINGER_M4_FLAG_... of the latest step, 0 after init and reset (to values in range). */

@@ -272,7 +272,7 @@ finger_q15_sig finger_q15_step(finger_q15_state *s, finger_q15_sig ref, finger_q
         s->increment = finger_q15_increment(gain, s->resting);
         s->starting = 0;
     }
-    /* |sum| <= 2013241344 < 2^31 */
+    /* |sum| <= 2013241344 < 2^31; clamped to 0 ... 10 V, in counts of 2^-26 V */
     s->integral = foc_clamp32(s->integral + (d + s->increment), 0, 671088640);
     s->increment = d;
     u = foc_sat16(foc_shift32(s->integral, 15));

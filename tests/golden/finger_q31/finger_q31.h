@@ -20,8 +20,8 @@ extern "C" {
 #define FINGER_Q31_SAMPLE_TIME 0.01f  /* s: call step this often */
 #define FINGER_Q31_PERIOD_US   10000u /* the same in microseconds */
 
-/* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest
-   integer. */
+/* Signals are integers. To convert a physical value, divide it by the size of one count, below, and round to
+   the nearest integer. */
 typedef int32_t finger_q31_sig;
 
 #define FINGER_Q31_REF_LSB   1.4551915228366852e-11f /* 1/mm, of reference and measurement */
@@ -76,8 +76,8 @@ void finger_q31_reset(finger_q31_state *s, finger_q31_sig ref, finger_q31_sig me
 finger_q31_sig finger_q31_step(finger_q31_state *s, finger_q31_sig ref, finger_q31_sig meas,
                                finger_q31_sig sched);
 
-/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling
-   step. */
+/* The plant got u_applied instead of u (manual mode, an outer limiter): the controller goes on from there.
+   Keep calling step. */
 void finger_q31_track(finger_q31_state *s, finger_q31_sig u_applied);
 
 /* FINGER_Q31_FLAG_... of the latest step, 0 after init and reset (to values in range). */

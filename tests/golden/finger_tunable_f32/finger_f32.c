@@ -223,7 +223,7 @@ static void finger_f32_settle(finger_f32_state *s, float e)
     s->flags = 0;
 }
 
-/* Whether an output is one that a step can have left: NaN is not. */
+/* Whether the state is one that a step can have left: its slot in the ring, its integral. */
 static uint8_t finger_f32_within(const finger_f32_state *s)
 {
     const int64_t now = s->integral;

@@ -20,8 +20,8 @@ extern "C" {
 #define FINGER_Q15_SAMPLE_TIME 0.01f  /* s: call step this often */
 #define FINGER_Q15_PERIOD_US   10000u /* the same in microseconds */
 
-/* Every signal is an integer, a count of so much. To convert, divide by it and round to the nearest
-   integer. */
+/* Signals are integers. To convert a physical value, divide it by the size of one count, below, and round to
+   the nearest integer. */
 typedef int16_t finger_q15_sig;
 
 #define FINGER_Q15_REF_LSB   9.5367431640625e-07f /* 1/mm, of reference and measurement */
@@ -100,8 +100,8 @@ void finger_q15_reset(finger_q15_state *s, finger_q15_sig ref, finger_q15_sig me
 finger_q15_sig finger_q15_step(finger_q15_state *s, finger_q15_sig ref, finger_q15_sig meas,
                                finger_q15_sig sched);
 
-/* The plant has got u_applied instead (manual mode, an outer limiter): go on from there. Keep calling
-   step. */
+/* The plant got u_applied instead of u (manual mode, an outer limiter): the controller goes on from there.
+   Keep calling step. */
 void finger_q15_track(finger_q15_state *s, finger_q15_sig u_applied);
 
 /* The parameters that the controller was designed with: factors of 1, the widest limits. */

@@ -26,7 +26,7 @@ _MARGIN = 0.1  # of the range of a rig that integrates: kept free, for what push
 
 
 @dataclass(frozen=True)
-class Reach:
+class InputLimits:
     """The input from ``low`` to ``high`` about ``rest``, at no more than ``rate`` a second (inf: steps are
     allowed), for at most ``seconds``; the rig responds in ``response`` s. Experiments are planned in samples
     of ``h`` s, ``coarse`` of the logs' each. ``integrates``: how often the rig integrates its input."""
@@ -42,7 +42,7 @@ class Reach:
     integrates: int = 0
 
     @property
-    def faster(self) -> Reach:
+    def faster(self) -> InputLimits:
         """The same with steps."""
         return replace(self, rate=np.inf)
 
@@ -82,7 +82,7 @@ class Bounds:
         return True
 
 
-def reach_of(rig: Rig, logs: Sequence[Experiment], entry: str) -> Reach:
+def limits_of(rig: Rig, logs: Sequence[Experiment], entry: str) -> InputLimits:
     """What may be done with the input ``entry``, by the rig's ranges and the session so far."""
     h = logs[0].sample_time
     response = response_time(rig, h, max(len(log) * log.sample_time for log in logs))
@@ -97,7 +97,9 @@ def reach_of(rig: Rig, logs: Sequence[Experiment], entry: str) -> Reach:
     session = sum(len(log) * log.sample_time for log in logs)
     seconds = min(max(session, _LEAST * response), _LONGEST * response)
     coarse = max(1, int(response / _FINE / h))
-    return Reach(low, high, rest, _rate(signals, h), seconds, response, coarse * h, coarse, integrations(rig))
+    return InputLimits(
+        low, high, rest, _rate(signals, h), seconds, response, coarse * h, coarse, integrations(rig)
+    )
 
 
 def bounds_of(rig: Rig, logs: Sequence[Experiment]) -> Bounds:

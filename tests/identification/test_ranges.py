@@ -6,7 +6,7 @@ Red when a range is derived that the logs leave, or nobody is told that it was.
 import numpy as np
 import pytest
 
-from focgen.identification.reach import seen_ranges
+from focgen.identification.ranges import seen_ranges
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Ranges
 

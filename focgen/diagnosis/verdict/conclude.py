@@ -34,7 +34,7 @@ from focgen.rig.rig import Rig
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
 
-def reach(
+def conclude(
     rig: Rig,
     logs: Sequence[Experiment],
     rigs: compose.Rigs,
@@ -291,10 +291,10 @@ def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
     """What the residual that no effect explains depends on."""
     found: dict[str, object] = {}
     for e in unknown:
-        parts, noise = {k: v for k, v in e.left_nominal.depends.items() if v > 0.02}, disturbed(e)
+        parts, noise = {k: v for k, v in e.nominal_predictability.depends.items() if v > 0.02}, disturbed(e)
         found[f"{e.segment.entry} to {e.segment.exit}"] = {
             "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"],
-            "share": e.left_nominal.share,
+            "share": e.nominal_predictability.share,
             "bursts": noise.bursts,
             "low_frequency": noise.low_frequency,
             "tonal": noise.tonal,

@@ -1,0 +1,44 @@
+"""Parts of a session, each predicted by a fit that does not see it: cross-validation.
+
+M. Stone, Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical
+Society B 36, 1974.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
+from focgen.diagnosis.fitting.integrating import settled
+
+_FOLDS = 4
+_ITERATIONS = 4
+
+
+def folds(lengths: Sequence[int]) -> np.ndarray:
+    """The fold (n,) of every sample of experiments of these lengths: neighbouring experiments about a quarter
+    of the session long, or quarters of it where experiments are fewer."""
+    n = sum(lengths)
+    if len(lengths) < _FOLDS:
+        return np.arange(n) * _FOLDS // n
+    middles = np.cumsum(lengths) - 0.5 * np.array(lengths)
+    return np.repeat((middles * _FOLDS / n).astype(int), lengths)
+
+
+def fitted_to(best: Fit, weighing: Weighing, seen: np.ndarray) -> Fit:
+    """A fit made anew to the samples ``seen`` (n,) only. What these do not tell stays as it was."""
+    problem, segment = best.problem, best.problem.segment
+    masked = replace(segment, trust=segment.trust * seen)
+    return settled(fit(replace(problem, segment=masked), best.vector, weighing, _ITERATIONS))
+
+
+def foreseen(best: Fit, weighing: Weighing, fold: np.ndarray) -> float:
+    """The mean square error of a segment whose every part is simulated by a fit to the others."""
+    error = np.empty(len(fold))
+    for part in np.unique(fold):
+        vector = fitted_to(best, weighing, fold != part).vector
+        error[fold == part] = best.problem.weighed(vector)[fold == part]
+    return float(np.mean(error**2))

@@ -1,0 +1,124 @@
+"""What is uncertain of every log: what the command does between samples, the zero and the gain of a gauge,
+numbers farther from those given than their uncertainty.
+
+Each is let go only where that is all there is: an effect is looked for in the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
+from focgen.diagnosis.fitting.integrating import pace
+from focgen.diagnosis.hypotheses.disturbance import disturbance
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.nominal_parameters import NominalParameters
+from focgen.diagnosis.problem.problem import Problem
+from focgen.diagnosis.problem.scales import references
+from focgen.diagnosis.problem.segments import Segment, owner
+from focgen.logs.between import Between
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Rig
+
+# of the rig's response, and a sample at most: what columns may be out of step by; more is a delay
+_OUT_OF_STEP = 0.05
+_GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
+_WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
+_SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
+_RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
+
+
+def uncertain(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
+    """The segment's problem without effects, with all that explains a log without one let go."""
+    return _widened(_gauged(_zeroed(_held(rig, segment, logs))))
+
+
+def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
+    """The segment's problem without effects."""
+    scales = references(rig, segment, logs)
+    freely = owner(rig) if owner(rig) in segment.stages else None
+    load, response = (scales.levels["load"], scales.levels["response"])
+    segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
+    slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
+    return Problem(
+        segment, NominalParameters(rig, segment.stages, freely, load, response), scales, slack=slack
+    )
+
+
+def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
+    """The problem with the command as a staircase, as a polygon or as a smooth curve, whichever the log was,
+    where the rig does not say it: loggers differ."""
+    tried = [segment.between] if segment.entry != "command" else ways(segment)
+    if rig.between is not None:
+        tried = [rig.between]
+    problems = [problem_of(rig, replace(segment, between=way), logs) for way in tried]
+    if len(problems) == 1:
+        return problems[0]
+    *plain, last = [fit(p, p.nominal(), WHITE, 6) for p in problems]
+    closest = min(plain, key=lambda f: f.sse)
+    if tried[-1] == Between.SMOOTH and last.sse > _SMOOTHER * closest.sse:
+        return closest.problem
+    return min(closest, last, key=lambda f: f.sse).problem
+
+
+def ways(segment: Segment) -> list[Between]:
+    """What a command may do between its samples."""
+    rests = np.mean(np.diff(segment.x) == 0.0) > _RESTS
+    return [way for way in _WAYS if not (rests and way == Between.SMOOTH)]
+
+
+def _zeroed(problem: Problem) -> Problem:
+    """The problem with a zero of the readings for each experiment, where that is all there is: a gauge is
+    zeroed anew, or its room is warmer. Where errors add up, a zero is lost among them."""
+    if problem.segment.pace or len(problem.segment.run.spans) < 2:
+        return problem
+    return _where_all(problem, replace(problem, uneven=True, memory={}))
+
+
+def _gauged(problem: Problem) -> Problem:
+    """The problem with a gauge that is a little off, where that is all there is: no two agree for sure. Where
+    a stage has a gain of its own, that is part of it."""
+    return problem if problem.nominals.has_gain else _where_all(problem, replace(problem, gauge=_GAUGE))
+
+
+def _where_all(problem: Problem, more: Problem) -> Problem:
+    """``problem``, or ``more``, which has further nuisances, where these explain all that there is."""
+    if not seems_more(problem, problem.nominal()):
+        return problem
+    return problem if seems_more(more, more.nominal()) else more
+
+
+def _widened(problem: Problem) -> Problem:
+    """The problem with a stage faster, or of another gain, than three times the uncertainty of what was given
+    allows, and an actuator of any numbers, where that is all there is: then no effect stands for it."""
+    ground = _ground(problem, problem.nominal())
+    if not problem.nominals.beyond(ground.vector) or not _shows_more(ground):
+        return problem
+    wide = replace(problem, nominals=replace(problem.nominals, wide=True, far=True))
+    return problem if seems_more(wide, wide.nominal()) else wide
+
+
+def seems_more(base: Problem, vector: np.ndarray) -> bool:
+    """Whether inputs predict something of the residual, or it is slower or less steady than noise is."""
+    return _shows_more(_ground(base, vector))
+
+
+def _ground(base: Problem, vector: np.ndarray) -> Fit:
+    return fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
+
+
+def _shows_more(ground: Fit) -> bool:
+    base = ground.problem
+    left, response = ground.residual(), base.references.clocks["response"]
+    found = disturbance(left, base.segment.run.h, response)
+    kept = base.segment.pace > 0.0 and found.pushed  # an integral of what inputs do shows little of them
+    return (
+        found.low_frequency
+        or found.tonal
+        or found.bursts
+        or kept
+        or ground.predictable_share > NUMBERS.chance
+    )

@@ -1,0 +1,84 @@
+"""Of several effects each has to foretell parts of the session that its fit did not see.
+
+Red when a form stays that only follows what another one lacks, run by run, or one of two true effects goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
+from focgen.diagnosis.fitting.folds import folds
+from focgen.diagnosis.hypotheses.foretelling import foretelling
+from focgen.diagnosis.hypotheses.nuisances import problem_of
+from focgen.diagnosis.hypotheses.search import evidence
+from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.segments import make
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import library
+from focgen.rig.rig import LinearActuator, Rig, Signals
+
+H, NOISE, TOPS = 0.05, 0.05, (2.0, 3.0, 4.0, 6.0, 6.0)
+LAG = TransferFunction([(6.0, 0.0)], [(2.0, 1.0), (1.0, 0.0)])
+TANK = Rig("tank", H, Signals("t", "p", "u"), LinearActuator(LAG))
+
+
+def steps(seed: int, *gains: float) -> list[Experiment]:
+    """Steps from rest of a tank with these gains, behind a pump that does nothing below 1.5 V."""
+    rng, t, logs = np.random.default_rng(seed), np.arange(600) * H, []
+    for top, gain in zip(TOPS, gains):
+        made = gain * (top - 1.5) * (1.0 - np.exp(-np.maximum(t - 5.0, 0.0) / 2.0))
+        roles = {"command": np.where(t >= 5.0, top, 0.0), "output": made + NOISE * rng.normal(size=600)}
+        logs.append(Experiment(f"{top} V", H, roles))
+    return logs
+
+
+def problem_for(logs: Sequence[Experiment], *forms: tuple[str, str]) -> Problem:
+    """The tank's, with these forms of effects."""
+    plain = problem_of(TANK, make(logs, "command", "output"), logs)
+    return plain.with_candidates(
+        [CandidateEffect(n, f, "actuator") for n, name in forms for f in library()[n].forms if f.name == name]
+    )
+
+
+def fitted(problem: Problem) -> Fit:
+    """From the first start values of each."""
+    starts = [problem.starts(candidate)[0] for candidate in problem.candidates]
+    bare = problem.with_candidates([])
+    return fit(problem, np.concatenate([bare.nominal(), *starts]), WHITE, 25)
+
+
+def families(of: Fit) -> list[str]:
+    return [c.effect for c in of.problem.candidates]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_two_runs_tell_differently_is_left_out(seed):
+    """The first step to 6 V ends lower, as at an obstacle, and the second one does not."""
+    logs = steps(seed, 6.0, 6.0, 6.0, 4.8, 6.0)
+    both = fitted(problem_for(logs, ("dead_zone", "soft"), ("contact", "hertz")))
+    without = fitted(problem_for(logs, ("dead_zone", "soft")))
+    assert evidence(both, without) > 50.0
+    assert families(foretelling(both, WHITE)) == ["dead_zone"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_effects_that_are_there_stay(seed):
+    logs = steps(seed, 6.0, 6.0, 6.0, 6.0, 6.0)
+    problem = problem_for(logs, ("dead_zone", "soft"), ("creep", "power"))
+    true = fitted(problem).vector
+    true[-len(problem.candidates[1].form.parameters) :] = problem.starts(problem.candidates[1])[0]
+    noise = np.random.default_rng(seed).normal(size=len(problem.segment.y))
+    seen = replace(problem.segment, y=problem.simulate(true) + NOISE * noise)
+    again = fitted(replace(problem, segment=seen, memory={}))
+    assert families(foretelling(again, WHITE)) == ["dead_zone", "creep"]
+
+
+def test_parts_are_neighbouring_experiments_or_quarters():
+    assert folds([5, 5, 5, 5]).tolist() == [0] * 5 + [1] * 5 + [2] * 5 + [3] * 5
+    assert folds([8]).tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
