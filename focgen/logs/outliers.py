@@ -45,9 +45,11 @@ def outliers(y: Array, barred: Bools | None = None) -> Bools:
 def barred_by(command: Array) -> Bools:
     """Where ``command`` (n,) jumps, and shortly after: a signal may move fast there."""
     jumps = np.abs(np.diff(command)) > 0.05 * (float(np.ptp(command)) or np.inf)
-    barred = np.zeros(len(command), bool)
+    count, barred = len(jumps), np.zeros(len(command), bool)
     for late in range(1 - _AHEAD, 2 + _AFTER):  # of a change, after the reading ahead of it
-        barred[max(late, 0) : len(jumps) + late] |= jumps[max(-late, 0) : len(command) - late]
+        first, last = max(-late, 0), min(count, len(command) - late)
+        if first < last:
+            barred[first + late : last + late] |= jumps[first:last]
     return barred
 
 

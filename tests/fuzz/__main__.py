@@ -20,7 +20,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument(
-        "--turn", type=float, default=300.0, help="s that a group runs before the next one does"
+        "--turn", type=float, default=900.0, help="s that a group runs before the next one does"
     )
     parser.add_argument("--only", nargs="+", choices=[g.name for g in GROUPS])
     parser.add_argument("--folder", type=Path, default=Path("build/fuzz"))

@@ -8,6 +8,7 @@ either.
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import json
 import math
@@ -20,20 +21,24 @@ from functools import cache
 from pathlib import Path
 
 import focgen
+import focgen.cli.diagnose as diagnosing
 import focgen.cli.main as entry
+from focgen import demonstration
 from focgen.cli import faults
+from focgen.errors import InputError
 from tests.fuzz import seeds
 from tests.fuzz.targets import Target, check
 
 _LINE = re.compile(r"focgen: error: .+?: .+; .+\n")
-_NEVER = (
-    "--e",
-    "--sc",
-    "--targ",
-    "--jobs",
-    "--minutes",
-)  # foreign C, other machines, emulators, many processes
-_BUSY = ("study", "diagnose", "demo", "cost")
+_NEVER = ("--e", "--sc", "--targ", "--jobs", "--minutes", "--boot")
+"""What asks for foreign C, other machines, every emulator, many processes, or hours."""
+_SMALL = {
+    "study": "--memory short --arithmetic q15 --sample-times 0.01 --lengths 5 --jobs 1".split(),
+    "cost": "--target cortex-m0plus".split(),
+}
+"""Ahead of what a line says: by themselves these commands take minutes."""
+_LOOKED_FOR = ("sensor_lag",)
+"""The effects that a diagnosis looks for: for all of them it takes minutes."""
 _LOGS = ("log.csv", "two.csv")
 _BARE_NUMBER = re.compile(r"(?<![\w./'\"-])[-+]?(nan|inf)(?![\w./'\"-])", re.IGNORECASE)
 
@@ -108,6 +113,16 @@ verified.json report verified.json --out out.html
 fw/manifest.json report fw c.toml --out out.html
 rig.toml report rig.toml --out out.html
 log.csv report rig.toml log.csv --out out.html
+log.csv diagnose linear.toml log.csv --out out --json
+rig.toml diagnose rig.toml log.csv two.csv --out gap
+gap/diagnosis.json diagnose rig.toml log.csv --out gap
+linear.toml diagnose linear.toml two.csv --plan
+c.toml study memory c.toml --out study --json
+e.toml study memory e.toml --out out --lengths 5 6
+study/study.json study memory c.toml --out study
+fw/manifest.json cost fw --json
+fw/lead.c cost fw --against fw
+- demo --out out
 trial/trial.json trial score trial --partial --no-baseline --json
 trial/sealed/0001/label.json trial score trial --no-baseline
 - --help
@@ -137,7 +152,7 @@ def run(data: bytes, place: Path) -> None:
     line, _, content = data.partition(b"\n")
     words = line.decode("utf-8", "replace").split(" ")
     file, argv = words[0], [word for word in map(_tame, words[1:]) if not word.startswith(_NEVER)]
-    argv = [word for word in argv if word not in _BUSY]
+    argv = argv[:1] + _SMALL.get(argv[0] if argv else "", []) + argv[1:]
     if argv[:1] == ["trial"] and "score" not in argv:
         argv = argv[:1]
     with _in(place, file, content):
@@ -196,7 +211,7 @@ class _Said(list):
 def _called(argv: list[str]) -> tuple[int, str, str, _Said]:
     """Status, stdout and stderr of a command; and what it was that nobody foresaw."""
     said, out, error = _Said(), io.StringIO(), io.StringIO()
-    real = faults._unforeseen, faults._foreseen, entry.to_json
+    real = faults._unforeseen, faults._foreseen, entry.to_json, demonstration._chain, diagnosing.diagnose
 
     def unforeseen(fault, words):
         said.append(fault)
@@ -207,7 +222,14 @@ def _called(argv: list[str]) -> tuple[int, str, str, _Said]:
             said.append(fault)
         return real[1](fault, command)
 
+    def chain(folder):
+        """Of the demo all but its chain, each command of which has lines of its own."""
+        (folder / "begun").write_text("half")
+        raise InputError("demo", "ends here", "run it by itself")
+
     faults._unforeseen, faults._foreseen = unforeseen, foreseen
+    demonstration._chain = chain
+    diagnosing.diagnose = functools.partial(real[4], only=_LOOKED_FOR)
     entry.to_json = lambda value: real[2](value)
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
@@ -215,7 +237,8 @@ def _called(argv: list[str]) -> tuple[int, str, str, _Said]:
     except SystemExit as end:  # --help
         status = end.code or 0
     finally:
-        faults._unforeseen, faults._foreseen, entry.to_json = real
+        faults._unforeseen, faults._foreseen, entry.to_json, demonstration._chain = real[:4]
+        diagnosing.diagnose = real[4]
     return status, out.getvalue(), error.getvalue(), said
 
 

@@ -332,3 +332,12 @@ def test_a_frozen_reading_is_named(tmp_path):
     assert frozen(stuck, [np.zeros(COUNT)]) is None, "nothing moves"
     play = np.cumsum(np.r_[np.ones(300), np.zeros(100), np.ones(200), -np.ones(400)])
     assert frozen(np.round(play / 5), [moving]) is None, "a coarse converter behind play"
+
+
+def test_readings_around_a_jump_are_left_alone_however_short_the_log():
+    """From three ahead of the first one after it to ten behind; of as few as make an experiment."""
+    for count in range(1, 40):
+        for jump in range(1, count):
+            near = np.arange(count) - jump
+            barred = barred_by(np.where(near < 0, 0.0, 1.0))
+            assert np.array_equal(barred, (near >= -3) & (near <= 10)), (count, jump)
