@@ -221,14 +221,15 @@ def longest_segment(controller: Controller) -> float:
 def table_error(plan: Plan, lsb: float) -> float:
     """Largest difference of a plan's schedule, not rounded further, from the controller's.
 
-    Both are straight between the breakpoints of either, so it is there. ``lsb`` is the physical size of a
-    gain count.
+    Both are straight between the breakpoints of either, so it is there, or at an end of the signal's range; a
+    breakpoint beyond that counts nothing. ``lsb`` is the physical size of a gain count.
     """
     schedule, (low, high) = present(plan.schedule), present(plan.controller.ranges.schedule)
     points = np.array(schedule.breakpoints) * schedule.signal.lsb
-    places = np.concatenate([points, plan.controller.schedule.breakpoints, [low, high]])
+    least, most = (float(end) * schedule.signal.lsb for end in (schedule.signal.low, schedule.signal.high))
+    places = np.concatenate([points, plan.controller.schedule.breakpoints, [low, high, least, most]])
     ideal = plan.controller.schedule(np.clip(places, low, high))
-    inside = (places >= min(low, points[0])) & (places <= max(high, points[-1]))
+    inside = (places >= min(low, least)) & (places <= max(high, most))
     sides = [_machine_gain(schedule, points, places, side) * lsb - ideal for side in _SIDES]
     return float(np.max(np.abs(sides)[:, inside]))
 

@@ -64,6 +64,14 @@ def test_driven_inputs_find_larger_errors_than_mixed_ones():
     assert not (execute(plan, raw).flags & 8)[:DRIVEN].any(), "no driven input leaves its range"
 
 
+@pytest.mark.parametrize("seed", (74, 77))
+def test_a_breakpoint_beyond_the_range_of_its_signal_costs_nothing(seed):
+    """No value comes there: the bound was by eleven orders that of a gain which is never used."""
+    plan = drawn(seed).plan
+    assert plan.floating and plan.schedule.breakpoints[-1] > plan.controller.ranges.schedule[1]
+    assert 1e-3 < cases(plan, 8, 300, seed)[1] <= 1.0
+
+
 def test_what_was_compared_is_not_compared_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(campaign, "_LANES", 8)
     monkeypatch.setattr(campaign, "_SAMPLES", 40)
