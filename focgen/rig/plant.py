@@ -103,12 +103,21 @@ def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> 
     spring, bend = dynamics.spring, dynamics.bend
     steepest = 1.0 + spring.share * max(abs(spring.loading), abs(spring.unloading)) * spring.scale
     steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second) + dynamics.stiffness
-    pace = np.sqrt(plant.k * steepest / plant.m) if plant.order == 2 else plant.k * steepest / plant.m
+    pace = _pace(plant, plant.k * steepest)
     short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend", "stiffness"} else _SWING
     short *= 1.0 if spring.power == 1.0 else 0.5
     base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
     base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _MOST))
     return base, base + _HALVED
+
+
+def _pace(plant: Plant, stiffness: float) -> float:
+    """Radians a second of the motion on a spring of this stiffness. A strong damper lets it only creep; what
+    dies away sooner is in the tables, which are exact."""
+    if plant.order == 1:
+        return stiffness / plant.m
+    swing = float(np.sqrt(stiffness / plant.m))
+    return min(swing, stiffness / plant.c) if plant.c > 0.0 else swing
 
 
 @lru_cache(maxsize=256)

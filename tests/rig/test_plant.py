@@ -18,7 +18,7 @@ from focgen.rig.engine import Chain, Placed, fits_in
 from focgen.rig.files import read_rig, write_rig
 from focgen.rig.kernels import BALANCED
 from focgen.rig.modes import respond as lag
-from focgen.rig.plant import Plant, plant_of, respond
+from focgen.rig.plant import Plant, _levels, plant_of, respond
 from focgen.rig.replay import replay
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 
@@ -136,6 +136,17 @@ def test_a_hysteretic_spring_against_an_integrator(spring):
     np.testing.assert_allclose(made, exact, atol=1e-6 * np.max(np.abs(exact)))
     plain = respond(plant, x, rest(len(x)), H)
     assert np.max(np.abs(made - plain)) > 0.05 * np.max(np.abs(exact))
+
+
+def test_a_plant_that_only_creeps_takes_few_steps_and_comes_as_close():
+    """What its mass does dies away in 3 ms; the spring follows a lag of 0.8 s."""
+    t = H * np.arange(240)
+    x, plant = 2 * np.sin(3 * t) + 1.2 * np.sin(7.3 * t), Plant(2, 0.1, 32.0, 40.0)
+    dynamics = Dynamics(spring=Spring(0.5, 4.0, 25.0))
+    exact = _integrated(plant, dynamics.spring, x, t)
+    made = respond(plant, x, rest(len(x)), H, dynamics)
+    np.testing.assert_allclose(made, exact, atol=1e-5 * np.max(np.abs(exact)))
+    assert _levels(plant, dynamics, H)[0] < _levels(Plant(2, 0.1, 0.3, 40.0), dynamics, H)[0]
 
 
 @pytest.mark.parametrize("rise", [Rise(0.4, 0.5), Rise(0.3, 0.004)])
