@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from focgen.trials.forms import Amplitude, Form, Spans, alone, either_way, wander
+from focgen.trials.forms import Amplitude, Form, Spans, either_way, wander
 
 
 def _preisach(rng: np.random.Generator, s: Spans) -> Amplitude:
@@ -19,7 +19,7 @@ def _duhem(rng: np.random.Generator, s: Spans) -> Amplitude:
 
 def _eyring(rng: np.random.Generator, s: Spans) -> Amplitude:
     tau, stress = rng.uniform(30.0, 90.0), rng.uniform(0.25, 0.5)
-    return lambda a: (a, tau, stress * s.drive)
+    return lambda a: (a * _reach(s), tau, stress * s.drive)
 
 
 def _roxburgh(rng: np.random.Generator, s: Spans) -> Amplitude:
@@ -78,13 +78,30 @@ def _oscillator(rng: np.random.Generator, s: Spans) -> Amplitude:
     return lambda a: (a, natural, damping, s.drive)
 
 
+def _side(rng: np.random.Generator, s: Spans) -> Amplitude:
+    drawn = _oscillator(rng, s)
+    return lambda a: (a * _reach(s), *drawn(a)[1:])
+
+
+def _reach(s: Spans) -> float:
+    """What moves per drive: a curvature per curvature, and per pressure of a plant that pressure drives."""
+    return s.curvature / s.drive
+
+
+def _log_creep(rng: np.random.Generator, s: Spans) -> Amplitude:
+    return lambda a: (a * _reach(s),)
+
+
 def _log_memory(rng: np.random.Generator) -> tuple[str, float, float]:
     return ("creep", rng.uniform(4.0, 20.0), 200.0)
 
 
 FORMS: dict[str, tuple[Form, ...]] = {
     "hysteresis": (Form("preisach_share", 0.05, 1.0, _preisach), Form("duhem_friction", 0.01, 0.3, _duhem)),
-    "creep": (Form("log_creep", 0.02, 1.0, alone, _log_memory), Form("eyring_creep", 0.02, 1.0, _eyring)),
+    "creep": (
+        Form("log_creep", 0.02, 1.0, _log_creep, _log_memory),
+        Form("eyring_creep", 0.02, 1.0, _eyring),
+    ),
     "unloading_asymmetry": (
         Form("recovery_viscosity", 0.05, 6.0, _viscosity),
         Form("sticky_release", 0.05, 6.0, lambda rng, s: lambda a: (a, s.curvature)),
@@ -99,7 +116,7 @@ FORMS: dict[str, tuple[Form, ...]] = {
         Form("preload", 0.02, 0.45, _preload),
     ),
     "contact": (Form("hertz_load", 0.03, 20.0, _hertz), Form("foam_pad", 0.2, 40.0, _foam)),
-    "resonance": (Form("duffing_share", 0.05, 1.0, _oscillator), Form("side_mode", 0.05, 1.2, _oscillator)),
+    "resonance": (Form("duffing_share", 0.05, 1.0, _oscillator), Form("side_mode", 0.05, 1.2, _side)),
     "gain_drift": (
         Form("warming_gain", 0.01, 1.0, _warm_gain),
         Form("wandering_gain", 0.005, 0.6, _wander_gain),

@@ -12,11 +12,14 @@ from scipy.signal import lsim
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.files import read_rig
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
+from focgen.trials.cases import draw_truth
+from focgen.trials.designs import Truth
 from focgen.trials.forms import Spans
 from focgen.trials.forms_plants import FRICTION
 from focgen.trials.machine import Machine, Setting, simulate
 from focgen.trials.make import make
 from focgen.trials.plants import AXIS, FIRST, MODE, SECOND, draw_kind, draw_plant, effects_on, forms_on
+from focgen.trials.plants_cases import _set_up
 from focgen.trials.plants_moves import moves, unseen_moves
 from focgen.trials.severity import Trial, surviving
 from focgen.trials.vocabulary import OUTSIDE, VOCABULARY
@@ -147,6 +150,17 @@ def test_plants_have_the_effects_that_mean_something_there():
     for form in FRICTION:
         force = form.draw(np.random.default_rng(0), spans)
         assert force(0.2)[0] == pytest.approx(0.2) and all(p > 0.0 for p in force(0.2))
+
+
+@pytest.mark.parametrize("kind", [MODE, FIRST, SECOND])
+def test_every_form_can_be_weak_on_every_plant(kind):
+    """A share of a pressure is no share of a curvature: one such form departed by seven spans."""
+    rng = np.random.default_rng(8)
+    stage = _set_up(kind, "C", rng)
+    for effect in ("creep", "resonance", "softening", "gain_nonlinearity", "hysteresis", "dead_zone"):
+        for form in forms_on(kind, effect):
+            _, facts = draw_truth(Truth(effect, form.name, 0.03), stage, rng)
+            assert facts["gap"] < 0.035, form.name
 
 
 def test_cases_are_made_and_the_same_again(tmp_path):
