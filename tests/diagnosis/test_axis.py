@@ -13,7 +13,7 @@ import pytest
 from scipy.signal import lsim
 
 from focgen.diagnosis.diagnose import diagnose
-from focgen.diagnosis.fitting.predictability import predictable_share
+from focgen.diagnosis.fitting.predictability import _Regression, predictable_share
 from focgen.diagnosis.problem.decimate import decimated
 from focgen.diagnosis.problem.scales import clocks
 from focgen.diagnosis.problem.segments import make
@@ -105,8 +105,9 @@ def test_inputs_predict_the_path_that_a_missing_force_leaves():
     force = np.sign(np.gradient(np.convolve(u, np.ones(9) / 9.0, "same")))
     path = kernels.lag(force, segment.run.rest, H, pace, pace)
     left = path - np.mean(path) + 0.5 * np.std(path) * np.random.default_rng(1).standard_normal(len(u))
-    kept, forgotten = (predictable_share(replace(segment, pace=p), left, 0.05) for p in (pace, 0.0))
+    kept, forgotten = (_Regression.of(replace(segment, pace=p), left, 0.05).whole for p in (pace, 0.0))
     assert kept > 0.3 and forgotten < 0.2
+    assert predictable_share(segment, left, 0.05) > 0.6  # the level alone, of few coefficients, tells more
 
 
 def test_what_a_command_does_between_samples_is_asked_of_the_file(tmp_path):
