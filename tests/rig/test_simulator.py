@@ -199,6 +199,12 @@ def test_a_curve_drawn_through_points_is_the_natural_spline():
     assert form.act(x, (*sizes, 2.0), None) == pytest.approx(exact, abs=1e-12)
 
 
+def test_a_curve_of_what_has_diverged_is_no_number():
+    """A plant may diverge at values that a fit tries, and the trial is then worse than any."""
+    made = form_of("gain_nonlinearity", "spline").act(np.array([0.5, np.nan]), (0.1,) * 5 + (1.0,), None)
+    assert np.isfinite(made[0]) and np.isnan(made[1])
+
+
 def test_softening_along_a_curve_keeps_to_the_largest_load():
     form = form_of("softening", "spline")
     x = np.array([0.0, 0.5, 1.0, 0.5, 1.0])

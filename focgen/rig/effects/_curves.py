@@ -43,7 +43,9 @@ def _bend(place: Array, sizes: Sequence[float]) -> Array:
     """The spline through ``sizes`` at the knots beyond zero; level beyond the last."""
     c = np.tensordot(_cardinal().c, np.asarray(sizes), axes=1)
     place = np.minimum(place, _KNOTS[-1])
-    piece = np.minimum((place * (len(_KNOTS) - 1)).astype(int), len(_KNOTS) - 2)
+    # a plant that a fit has driven apart gives NaN, which stays NaN: such a trial is worse than any
+    knot = np.nan_to_num(place * (len(_KNOTS) - 1))
+    piece = np.clip(knot.astype(int), 0, len(_KNOTS) - 2)
     q = place - _KNOTS[piece]
     a, b, slope, start = (row[piece] for row in c)
     made: Array = ((a * q + b) * q + slope) * q + start
