@@ -14,7 +14,7 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.replay import replay
 from focgen.rig.rig import LinearActuator, Rig, Signals
 from focgen.trials import patterns
-from focgen.trials.cases import _spans
+from focgen.trials.cases import spans_of
 from focgen.trials.machine import Machine, Session
 from focgen.trials.recording import MEASURED, coloured
 from focgen.trials.rigs import draw_chain, nominal_of
@@ -42,7 +42,7 @@ def session(signals: str, effect: str, seed: int = 7):
     commands = [e.levels * full for e in seen]
     coarse = Trial(commands, list(np.cumsum([0.0, *(len(c) * TS + 20.0 for c in commands[:-1])])), TS)
     setting, _ = calibrate(
-        draw_form(effect, rng, _spans(rig, full, coarse, coarse.clocks[-1])), rig, coarse, 0.08
+        draw_form(effect, rng, spans_of(rig, full, coarse, coarse.clocks[-1])), rig, coarse, 0.08
     )
     machine = Session(Machine(rig, (setting,)), TS / 4)
     logs = []
