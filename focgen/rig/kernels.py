@@ -85,6 +85,12 @@ def _call(name: str, x: Array, rest: Bytes, *others: Any) -> Array:
     return y
 
 
+def _doubles(*arrays: Array) -> list[Any]:
+    """Pointers to arrays of doubles; each keeps what it points to, a copy where one is needed."""
+    ffi, _ = _library()
+    return [ffi.from_buffer("double[]", np.ascontiguousarray(a, float)) for a in arrays]
+
+
 def modes(
     x: Array,
     rest: Bytes,
@@ -101,15 +107,12 @@ def modes(
 ) -> Array:
     """Sum of first-order modes; ``a``, ``b0``, ``b1`` (2, m) and ``pair`` (2, 6), rows loading and
     unloading; beyond ``place`` an obstacle takes ``stiffness`` times how far from ``x``."""
-    ffi, _ = _library()
-    tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
-    scratch = np.empty(tables[0].shape[1])
-    pointers = [ffi.from_buffer("double[]", t) for t in tables]
+    *pointers, room = _doubles(a, b0, b1, pair, np.empty(a.shape[1]))
     return _call(
         "focgen_modes",
         x,
         rest,
-        len(scratch),
+        a.shape[1],
         *pointers,
         float(through),
         int(switching),
@@ -117,15 +120,13 @@ def modes(
         float(stiffness),
         float(slide),
         float(stick),
-        ffi.from_buffer("double[]", scratch),
+        room,
     )
 
 
 def lag(x: Array, rest: Bytes, h: float, up: float, down: float) -> Array:
     """A first-order lag with time constants ``up`` while rising and ``down`` while falling, s (0: none)."""
-    ffi, _ = _library()
-    rows = [np.array(_lag(h, float(t))) for t in (up, down)]
-    return _call("focgen_lag", x, rest, *(ffi.from_buffer("double[]", row) for row in rows))
+    return _call("focgen_lag", x, rest, *_doubles(*(np.array(_lag(h, float(t))) for t in (up, down))))
 
 
 def _lag(h: float, tau: float) -> tuple[float, float, float]:
@@ -173,14 +174,11 @@ def power_creep(x: Array, rest: Bytes, h: float, tau: float, scale: float, power
 
 def rational(x: Array, rest: Bytes, b: Array, a: Array) -> Array:
     """A discrete filter with numerator ``b`` and denominator ``a`` (a[0] = 1), of any length."""
-    ffi, _ = _library()
     order = max(len(a), len(b)) - 1
     scratch, *tables = np.zeros((3, order + 1))
     for table, values in zip(tables, (b, a)):
         table[: len(values)] = values
-    return _call(
-        "focgen_filter", x, rest, order, *(ffi.from_buffer("double[]", t) for t in (*tables, scratch))
-    )
+    return _call("focgen_filter", x, rest, order, *_doubles(*tables, scratch))
 
 
 def plant(
@@ -196,10 +194,8 @@ def plant(
     ``course``: ``line``, ``bend`` and ``twist`` (n,); ``levels``: the order, and the levels ``base`` and
     ``last``.
     """
-    ffi, _ = _library()
-    arrays = [np.ascontiguousarray(a, float) for a in (*course, numbers, tables)]
-    *parts, numbers, tables = [ffi.from_buffer("double[]", a) for a in arrays]
-    return _call("focgen_plant", x, rest, *parts, *levels, numbers, tables)
+    *parts, own, steps = _doubles(*course, numbers, tables)
+    return _call("focgen_plant", x, rest, *parts, *levels, own, steps)
 
 
 def bent_modes(
@@ -214,17 +210,12 @@ def bent_modes(
     spring: Sequence[float],
 ) -> Array:
     """As :func:`modes`, with the input less what ``spring`` (8,) takes: see ``bending.c``."""
-    ffi, _ = _library()
-    tables = [np.ascontiguousarray(t, float) for t in (a, b0, b1, pair)]
-    scratch = np.empty(tables[0].shape[1])
-    *pointers, own, room = [
-        ffi.from_buffer("double[]", t) for t in (*tables, np.array(spring, float), scratch)
-    ]
+    *pointers, own, room = _doubles(a, b0, b1, pair, np.array(spring, float), np.empty(a.shape[1]))
     return _call(
         "focgen_bent_modes",
         x,
         rest,
-        len(scratch),
+        a.shape[1],
         *pointers,
         float(through),
         int(switching),
@@ -235,24 +226,20 @@ def bent_modes(
 
 def bent_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, spring: Sequence[float]) -> Array:
     """As :func:`rational`, with ``c`` the numerator for what ``spring`` (8,) takes from the input."""
-    ffi, _ = _library()
     order = max(len(a), len(b), len(c)) - 1
     scratch, *tables = np.zeros((4, order + 1))
     for table, values in zip(tables, (b, c, a)):
         table[: len(values)] = values
-    pointers = [ffi.from_buffer("double[]", t) for t in (*tables, np.array(spring, float), scratch)]
+    pointers = _doubles(*tables, np.array(spring, float), scratch)
     return _call("focgen_bent_filter", x, rest, order, *pointers)
 
 
 def products(rows: Array) -> Array:
     """Every row's product with every other, (k, k), of ``rows`` (k, n); unlike ``rows @ rows.T`` in one
     thread."""
-    ffi, library = _library()
-    rows = np.ascontiguousarray(rows, float)
+    _, library = _library()
     found = np.empty((len(rows), len(rows)))
-    library.focgen_products(
-        rows.shape[1], len(rows), ffi.from_buffer("double[]", rows), ffi.from_buffer("double[]", found)
-    )
+    library.focgen_products(rows.shape[1], len(rows), *_doubles(rows, found))
     return found
 
 
@@ -260,9 +247,8 @@ def innovations(y: Array, made: Array, weight: Array, rest: Bytes, coarse: int, 
     """(y − made) · weight of every experiment in means of ``coarse`` samples, whitened by ``ar``; all (n,)
     but ``ar``."""
     ffi, library = _library()
-    arrays = [np.ascontiguousarray(a, float) for a in (y, made, weight, ar)]
     found, scratch = np.empty(len(y)), np.empty(len(y))
-    pointers = [ffi.from_buffer("double[]", a) for a in (*arrays, found, scratch)]
+    pointers = _doubles(y, made, weight, ar, found, scratch)
     count = library.focgen_innovations(
         len(y),
         pointers[0],

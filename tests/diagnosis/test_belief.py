@@ -25,7 +25,7 @@ def _fit(square, effects=(), predictable_share=0.0, size=None):
         innovations=np.zeros(_COUNT),
         sse=_COUNT * square,
         weighed=np.full(4, np.sqrt(square)),
-        problem=SimpleNamespace(candidates=candidates),
+        problem=SimpleNamespace(candidates=candidates, families=tuple(effects)),
         size=len(effects) if size is None else size,
         prior_penalty=0.0,
         predictable_share=predictable_share,
@@ -34,7 +34,7 @@ def _fit(square, effects=(), predictable_share=0.0, size=None):
 
 def _ground(base, tried, changed=0.0, **around):
     """``base``, whose effects change a mean square of ``changed``, and what was tried beside it."""
-    bare = SimpleNamespace(**{**vars(base), "problem": SimpleNamespace(candidates=())})
+    bare = SimpleNamespace(**{**vars(base), "problem": SimpleNamespace(candidates=(), families=())})
     ground = Ground.of(bare, bare, tried, None, Surroundings(**around))
     return Ground(base, ground.floor, 0.5 * _COUNT * changed, ground.scale)
 

@@ -13,7 +13,7 @@ from focgen.diagnosis.numbers import NUMBERS
 
 def prior(effect: str, base: Fit) -> float:
     """Log odds, before the data, that ``base`` lacks ``effect``; of another form of a family that it has."""
-    if effect in {c.effect for c in base.problem.candidates}:
+    if effect in base.problem.families:
         return float(np.log(NUMBERS.again))
     return float(np.log(NUMBERS.rare))
 

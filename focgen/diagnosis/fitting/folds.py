@@ -35,8 +35,9 @@ def fitted_to(best: Fit, weighing: Weighing, seen: np.ndarray) -> Fit:
     return settled(fit(replace(problem, segment=masked), best.vector, weighing, _ITERATIONS))
 
 
-def foreseen(best: Fit, weighing: Weighing, fold: np.ndarray) -> float:
+def foreseen(best: Fit, weighing: Weighing) -> float:
     """The mean square error of a segment whose every part is simulated by a fit to the others."""
+    fold = folds([last - first for first, last in best.problem.segment.run.spans])
     error = np.empty(len(fold))
     for part in np.unique(fold):
         vector = fitted_to(best, weighing, fold != part).vector

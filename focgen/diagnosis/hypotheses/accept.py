@@ -55,7 +55,7 @@ def select(rankings: Sequence[Ranking], criteria: AcceptanceCriteria) -> Fit | N
 
 def _missing(ranking: Ranking) -> Fit | None:
     """The likeliest of the families not found yet that finds anything to mend."""
-    found = {c.effect for c in ranking.base.problem.candidates}
+    found = ranking.base.problem.families
     return next((f for n, f in ranking.best.items() if n not in found and ranking.gain[n] > 0), None)
 
 

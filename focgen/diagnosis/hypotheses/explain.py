@@ -195,7 +195,7 @@ def _explained(
     rankings, candidates = _grown(problem, given, candidates, guests, asked)
     weighing = Weighing(rankings[-1].ar)
     best = _dropped(rankings[-1].base, weighing, threshold)
-    best = realigned(best if only is not None else foretelling(best, weighing), weighing)
+    best = realigned(best if asked.granted else foretelling(best, weighing), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted)
     best, causes = reexamined(best, beside)

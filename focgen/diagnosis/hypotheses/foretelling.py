@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import Fit, Weighing
-from focgen.diagnosis.fitting.folds import folds, foreseen
-from focgen.diagnosis.hypotheses.rivals import left_out
+from focgen.diagnosis.fitting.folds import foreseen
+from focgen.diagnosis.hypotheses.rivals import without_family
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.rig.effects import library
 
@@ -15,32 +17,38 @@ def foretelling(best: Fit, weighing: Weighing) -> Fit:
     """``best`` without the effects that, on parts of the session which a fit does not see, leave
     :attr:`~focgen.diagnosis.numbers.Numbers.stays` of what they close where it does; the vainest is left out
     first, and one is kept. What a rounding or a wander does is foretold by nothing."""
-    while len(names := _asked(best)) > 1 or (names and len(_families(best)) > 1):
-        fold = folds([last - first for first, last in best.problem.segment.run.spans])
-        both = foreseen(best, weighing, fold)
-        tried = [_kept(name, best, both, weighing, fold) for name in names]
-        least, without = min(tried, key=lambda pair: pair[0])
-        if least >= 1.0 - NUMBERS.stays:
+    if not _asked(best):
+        return best
+    error = foreseen(best, weighing)
+    while names := _asked(best):
+        vainest = min((_Left.of(name, best, error, weighing) for name in names), key=lambda left: left.share)
+        if vainest.share >= 1.0 - NUMBERS.stays:
             break
-        best = without
+        best, error = vainest.without, vainest.error
     return best
 
 
-def _families(best: Fit) -> list[str]:
-    return list(dict.fromkeys(c.effect for c in best.problem.candidates))
-
-
 def _asked(best: Fit) -> list[str]:
-    """The families that may be asked to foretell."""
+    """The families that may be asked to foretell: none where there is only one."""
+    families = best.problem.families
     wandering = {c.effect for c in best.problem.candidates if c.form.wanders}
-    return [n for n in _families(best) if n not in wandering and not library()[n].rounds]
+    asked = [n for n in families if n not in wandering and not library()[n].rounds]
+    return asked if len(families) > 1 else []
 
 
-def _kept(name: str, best: Fit, both: float, weighing: Weighing, fold: np.ndarray) -> tuple[float, Fit]:
-    """The part of what a family closes beside the others that it closes where it is not fitted, too; and the
-    fit without it. ``both``: the mean square that is foreseen with it."""
-    own = [c for c in best.problem.candidates if c.effect == name]
-    without = left_out(best, own, weighing)
-    fitted = float(np.mean(without.weighed**2)) - float(np.mean(best.weighed**2))
-    share = (foreseen(without, weighing, fold) - both) / fitted if fitted > 0.0 else 0.0
-    return share, without
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What is left ``without`` a family: a fit, the mean square ``error`` it foresees, and the ``share`` of
+    what the family closes beside the others that it closes where it is not fitted, too."""
+
+    without: Fit
+    error: float
+    share: float
+
+    @classmethod
+    def of(cls, name: str, best: Fit, error: float, weighing: Weighing) -> _Left:
+        """``error``: the mean square that is foreseen with the family."""
+        without = without_family(best, name, weighing)
+        fitted = float(np.mean(without.weighed**2)) - float(np.mean(best.weighed**2))
+        alone = foreseen(without, weighing)
+        return cls(without, alone, (alone - error) / fitted if fitted > 0.0 else 0.0)

@@ -69,22 +69,21 @@ def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
         needless = min(first, key=lambda r: r.odds, default=None)
         if needless is None or needless.odds >= 0.0 or beside.granted:
             return best, causes
-        own = [c for c in best.problem.candidates if c.effect == needless.effect]
-        best = left_out(best, own, beside.weighing)
+        best = without_family(best, needless.effect, beside.weighing)
     return best, _causes(best, beside)
 
 
 def _causes(best: Fit, beside: Beside) -> tuple[Cause, ...]:
     """A cause for every family of ``best``."""
-    names = dict.fromkeys(c.effect for c in best.problem.candidates)
-    return tuple(sorted((_cause(name, best, beside) for name in names), key=lambda c: -c.share))
+    causes = (_cause(name, best, beside) for name in best.problem.families)
+    return tuple(sorted(causes, key=lambda c: -c.share))
 
 
 def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     """One effect of ``best`` and its rivals, the best first. Of a rival that the experiments are not made to
     show, no more free values are counted than of the effect: they were not to be seen."""
     own = [c for c in best.problem.candidates if c.effect == name]
-    without = left_out(best, own, beside.weighing)
+    without = without_family(best, name, beside.weighing)
     others = _rivals(best, _ranking(name, without, beside), beside, len(own) > 1)
     fits = [best, *(f for _, f in others)]
     ground = Ground.of(beside.nominal, without, fits, beside.weighing, beside.surroundings)
@@ -125,7 +124,7 @@ def _rivals(best: Fit, ranking: Ranking, beside: Beside, mended: bool) -> list[t
     the foremost of the others may have, too."""
     found: list[tuple[str, Fit]] = []
     for other, candidate in ranking.best.items():
-        if other in {c.effect for c in best.problem.candidates}:
+        if other in best.problem.families:
             continue
         again = fit(candidate.problem, candidate.vector, beside.weighing, 6, leader=best)
         if mended and len(found) < _MENDED:
@@ -143,6 +142,11 @@ def _second_form(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weigh
         return of
     better = fit(ranking.best[ranking.winner].problem, ranking.best[ranking.winner].vector, weighing, 6)
     return better if evidence(better, of) > 0 else of
+
+
+def without_family(of: Fit, name: str, weighing: Weighing) -> Fit:
+    """``of`` without any form of this family, fitted again."""
+    return left_out(of, [c for c in of.problem.candidates if c.effect == name], weighing)
 
 
 def left_out(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:

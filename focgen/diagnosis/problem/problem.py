@@ -100,6 +100,11 @@ class Problem:
         """What the experiments lack to show an effect."""
         return library()[effect].needs(self.excitation)
 
+    @property
+    def families(self) -> tuple[str, ...]:
+        """Those of the candidate effects, each once, in their order."""
+        return tuple(dict.fromkeys(c.effect for c in self.candidates))
+
     def untried(self, candidates: Sequence[CandidateEffect]) -> list[CandidateEffect]:
         """Those of ``candidates`` that may still be put to it: what is read off at sight is not fitted."""
         return [c for c in candidates if c not in self.candidates and not c.form.seen]

@@ -46,7 +46,7 @@ def conclude(
     ``granted``: the effects are there, however little they explain."""
     unknown = [e for e in explanations if is_unknown(e)]
     summary = _summary(rig, logs, rigs, explanations, [*unknown, *_no_closer(rigs, logs, explanations[-1])])
-    if summary.in_vain and not granted and (vain := _in_vain(summary, logs, explanations)):
+    if summary.in_vain and not granted and (vain := _in_vain(summary)):
         unknown += vain
         summary = _summary(rig, logs, rigs, explanations, unknown)
     made, squares, floor, total = summary.made, summary.squares, summary.floor, summary.total
@@ -137,16 +137,11 @@ def _summary(
     return _Summary(rigs, causes, made, squares, floor, total)
 
 
-def _in_vain(
-    summary: _Summary, logs: Sequence[Experiment], explanations: Sequence[Explanation]
-) -> list[Explanation]:
+def _in_vain(summary: _Summary) -> list[Explanation]:
     """Of the segments with effects those whose own gap they do not close on new experiments either: what one
     leaves unexplained takes nothing away from what is clear in another."""
-    return [
-        e
-        for e in dict.fromkeys(e for e, _ in summary.causes)
-        if cross_validated_share(e, logs) < NUMBERS.vain
-    ]
+    explained = dict.fromkeys(e for e, _ in summary.causes)
+    return [e for e in explained if cross_validated_share(e) < NUMBERS.vain]
 
 
 def _no_closer(rigs: compose.Rigs, logs: Sequence[Experiment], last: Explanation) -> list[Explanation]:

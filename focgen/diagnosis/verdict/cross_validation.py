@@ -30,10 +30,10 @@ def cross_validated(rig: Rig, logs: Sequence[Experiment], explanations: Sequence
     return np.array([np.mean(part**2) for part in np.split(error, ends)])
 
 
-def cross_validated_share(e: Explanation, logs: Sequence[Experiment]) -> float:
+def cross_validated_share(e: Explanation) -> float:
     """The part of a segment's own gap that its effects close at its own exit, each part of the session
     simulated by a fit to the others."""
-    error = foreseen(e.best, Weighing(e.ar), folds([len(log) for log in logs]))
+    error = foreseen(e.best, Weighing(e.ar))
     before, after = (float(np.mean(f.weighed**2)) for f in (e.nominal, e.best))
     noise = after * (1.0 - e.predictability.share)
     return float((before - error) / max(before - noise, 1e-300))

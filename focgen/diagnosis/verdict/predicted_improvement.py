@@ -39,7 +39,7 @@ def promised(
         rigs = compose.compose(rig, lasting, logs)
         made = compose.simulated(rigs.fitted, rigs.placed, logs)
         explained = np.maximum(compose.squares(logs, made), explained)
-    names = {c.effect for e in explanations for c in e.best.problem.candidates}
+    names = {name for e in explanations for name in e.best.problem.families}
     drifts = any(p.clock == "session" for name in names for f in library()[name].forms for p in f.parameters)
     found = predict(squares["refitted"], explained, cross_validated(rig, logs, lasting), floor, drifts)
     if found is not None and not any(e.best.problem.candidates for e in lasting):
