@@ -73,6 +73,7 @@ def measure(place: Path, folder: Path) -> None:
     options = ["--branch", "--source=focgen", f"--data-file={data}"]
     unwanted = " and ".join(f"not {name}" for name in ASIDE)
     command = ["coverage", "run", *options, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", unwanted]
+    command += [f"tests/{folder}" for folder in ASKED]
     env = {**os.environ, "FOCGEN_SEEN": str(seen), "PYTHONPATH": f"{place}{os.pathsep}{_path()}"}
     subprocess.run(
         [sys.executable, "-m", *command, "-p", "tests.mutants.seen"], cwd=place, env=env, check=False
