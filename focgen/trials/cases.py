@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,12 +16,13 @@ from focgen.trials.designs import Design, Truth, draw_design
 from focgen.trials.forms import Drawn, Spans
 from focgen.trials.machine import Machine, Session, Setting, Trace
 from focgen.trials.plan import Assignment
-from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of, sample
+from focgen.trials.recording import MEASURED, Reader, Recorder, draw_recorder, floor_of, sample
 from focgen.trials.rigs import draw_chain, draw_linear, in_time_unit, nominal_of
 from focgen.trials.severity import SEVERITIES, VISIBLE, Trial, calibrate, surviving
 from focgen.trials.vocabulary import draw_form
 
-_COARSE, _FINE = 0.01, 0.0025  # s: steps of the calibration and of the logs
+FINE = 0.0025  # s: step of the logs
+_COARSE = 0.01  # s: step of the calibration
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,35 +200,65 @@ def believed(assignment: Assignment, rig: Rig, rng: np.random.Generator) -> Rig:
     return nominal_of(rig, rng, scatter)
 
 
+class InUse(Reader, Protocol):
+    """A rig in use: what outlives a rest stays from one experiment to the next."""
+
+    def run(self, command: Array, clock: float) -> Trace:
+        """One experiment from rest, the command (n,) held from step to step, begun at ``clock`` s."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """The true rig of a case, and how its logs are taken: makes experiments, those of the session first."""
+    """The true rig of a case, and how its logs are taken.
 
-    stage: Stage
-    settings: tuple[Setting, ...]
+    ``programme``: what was done, as (name, command (n,) at steps of ``FINE``, clock in s); the first ``seen``
+    of it is logged, the rest sealed. ``Ts``: the rig's sample time, s. ``fresh``: the rig as it was ahead.
+    """
+
+    programme: Sequence[tuple[str, Array, float]]
+    seen: int
+    Ts: float
+    fresh: Callable[[], InUse]
     recorder: Recorder
 
     def play(self, rng: np.random.Generator) -> list[tuple[str, dict[str, Any]]]:
         """The session and what stays sealed, as (name, columns by role)."""
-        stage = self.stage
-        session = Session(Machine(stage.rig, self.settings), _FINE)
-        played, experiments = [], [*stage.seen, *stage.unseen]
-        for experiment, command, clock in zip(experiments, stage.commands(experiments, _FINE), stage.clocks):
-            trace = session.run(command, clock)
-            played.append((experiment.name, self._sampled(trace, session, rng)))
-        return played
+        session = self.fresh()
+        return [
+            (name, self._sampled(session.run(command, clock), session, rng))
+            for name, command, clock in self.programme
+        ]
 
     def further(self, command: Array, rng: np.random.Generator) -> dict[str, Any]:
         """One more experiment after the session: the log by role of a ``command`` (n,) in its unit."""
-        stage = self.stage
-        session = Session(Machine(stage.rig, self.settings), _FINE)
-        for before, clock in zip(stage.commands(stage.seen, _FINE), stage.clocks):
+        session = self.fresh()
+        for _, before, clock in self.programme[: self.seen]:
             session.run(before, clock)
-        fine = np.repeat(np.asarray(command, float), round(stage.rig.sample_time / _FINE))
-        return self._sampled(session.run(fine, stage.clocks[len(stage.seen)]), session, rng)
+        fine = np.repeat(np.asarray(command, float), round(self.Ts / FINE))
+        return self._sampled(session.run(fine, self.programme[self.seen][2]), session, rng)
 
-    def _sampled(self, trace: Trace, session: Session, rng: np.random.Generator) -> dict[str, Any]:
-        return sample(trace, self.stage.rig.sample_time, self.recorder, session, rng)
+    def _sampled(self, trace: Trace, session: InUse, rng: np.random.Generator) -> dict[str, Any]:
+        return sample(trace, self.Ts, self.recorder, session, rng)
+
+
+class Played(Protocol):
+    """What a case is played on: commands on a grid, and when each begins, s."""
+
+    @property
+    def clocks(self) -> list[float]:
+        """Of all experiments."""
+        ...
+
+    def commands(self, experiments: Sequence[patterns.Experiment], h: float) -> list[Array]:
+        """On the grid of step ``h`` s."""
+        ...
+
+
+def programme(experiments: Sequence[patterns.Experiment], on: Played) -> list[tuple[str, Array, float]]:
+    """All experiments, as a :class:`Bench` makes them."""
+    commands = on.commands(experiments, FINE)
+    return [(e.name, c, at) for e, c, at in zip(experiments, commands, on.clocks)]
 
 
 def play_case(
@@ -239,14 +270,15 @@ def play_case(
     rng: np.random.Generator,
 ) -> Case:
     """The session, made by the stage's rig with these ``settings`` and given with the ``nominal`` one."""
-    bench = Bench(stage, tuple(settings), recorder)
+    machine, count = Machine(stage.rig, tuple(settings)), len(stage.seen)
+    done = programme([*stage.seen, *stage.unseen], stage)
+    bench = Bench(done, count, stage.rig.sample_time, lambda: Session(machine, FINE), recorder)
     played = bench.play(rng)
     unit = float(rng.choice((0.001, 0.1, 1.0, 60.0))) if label["kind"] == "linear" else 1.0
     rig = in_time_unit(nominal, unit)
     if recorder.one_file:
         rig = replace(rig, signals=replace(rig.signals, run="run"))
     rig = replace(rig, ranges=_ranges(stage) if rng.random() < 0.7 else Ranges())
-    count = len(stage.seen)
     label = {**label, "floor": floor_of(played[count:])}
     recorder = replace(recorder, time_unit=unit)
     return Case(rig, played[:count], played[count:], recorder, label, bench=bench)

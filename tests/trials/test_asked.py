@@ -36,11 +36,22 @@ def test_a_further_experiment_goes_on_where_the_session_ended(drawn):
     log = bench.further(command, np.random.default_rng(0))
     assert len(log["output"]) == len(command)
     noise = bench.recorder.noise["output"]
-    last = bench.stage.clocks[len(bench.stage.seen)]
+    last = bench.programme[bench.seen][2]
     apart = np.std(log["output"] - case.logs[-1][1]["output"])
     assert 0.5 * noise < apart < 3.0 * noise  # a healthy rig does the same again, with noise of its own
     if bench.recorder.absolute:
         assert log["time"][0] == pytest.approx(last, abs=0.1)
+
+
+@pytest.mark.parametrize("suite", ["engine", "plants"])
+def test_rigs_of_other_suites_make_further_experiments(suite):
+    if suite == "engine":
+        pytest.importorskip("mujoco")
+    case, _ = Drawing(1, 5, "A", suite, ("none",)).case(1)
+    at = next(i for i, (name, *_) in enumerate(case.bench.programme) if name == case.logs[0][0])
+    log = case.bench.further(case.logs[at][1]["command"], np.random.default_rng(0))
+    apart, noise = np.std(log["output"] - case.logs[at][1]["output"]), case.bench.recorder.noise["output"]
+    assert 0.5 * noise < apart < 3.0 * noise  # healthy: the first experiment again, behind the last
 
 
 def test_resolved_is_the_truth_named_and_nothing_else(tmp_path):

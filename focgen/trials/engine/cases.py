@@ -12,7 +12,7 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.rig import Actuator, Ranges, Rig
 from focgen.trials import patterns
-from focgen.trials.cases import Case, clocks_of, label_of
+from focgen.trials.cases import FINE, Bench, Case, clocks_of, label_of, programme
 from focgen.trials.engine.bodies import Body
 from focgen.trials.engine.forms import BODY, HANDS, Angles
 from focgen.trials.engine.machine import EngineRig, EngineSession, EngineTrial
@@ -20,12 +20,12 @@ from focgen.trials.engine.nominal import believed, fitted
 from focgen.trials.forms import Drawn, Spans
 from focgen.trials.machine import Setting
 from focgen.trials.plan import Assignment
-from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of, sample
+from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of
 from focgen.trials.rigs import Units, columns_of, draw_regulator, draw_units, nominal_of
 from focgen.trials.severity import SEVERITIES, VISIBLE, Trial, calibrate, surviving
 from focgen.trials.vocabulary import draw_form
 
-_COARSE, _FINE = 0.005, 0.0025  # s: steps of the calibration and of the logs
+_COARSE = 0.005  # s: step of the calibration
 _NOISE = (0.005, 0.01)  # of each span
 _AGAIN = 6  # times that a design which cannot show its effect is drawn
 
@@ -42,11 +42,6 @@ class Scene:
     spans: Spans
     angles: Angles
     trial: EngineTrial
-
-    @property
-    def experiments(self) -> list[patterns.Experiment]:
-        """All of them, the sealed ones last."""
-        return [*self.seen, *self.unseen]
 
     def commands(self, experiments: Sequence[patterns.Experiment], h: float) -> list[Array]:
         """The experiments' commands on the grid of step ``h``."""
@@ -157,12 +152,9 @@ def _play(
     scene: Scene, settings: list[Setting], recorder: Recorder, label: dict[str, Any], rng: np.random.Generator
 ) -> Case:
     rig = scene.true.rig
-    session, played = EngineSession(scene.true, settings, _FINE), []
-    for experiment, command, clock in zip(
-        scene.experiments, scene.commands(scene.experiments, _FINE), scene.clocks
-    ):
-        trace = session.run(command, clock)
-        played.append((experiment.name, sample(trace, rig.sample_time, recorder, session, rng)))
+    done, count = programme([*scene.seen, *scene.unseen], scene), len(scene.seen)
+    bench = Bench(done, count, rig.sample_time, lambda: EngineSession(scene.true, settings, FINE), recorder)
+    played = bench.play(rng)
     nominal = believed(rig, rng)
     if label["kind"] == "parameters":
         nominal = nominal_of(nominal, rng, (0.08, 0.2))
@@ -170,7 +162,5 @@ def _play(
         nominal = replace(nominal, signals=replace(nominal.signals, run="run"))
     ranges = Ranges((0.0, 1.2 * scene.full), None, (0.0, 1.3 * scene.spans.output))
     nominal = replace(nominal, ranges=ranges if rng.random() < 0.7 else Ranges())
-    count = len(scene.seen)
-    return Case(
-        nominal, played[:count], played[count:], recorder, {**label, "floor": floor_of(played[count:])}
-    )
+    label = {**label, "floor": floor_of(played[count:])}
+    return Case(nominal, played[:count], played[count:], recorder, label, bench=bench)
