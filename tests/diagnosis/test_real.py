@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from tests.records.benchmarks import DRIVES
 
 OPEN = Path(__file__).resolve().parents[2] / ".." / "shared" / "data" / "open"
 
@@ -40,20 +41,7 @@ num = [[0.1, 0.0]]
 den = [[0.002, 1.0], [1.0, 0.0]]
 """,
     ),
-    "drives": (
-        "coupled_electric_drives.csv",
-        """
-sample_time = 0.02
-[signals]
-run = "run"
-time = "t_s"
-command = "u_V"
-output = "y_speed"
-[actuator]
-num = [[100.0, 0.0]]
-den = [[1.0, 2.0], [5.0, 1.0], [50.0, 0.0]]
-""",
-    ),
+    "drives": ("coupled_electric_drives.csv", DRIVES),
     "tank": (
         "spba_pump_pressure_steps.csv",
         """

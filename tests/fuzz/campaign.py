@@ -27,6 +27,7 @@ from focgen.errors import FocgenError
 from tests.fuzz.guidance import Guidance
 from tests.fuzz.mutate import LARGEST, mutated
 from tests.fuzz.targets import Target, one_line
+from tests.waiting import waited
 
 MEMORY = 4 << 30
 """Bytes of address space of the process that is fuzzed."""
@@ -208,13 +209,13 @@ def supervised(
         child = os.fork()
         if child == 0:
             _child(group, folder, left, corpora, slot)
-        status = _waited(child, left + 20.0 * group.seconds)
+        status = waited(child, left + 20.0 * group.seconds)
         if status == 0:
             return
         name, data = slot.get()
-        campaign = Campaign(group, folder, 0, {})
-        campaign.find(name, data, f"the process ended with {status}\n")
-        say(f"{group.name}: an input of {name} ended the process with {status}")
+        what = "the process did not end" if status is None else f"the process ended with {status}"
+        Campaign(group, folder, 0, {}).find(name, data, f"{what}\n")
+        say(f"{group.name}: {what} by an input of {name}")
 
 
 def _child(group: Group, folder: Path, seconds: float, corpora, slot: Slot) -> None:
@@ -232,19 +233,6 @@ def _child(group: Group, folder: Path, seconds: float, corpora, slot: Slot) -> N
         traceback.print_exc()
     finally:
         os._exit(status)
-
-
-def _waited(child: int, seconds: float) -> int:
-    """The status of a process; it is ended where it takes longer."""
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.2)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    return -signal.SIGKILL
 
 
 def _hang(number, frame) -> None:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.mutants.change import Change, read
+from tests.waiting import waited
 
 _MEMORY = 6 << 30  # bytes a try may take beside what the warm process has mapped
 _WAIT = 40.0
@@ -55,7 +56,7 @@ def tried(place: Path, change: Change, tests: list[str], patience: float) -> Tri
     try:
         _remember(place, change.file, text)
         _write(path, change.applied(text))
-        status = _waited(_forked(place, tests, log, patience), _WAIT * patience)
+        status = waited(_forked(place, tests, log, patience), _WAIT * patience)
     finally:
         restored(place)
     return _told(status, log.read_text(errors="replace"), time.monotonic() - begin)
@@ -137,19 +138,6 @@ def _further() -> list[str]:
     return [
         p for p in os.environ.get("PYTHONPATH", "").split(os.pathsep) if p and Path(p).resolve() != _own()
     ]
-
-
-def _waited(child: int, patience: float) -> int | None:
-    """The exit status, or None where it did not end; what it started goes with it."""
-    end = time.monotonic() + patience
-    while time.monotonic() < end:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.05)
-    os.killpg(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    return None
 
 
 def _told(status: int | None, log: str, seconds: float) -> Tried:

@@ -47,7 +47,7 @@ num = [[1.0, 0.0]]
 den = [[2.0, 2.0], [12.0, 1.0], [95000.0, 0.0]]
 """
 
-_DRIVES = """
+DRIVES = """
 name = "coupled drives"
 sample_time = 0.02
 [signals]
@@ -77,7 +77,7 @@ BENCHMARKS = (
         "coupled drives",
         "coupled_electric_drives.csv",
         "coupled_electric_drives.csv",
-        _DRIVES,
+        DRIVES,
         "–",
         1.0,
         "RNN 0.096, GP-NARX 0.089",
