@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -56,17 +56,42 @@ def read_json(path: Path, remedy: str) -> Any:
         raise InputError(str(path), "is no JSON", remedy) from None
 
 
+ANY = "*"
+"""Stands for every key of an object, in a shape."""
+
+
+def shape_of(kind: Any) -> Any:
+    """The shape, as :func:`fits` takes it, of what :func:`plain` writes of a type: of a dataclass, or of what
+    its fields are annotated with. Fields with a default may be absent."""
+    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+        hints = get_type_hints(kind)
+        given = (
+            f"{f.name}{'' if f.default is dataclasses.MISSING else '?'}" for f in dataclasses.fields(kind)
+        )
+        return {name: shape_of(hints[name.rstrip("?")]) for name in given}
+    parts = get_args(kind)
+    if get_origin(kind) is tuple:
+        return [shape_of(part) for part in parts if part is not Ellipsis]
+    if get_origin(kind) is dict:
+        return {ANY: shape_of(parts[1])}
+    return tuple(map(shape_of, parts)) if parts else None if kind is type(None) else kind
+
+
 def fits(value: Any, shape: Any) -> bool:
     """Whether a value from JSON has a shape.
 
     A shape is a type (``float`` takes any finite number, and none takes a truth value for a number), a
-    pattern for a whole text, None, a tuple of alternatives, ``[shape]`` for a list of it, or ``{key: shape}``
-    for an object that has these keys at least; a key with a question mark may be absent.
+    pattern for a whole text, None, a tuple of alternatives, ``[shape]`` for a list of it, ``[shape, shape]``
+    for one of just these, or ``{key: shape}`` for an object that has these keys at least. A key with a
+    question mark may be absent; ``{ANY: shape}`` is an object of any keys.
     """
+    if isinstance(shape, dict) and ANY in shape:
+        return isinstance(value, dict) and all(fits(item, shape[ANY]) for item in value.values())
     if isinstance(shape, dict):
         return isinstance(value, dict) and all(_has(value, key, part) for key, part in shape.items())
     if isinstance(shape, list):
-        return isinstance(value, list) and all(fits(item, shape[0]) for item in value)
+        each = shape if len(shape) > 1 else shape * len(value) if isinstance(value, list) else []
+        return isinstance(value, list) and len(value) == len(each) and all(map(fits, value, each))
     if isinstance(shape, tuple):
         return any(fits(value, one) for one in shape)
     if isinstance(shape, re.Pattern):

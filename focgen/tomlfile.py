@@ -11,8 +11,12 @@ from typing import Any, overload
 from focgen.errors import InputError
 from focgen.textfile import LARGEST_SETTING, read_regular
 
-LARGEST = 1e60
-"""The size of a number in a file of TOML."""
+SMALLEST, LARGEST = 1e-60, 1e60
+"""The size of a number in a file of TOML, but for 0."""
+MOST_ORDER = 20.0
+"""The size of an order of s: powers of what is fast in a slow rig stay numbers."""
+_SIZES = f"of a size from {SMALLEST:g} to {LARGEST:g}, or 0"
+_NONE = "not a finite number, or too small or too large"
 
 
 class Table:
@@ -86,9 +90,7 @@ class Table:
         """A finite number > ``above``; required where ``default`` is None."""
         value = self.required(key) if default is None else self.raw(key, default)
         if not _is_number(value):
-            raise self.fail(
-                key, f"is {value!r}, not a finite number", f"give a number of at most {LARGEST:g}"
-            )
+            raise self.fail(key, f"is {value!r}, {_NONE}", f"give a number {_SIZES}")
         if value <= above:
             raise self.fail(key, f"is {value:g}", f"give a number above {above:g}")
         return float(value)
@@ -97,7 +99,7 @@ class Table:
         """A non-empty list of finite numbers."""
         value = self.required(key)
         if not isinstance(value, list) or not value or not all(map(_is_number, value)):
-            raise self.fail(key, f"is {value!r}", f"give a list of finite numbers, of at most {LARGEST:g}")
+            raise self.fail(key, f"is {value!r}", f"give a list of finite numbers {_SIZES}")
         return tuple(map(float, value))
 
     def span(self, key: str) -> tuple[float, float] | None:
@@ -119,6 +121,10 @@ class Table:
         )
         if not right:
             raise self.fail(key, f"is {value!r}", "give a list of [coefficient, order of s] terms")
+        highest = max((order for _, order in value), key=abs)
+        if abs(highest) > MOST_ORDER:
+            what = f"has the order {highest:g}"
+            raise self.fail(key, what, f"give orders from {-MOST_ORDER:g} to {MOST_ORDER:g}")
         return [(float(c), float(o)) for c, o in value]
 
     def table(self, key: str) -> Table | None:
@@ -146,5 +152,8 @@ class Table:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a value is a number that can be computed with: powers and products of larger ones overflow."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and -LARGEST <= value <= LARGEST
+    """Whether a value is a number that can be computed with: powers and products of larger ones overflow, and
+    what is divided by smaller ones."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return value == 0 or SMALLEST <= abs(value) <= LARGEST

@@ -12,17 +12,33 @@ import numpy as np
 
 from focgen.control.files import controller_of, controller_table
 from focgen.errors import ControllerError, InputError
-from focgen.jsontext import plain, read_json
+from focgen.jsontext import fits, plain, read_json, shape_of
 from focgen.logs.thinning import thinned
 from focgen.present import present
 from focgen.studies.jobs import read_ideal, read_plant, read_row
-from focgen.studies.results import Band, Curves, Plant, Study
+from focgen.studies.results import Band, Curves, Plant, PlantRow, Study
 from focgen.tomlfile import Table
 
 FILE = "curves.json"
 MOST = 400
 """Points of a curve that are kept."""
 _DIGITS = 6
+_DRAWN = (("omega", "phase_deg", "magnitude_db"), ("time", "output"))
+_CURVE = [(float, None)]
+_PLANT_ROW = {name: shape for name, shape in shape_of(PlantRow).items() if name != "output"}
+_TOLD: dict[str, Any] = {
+    **{name: shape for name, shape in shape_of(Study).items() if "curves" not in name},
+    "controller": str,
+    "plant": (None, {"transfer": str, "sample_time": float, "rows": [_PLANT_ROW]}),
+}
+"""The shape of ``study.json``; the curves are in a file of their own."""
+_CURVES = {name: (float, None) if name.startswith("reference") else _CURVE for name in shape_of(Curves)}
+_KEPT: dict[str, Any] = {
+    "controller": dict,
+    "rows": [_CURVES],
+    "ideal": [_CURVES],
+    "plant": (None, {"time": _CURVE, "exact": _CURVE, "outputs": [_CURVE]}),
+}
 _REMEDY = "name a folder that `focgen study` has written; study again where it is of an earlier version"
 
 
@@ -42,7 +58,7 @@ def curves_text(study: Study) -> str:
 def _thin(curves: Curves) -> dict[str, Any]:
     """The same with fewer points, peaks kept."""
     found = asdict(curves)
-    for parts in (("omega", "phase_deg", "magnitude_db"), ("time", "output")):
+    for parts in _DRAWN:
         signals = [np.asarray(found[name], float) for name in parts]
         kept: Any = thinned(*signals[1:], most=MOST) if len(signals[0]) else []
         found |= {
@@ -59,9 +75,26 @@ def read_study(folder: Path) -> Study:
     """The study that a folder holds, its curves thinned. Raises InputError where it holds none."""
     told, kept = (read_json(folder / name, _REMEDY) for name in ("study.json", FILE))
     try:
+        if not (fits(told, _TOLD) and fits(kept, _KEPT) and _one_study(told, kept)):
+            raise ValueError
         return _study(told, kept, str(folder / FILE))
     except (TypeError, KeyError, ValueError, IndexError, AttributeError, ControllerError):
         raise InputError(str(folder), "holds no study that can be read", _REMEDY) from None
+
+
+def _one_study(told: dict[str, Any], kept: dict[str, Any]) -> bool:
+    """Whether curves that belong together are equally long, and rows that stand in one table have its
+    columns."""
+    curves = [[one[n] for n in names] for one in (*kept["rows"], *kept["ideal"]) for names in _DRAWN]
+    if bool(told["plant"]) != bool(kept["plant"]):
+        return False
+    if told["plant"]:
+        plant, rows = kept["plant"], told["plant"]["rows"]
+        curves.append([plant["time"], plant["exact"], *plant["outputs"]])
+        if not rows or any(row["errors"].keys() != rows[0]["errors"].keys() for row in rows):
+            return False
+    inside = all(0 <= i < len(told["rows"]) for front in told["pareto"].values() for i in front)
+    return inside and all(len({len(values) for values in of}) == 1 for of in curves)
 
 
 def _study(told: dict[str, Any], kept: dict[str, Any], where: str) -> Study:

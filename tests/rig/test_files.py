@@ -74,6 +74,14 @@ FAULTS = {
     "den zero": (RIG.replace("[[1.0, 2.0], [53.39, 1.0], [1528.0, 0.0]]", "[[0.0, 1.0]]"), "denominator"),
     "improper": (RIG.replace("[[152.48, 0.0]]", "[[1.0, 3.0]]"), "higher order"),
     "terms wrong": (RIG.replace("[[152.48, 0.0]]", "[152.48]"), "list of [coefficient, order of s]"),
+    "terms of endless order": (
+        RIG.replace("[53.39, 1.0]", "[53.39, 9223372036854775807]"),
+        "orders from -20",
+    ),
+    "a term that is hardly there": (
+        RIG.replace("[53.39, 1.0]", "[1e-320, 1.0]"),
+        "[coefficient, order of s]",
+    ),
     "one column for two roles": (RIG.replace('output = "kappa"', 'output = "u_V"'), "as 'output' is"),
     "the column of the time": (RIG.replace('output = "kappa"', 'output = "t_s"'), "as 'time' is"),
     "table as text": (RIG + 'sensor = "H"', "unknown key 'sensor'"),
