@@ -1,12 +1,12 @@
-"""Binary logs through their readers in processes of their own: forked, so that a hundred thousand take an
-hour.
+"""Binary logs through their readers in processes of their own, so that a hundred thousand take minutes.
 
-The process is the one that a log is read in (:mod:`focgen.logs.reader`) with its limits on memory; only
-the start of the interpreter is saved.
+The process is the one that a log is read in (:mod:`focgen.logs.reader`) with its limits on memory. It is
+forked, so that no interpreter has to start, and reads some logs before the next one does.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 import signal
@@ -27,53 +27,80 @@ from tests.fuzz.targets import Target, check
 
 SECONDS = 30
 """Until a reader must have answered, however loaded the machine is."""
+_EACH = 50  # logs that a process reads: what a reader loses in memory ends with it
 
 
 class Forked:
-    """Stands in for ``subprocess`` where a log is read apart; branches that the child sees first are
-    learnt."""
+    """Stands in for ``subprocess`` where a log is read apart; branches that a child sees first are learnt."""
 
     TimeoutExpired = subprocess.TimeoutExpired
 
     def __init__(self, guidance: Guidance):
         self.guidance = guidance
+        self.out, self.seen = tempfile.TemporaryFile(), tempfile.TemporaryFile()  # noqa: SIM115 -- shared with each child
+        self.child = self.read = 0
+        self.ask = self.told = -1
 
     def run(self, command, capture_output, timeout, env) -> SimpleNamespace:
         """Read as the command would, in a forked process."""
-        module, path = command[-2], Path(command[-1])
-        import_module(module)
-        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as seen:
-            child = os.fork()
-            if child == 0:
-                self._child(module, path, out.fileno(), seen)
-            status = _waited(child, timeout)
-            out.seek(0)
-            seen.seek(0)
-            learnt = seen.read()
-            if learnt:
-                self.guidance.new |= pickle.loads(learnt)  # our own child's
-            return SimpleNamespace(returncode=status, stdout=out.read(), stderr=b"")
+        import_module(command[-2])
+        if not self.child or self.read == _EACH:
+            self._begin()
+        for file in (self.out, self.seen):
+            file.seek(0)
+            file.truncate()
+        self.read += 1
+        os.write(self.ask, json.dumps([command[-2], command[-1]]).encode() + b"\n")
+        status = 0 if os.read(self.told, 1) else self._ended()
+        if status == -signal.SIGALRM:
+            raise subprocess.TimeoutExpired("reader", timeout)
+        self.out.seek(0)
+        self.seen.seek(0)
+        learnt = self.seen.read()
+        if learnt and not status:
+            self.guidance.new |= pickle.loads(learnt)  # our own child's
+        return SimpleNamespace(returncode=status, stdout=self.out.read(), stderr=b"")
 
-    def _child(self, module: str, path: Path, out: int, seen) -> None:
+    def _begin(self) -> None:
+        """A new process, and the end of the one before."""
+        if self.child:
+            self._ended()
+        asked, self.ask = os.pipe()
+        self.told, tell = os.pipe()
+        self.child, self.read = os.fork(), 0
+        if self.child == 0:
+            os.close(self.ask)
+            self._serve(asked, tell)
+        os.close(asked)
+        os.close(tell)
+
+    def _ended(self) -> int:
+        """The status of the process, which has ended or is told that nobody asks any more."""
+        os.close(self.ask)
+        status = os.waitstatus_to_exitcode(os.waitpid(self.child, 0)[1])
+        os.close(self.told)
+        self.child = 0
+        return status
+
+    def _serve(self, asked: int, tell: int) -> None:
+        """Read log after log until nobody asks; whatever else happens ends the process."""
         status = 1
         try:
-            signal.alarm(SECONDS)
             signal.setitimer(signal.ITIMER_PROF, 0)
-            os.dup2(out, 1)
-            reader.main(module, path)
-            seen.write(pickle.dumps(self.guidance.new))
-            seen.flush()
+            for line in os.fdopen(asked):
+                module, path = json.loads(line)
+                self.guidance.known |= self.guidance.new
+                self.guidance.new = set()
+                signal.alarm(SECONDS)
+                os.dup2(self.out.fileno(), 1)
+                reader.main(module, Path(path))
+                signal.alarm(0)
+                self.seen.write(pickle.dumps(self.guidance.new))
+                self.seen.flush()
+                os.write(tell, b".")
             status = 0
         finally:
             os._exit(status)
-
-
-def _waited(child: int, timeout: float) -> int:
-    """The status as ``subprocess`` tells it."""
-    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if status == -signal.SIGALRM:
-        raise subprocess.TimeoutExpired("reader", timeout)
-    return status
 
 
 def _read(name: str) -> Callable[[bytes, Path], None]:
