@@ -42,6 +42,7 @@ def _asked() -> argparse.Namespace:
         "--core-samples", type=float, default=1e7, help="on each emulated core; a tenth on an AVR"
     )
     given.add_argument("--cores", nargs="*", default=list(TARGETS), choices=list(TARGETS))
+    given.add_argument("--lanes", type=int, default=_LANES, help="that run side by side on the host")
     given.add_argument("--first", type=int, default=0, help="the first seed")
     given.add_argument("--folder", type=Path, default=Path("build/equality"), help="kept from run to run")
     given.add_argument("--report", action="store_true", help="only print what was compared")
@@ -72,10 +73,11 @@ def _compare(asked: argparse.Namespace, path: Path) -> None:
             targets += _lacking(samples, wanted, absent)
         for target in targets if one else ():
             if (seed, target) not in done:
-                found = on_host(one, _LANES, _SAMPLES) if target == "host" else _there(one, target, absent)
+                host = target == "host"
+                found = on_host(one, asked.lanes, _SAMPLES) if host else _there(one, target, absent)
                 if found:
                     samples[target] += found.samples
-                    controllers += target == "host"
+                    controllers += host
                     _keep(path, asdict(found))
         seed += 1
 
