@@ -67,18 +67,18 @@ def _compare(asked: argparse.Namespace, path: Path) -> None:
         or controllers < asked.controllers
         or _lacking(samples, wanted, absent)
     ):
-        one = drawn(seed)
         targets = ["host"] if samples["host"] < asked.samples or controllers < asked.controllers else []
         if seed % _EVERY == 0:
             targets += _lacking(samples, wanted, absent)
-        for target in targets if one else ():
-            if (seed, target) not in done:
-                host = target == "host"
-                found = on_host(one, asked.lanes, _SAMPLES) if host else _there(one, target, absent)
-                if found:
-                    samples[target] += found.samples
-                    controllers += host
-                    _keep(path, asdict(found))
+        waiting = [target for target in targets if (seed, target) not in done]
+        one = drawn(seed) if waiting else None
+        for target in waiting if one else ():
+            host = target == "host"
+            found = on_host(one, asked.lanes, _SAMPLES) if host else _there(one, target, absent)
+            if found:
+                samples[target] += found.samples
+                controllers += host
+                _keep(path, asdict(found))
         seed += 1
 
 
