@@ -33,6 +33,7 @@ from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.engine import STAGES
 from focgen.rig.files import rig_text
 from focgen.rig.plausibility import doubts
+from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Actuator, Rig
 
 Quality = dict[str, dict[str, float]]
@@ -83,6 +84,7 @@ def identify(
     nominal = rig_of(rig)
     experiments = _read(given, nominal, from_, to)
     others = _read(shown, nominal, None, None) if shown else ()
+    check_bounded(replace(nominal, actuator=None), longest(experiments))
     found = {stage: identify_stage(experiments, stage) for stage in stages if stage != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
     new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)

@@ -18,6 +18,7 @@ from focgen.report.style import (
     ORANGE,
     RED,
     figure,
+    log_scales,
     png,
     sparse_ticks,
     with_unit,
@@ -82,10 +83,9 @@ def _by_size(axis: Axes, rows: Sequence[Row], memory: str) -> None:
     """Error and bound of one form of memory, a colour for each arithmetic."""
     for arithmetic, colour in ARITHMETIC_COLOURS.items():
         _against(axis, [r for r in rows if r.arithmetic == arithmetic], PLACES[memory], colour, arithmetic)
-    axis.set_yscale("log")
+    log_scales(axis, "xy" if memory == "short" else "y")
     axis.set_title(f"{memory.capitalize()} memory")
     if memory == "short":
-        axis.set_xscale("log")
         axis.set_xlabel("length L (past samples)")
         sparse_ticks(axis.xaxis)
     else:
@@ -146,8 +146,7 @@ def _front(axis: Axes, study: Study, cost: str) -> None:
         lw=0.9,
         zorder=1,
     )
-    axis.set_xscale("log")
-    axis.set_yscale("log")
+    log_scales(axis)
 
 
 def chosen(study: Study, part: str) -> list[tuple[Row, Curves, str]]:

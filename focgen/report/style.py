@@ -18,9 +18,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from focgen.errors import MissingExtra
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
@@ -139,6 +142,15 @@ def sparse_ticks(axis: Axis) -> None:
     else:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def log_scales(axes: Axes, names: str = "xy") -> None:
+    """Make the axes ``names`` logarithmic, each where something above 0 is drawn on it: else there is no such
+    scale, and it stays as it is."""
+    for name in names:
+        drawn = [np.asarray(getattr(line, f"get_{name}data")(), float) for line in axes.lines]
+        if any(np.any(values > 0.0) for values in drawn):
+            getattr(axes, f"set_{name}scale")("log")
 
 
 def png(fig: Figure) -> bytes:

@@ -290,7 +290,7 @@ def _fractional(transfer: TransferFunction, h: float, duration: float) -> Modes:
     xi = np.exp(x)
     cut = transfer(xi * np.exp(1j * np.pi))
     weights = -np.imag(cut) / np.pi * xi * _SPACING
-    poles = _poles(transfer, 1e-3 / duration, 30.0 / h)
+    poles = fractional_poles(transfer, 1e-3 / duration, 30.0 / h)
     residues = np.array([_residue(transfer, p) for p in poles])
     fast = float(np.real(transfer(np.array([30.0 / h * np.exp(0.0)]))[0]))
     through = fast - float(np.sum(weights / (xi + 30.0 / h)))
@@ -326,9 +326,9 @@ def _residue(transfer: TransferFunction, pole: complex) -> complex:
     return num / slope
 
 
-def _poles(transfer: TransferFunction, low: float, high: float) -> list[complex]:
+def fractional_poles(transfer: TransferFunction, low: float, high: float) -> list[complex]:
     """Zeros of the denominator on the principal sheet, upper half plane and negative-free axis, by Newton's
-    rule."""
+    rule from places between ``low`` and ``high`` rad/s."""
     radius, angle = np.meshgrid(np.geomspace(low, high, 60), np.linspace(0.0, 0.999 * np.pi, 24))
     s = (radius * np.exp(1j * angle)).ravel()
     with np.errstate(all="ignore"):

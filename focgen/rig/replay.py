@@ -20,6 +20,7 @@ from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import begun
 from focgen.rig.plausibility import doubts
+from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
@@ -74,8 +75,11 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
 def experiments(
     rig: Rig, logs: Logs, first: float | None = None, last: float | None = None
 ) -> tuple[Experiment, ...]:
-    """The logs read, and cut to ``first`` … ``last`` s."""
-    return read_logs(logs, rig.signals, rig.sample_time, first, last)
+    """The logs read, and cut to ``first`` … ``last`` s. Raises RigError for a rig that cannot be run on
+    them."""
+    found = read_logs(logs, rig.signals, rig.sample_time, first, last)
+    check_bounded(rig, longest(found))
+    return found
 
 
 def simulate_session(

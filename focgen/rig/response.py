@@ -1,12 +1,20 @@
-"""How fast a rig is, and whether it comes to rest."""
+"""How fast a rig is, whether it comes to rest, and whether it runs away."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from focgen.errors import RigError
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig import linear
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
 from focgen.rig.rig import LinearActuator, Rig
+
+_GROWN = 25.0  # time constants that a pole may grow for: beyond, what it makes is no signal of a rig
 
 
 def response_time(rig: Rig, h: float, record: float) -> float:
@@ -27,3 +35,34 @@ def integrations(rig: Rig) -> int:
     if isinstance(rig.actuator, LinearActuator):
         stages.append(rig.actuator.dynamics)
     return sum(int(min(t.order for t in s.den)) - int(min(t.order for t in s.num)) for s in stages)
+
+
+def longest(logs: Sequence[Experiment]) -> float:
+    """How long the longest of the logs takes, s."""
+    return max(len(log) * log.sample_time for log in logs)
+
+
+def check_bounded(rig: Rig, seconds: float) -> None:
+    """Raises RigError where a stage of the nominal rig grows by itself, by more than e²⁵ in so many
+    ``seconds``: run for so long it would leave all numbers."""
+    stages = {"regulator": rig.regulator, "sensor": rig.sensor}
+    if isinstance(rig.actuator, LinearActuator):
+        stages["actuator"] = rig.actuator.dynamics
+    for name, transfer in stages.items():
+        rate = _growth(transfer, rig.sample_time, seconds)
+        if rate * seconds > _GROWN:
+            what = f"grows by itself, by a factor of e every {1.0 / rate:.3g} s"
+            raise RigError(f"{rig.name} [{name}]", what, "check the signs and orders of its den")
+
+
+def _growth(transfer: TransferFunction, h: float, seconds: float) -> float:
+    """The largest real part of a pole, 1/s, that shows in so many seconds; 0 where none is positive."""
+    if transfer.is_integer:
+        lowest, highest = transfer.den[-1].order, transfer.den[0].order
+        dense = np.zeros(int(highest - lowest) + 1)
+        for term in transfer.den:
+            dense[int(highest - term.order)] = term.coefficient
+        poles = list(np.roots(dense))
+    else:
+        poles = linear.fractional_poles(transfer, 1e-3 / seconds, 30.0 / h)
+    return max((float(pole.real) for pole in poles), default=0.0)

@@ -84,6 +84,7 @@ def study(
     setup = Setup(which, model, band_of(which, model, points), SAMPLES, points, target)
     with Workers(jobs, scheduler) as workers, _folder(out) as folder:
         found = _Sweep(setup, grid, Store(folder), workers).result(notes)
+    _check_measured(found.rows, str(file_of(controller) or which.name))
     if out is not None:
         write(found, Path(out), (controller, rig, *_designed_from(which, controller)))
     return found
@@ -260,6 +261,13 @@ class _Sweep:
         times = plant_times(self.own) * self.own
         exact = exact_step(plant, self.own)
         return Plant(str(plant), self.own, tuple(map(float, times)), tuple(map(float, exact)), rows)
+
+
+def _check_measured(rows: tuple[Row, ...], where: str) -> None:
+    """Raises ControllerError where there is nothing to show."""
+    if all(row.error is None for row in rows):
+        reasons = "; ".join(_missing(rows))
+        raise ControllerError(where, f"gives nothing to study: {reasons}", "mend that, or study other forms")
 
 
 def _unsettled(ideal: Ideal) -> list[str]:

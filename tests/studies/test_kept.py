@@ -4,12 +4,14 @@ Red when a study whose parts do not fit together is taken, and a page of it ends
 """
 
 import json
+from dataclasses import replace
 
 import pytest
 
 import focgen
+from focgen.control.controller import GainSchedule
 from focgen.control.files import write_controller
-from focgen.errors import InputError
+from focgen.errors import ControllerError, InputError
 from focgen.studies.kept import read_study
 from tests.conftest import paper_controller, paper_rig
 
@@ -75,3 +77,11 @@ def test_parts_that_do_not_fit_are_refused(folder, tmp_path, damage):
     (tmp_path / "curves.json").write_text(json.dumps(kept))
     with pytest.raises(InputError, match="no study that can be read"):
         read_study(tmp_path)
+
+
+def test_a_study_of_nothing_is_refused(tmp_path):
+    """Of two gains a millionth of the range apart no variant has the bits for the slope."""
+    steep = replace(paper_controller(20), gain=GainSchedule((0.0, 1e-7), (48.0, 42.0)))
+    with pytest.raises(ControllerError, match="gives nothing to study: 2 rows"):
+        focgen.study("memory", steep, tmp_path / "study", **SMALL)
+    assert not (tmp_path / "study" / "study.json").exists()

@@ -10,7 +10,7 @@ from focgen.diagnosis.problem.problem import References
 from focgen.diagnosis.problem.segments import Segment
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import Chain
-from focgen.rig.response import response_time
+from focgen.rig.response import longest, response_time
 from focgen.rig.rig import Rig
 
 
@@ -61,7 +61,7 @@ def clocks(rig: Rig, logs: Sequence[Experiment]) -> dict[str, float]:
     """``response``: 63 % of the nominal chain's step; ``record``: the longest experiment; ``session``: all;
     ``sample``."""
     h = min(log.sample_time for log in logs)
-    record = max(len(log) * log.sample_time for log in logs)
+    record = longest(logs)
     begin = min(log.start for log in logs)
     session = max(log.start + len(log) * log.sample_time for log in logs) - begin
     return {"response": response_time(rig, h, record), "record": record, "session": session, "sample": h}

@@ -24,7 +24,7 @@ from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Excitation, Run, library
 from focgen.rig.engine import Chain
 from focgen.rig.replay import experiments
-from focgen.rig.response import integrations, response_time
+from focgen.rig.response import check_bounded, integrations, longest, response_time
 from focgen.rig.rig import Rig
 
 ALIKE = 0.9  # cosine beyond which two effects cannot be told apart
@@ -73,7 +73,7 @@ def plan(rig: RigLike, logs: Logs = ()) -> Plan:
     nominal, each = rig_of(rig), each_of(logs)
     session = experiments(nominal, each) if each else _menu(nominal)
     roles = cuts(session)
-    response = response_time(nominal, session[0].sample_time, max(len(s) * s.sample_time for s in session))
+    response = response_time(nominal, session[0].sample_time, longest(session))
     seen = excitation([s[roles[0]] for s in session], session[0].sample_time, response)
     found = [survival for a, b in pairwise(roles) for survival in _segment(nominal, session, a, b, seen)]
     return Plan(tuple(s.name for s in session), tuple(found))
@@ -81,7 +81,9 @@ def plan(rig: RigLike, logs: Logs = ()) -> Plan:
 
 def _menu(rig: Rig) -> tuple[Experiment, ...]:
     """The menu's experiments on the nominal rig."""
-    response = response_time(rig, rig.sample_time, 2e4 * rig.sample_time)
+    seconds = 2e4 * rig.sample_time
+    check_bounded(rig, seconds)
+    response = response_time(rig, rig.sample_time, seconds)
     start, found = 0.0, []
     for choice in menu(_limits(rig, response)):
         run = Run.of([len(choice.levels)], [start], choice.limits.h)

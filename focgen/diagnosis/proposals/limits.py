@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.logs.experiment import Experiment
-from focgen.rig.response import integrations, response_time
+from focgen.rig.response import integrations, longest, response_time
 from focgen.rig.rig import Rig
 
 _JUMP = 0.1  # of the input's span: a change by more in one sample is a step, and steps are allowed
@@ -85,7 +85,7 @@ class Bounds:
 def limits_of(rig: Rig, logs: Sequence[Experiment], entry: str) -> InputLimits:
     """What may be done with the input ``entry``, by the rig's ranges and the session so far."""
     h = logs[0].sample_time
-    response = response_time(rig, h, max(len(log) * log.sample_time for log in logs))
+    response = response_time(rig, h, longest(logs))
     signals = [np.asarray(log[entry], float) for log in logs]
     low, high = _ends(signals)
     stated = getattr(rig.ranges, entry, None)
