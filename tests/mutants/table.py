@@ -79,9 +79,9 @@ def table(results: list[dict], weights: dict[str, int]) -> str:
     whole = Count(
         *(sum(getattr(c, k) for c in counts.values()) for k in ("tried", "killed", "equivalent", "weight"))
     )
-    lines.append(
-        _row("all, rooms by their places", int(whole.weight), whole, *weighted(list(counts.values())))
-    )
+    if counts:
+        every = weighted(list(counts.values()))
+        lines.append(_row("all, rooms by their places", int(whole.weight), whole, *every))
     return "\n".join([*lines, "", *survivors(results)])
 
 
