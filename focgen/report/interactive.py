@@ -269,7 +269,9 @@ def _source(**columns: Any) -> Any:
     """The data, in single precision: more than a screen shows, at half the size."""
     from bokeh.models import ColumnDataSource
 
-    return ColumnDataSource({name: np.asarray(part, np.float32) for name, part in columns.items()})
+    most = np.finfo(np.float32).max  # what a page draws with
+    clipped = {name: np.clip(np.asarray(part, float), -most, most) for name, part in columns.items()}
+    return ColumnDataSource({name: part.astype(np.float32) for name, part in clipped.items()})
 
 
 # ------------------------------------------------------------------------------------------------- JSON

@@ -140,3 +140,12 @@ def test_a_page_says_where_which_how_far_and_what_next():
         panel.y.label for section in page.sections for figure in section.figures for panel in figure.panels
     ]
     assert "output (mm)" in labels and "pressure (bar)" in labels
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_number_that_a_page_cannot_draw_is_drawn_at_its_end():
+    pytest.importorskip("bokeh")
+    from focgen.report.interactive import _source
+
+    drawn = _source(y=[1e308, -1e300, float("nan"), 1.0]).data["y"]
+    assert np.isfinite(drawn[:2]).all() and drawn[0] > 1e38 and np.isnan(drawn[2]) and drawn[3] == 1.0
