@@ -10,12 +10,14 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor
 
 import focgen
 from focgen.errors import FocgenError
 from focgen.terminal import for_terminal
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_UNLOADED = "failed to map segment", "annot allocate memory"  # words of the system's loader
 _SCARCE = (errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM)
 
 
@@ -32,6 +34,11 @@ def _foreseen(error: BaseException, command: str) -> FocgenError | None:
         return FocgenError(command, "takes more memory than there is", "ask for less, or cut the logs")
     if isinstance(error, RecursionError):
         return FocgenError(command, "is given something nested too deeply", "write it flatter")
+    if isinstance(error, BrokenExecutor):
+        what = "has lost one of its processes, which was ended or had no memory"
+        return FocgenError(command, what, "run it again, with fewer --jobs: what was kept is not done again")
+    if isinstance(error, ImportError) and any(words in str(error) for words in _UNLOADED):
+        return FocgenError(command, "has no memory for its libraries", "raise the limit (ulimit -v)")
     if not isinstance(error, OSError):
         return None
     where, why = str(error.filename or command), error.strerror or type(error).__name__
@@ -85,6 +92,9 @@ def open_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free: this one
+    # those that were closed as the interpreter began; a closed stdout is a fault, for want of the result
+    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115 - as long as the process
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 
 
 def write_out(text: str) -> None:

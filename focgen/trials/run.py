@@ -12,7 +12,6 @@ import os
 import shutil
 import stat
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.children import environment, python
 from focgen.errors import InputError
 from focgen.output import replace_folder
 from focgen.progress import say, track
@@ -151,9 +151,9 @@ def _first(reason: OSError) -> str:
 
 
 def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> str:
-    command = [sys.executable, "-m", "focgen.trials.worker", str(blind), str(out), *effects]
+    command = python("-m", "focgen.trials.worker", str(blind), str(out), *effects)
     try:
-        done = subprocess.run(command, capture_output=True, timeout=limit, env={**os.environ, **_ONE_THREAD})
+        done = subprocess.run(command, capture_output=True, timeout=limit, env=environment(**_ONE_THREAD))
         return f"the process ended with status {done.returncode}"
     except subprocess.TimeoutExpired:
         return f"took longer than {limit:g} s"
