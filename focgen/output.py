@@ -55,7 +55,8 @@ def new_folder(target: str | Path, inputs: Iterable[Any] = (), old: Old = tuple)
     """
     target = Path(target)
     with ExitStack() as stack:
-        stack.callback(_remove_empty, target)
+        if not target.exists():  # a folder that somebody has made stays, empty as it is
+            stack.callback(_remove_empty, target)
         try:
             target.mkdir(parents=True, exist_ok=True)
             journal.finish(target)

@@ -6,10 +6,12 @@ import contextlib
 import errno
 import os
 import platform
+import signal
 import sys
 import tempfile
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 
 import focgen
@@ -83,6 +85,38 @@ def _written(error: BaseException, argv: Sequence[str]) -> str:
         os.unlink(path)
         raise
     return path
+
+
+class Ended(BaseException):
+    """A signal asks the process to end; what it has begun it clears away on the way out."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.status = 128 + number
+
+
+@contextlib.contextmanager
+def ending_in_order() -> Iterator[None]:
+    """Raise Ended for what ends a process politely: scratch folders go, and processes that were begun end."""
+    numbers = [number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None))]
+    ours = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    if threading.current_thread() is not threading.main_thread():
+        ours = []
+    process = os.getpid()
+
+    def end(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_DFL)  # a second one does not wait
+        if os.getpid() != process:  # forked from it: there is nothing of its own to clear away
+            os.kill(os.getpid(), number)
+        raise Ended(number)
+
+    for number in ours:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def open_streams() -> None:

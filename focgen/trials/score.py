@@ -8,7 +8,7 @@ over cases. A case without a diagnosis counts as a miss in every row; one not ye
 from __future__ import annotations
 
 import json
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from focgen.trials.facts import achieved_in, diagnosis_in, facts_of
 from focgen.trials.judging import Judged, forgone, judge
 from focgen.trials.proposed import ask, resolved
 from focgen.trials.rows import Row, rows, stated_in
-from focgen.trials.run import diagnose_case, outcome_of, processes, ran
+from focgen.trials.run import diagnose_case, outcome_of, processes, ran, threads
 from focgen.trials.sealing import unseal
 from focgen.trials.worker import oracle_possible
 
@@ -150,7 +150,7 @@ def _ask_oracle(folder: Path, labels: dict[str, dict[str, Any]], jobs: int) -> N
         and label["truth"]
         and not (folder / "oracle" / n / "outcome.json").exists()
     ]
-    with ThreadPoolExecutor(jobs) as pool:
+    with threads(jobs) as pool:
         asked = [
             pool.submit(
                 diagnose_case,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import os
 import platform
 import re
 import tempfile
@@ -19,6 +20,7 @@ from pathlib import Path
 
 from focgen.compiler import compile_shared
 from focgen.custody import sha256_within
+from focgen.present import present
 from focgen.textfile import LARGEST_CODE, holds
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can tell
@@ -27,6 +29,7 @@ _SYSTEMS = {"Linux": ("linux", "so"), "Darwin": ("darwin", "dylib"), "Windows": 
 _MACHINES = {"AMD64": "x86_64", "arm64": "aarch64", "ARM64": "aarch64"}
 _OLD = {"x86_64-linux": "linux64", "x86_64-darwin": "darwin64", "x86_64-windows": "win64"}  # of FMI 2.0
 _BINARIES = "binaries/"
+_LOCAL, _LISTED, _END = 30, 46, 22  # bytes of a zip's headers
 DIGEST = ".sha256"
 """Ends the name of the file beside an archive that holds its SHA-256, as ``sha256sum -c`` reads it."""
 
@@ -132,12 +135,27 @@ def _faults(archive: zipfile.ZipFile, expected: Mapping[str, bytes], name: str) 
         yield "has files that do not belong to it"
     if len(found) < len(archive.infolist()):
         yield "has files of the same name"  # which of them is taken is the reader's choice
+    if not _is_dense(archive):
+        yield "has bytes that are no part of its files"
 
 
 def _is(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, content: bytes) -> bool:
     """Whether a member holds these bytes; it is packed as :func:`_zip` does it, or taken to be another."""
     usual = entry.compress_type == zipfile.ZIP_DEFLATED and entry.file_size == len(content)
     return usual and archive.read(entry) == content
+
+
+def _is_dense(archive: zipfile.ZipFile) -> bool:
+    """Whether the members, their headers and the list of them are all that there is, as :func:`_zip` writes
+    it."""
+    at = 0
+    for entry in sorted(archive.infolist(), key=lambda entry: entry.header_offset):
+        if entry.header_offset != at or entry.extra or entry.comment:
+            return False
+        at += _LOCAL + len(entry.orig_filename) + entry.compress_size
+    listed = sum(_LISTED + len(entry.orig_filename) for entry in archive.infolist())
+    whole = present(archive.fp).seek(0, os.SEEK_END)
+    return archive.start_dir == at and whole == at + listed + _END
 
 
 def _is_binary(file: str, name: str) -> bool:
