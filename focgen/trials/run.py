@@ -152,9 +152,8 @@ def _check_plain(case: Path, trial: Path) -> None:
     for path in found:
         mode, left = path.lstat().st_mode, left - path.lstat().st_size
         if left < 0:  # on the disk it may be nothing: a copy of it is not
-            raise InputError(
-                str(path), f"is more than {LARGEST_LOG >> 20} MiB of a case", "make the cases anew"
-            )
+            what = f"makes the case larger than {LARGEST_LOG >> 20} MiB"
+            raise InputError(str(path), what, "make the cases anew")
         if not (stat.S_ISDIR(mode) or stat.S_ISREG(mode)) or not _is_in(path, trial):
             raise InputError(str(path), "is neither a file nor a folder of the trial", "make the cases anew")
 
