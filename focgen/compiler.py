@@ -6,11 +6,11 @@ import os
 import shlex
 import shutil
 import subprocess
-import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
+from focgen.children import python
 from focgen.errors import BuildError
 
 _USUAL = ("cc", "gcc", "clang")
@@ -30,7 +30,7 @@ def find_compiler() -> list[str]:
         if shutil.which(name):
             return [name]
     if find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
+        return python("-m", "ziglang", "cc")
     raise BuildError("the compiler", "no C compiler was found", _REMEDY)
 
 

@@ -16,16 +16,39 @@ from typing import Any
 import tomlkit
 
 from focgen.errors import InputError
-from focgen.textfile import LARGEST_SETTING, read_regular
+from focgen.textfile import LARGEST_SETTING, check_regular, read_regular
 
 TABLE = "identified_from"
 _MOST = 64  # files of one link that are followed
+_LARGEST = 4 << 30  # bytes of them all: a log as large takes more memory to read than there is for it
+_PART = 1 << 20  # bytes that are read at a time
 
 
 def sha256_of(path: str | Path) -> str:
     """Of a file's bytes, in hexadecimal digits. Raises OSError where it cannot be read."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def sha256_within(path: str | Path, most: int) -> str | None:
+    """The same of a regular file of at most ``most`` bytes, for a name that is a stranger's; None for any
+    other.
+
+    No more is read than the system says that there is: of ``/proc``, whose files may never end, nothing.
+    """
+    try:
+        check_regular(path)
+        with open(path, "rb") as file:
+            left = os.fstat(file.fileno()).st_size
+            if left > most:
+                return None
+            digest = hashlib.sha256()
+            while left > 0 and (part := file.read(min(left, _PART))):
+                digest.update(part)
+                left -= len(part)
+        return digest.hexdigest()
+    except (OSError, InputError):
+        return None
 
 
 def identified_from(inputs: Iterable[Any], out: str | Path, options: Mapping[str, Any]) -> str:
@@ -55,15 +78,19 @@ def followed(controller: Path, near: Path) -> Iterator[str]:
     rig = _found(source.get("file"), (near, near.parent))
     if rig is None:
         return
-    if sha256_of(rig) != source.get("sha256"):
+    if sha256_within(rig, LARGEST_SETTING) != source.get("sha256"):
         yield f"{rig}: is not the rig that the controller was designed from"
         return
     made = _table(rig).get(TABLE)
     files = made.get("files") if isinstance(made, dict) else None
+    left = _LARGEST
     for entry in files[:_MOST] if isinstance(files, list) else ():
         path = _found(entry.get("file"), (rig.parent,)) if isinstance(entry, dict) else None
-        if path is not None and sha256_of(path) != entry.get("sha256"):
+        if path is None:
+            continue
+        if sha256_within(path, left) != entry.get("sha256"):
             yield f"{path}: is not what {rig.name} was identified from"
+        left = max(0, left - path.stat().st_size)
 
 
 def _found(name: Any, places: Iterable[Path]) -> Path | None:

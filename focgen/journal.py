@@ -24,7 +24,7 @@ from typing import Any
 from focgen.custody import sha256_of
 from focgen.errors import InputError
 from focgen.jsontext import fits, read_json
-from focgen.scratch import lock, own, synced, unlock, waited_for
+from focgen.scratch import as_before, lock, own, synced, unlock, waited_for
 
 FILES, NEW, OLD = "files", "new", "old"
 _PLAN = "plan.json"
@@ -156,6 +156,7 @@ def _move(source: Path, place: Path, stood: str | None, target: Path) -> None:
     """To its place, unless it has been moved or something else stands there by now."""
     if source.is_file() and _within(place, target) and _digest(place) in (stood, _digest(source)):
         place.parent.mkdir(parents=True, exist_ok=True)
+        as_before(source, place)
         os.replace(source, place)
 
 

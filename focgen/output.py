@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -11,7 +12,8 @@ from typing import Any
 
 from focgen import journal
 from focgen.errors import InputError
-from focgen.scratch import scratch_file, scratch_folder, synced
+from focgen.scratch import as_before, scratch_file, scratch_folder, synced
+from focgen.textfile import holds
 
 Old = Callable[[], Iterable[Path]]
 """What goes from a folder as a result takes its place there."""
@@ -53,7 +55,8 @@ def new_folder(target: str | Path, inputs: Iterable[Any] = (), old: Old = tuple)
     """
     target = Path(target)
     with ExitStack() as stack:
-        stack.callback(_remove_empty, target)
+        if not target.exists():  # a folder that somebody has made stays, empty as it is
+            stack.callback(_remove_empty, target)
         try:
             target.mkdir(parents=True, exist_ok=True)
             journal.finish(target)
@@ -90,19 +93,43 @@ def _move(scratch: Path, target: Path, inputs: tuple[Any, ...], old: Old) -> Non
 
 
 def _check_places(made: Path, target: Path, files: list[Path], inputs: tuple[Any, ...]) -> None:
-    """Raise InputError where an input or a folder stands at the place of a file, or a file at a folder's."""
+    """Raise InputError where an input, a folder or a device stands at the place of a file, or a file at a
+    folder's."""
     check_apart((target / name for name in files if not _equal(made / name, target / name)), inputs)
     for name in files:
         if (target / name).is_dir():
             raise InputError(str(target / name), "is a folder where a file belongs", "move it away")
+        _check_no_device(target / name)
         for parent in list(name.parents)[:-1]:
             if (target / parent).exists() and not (target / parent).is_dir():
                 raise InputError(str(target / parent), "is a file where a folder belongs", "move it away")
 
 
+def _check_no_device(path: Path) -> None:
+    """Raise InputError where a pipe, a socket or a device stands at a place, or a link to what a process has
+    open: a file would replace it, and ``/dev/null`` or ``/dev/stdout`` were no more."""
+    try:
+        mode, link = os.stat(path).st_mode, path.is_symlink() and os.readlink(path)
+    except (OSError, ValueError):
+        return
+    plain = stat.S_ISREG(mode) or stat.S_ISDIR(mode)  # of a folder the system has its own words
+    if not plain or (link and link.startswith("/proc/")):
+        raise InputError(str(path), "is no regular file, and would be replaced by one", "name another file")
+
+
+def _bytes(text: str, path: Path) -> bytes:
+    """Text as UTF-8. Raises InputError where a name in it, of a log for instance, has no characters."""
+    try:
+        return text.encode("utf-8")
+    except UnicodeEncodeError as reason:
+        near = reason.object[max(0, reason.start - 8) : reason.end]
+        what = f"would hold a name that is no UTF-8 ({near!r})"
+        raise InputError(str(path), what, "rename that file or folder") from None
+
+
 def _equal(one: Path, other: Path) -> bool:
     """Whether both are files of the same bytes: then nothing is lost."""
-    return other.is_file() and one.read_bytes() == other.read_bytes()
+    return holds(other, one.read_bytes())
 
 
 def write_files(
@@ -122,21 +149,23 @@ def write_files(
         for name, content in files.items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+            path.write_bytes(content if isinstance(content, bytes) else _bytes(content, Path(target) / name))
 
 
 def write_file(path: str | Path, text: str, inputs: Iterable[Any] = ()) -> None:
-    """Write one file whole or not at all. Raises InputError where it cannot be written, or is one of
-    ``inputs``.
+    """Write one file whole or not at all. Raises InputError where it cannot be written, is one of ``inputs``,
+    a pipe or a device, or where ``text`` holds what UTF-8 has no bytes for.
     """
     check_apart([path], inputs)
     path = Path(path)
+    _check_no_device(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with scratch_file(path.parent) as (scratch, handle):
-            with open(handle, "w", encoding="utf-8", closefd=False) as file:
-                file.write(text)
+            with open(handle, "wb", closefd=False) as file:
+                file.write(_bytes(text, path))
             os.fsync(handle)
+            as_before(scratch, path)
             os.replace(scratch, path)
         synced(path.parent)
     except OSError as reason:

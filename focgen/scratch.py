@@ -6,10 +6,12 @@ and the next that writes to the same folder removes it.
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import secrets
 import shutil
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -22,6 +24,8 @@ except ImportError:  # Windows: nothing can be told of who lives, so nothing is 
 
 PATIENCE = 60.0
 """Seconds that one process waits for others to move their files into the same folder."""
+_TRIES = 100  # at a new folder, until nobody else takes it away
+_HELD = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)  # what a lock of another process answers
 _OURS = re.compile(r"\.focgen-[0-9a-f]{16}(\.part)?")
 _swept: set[tuple[int, str]] = set()  # by process: looking once is enough
 
@@ -40,14 +44,22 @@ def scratch_folder(place: Path) -> Iterator[Path]:
 
 def _new_folder(place: Path) -> tuple[Path, int | None]:
     """A new folder and what holds its lock. Until that is had, another process may take it for one that was
-    left: then there is a further one."""
-    while True:
+    left: then there is a further one. Where the file system has no locks, nothing is taken for left."""
+    for _ in range(_TRIES):
         path = place / _name()
         path.mkdir(mode=0o700)
+        os.chmod(path, 0o700)  # whatever the umask takes away: what cannot be opened cannot be locked
         held = lock(path)
-        if fcntl is None or (held is not None and path.is_dir()):
+        if path.is_dir() and (held is not None or not lockable(path)):
             return path, held
         unlock(held)
+        with suppress(OSError):
+            path.rmdir()
+    raise _taken_away(place)
+
+
+def _taken_away(place: Path) -> OSError:
+    return OSError(errno.EBUSY, "others take away what is written", str(place))
 
 
 @contextmanager
@@ -57,18 +69,26 @@ def scratch_file(place: Path) -> Iterator[tuple[Path, int]]:
     Raises OSError where none can be made.
     """
     clear(place)
-    path = place / f"{_name()}.part"
-    # never a file, or a link, that is there
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    path, handle = _new_file(place)
     try:
-        if fcntl:
-            with suppress(OSError):
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield path, handle
     finally:
         with suppress(OSError):
             path.unlink()
         os.close(handle)
+
+
+def _new_file(place: Path) -> tuple[Path, int]:
+    """A new file and its descriptor, which holds its lock where there are locks; a further one where another
+    process has taken it for one that was left."""
+    for _ in range(_TRIES):
+        path = place / f"{_name()}.part"
+        # never a file, or a link, that is there
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        if _flocked(handle) not in _HELD and os.fstat(handle).st_nlink:
+            return path, handle
+        os.close(handle)
+    raise _taken_away(place)
 
 
 def clear(place: Path) -> None:
@@ -105,31 +125,65 @@ def synced(path: Path) -> None:
             os.close(handle)
 
 
+def as_before(new: Path, place: Path) -> None:
+    """Give a file the rights of the one whose place it takes: what was private stays so."""
+    with suppress(OSError):  # there is none
+        mode = place.lstat().st_mode
+        if stat.S_ISREG(mode):
+            os.chmod(new, stat.S_IMODE(mode))
+
+
 def _name() -> str:
     return f".focgen-{secrets.token_hex(8)}"
 
 
 def lock(path: Path) -> int | None:
-    """A descriptor that holds the lock of ``path``; None where another process has it."""
+    """A descriptor that holds the lock of a file or folder; None where another process has it, or where there
+    are no locks."""
+    return _locked(path)[0]
+
+
+def lockable(path: Path) -> bool:
+    """Whether ``path`` can be locked at all: some file systems of clusters have no locks."""
+    held, reason = _locked(path)
+    unlock(held)
+    return held is not None or reason in _HELD
+
+
+def _locked(path: Path) -> tuple[int | None, int]:
+    """A descriptor that holds the lock, or why there is none."""
     if fcntl is None:
-        return None
+        return None, errno.ENOSYS
+    # a pipe of such a name must not be waited for
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     try:
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
+        handle = os.open(path, flags)
     except OSError:
-        return None
+        return None, errno.ENOENT
+    if reason := _flocked(handle):
+        os.close(handle)
+        return None, reason
+    return handle, 0
+
+
+def _flocked(handle: int) -> int:
+    """Lock what a descriptor leads to, at once or not at all: 0, or why not."""
+    if fcntl is None:
+        return errno.ENOSYS
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(handle)
-        return None
-    return handle
+    except OSError as reason:
+        return reason.errno or errno.ENOSYS
+    return 0
 
 
 def waited_for(folder: Path) -> int | None:
-    """A descriptor that holds the lock of a folder, once other processes have let it go; None where they do
-    not within :data:`PATIENCE`, or where there are no locks."""
+    """A descriptor that holds the lock of a folder, once other processes have let it go; None where there are
+    no locks. Raises OSError where they do not within :data:`PATIENCE`."""
     until = time.monotonic() + PATIENCE
-    while (held := lock(folder)) is None and fcntl is not None and time.monotonic() < until:
+    while (held := lock(folder)) is None and lockable(folder):
+        if time.monotonic() > until:
+            raise OSError(errno.EBUSY, "another process writes there", str(folder))
         time.sleep(0.02)
     return held
 

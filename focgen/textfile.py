@@ -15,6 +15,8 @@ LARGEST_LOG = 512 << 20
 """Bytes of a log in text, unpacked: ten million rows of five columns."""
 LARGEST_SETTING = 16 << 20
 """Bytes of a file of TOML."""
+LARGEST_CODE = 64 << 20
+"""Bytes of a file of generated C."""
 LARGEST_JSON = 512 << 20
 """Bytes of a file of JSON: what has been drawn of a diagnosis is the largest."""
 _PART = 1 << 20  # bytes that are read at a time
@@ -30,6 +32,16 @@ def read_regular(path: str | Path, most: int, error: type[InputError] = InputErr
     check_regular(path, error)
     with path.open("rb") as file:
         return _at_most(file, most, path, error)
+
+
+def holds(path: str | Path, content: bytes) -> bool:
+    """Whether a path leads to a regular file of these bytes. No more of it is read than they are."""
+    try:
+        check_regular(path)
+        with open(path, "rb") as file:
+            return file.read(len(content) + 1) == content
+    except (OSError, InputError):
+        return False
 
 
 def check_regular(path: str | Path, error: type[InputError] = InputError) -> None:

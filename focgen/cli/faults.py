@@ -6,16 +6,20 @@ import contextlib
 import errno
 import os
 import platform
+import signal
 import sys
 import tempfile
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor
 
 import focgen
 from focgen.errors import FocgenError
 from focgen.terminal import for_terminal
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_UNLOADED = "failed to map segment", "annot allocate memory"  # words of the system's loader
 _SCARCE = (errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM)
 
 
@@ -32,6 +36,11 @@ def _foreseen(error: BaseException, command: str) -> FocgenError | None:
         return FocgenError(command, "takes more memory than there is", "ask for less, or cut the logs")
     if isinstance(error, RecursionError):
         return FocgenError(command, "is given something nested too deeply", "write it flatter")
+    if isinstance(error, BrokenExecutor):
+        what = "has lost one of its processes, which was ended or had no memory"
+        return FocgenError(command, what, "run it again, with fewer --jobs: what was kept is not done again")
+    if isinstance(error, ImportError) and any(words in str(error) for words in _UNLOADED):
+        return FocgenError(command, "has no memory for its libraries", "raise the limit (ulimit -v)")
     if not isinstance(error, OSError):
         return None
     where, why = str(error.filename or command), error.strerror or type(error).__name__
@@ -78,6 +87,38 @@ def _written(error: BaseException, argv: Sequence[str]) -> str:
     return path
 
 
+class Ended(BaseException):
+    """A signal asks the process to end; what it has begun it clears away on the way out."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.status = 128 + number
+
+
+@contextlib.contextmanager
+def ending_in_order() -> Iterator[None]:
+    """Raise Ended for what ends a process politely: scratch folders go, and processes that were begun end."""
+    numbers = [number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None))]
+    ours = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    if threading.current_thread() is not threading.main_thread():
+        ours = []
+    process = os.getpid()
+
+    def end(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_DFL)  # a second one does not wait
+        if os.getpid() != process:  # forked from it: there is nothing of its own to clear away
+            os.kill(os.getpid(), number)
+        raise Ended(number)
+
+    for number in ours:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)
+
+
 def open_streams() -> None:
     """Give closed standard streams a place to go: else the next file that is opened would stand for one."""
     for number in range(3):
@@ -85,6 +126,9 @@ def open_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free: this one
+    # those that were closed as the interpreter began; a closed stdout is a fault, for want of the result
+    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115 - as long as the process
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 
 
 def write_out(text: str) -> None:

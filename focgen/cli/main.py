@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import focgen
 import focgen.cli
 from focgen.cli.completion import SHELLS, PrintCompletion
-from focgen.cli.faults import as_one_line, open_streams, say_error, write_out
+from focgen.cli.faults import Ended, as_one_line, ending_in_order, open_streams, say_error, write_out
 from focgen.errors import FocgenError
 from focgen.jsontext import to_json
 from focgen.terminal import for_terminal
@@ -116,12 +116,16 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns 0 (done), 1 (what was checked does not hold), 2 (unusable input, or a fault:
-    one line on stderr) or 130 (interrupted).
+    one line on stderr), 130 (interrupted), or 128 and the number of the signal that has ended it.
     """
     argv = sys.argv[1:] if argv is None else list(argv)
     try:
         open_streams()
-        return _run(argv)
+        with ending_in_order():
+            return _run(argv)
+    except Ended as ended:
+        say_error(f"focgen: ended ({ended})")
+        return ended.status
     except KeyboardInterrupt:
         say_error("focgen: interrupted")
         return 130

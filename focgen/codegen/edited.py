@@ -8,7 +8,9 @@ from typing import Any
 
 from focgen.codegen.manifest import read_manifest, sha256
 from focgen.codegen.neighbours import MANIFEST
+from focgen.custody import sha256_within
 from focgen.errors import InputError
+from focgen.textfile import LARGEST_CODE
 
 _NAMED = 3
 
@@ -38,8 +40,8 @@ def _not_as(count: int) -> str:
 def _lost(path: Path, new: bytes | None, written: Any) -> bool:
     if path.name.endswith(MANIFEST) or ".fmu" in path.suffixes or not path.is_file():
         return False  # an archive is built by a compiler, which promises no bytes
-    content = path.read_bytes()
-    return content != new and sha256(content) != written
+    found = sha256_within(path, LARGEST_CODE)
+    return found is None or found not in (written, None if new is None else sha256(new))
 
 
 def _written(folder: Path) -> dict[str, Any]:

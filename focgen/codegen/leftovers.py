@@ -11,6 +11,8 @@ from focgen.codegen.manifest import sha256
 from focgen.codegen.neighbours import manifest_of_controller, others
 from focgen.codegen.packages.archive import DIGEST
 from focgen.codegen.packages.package import moved, package_file
+from focgen.custody import sha256_within
+from focgen.textfile import LARGEST_CODE
 
 
 def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tuple[Path, ...]:
@@ -52,4 +54,4 @@ def _of(entry: Any, key: str) -> Any:
 
 
 def _is(path: Path, digest: str) -> bool:
-    return path.is_file() and sha256(path.read_bytes()) == digest
+    return sha256_within(path, LARGEST_CODE) == digest

@@ -10,6 +10,7 @@ from typing import Any
 from focgen.codegen.manifest import read_manifest
 from focgen.codegen.names import check_name
 from focgen.errors import InputError
+from focgen.textfile import LARGEST_CODE, read_regular
 
 MANIFEST = "manifest.json"
 _OWN = (MANIFEST, "controller.toml")
@@ -23,7 +24,11 @@ def kept(folder: Path, name: str) -> dict[str, bytes]:
     other = _name_of(read_manifest(folder))
     if other in (None, name):
         return {}
-    return {f"{other}.{file}": (folder / file).read_bytes() for file in _OWN if (folder / file).is_file()}
+    return {
+        f"{other}.{file}": read_regular(folder / file, LARGEST_CODE)
+        for file in _OWN
+        if (folder / file).is_file()
+    }
 
 
 def taken_back(folder: Path, name: str) -> tuple[Path, ...]:

@@ -8,6 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
+from focgen.children import workers
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit, fit_fractional
@@ -83,10 +84,10 @@ def _integer_models(done: list[tuple[Excitation, FractionalFit]]) -> list[tuple[
     """The integer-order models of each experiment, on all cores where that is worth it."""
     offsets = [_needs_offset(x, fit) for x, fit in done]
     runs = [x for x, _ in done]
-    workers = min(len(runs), os.cpu_count() or 1)
-    if workers < 2 or sum(map(len, runs)) < _WORTH_PROCESSES:
+    count = min(len(runs), os.cpu_count() or 1)
+    if count < 2 or sum(map(len, runs)) < _WORTH_PROCESSES:
         return [fit_integer_models(x, o) for x, o in track(list(zip(runs, offsets)), "integer orders")]
-    with ProcessPoolExecutor(workers) as pool:
+    with workers(), ProcessPoolExecutor(count) as pool:
         found = pool.map(fit_integer_models, [x.bare() for x in runs], offsets)
         return list(track(found, "integer orders", len(runs)))
 

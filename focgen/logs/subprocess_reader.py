@@ -8,16 +8,14 @@ texts and nothing that is executed.
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import focgen
+from focgen.children import environment, python
 from focgen.errors import FocgenError, LogError, MissingExtra
 from focgen.logs.table import LogTable
 
@@ -37,9 +35,9 @@ def read_in_subprocess(module: str, path: Path) -> LogTable:
     Raises what it raises (LogError, MissingExtra, OSError), and LogError where it crashes, takes too long or
     needs too much memory.
     """
-    command = [sys.executable, "-P", "-m", "focgen.logs.reader", module, str(path)]
+    command = python("-m", "focgen.logs.reader", module, str(path))
     try:
-        done = subprocess.run(command, capture_output=True, timeout=SECONDS, env=_environment())
+        done = subprocess.run(command, capture_output=True, timeout=SECONDS, env=environment(**_LEAN))
     except subprocess.TimeoutExpired:
         what = f"was not read within {SECONDS:g} s"
         raise LogError(str(path), what, "give a regular file, or split it into smaller ones") from None
@@ -50,13 +48,6 @@ def read_in_subprocess(module: str, path: Path) -> LogTable:
         raise LogError(str(path), what, "save it again, or as .csv")
     head, _, body = done.stdout.partition(b"\n")
     return _table(path, json.loads(head), body)
-
-
-def _environment() -> dict[str, str]:
-    """The same packages as here, whatever their paths were, and no more threads than reading takes."""
-    home = str(Path(focgen.__file__).resolve().parent.parent)
-    paths = [path for path in sys.path if path]
-    return {**os.environ, **_LEAN, "PYTHONPATH": os.pathsep.join(dict.fromkeys([home, *paths]))}
 
 
 def _ending(status: int) -> str:

@@ -81,6 +81,9 @@ _RC: dict[str, Any] = {
     "image.cmap": "cividis",
 }
 
+_NOT_OURS = ("backend", "interactive", "toolbar", "webagg", "tk.", "date.epoch", "docstring")
+"""Settings of windows, which are the session's: no picture depends on them."""
+
 
 @cache
 def _notebooks() -> type[Figure]:
@@ -102,6 +105,15 @@ def _matplotlib() -> ModuleType:
     return matplotlib
 
 
+def _look() -> dict[str, Any]:
+    """Every setting of matplotlib: its own defaults and those of this page. It takes a file ``matplotlibrc``
+    of the current folder for the user's, which may be a stranger's and have a text drawn by LaTeX.
+    """
+    defaults = _matplotlib().rcParamsDefault
+    ours = {name: value for name, value in dict.items(defaults) if not name.startswith(_NOT_OURS)}
+    return ours | _RC
+
+
 @contextmanager
 def figure(
     rows: int = 1, columns: int = 1, size: tuple[float, float] | None = None, **subplots: Any
@@ -113,7 +125,7 @@ def figure(
     shared between figures and no window is opened. Raises MissingExtra where matplotlib is not installed.
     """
     matplotlib = _matplotlib()
-    with matplotlib.rc_context(_RC | {"axes.prop_cycle": matplotlib.cycler(color=CYCLE)}):
+    with matplotlib.rc_context(_look() | {"axes.prop_cycle": matplotlib.cycler(color=CYCLE)}):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         fig = _notebooks()(figsize=size or (7.0, 2.8 * rows + 0.4), dpi=DPI)
@@ -156,7 +168,7 @@ def log_scales(axes: Axes, names: str = "xy") -> None:
 def png(fig: Figure) -> bytes:
     """The figure as a PNG without date or version inside: the same figure gives the same bytes."""
     stream = BytesIO()
-    with _matplotlib().rc_context(_RC), warnings.catch_warnings():
+    with _matplotlib().rc_context(_look()), warnings.catch_warnings():
         # where a legend took a second to place: that the computer is busy is no fault of the figure
         warnings.filterwarnings("ignore", "Creating legend with loc", UserWarning)
         _tame(fig)

@@ -12,7 +12,7 @@ import tomlkit
 from focgen.custody import TABLE
 from focgen.errors import RigError
 from focgen.fractional.terms import read_transfer, terms_of
-from focgen.fractional.transfer import TransferFunction
+from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.scales import Scale
 from focgen.output import write_file
@@ -27,10 +27,12 @@ from focgen.rig.rig import (
     Signals,
     Uncertainty,
 )
-from focgen.tomlfile import Table
+from focgen.tomlfile import MOST_ORDER, Table
 
 _STAGES = ("regulator", "actuator", "sensor")
 _ROLES = ("time", "output", "command", "pressure", "curvature", "reference")
+LEAST_ORDER = 0.01
+"""The least order of s that a stage of a rig may have beside 0."""
 _LONGEST = 1e6  # samples that a nominal delay may have
 _WHICH = "say which log column plays which role"
 
@@ -182,7 +184,17 @@ def _proper(table: Table) -> TransferFunction:
         raise table.fail("num", "is zero", "give what the stage lets pass, or leave the stage out")
     if not transfer.is_proper:
         raise table.fail("num", "has a higher order than the denominator", "give a proper transfer function")
+    for key, terms in (("num", transfer.num), ("den", transfer.den)):
+        _check_orders(table, key, terms)
     return transfer
+
+
+def _check_orders(table: Table, key: str, terms: Polynomial) -> None:
+    """Raise where a response to a term could not be computed."""
+    for term in terms:
+        if term.order != 0.0 and not LEAST_ORDER <= term.order <= MOST_ORDER:
+            what, span = f"has a term of order {term.order:g}", f"{LEAST_ORDER:g} to {MOST_ORDER:g}"
+            raise table.fail(key, what, f"give orders of 0, or of {span}")
 
 
 def _alpha(table: Table) -> float:
@@ -191,6 +203,8 @@ def _alpha(table: Table) -> float:
         raise table.fail(
             "alpha", f"is {alpha:g}", "give an order in (0, 2); beyond it 1/(T s^alpha + 1) is unstable"
         )
+    if alpha < LEAST_ORDER:
+        raise table.fail("alpha", f"is {alpha:g}", f"give an order of at least {LEAST_ORDER:g}")
     return alpha
 
 

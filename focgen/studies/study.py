@@ -14,7 +14,7 @@ from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding, rest
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.setpoints import default_setpoints
-from focgen.custody import sha256_of
+from focgen.custody import sha256_within
 from focgen.errors import ControllerError, DesignError, InputError, check_choice
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.arguments import RigLike, file_of, rig_of
@@ -32,6 +32,7 @@ from focgen.studies.spectrum import band_of
 from focgen.studies.store import Store
 from focgen.studies.sweep import Workers, sweep
 from focgen.studies.write import write
+from focgen.textfile import LARGEST_SETTING
 
 SUBJECTS = ("memory",)
 SAMPLES = 10_000  # of the open-loop inputs
@@ -120,7 +121,7 @@ def _rig(
     if made_from is None:
         return None, ["no rig is named in the controller: give --rig for the closed-loop columns"]
     places = _designed_from(controller, source)
-    same = [p for p in places if sha256_of(p) == made_from.sha256]
+    same = [p for p in places if sha256_within(p, LARGEST_SETTING) == made_from.sha256]
     if same:
         return read_rig(same[0]), []
     if places:

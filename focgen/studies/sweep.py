@@ -16,6 +16,7 @@ from contextlib import ExitStack, contextmanager
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from focgen.children import workers
 from focgen.errors import InputError, MissingExtra
 from focgen.progress import track
 from focgen.studies.jobs import Job, answer
@@ -68,15 +69,12 @@ def sweep(jobs: Sequence[Job], store: Store, workers: Workers) -> list[dict[str,
 @contextmanager
 def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
     """Fresh processes of one thread each, which end with this one however it ends."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-        for name, value in before.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
+    with workers(dict.fromkeys(_ONE_THREAD, "1")):
+        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin)
+        try:
+            yield pool
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def _begin() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from focgen.cache import cache_folder
+from focgen.children import python
 from focgen.compiler import first_complaint
 from focgen.errors import BuildError, MissingExtra
 from focgen.targets.cores import Core
@@ -65,7 +65,7 @@ def absent(core: Core) -> tuple[str, ...]:
 def _zig() -> Toolchain | None:
     if find_spec("ziglang") is None:
         return None
-    command = (sys.executable, "-m", "ziglang")
+    command = tuple(python("-m", "ziglang"))
     return Toolchain("zig cc", _said(*command, "version"), (*command, "cc"))
 
 

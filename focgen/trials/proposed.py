@@ -12,7 +12,6 @@ import json
 import shutil
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,19 +24,23 @@ from focgen.diagnosis.problem.segments import cuts
 from focgen.diagnosis.proposals.limits import limits_of
 from focgen.diagnosis.proposals.menu import menu
 from focgen.errors import InputError
+from focgen.jsontext import fits, read_json
 from focgen.output import replace_folder
 from focgen.present import present
 from focgen.progress import track
 from focgen.rig.files import read_rig, rig_table
 from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
+from focgen.textfile import LARGEST_LOG, read_regular
 from focgen.trials.cases import Case
 from focgen.trials.facts import Facts, diagnosis_in, outcome_in
 from focgen.trials.judging import PROPOSED, judge
 from focgen.trials.make import DEFAULT_KINDS, Drawing
 from focgen.trials.recording import as_csv
-from focgen.trials.run import blind_diagnosis
+from focgen.trials.run import blind_diagnosis, threads
 
+_ANEW = "remove the case's folder in runs, and run the trial again"
+_PROPOSAL = {"next_experiment": {"inputs": {"also_log": (str, None)}}}
 _LIMIT = 900.0  # s for one diagnosis
 _LAST = "zz_asked.csv"  # behind the session's logs, in the order of names
 
@@ -56,7 +59,7 @@ def ask(folder: Path, facts: Facts, labels: dict[str, dict[str, Any]], jobs: int
     """Have every case that ended in a set make its proposal and the menu, those not made yet. Raises
     InputError where a case is not what its seed gives."""
     waiting = [n for n in labels if _ends_in_set(folder, n) and not (folder / "asked" / n).exists()]
-    with ThreadPoolExecutor(jobs) as pool:
+    with threads(jobs) as pool:
         asked = [pool.submit(_ask_case, folder, facts, n, labels[n]) for n in waiting]
         for one in track(asked, "proposals"):
             one.result()
@@ -107,13 +110,28 @@ def _remade(folder: Path, facts: Facts, number: str, label: dict[str, Any]) -> C
 def _experiments(folder: Path, number: str) -> Iterator[_Asked]:
     """What was proposed, and the menu for this rig and these logs."""
     case, run = folder / "cases" / number, folder / "runs" / number
-    told = json.loads((run / "diagnosis.json").read_text(encoding="utf-8"))["next_experiment"]
-    table = np.loadtxt(run / "next_experiment.csv", delimiter=",", skiprows=1)
-    yield _Asked(PROPOSED, table[:, 1], told["inputs"]["also_log"])
+    yield _proposed(run)
     rig = read_rig(case / "rig.toml")
     logs = experiments(rig, sorted((case / "logs").iterdir()))
     for i, choice in enumerate(menu(limits_of(rig, logs, cuts(logs)[0]).faster)):
         yield _Asked(f"menu{i}", np.repeat(choice.input, choice.limits.coarse))
+
+
+def _proposed(run: Path) -> _Asked:
+    """What a run proposes. Raises InputError where its files are not as a diagnosis writes them."""
+    told = read_json(run / "diagnosis.json", _ANEW)
+    path = run / "next_experiment.csv"
+    if not fits(told, _PROPOSAL):
+        raise InputError(str(run / "diagnosis.json"), "proposes no experiment as it was written", _ANEW)
+    try:
+        lines = read_regular(path, LARGEST_LOG).decode("ascii").splitlines()
+        table = np.loadtxt(lines, delimiter=",", skiprows=1, ndmin=2)
+        command = table[:, 1]
+    except (OSError, ValueError, IndexError):
+        raise InputError(str(path), "is no table of time and command", _ANEW) from None
+    if not np.isfinite(command).all():
+        raise InputError(str(path), "has a command that is no number", _ANEW)
+    return _Asked(PROPOSED, command, told["next_experiment"]["inputs"]["also_log"])
 
 
 def _lay_out(given: Path, blind: Path, case: Case, asked: _Asked, columns: dict[str, Any]) -> None:

@@ -12,23 +12,28 @@ import os
 import shutil
 import stat
 import subprocess
-import sys
 import tempfile
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.children import environment, python
 from focgen.errors import InputError
 from focgen.output import replace_folder
 from focgen.progress import say, track
+from focgen.textfile import LARGEST_LOG
 from focgen.trials.facts import facts_of, outcome_in
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
+_LOOK = 0.2  # s between looks whether the run is to end
+_ended = threading.Event()
 
 
 @dataclass(frozen=True)
@@ -74,7 +79,7 @@ def run(
         diagnose_case(place, "runs", number, limit)
         return True
 
-    with ThreadPoolExecutor(at_once) as pool:
+    with threads(at_once) as pool:
         asked = [pool.submit(one, *case) for case in waiting]
         now = sum(job.result() for job in track(as_completed(asked), "trial run", len(asked)))
     failed = [
@@ -83,6 +88,24 @@ def run(
     if failed:
         say(f"trial run: {len(failed)} failed, the first being {failed[0]}: {outcome_of(failed[0])['fault']}")
     return Ran(tuple(map(str, places)), now, len(cases) - len(waiting), len(failed), len(waiting) - now)
+
+
+class Ended(Exception):
+    """The whole run was ended before a case was done: there is no result, and the next run begins it anew."""
+
+
+@contextmanager
+def threads(count: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads that wait for diagnoses. Where the block ends by an exception, an interrupt also, none is begun
+    any more, and those that run are ended without a result."""
+    _ended.clear()
+    with ThreadPoolExecutor(count) as pool:
+        try:
+            yield pool
+        except BaseException:
+            _ended.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def _in_turn(rows: Sequence[Sequence[Any]]) -> list[Any]:
@@ -125,8 +148,12 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
 def _check_plain(case: Path, trial: Path) -> None:
     """Raise InputError where copying a case would lead out of its trial, or would never end."""
     found = [case, *(Path(at, name) for at, *names in os.walk(case) for name in itertools.chain(*names))]
+    left = LARGEST_LOG
     for path in found:
-        mode = path.lstat().st_mode
+        mode, left = path.lstat().st_mode, left - path.lstat().st_size
+        if left < 0:  # on the disk it may be nothing: a copy of it is not
+            what = f"makes the case larger than {LARGEST_LOG >> 20} MiB"
+            raise InputError(str(path), what, "make the cases anew")
         if not (stat.S_ISDIR(mode) or stat.S_ISREG(mode)) or not _is_in(path, trial):
             raise InputError(str(path), "is neither a file nor a folder of the trial", "make the cases anew")
 
@@ -151,9 +178,18 @@ def _first(reason: OSError) -> str:
 
 
 def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> str:
-    command = [sys.executable, "-m", "focgen.trials.worker", str(blind), str(out), *effects]
-    try:
-        done = subprocess.run(command, capture_output=True, timeout=limit, env={**os.environ, **_ONE_THREAD})
-        return f"the process ended with status {done.returncode}"
-    except subprocess.TimeoutExpired:
-        return f"took longer than {limit:g} s"
+    command = python("-m", "focgen.trials.worker", str(blind), str(out), *effects)
+    until = time.monotonic() + limit
+    null, own = subprocess.DEVNULL, environment(**_ONE_THREAD)
+    # a session of its own: an interrupt is this process's to tell of, not a fault of the case
+    with subprocess.Popen(
+        command, stdin=null, stdout=null, stderr=null, env=own, start_new_session=True
+    ) as child:
+        while child.poll() is None and not _ended.is_set() and (left := until - time.monotonic()) > 0:
+            with suppress(subprocess.TimeoutExpired):
+                child.wait(min(_LOOK, left))
+        in_time = child.poll() is not None
+        child.kill()
+    if _ended.is_set():
+        raise Ended
+    return f"the process ended with status {child.returncode}" if in_time else f"took longer than {limit:g} s"

@@ -8,21 +8,23 @@ over cases. A case without a diagnosis counts as a miss in every row; one not ye
 from __future__ import annotations
 
 import json
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.children import workers
 from focgen.errors import FocgenError, InputError
 from focgen.output import write_file
 from focgen.progress import say, track
 from focgen.shown import Shown
+from focgen.textfile import LARGEST_SETTING, read_regular
 from focgen.trials import achieved, baselines
 from focgen.trials.facts import achieved_in, diagnosis_in, facts_of
 from focgen.trials.judging import Judged, forgone, judge
 from focgen.trials.proposed import ask, resolved
 from focgen.trials.rows import Row, rows, stated_in
-from focgen.trials.run import diagnose_case, outcome_of, processes, ran
+from focgen.trials.run import diagnose_case, outcome_of, processes, ran, threads
 from focgen.trials.sealing import unseal
 from focgen.trials.worker import oracle_possible
 
@@ -100,7 +102,7 @@ def _scored(folder: Path, asked: tuple[bool, bool], baseline: bool, partial: boo
         _ask_oracle(folder, labels, jobs)
     if proposals:
         ask(folder, facts, labels, jobs)
-    with ProcessPoolExecutor(jobs) as pool:
+    with workers(), ProcessPoolExecutor(jobs) as pool:
         waiting = [pool.submit(_judged, folder, number, label, baseline) for number, label in labels.items()]
         judged = [one.result() for one in track(waiting, "trial score")]
     scores = Scores(
@@ -132,8 +134,8 @@ def _unsealed(folder: Path, number: str, committed: str) -> dict[str, Any]:
 def _carried(path: Path) -> str:
     """The commitment that a case carries. Raises InputError where it carries none."""
     try:
-        return path.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError):
+        return read_regular(path, LARGEST_SETTING).decode("utf-8").strip()
+    except (OSError, UnicodeDecodeError, InputError):
         raise InputError(str(path), "cannot be read", "make the cases anew") from None
 
 
@@ -148,7 +150,7 @@ def _ask_oracle(folder: Path, labels: dict[str, dict[str, Any]], jobs: int) -> N
         and label["truth"]
         and not (folder / "oracle" / n / "outcome.json").exists()
     ]
-    with ThreadPoolExecutor(jobs) as pool:
+    with threads(jobs) as pool:
         asked = [
             pool.submit(
                 diagnose_case,

@@ -7,8 +7,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from focgen.custody import sha256_of
+from focgen.custody import sha256_within
 from focgen.errors import InputError
+from focgen.textfile import LARGEST_LOG
 from focgen.trials.facts import sealed_label
 
 
@@ -41,8 +42,8 @@ def unseal(path: Path, committed: str, unseen: Path) -> dict[str, Any]:
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal. Raises InputError where it cannot be read."""
-    try:
-        return sha256_of(path)
-    except OSError as reason:
-        raise InputError(str(path), f"cannot be read ({reason.strerror})", "make the cases anew") from None
+    """SHA-256 of a file, hexadecimal. Raises InputError where it is no file that can be a log."""
+    found = sha256_within(path, LARGEST_LOG)
+    if found is None:
+        raise InputError(str(path), "is no file that can be read as a log", "make the cases anew")
+    return found

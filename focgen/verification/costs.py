@@ -20,6 +20,7 @@ from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr, with_runtim
 from focgen.targets.emulator import emulator_title
 from focgen.targets.selection import entry_of, selected
 from focgen.targets.toolchains import Toolchain, absent, toolchains
+from focgen.textfile import LARGEST_CODE, read_regular
 from focgen.verification.folder import REMEMBERED, GeneratedFolder, read_folder, sources
 
 COMPILERS = ("zig", "gcc")
@@ -157,5 +158,5 @@ def _hash(read: GeneratedFolder) -> str:
     digest = hashlib.sha256()
     for path in sorted([*read.path.glob("*.c"), *read.path.glob("*.h")]):
         if "_selftest." not in path.name:
-            digest.update(path.read_bytes())
+            digest.update(read_regular(path, LARGEST_CODE))
     return digest.hexdigest()

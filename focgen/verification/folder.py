@@ -22,6 +22,7 @@ from focgen.journal import finish
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.plan import ErrorBound, Plan
+from focgen.textfile import LARGEST_SETTING, holds, read_regular
 from focgen.verification.recorded import AGAIN, Recorded, read_recorded
 
 _EXAMPLES = ("example/", "examples/", "extras/")
@@ -96,13 +97,13 @@ def sources(read: GeneratedFolder) -> Iterator[Path]:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path, LARGEST_SETTING)
     except OSError as reason:
         raise InputError(str(path), f"cannot be read ({reason.strerror})", AGAIN) from None
 
 
 def _same_bytes(path: Path, content: str | bytes) -> bool:
-    return _bytes(path) == (content if isinstance(content, bytes) else content.encode("utf-8"))
+    return holds(path, content if isinstance(content, bytes) else content.encode("utf-8"))
 
 
 def _edited(path: Path, files: Mapping[str, str | bytes], recorded: Recorded) -> Iterator[str]:

@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 import sys
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -261,7 +262,21 @@ def changed(path: Path, name: str, content) -> None:
                 archive.writestr(entry, data)
 
 
+def hidden(path: Path, name: str, content: bytes) -> None:
+    """Write the archive anew as it is packed, with one more member before all others."""
+    with zipfile.ZipFile(path) as archive:
+        inside = [(entry.filename, archive.read(entry)) for entry in archive.infolist()]
+    with warnings.catch_warnings(), zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        warnings.simplefilter("ignore")  # of names that are there already
+        for entry, data in [(name, content), *inside]:
+            archive.writestr(entry, data)
+
+
 DAMAGED = {
+    "files of the same name": lambda path: hidden(path, "modelDescription.xml", b"<mine/>"),
+    "do not belong to it": lambda path: hidden(path, "binaries/../../mine.so", b"mine"),
+    "bytes that are no part": lambda path: path.write_bytes(path.read_bytes() + b"mine"),
+    "that are no part of its files": lambda path: path.write_bytes(b"#!/bin/sh\n" + path.read_bytes()),
     "sources/filter.c is not what": lambda path: changed(path, "sources/filter.c", b"/* mine */"),
     "sources/filter.h is not what": lambda path: changed(path, "sources/filter.h", bytes.swapcase),
     "lacks modelDescription.xml": lambda path: changed(path, "modelDescription.xml", None),

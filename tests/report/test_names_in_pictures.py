@@ -3,8 +3,11 @@
 Red when a name with signs of a formula stops a picture, or is drawn as one.
 """
 
+import subprocess
+
 import pytest
 
+from focgen.children import environment, python
 from focgen.report.style import figure, png
 from focgen.report.texts import pictured
 
@@ -37,3 +40,18 @@ def test_formulas_of_our_own_stay_formulas():
         title = grid[0, 0].set_title(r"T ($\mathrm{s}^\alpha$)")
     png(fig)
     assert title.get_parse_math()
+
+
+def test_settings_of_the_folder_one_stands_in_change_no_picture(tmp_path):
+    """matplotlib reads a ``matplotlibrc`` there, before the user's own."""
+    draw = (
+        "import sys; from focgen.report.style import figure, png\n"
+        "with figure() as (fig, axes):\n"
+        "    axes.plot([0, 1]); axes.set_title('a'); sys.stdout.buffer.write(png(fig))\n"
+    )
+    command = python("-c", draw)
+    sound = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True, check=True).stdout
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\naxes.facecolor: red\nlines.marker: o\n")
+    done = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True)
+    assert done.returncode == 0, done.stderr[-300:]
+    assert done.stdout == sound

@@ -95,6 +95,29 @@ def test_a_case_is_copied_from_within_its_trial_only(trial, precious, how, capsy
     assert not (trial / "runs" / "0001").exists()
 
 
+def test_a_case_that_would_fill_the_disk_is_not_copied(trial, capsys):
+    with (trial / "cases" / "0001" / "logs" / "more.csv").open("wb") as file:
+        file.truncate(300 << 30)  # holes, that a copy fills
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 2
+    assert "larger than" in capsys.readouterr().err
+    assert not (trial / "runs" / "0001").exists()
+
+
+@pytest.mark.parametrize("how", ("a pipe", "a device", "a terabyte"))
+def test_a_commitment_is_a_small_file(trial, how, capsys):
+    path = trial / "cases" / "0001" / "commitment.txt"
+    path.unlink()
+    if how == "a pipe":
+        os.mkfifo(path)
+    elif how == "a device":
+        path.symlink_to("/dev/zero")
+    else:
+        with path.open("wb") as file:
+            file.truncate(1 << 40)
+    assert main(["trial", "score", str(trial), "--no-baseline", "--jobs", "1"]) == 2
+    assert "commitment.txt: cannot be read" in capsys.readouterr().err
+
+
 def test_a_folder_is_replaced_within_its_root_only(tmp_path, precious):
     made = tmp_path / "made"
     for target in (tmp_path / "root" / ".." / "precious", precious, tmp_path / "root" / ".."):

@@ -12,10 +12,12 @@ from pathlib import Path
 
 import pytest
 
+from focgen import custody
 from focgen.cli.main import main
 from focgen.codegen.generate import generate
 from focgen.control.controller import Source
 from focgen.control.files import controller_from, write_controller
+from focgen.custody import sha256_within
 from focgen.errors import FocgenError
 from focgen.rig.files import read_rig, rig_text
 from focgen.verification.folder import read_folder
@@ -95,6 +97,39 @@ def test_a_strangers_table_leads_nowhere(chain, told):
     own.write_text(own.read_text().replace(before, digest(rig)))
     assert not [note for note in read_folder(chain / "fw").notes if "identified from" in note]
     assert read_rig(rig).name == read_rig(EXAMPLES / "rig.toml").name
+
+
+@pytest.mark.parametrize("name", ("huge.toml", "/proc/self/mem", "/proc/kcore"))
+def test_a_strangers_table_leads_to_nothing_without_end(chain, name, monkeypatch):
+    """A file whose bytes nobody may have, one of no end, and one of a terabyte that no disk holds."""
+    reach = "../" * len(chain.parents) + name.lstrip("/") if name.startswith("/") else name
+    if not (chain / "fw" / reach).exists() and name.startswith("/"):
+        pytest.skip("the system has no such file")
+    if name == "huge.toml":
+        with (chain / name).open("wb") as file:
+            file.truncate(1 << 40)
+    asked = []
+    monkeypatch.setattr(custody, "check_regular", lambda path, *more: asked.append(str(path)))
+    own = chain / "fw" / "controller.toml"
+    own.write_text(own.read_text().replace('"identified.toml"', f'"{reach}"'))
+    told = [note for note in read_folder(chain / "fw").notes if "is not the rig" in note]
+    assert len(told) == len(asked) <= 1  # who may not read a file is not told of it
+
+
+def test_no_more_of_a_file_is_read_than_is_said_to_be_there(tmp_path):
+    (tmp_path / "a").write_bytes(bytes(3 << 20))
+    assert sha256_within(tmp_path / "a", 3 << 20) == digest(tmp_path / "a")
+    assert sha256_within(tmp_path / "a", (3 << 20) - 1) is None
+    assert sha256_within(tmp_path, 3 << 20) is None is sha256_within(tmp_path / "b", 9)
+
+
+def test_a_file_of_a_terabyte_is_named_and_not_read(packed, rendered_once):
+    folder, files = packed
+    for name in files:
+        with (folder / name).open("r+b") as file:
+            file.truncate(1 << 40)
+        assert name in told_of(folder), name
+        (folder / name).write_bytes(files[name])
 
 
 def test_a_controller_says_what_it_was_designed_from_and_how(chain):

@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import tomllib
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pytest
@@ -91,6 +92,8 @@ def test_a_fault_on_a_full_disk_still_is_a_line(scratch, monkeypatch, capsys):
         (OSError(28, "No space left on device", "out/x.c"), "out/x.c: cannot be written"),
         (OSError(28, "No space left on device"), "make room"),
         (OSError(24, "Too many open files"), "ulimit"),
+        (BrokenExecutor("terminated abruptly"), "fewer --jobs"),
+        (ImportError("x.so: failed to map segment from shared object"), "ulimit -v"),
         (PermissionError(13, "Permission denied", "/etc/x"), "/etc/x: cannot be used"),
     ],
 )
@@ -109,6 +112,13 @@ def test_a_result_that_cannot_be_written_is_no_success(tmp_path):
     done = run(f"FOCGEN {tmp_path}/fw >/dev/full")
     assert done.returncode == 2 and done.stderr.count("\n") == 1 and "No space left" in done.stderr
     assert run(f"FOCGEN {tmp_path}/fw >&- 2>&-").returncode == 2
+
+
+def test_streams_that_are_closed_are_missed_by_nobody(tmp_path):
+    """A daemon's: neither is asked, and the other takes no message."""
+    assert run(f"FOCGEN {tmp_path}/fw <&- 2>&-").returncode == 0
+    own = f"{sys.executable} -m focgen init {EXAMPLES / 'logs' / 'steps.csv'} --out {tmp_path}/rig.toml"
+    assert run(f"{own} <&- 2>&-").returncode == 0 and (tmp_path / "rig.toml").exists()
 
 
 def test_a_closed_stdout_is_said(monkeypatch, capsys):
@@ -295,5 +305,7 @@ def test_no_number_of_a_rig_ends_as_nan(tmp_path, way, capsys):
             assert status in (0, 1, 2), err
             if status == 2:
                 assert err.startswith("focgen: error: ") and err.count("\n") == 1
+                # numpy's remarks are faults in tests only
+                assert "fault of its own" not in err or "(RuntimeWarning)" in err, err
                 continue
             json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} at exit {status}"))

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import io
+import os
 import platform
+import re
 import tempfile
 import zipfile
 import zlib
@@ -17,6 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from focgen.compiler import compile_shared
+from focgen.custody import sha256_within
+from focgen.present import present
+from focgen.textfile import LARGEST_CODE, holds
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can tell
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
@@ -24,6 +29,7 @@ _SYSTEMS = {"Linux": ("linux", "so"), "Darwin": ("darwin", "dylib"), "Windows": 
 _MACHINES = {"AMD64": "x86_64", "arm64": "aarch64", "ARM64": "aarch64"}
 _OLD = {"x86_64-linux": "linux64", "x86_64-darwin": "darwin64", "x86_64-windows": "win64"}  # of FMI 2.0
 _BINARIES = "binaries/"
+_LOCAL, _LISTED, _END = 30, 46, 22  # bytes of a zip's headers
 DIGEST = ".sha256"
 """Ends the name of the file beside an archive that holds its SHA-256, as ``sha256sum -c`` reads it."""
 
@@ -101,10 +107,10 @@ def compare_archive(path: Path, name: str, files: Mapping[str, str | bytes], fmi
         return Compared(notes=(f"{path.name}: is missing",))
     try:
         with zipfile.ZipFile(path) as archive:
-            faults = tuple(_faults(archive, _members(name, files, fmi)))
-        if not faults and _recorded(path) != f"{_sha256(path.read_bytes())}  {path.name}\n".encode("ascii"):
+            faults = tuple(_faults(archive, _members(name, files, fmi), name))
+        if not faults and not _recorded(path):
             faults = (f"is not what was built, by {path.name}{DIGEST}",)
-    except (zipfile.BadZipFile, zlib.error, OSError, NotImplementedError, RuntimeError, EOFError):
+    except (zipfile.BadZipFile, zlib.error, OSError, ValueError, NotImplementedError, RuntimeError, EOFError):
         return Compared((f"{path.name}: is no zip that can be read",))
     return Compared(
         tuple(f"{path.name}: {fault}" for fault in faults),
@@ -112,18 +118,46 @@ def compare_archive(path: Path, name: str, files: Mapping[str, str | bytes], fmi
     )
 
 
-def _recorded(path: Path) -> bytes:
-    """What stands beside an archive; nothing where there is no such file."""
-    place = path.with_name(path.name + DIGEST)
-    return place.read_bytes() if place.is_file() else b""
+def _recorded(path: Path) -> bool:
+    """Whether what stands beside an archive is its digest."""
+    found = sha256_within(path, LARGEST_CODE)
+    return holds(path.with_name(path.name + DIGEST), f"{found}  {path.name}\n".encode("ascii"))
 
 
-def _faults(archive: zipfile.ZipFile, expected: Mapping[str, bytes]) -> Iterator[str]:
+def _faults(archive: zipfile.ZipFile, expected: Mapping[str, bytes], name: str) -> Iterator[str]:
     found = {entry.filename: entry for entry in archive.infolist()}
     for file, content in expected.items():
         if file not in found:
             yield f"lacks {file}"
-        elif found[file].file_size != len(content) or archive.read(file) != content:
+        elif not _is(archive, found[file], content):
             yield f"{file} is not what focgen writes for this controller.toml"
-    if any(file not in expected and not file.startswith(_BINARIES) for file in found):
+    if any(file not in expected and not _is_binary(file, name) for file in found):
         yield "has files that do not belong to it"
+    if len(found) < len(archive.infolist()):
+        yield "has files of the same name"  # which of them is taken is the reader's choice
+    if not _is_dense(archive):
+        yield "has bytes that are no part of its files"
+
+
+def _is(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, content: bytes) -> bool:
+    """Whether a member holds these bytes; it is packed as :func:`_zip` does it, or taken to be another."""
+    usual = entry.compress_type == zipfile.ZIP_DEFLATED and entry.file_size == len(content)
+    return usual and archive.read(entry) == content
+
+
+def _is_dense(archive: zipfile.ZipFile) -> bool:
+    """Whether the members, their headers and the list of them are all that there is, as :func:`_zip` writes
+    it."""
+    at = 0
+    for entry in sorted(archive.infolist(), key=lambda entry: entry.header_offset):
+        if entry.header_offset != at or entry.extra or entry.comment:
+            return False
+        at += _LOCAL + len(entry.orig_filename) + entry.compress_size
+    listed = sum(_LISTED + len(entry.orig_filename) for entry in archive.infolist())
+    whole = present(archive.fp).seek(0, os.SEEK_END)
+    return archive.start_dir == at and whole == at + listed + _END
+
+
+def _is_binary(file: str, name: str) -> bool:
+    """Whether a member is what one system's compiler has made of the C, in the place for that."""
+    return re.fullmatch(rf"{_BINARIES}[0-9a-z_-]+/{re.escape(name)}\.(so|dylib|dll)", file) is not None
