@@ -60,6 +60,7 @@ def test_a_limit_is_found_on_its_side_of_the_dynamics(where, effect):
         ("supply_saturation", "hard", ("supply", "load", "strain")),
         ("sensor_nonlinearity", "quadratic", ("supply", "response", "strain")),
         ("gain_nonlinearity", "cubic", ("command", "drive", "strain")),
+        ("transport_delay", "delay", ("supply", "response", "reading")),
         ("contact", "knee", ("supply", "response", "reading")),
     ],
 )
