@@ -57,16 +57,15 @@ class Placed:
 
 
 def slot_in(form: Form, stage: str) -> str:
-    """The slot of ``form`` in ``stage``: its own, or where it is not at home the one before or after the
-    dynamics."""
+    """The slot of ``form`` in ``stage``: its own, or where it is not at home the first for what is at home
+    ahead of the actuator, the last for what is behind it, and for the actuator's own the one on the same side
+    of the dynamics. What is linear may stand on either side: behind, where a delay interpolates what is
+    smooth."""
     if form.slot in SLOTS[stage]:
         return form.slot
-    before = form.slot in ("command", "load", "drive", "strain")
-    return {
-        "regulator": "command" if before else "supply",
-        "actuator": "drive" if before else "response",
-        "sensor": "strain" if before else "reading",
-    }[stage]
+    first, *_, last = SLOTS[stage]
+    ahead = form.slot in (*SLOTS["regulator"], "load", "drive")
+    return first if ahead and not form.response else last
 
 
 Step = tuple[tuple[Hashable, ...], Callable[[Array, Run], Array], Placed | None]

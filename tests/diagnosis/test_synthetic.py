@@ -195,14 +195,24 @@ def test_behind_a_stage_that_hums_small_effects_are_not_believed(hum, trusted, m
     assert told[:2] == [True, trusted]
 
 
+class Explained:
+    """What a verdict asks of a segment: its pace, 0 where errors do not add up, and what it closes."""
+
+    def __init__(self, pace: float, share: float) -> None:
+        self.segment, self.share = SimpleNamespace(pace=pace), share
+
+
 def test_of_a_promise_of_next_to_nothing_segments_that_close_their_own_gap_are_not_in_vain(monkeypatch):
-    """Of several as of one."""
-    shares = {"clear": 0.9, "vain": 0.1}
-    monkeypatch.setattr(conclude, "cross_validated_share", lambda e: shares[e])
-    told = SimpleNamespace(causes=[("clear", None), ("vain", None), ("vain", None)])
-    assert conclude._in_vain(told) == ["vain"]
-    assert conclude._in_vain(SimpleNamespace(causes=[("clear", None)])) == []
-    assert conclude._in_vain(SimpleNamespace(causes=[("vain", None)])) == ["vain"]
+    """Of several as of one; but where errors add up, what is closed at the pace of the rig is no path."""
+    monkeypatch.setattr(conclude, "cross_validated_share", lambda e: e.share)
+    clear, vain, path = Explained(0.0, 0.9), Explained(0.0, 0.1), Explained(0.4, 0.9)
+
+    def found(*explanations):
+        return conclude._in_vain(SimpleNamespace(causes=[(e, None) for e in explanations]))
+
+    assert found(clear, vain, vain) == [vain]
+    assert found(clear) == [] and found(vain) == [vain]
+    assert found(clear, path) == [path]
 
 
 @pytest.mark.parametrize("share, causes", [(0.9, [["valve_asymmetry"]]), (0.1, [])])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.present import present
 from focgen.rig.effects import Effect, library
-from focgen.rig.engine import between_of, fits_in
+from focgen.rig.engine import between_of, fits_in, slot_in
 from focgen.rig.rig import Rig
 
 _DEPTH = 4
@@ -89,8 +89,8 @@ class Explanation:
 
 def candidates_for(segment: Segment, rig: Rig) -> list[CandidateEffect]:
     """Every form that may act in this segment. In a rig of one stage every family may, but of those that
-    share a formula only the one at home there. Where every experiment begins at rest, none that says where
-    something lay before."""
+    share a formula and its place, or a linear one, only the one at home there. Where every experiment begins
+    at rest, none that says where something lay before."""
     every = _placed_in(segment, rig)
     return every if segment.run.begins else [c for c in every if not c.form.begun]
 
@@ -105,11 +105,12 @@ def _placed_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
             if fits_in(form, stage, rig)
         ]
     stage = present(owner(rig))
-    found: dict[tuple[object, bool], CandidateEffect] = {}
+    found: dict[Hashable, CandidateEffect] = {}
     for effect in sorted(library().values(), key=lambda e: e.stage != stage):
         for form in effect.forms:
             if fits_in(form, stage, rig):
-                found.setdefault((form.act, form.begun), CandidateEffect(effect.name, form, stage))
+                slot = None if form.response else slot_in(form, stage)
+                found.setdefault((form.act, form.begun, slot), CandidateEffect(effect.name, form, stage))
     return list(found.values())
 
 

@@ -139,9 +139,10 @@ def _summary(
 
 def _in_vain(summary: _Summary) -> list[Explanation]:
     """Of the segments with effects those whose own gap they do not close on new experiments either: what one
-    leaves unexplained takes nothing away from what is clear in another."""
+    leaves unexplained takes nothing away from what is clear in another. Where errors add up, a fit does not
+    see its gap whole, but forgets it at its pace: there the promise tells, which is of the path."""
     explained = dict.fromkeys(e for e, _ in summary.causes)
-    return [e for e in explained if cross_validated_share(e) < NUMBERS.vain]
+    return [e for e in explained if e.segment.pace or cross_validated_share(e) < NUMBERS.vain]
 
 
 def _no_closer(rigs: compose.Rigs, logs: Sequence[Experiment], last: Explanation) -> list[Explanation]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.rig.dynamics import Bend, Dynamics
+from focgen.rig.dynamics import Bend, Dynamics, Spring
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 
@@ -36,8 +36,18 @@ def _bent_spring(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, bend=Bend(*values))
 
 
+def _yielding(x: Dynamics, values: Values, run: None) -> Dynamics:
+    """Bouc and Wen's spring without its memory: it lets go along the way on which it was wound."""
+    share, yielding, power, scale = values
+    return replace(x, spring=Spring(share, yielding / scale, -yielding / scale, power, scale))
+
+
 _FIRST = Parameter("first", lower=-0.45, upper=20.0, starts=(0.2, -0.1, 1.0), zero=0.0)
 _SECOND = Parameter("second", lower=-0.3, upper=50.0, starts=(0.0, 0.0, 1.0), zero=0.0)
+# a share of the stiffness, and what of it a spring wound to the largest displacement has lost
+_SHARE = Parameter("share", lower=0.0, upper=1.0, starts=(0.5, 0.8), zero=0.0)
+_YIELDING = Parameter("yielding", lower=-3.0, upper=30.0, starts=(0.5, 2.0))
+_POWER = Parameter("power", lower=0.5, upper=4.0, starts=(1.0, 1.0))
 
 EFFECT = Effect(
     name="gain_nonlinearity",
@@ -76,6 +86,7 @@ EFFECT = Effect(
             _stiffening,
         ),
         Form("bent_spring", "dynamics", (_FIRST, _SECOND, LARGEST), _bent_spring),
+        Form("yielding", "dynamics", (_SHARE, _YIELDING, _POWER, LARGEST), _yielding),
         _curves.quartic("drive"),
         _curves.spline("drive"),
     ],

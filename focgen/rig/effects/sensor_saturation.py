@@ -13,6 +13,10 @@ def _hard(x: Array, values: Values, run: Run) -> Array:
     return np.minimum(x, values[0])
 
 
+def _both_ways(x: Array, values: Values, run: Run) -> Array:
+    return np.clip(x, -values[0], values[0])
+
+
 def _soft(x: Array, values: Values, run: Run) -> Array:
     return x - softly_beyond(x, *values)
 
@@ -26,6 +30,8 @@ EFFECT = Effect(
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
     forms=[
         Form("hard", "reading", (_LIMIT,), _hard),
+        # a converter ends on both sides of its zero
+        Form("both_ways", "reading", (_LIMIT,), _both_ways),
         Form(
             "soft",
             "reading",

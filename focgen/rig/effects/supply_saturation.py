@@ -13,6 +13,10 @@ def _hard(x: Array, values: Values, run: Run) -> Array:
     return np.minimum(x, values[0])
 
 
+def _both_ways(x: Array, values: Values, run: Run) -> Array:
+    return np.clip(x, -values[0], values[0])
+
+
 def _soft(x: Array, values: Values, run: Run) -> Array:
     return x - softly_beyond(x, *values)
 
@@ -26,6 +30,8 @@ EFFECT = Effect(
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
     forms=[
         Form("hard", "supply", (_CEILING,), _hard),
+        # an amplifier clips what goes either way
+        Form("both_ways", "supply", (_CEILING,), _both_ways),
         Form(
             "soft",
             "supply",

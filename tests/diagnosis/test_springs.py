@@ -1,0 +1,70 @@
+"""A spring that yields without memory is a bent gain, not a hysteresis.
+
+Red when the hysteretic spring, which may lose its loop in a fit, is named for what has none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run, form_of
+from focgen.rig.engine import Chain, Placed
+from focgen.rig.rig import LinearActuator, Rig, Signals
+
+H, FULL = 0.2, 10.0  # s, largest level
+TWO_TANKS = TransferFunction([(1.9, 0.0)], [(11.0, 2.0), (7.3, 1.0), (1.0, 0.0)])
+TANKS = Rig("tanks", H, Signals("t", "h", "u"), LinearActuator(TWO_TANKS))
+LEVELS = (3.0, 0.0, 1.5, 5.0, 2.2, 5.5, 1.0, 4.0, 0.0)
+
+
+def outflow(level: float) -> float:
+    """Half through a pipe of laminar flow, half through an orifice."""
+    return 0.5 * max(level, 0.0) + 0.5 * float(np.sqrt(max(level, 0.0) * FULL))
+
+
+def filled(pump: np.ndarray) -> np.ndarray:
+    """The level (n,) of the second of two tanks in series, steps of a tenth of a sample."""
+    first, second, levels = 0.0, 0.0, []
+    for u in pump:
+        levels.append(second)
+        for _ in range(10):
+            between = outflow(first)
+            second += H / 10.0 / 3.0 * (between - outflow(second))
+            first += H / 10.0 / 4.0 * (2.0 * u - between)
+    return np.array(levels)
+
+
+def session() -> list[Experiment]:
+    """Steps and a slow sine of the pump."""
+    rng, t = np.random.default_rng(5), np.arange(640) * H
+    steps = np.r_[np.zeros(10), np.repeat(LEVELS, 70)]
+    pumps = {"steps": steps, "sine": 2.5 - 2.5 * np.cos(0.2 * t)}
+    logs = []
+    for i, (name, pump) in enumerate(pumps.items()):
+        seen = filled(pump) + 0.05 * rng.normal(size=640)
+        logs.append(replace(Experiment(name, H, {"command": pump, "output": seen}), start=150.0 * i))
+    return logs
+
+
+def test_an_orifice_that_drains_a_tank_is_a_bent_gain():
+    found = diagnose(TANKS, session())
+    assert [c.candidates[0].effect for c in found.causes] == ["gain_nonlinearity"]
+    assert found.shrink is not None and found.shrink > 0.8
+
+
+def test_it_is_the_hysteretic_spring_without_its_loop():
+    run = Run.of([400], [0.0], H)
+    push = np.r_[np.linspace(0.0, 8.0, 200), np.linspace(8.0, 0.0, 200)]
+
+    def bent(effect: str, form: str, *values: float) -> np.ndarray:
+        placed = Placed(effect, form_of(effect, form), "actuator", values)
+        return Chain(TANKS, (placed,)).run(push, "actuator", "actuator", run)
+
+    yielding = bent("gain_nonlinearity", "yielding", 0.7, 2.0, 1.2, 15.0)
+    assert np.allclose(yielding, bent("hysteresis", "sharp_spring", 0.7, 2.0, -2.0, 1.2, 15.0))
+    assert np.ptp(yielding - bent("hysteresis", "sharp_spring", 0.7, 2.0, 2.0, 1.2, 15.0)) > 0.3
