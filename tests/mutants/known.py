@@ -7,7 +7,9 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 from tests.mutants.change import Change
@@ -21,7 +23,7 @@ ASKED = ("fractional", "plan", "codegen", "verification", "control", "running", 
 ASIDE = ("golden", "same_bytes", "mutants", "docs", "distribution", "misra", "lto")
 """Tests that tell of any change, a right one as well, or of none in what is computed: they do not judge."""
 PATIENCE = 40.0
-"""Seconds of tests that one change is worth, the fastest of those that run it first."""
+"""Seconds of tests that one change is worth."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,8 @@ class Known:
     reads: dict[str, list[str]]
 
     def tests(self, change: Change, text: str) -> list[str]:
-        """Those that could tell of a change, the fastest first, as many as ``PATIENCE`` allows."""
+        """Those that could tell of a change, as many as ``PATIENCE`` allows: the fastest of each file of tests,
+        then the next fastest. A file tells of what the others do not look at."""
         if change.file.endswith(".py"):
             lines = self.runs.get(change.file, {})
             found = {t for line in lines_of(text, change.line(text)) for t in lines.get(line, ())}
@@ -43,12 +46,19 @@ class Known:
         else:
             found = set(self.reads.get(change.file, ()))
         chosen, spent = [], 0.0
-        for test in sorted(found, key=lambda t: self.seconds[t]):
+        for test in self._in_turn(found):
             spent += self.seconds[test]
             if spent > PATIENCE and chosen:
                 break
             chosen.append(test)
         return chosen
+
+    def _in_turn(self, tests: Iterable[str]) -> Iterator[str]:
+        """The fastest of each file, the fastest file first, then the second of each …"""
+        files: dict[str, list[str]] = {}
+        for test in sorted(tests, key=lambda t: self.seconds[t]):
+            files.setdefault(test.split("::")[0], []).append(test)
+        return (test for turn in zip_longest(*files.values()) for test in turn if test)
 
 
 def copy_to(place: Path) -> Path:
