@@ -36,8 +36,8 @@ class Known:
     reads: dict[str, list[str]]
 
     def tests(self, change: Change, text: str) -> list[str]:
-        """Those that could tell of a change, as many as ``PATIENCE`` allows: the fastest of each file of tests,
-        then the next fastest. A file tells of what the others do not look at."""
+        """Those that could tell of a change, as many as ``PATIENCE`` allows: the fastest of each file, then
+        the next fastest. A file tells of what the others do not look at."""
         if change.file.endswith(".py"):
             lines = self.runs.get(change.file, {})
             found = {t for line in lines_of(text, change.line(text)) for t in lines.get(line, ())}
@@ -47,10 +47,9 @@ class Known:
             found = set(self.reads.get(change.file, ()))
         chosen, spent = [], 0.0
         for test in self._in_turn(found):
-            spent += self.seconds[test]
-            if spent > PATIENCE and chosen:
-                break
-            chosen.append(test)
+            if not chosen or spent + self.seconds[test] <= PATIENCE:
+                chosen.append(test)
+                spent += self.seconds[test]
         return chosen
 
     def _in_turn(self, tests: Iterable[str]) -> Iterator[str]:
