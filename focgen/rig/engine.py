@@ -60,11 +60,12 @@ def slot_in(form: Form, stage: str) -> str:
     """The slot of ``form`` in ``stage``: its own, or where it is not at home the first for what is at home
     ahead of the actuator, the last for what is behind it, and for the actuator's own the one on the same side
     of the dynamics. What is linear may stand on either side: behind, where a delay interpolates what is
-    smooth."""
+    smooth. Of a regulator alone the output is what its own gauge reads: behind it, the memory of a sensor of
+    its own would stand for whatever fills and vents at another pace."""
     if form.slot in SLOTS[stage]:
         return form.slot
     first, *_, last = SLOTS[stage]
-    ahead = form.slot in (*SLOTS["regulator"], "load", "drive")
+    ahead = form.slot in (*SLOTS["regulator"], "load", "drive", *(("strain",) * (stage == "regulator")))
     return first if ahead and not form.response else last
 
 

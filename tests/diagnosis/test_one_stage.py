@@ -58,7 +58,7 @@ def test_a_limit_is_found_on_its_side_of_the_dynamics(where, effect):
     "effect, form, slots",
     [
         ("supply_saturation", "hard", ("supply", "load", "strain")),
-        ("sensor_nonlinearity", "quadratic", ("supply", "response", "strain")),
+        ("sensor_nonlinearity", "quadratic", ("command", "response", "strain")),
         ("gain_nonlinearity", "cubic", ("command", "drive", "strain")),
         ("transport_delay", "delay", ("supply", "response", "reading")),
         ("contact", "knee", ("supply", "response", "reading")),
