@@ -73,7 +73,8 @@ def relative_halves(excitations: Sequence[Excitation], fit: FractionalFit) -> di
     powers = level ** np.arange(len(fit.gain))
     K = float(powers @ fit.gain)
     scale = np.max(np.asarray(fit.half["gain"]) / np.sqrt(np.maximum(np.diag(fit.gain_covariance), 1e-300)))
-    half_K = float(scale * np.sqrt(max(float(powers @ fit.gain_covariance @ powers), 0.0)))
+    spread = max(float(powers @ fit.gain_covariance @ powers), 0.0)
+    half_K = float(scale * np.sqrt(spread)) if np.isfinite(scale) else np.inf
     return {
         "T": float(fit.half["T"]) / abs(fit.T),
         "alpha": float(fit.half["alpha"]) / abs(fit.alpha),

@@ -32,6 +32,7 @@ from focgen.plan.plan import LONGEST, Plan
 from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.rig import Rig
 from focgen.shown import Shown
+from focgen.tomlfile import LARGEST, SMALLEST
 
 SETTLING = 1.5  # s, where nothing is specified and it is feasible
 _SLACK = 1.02  # of the specification, for the controller as it will run
@@ -171,8 +172,8 @@ def _check_wishes(
     delay: int,
     tolerance: float,
 ) -> None:
-    if settling is not None and not (math.isfinite(settling) and settling > 0.0):
-        raise DesignError("--settling", f"is {settling:g}", "give a time above 0 s")
+    if settling is not None and not SMALLEST <= settling <= LARGEST:
+        raise DesignError("--settling", f"is {settling:g}", f"give a time above 0 s, from {SMALLEST:g} on")
     if overshoot is not None and not (math.isfinite(overshoot) and overshoot >= 0.0):
         raise DesignError("--overshoot", f"is {overshoot:g}", "give percent, 0 or more")
     check_choice("--arithmetic", arithmetic, ARITHMETICS, DesignError)

@@ -265,7 +265,7 @@ def _check_files(place: Path) -> None:
     for _, folders, names in os.walk(place):
         for name in (*folders, *names):
             check(not name.startswith(".focgen-"), f"{name} is left")
-    for path in place.glob("out*.toml"):
+    for path in filter(Path.is_file, place.glob("out*.toml")):
         import tomllib
 
         content = tomllib.loads(path.read_text("utf-8"))

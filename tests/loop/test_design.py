@@ -257,6 +257,7 @@ FAULTS = {
     "NaN set point": (paper_rig(), {"setpoints": [math.nan]}, "not finite"),
     "settling NaN": (paper_rig(), {"settling": math.nan}, "above 0 s"),
     "settling 0": (paper_rig(), {"settling": 0.0}, "above 0 s"),
+    "settling next to 0": (paper_rig(), {"settling": 1e-320}, "above 0 s"),
     "overshoot negative": (paper_rig(), {"overshoot": -1.0}, "0 or more"),
     "length 0": (paper_rig(), {"length": 0}, "give 1 to"),
     "length beyond the ring": (paper_rig(), {"length": 10**8}, "give 1 to 65534"),
