@@ -116,7 +116,8 @@ class AvrLibrary:
                 self.test = _compiled([feeder, own, folder / f"{plan.name}_selftest.c"], folder)
         self._symbols = _symbols(self.elf)
         signal, increment = (DTYPES[f.ctype]().itemsize for f in (plan.output, plan.increment))
-        self._in, self._out = (3 + given_width(plan)) * signal + 1, signal + increment + 1
+        self._event, self._in = 3 * signal, (3 + given_width(plan)) * signal + 1
+        self._out = signal + increment + 1
 
     def answers(self, plan: Plan, scenario: Scenario) -> Answers:
         """Run raw inputs, as the host's library does."""
@@ -127,7 +128,8 @@ class AvrLibrary:
         lanes = range(scenario.lanes)
         inputs = b"".join(self._records(scenario, lane) for lane in lanes)
         place, state = self._symbols["tried"]
-        places = [self._symbols["cell"][0], self._in, self._out, place, state]
+        cell = self._symbols["cell"][0]
+        places = [cell, cell + self._event, self._in, self._out, place, state]
         seconds = 60.0 + scenario.samples * scenario.lanes * 20.0
         found = _simulated(self.elf, inputs, places, _STEP_CYCLES, seconds)
         size, count = self._out + 4, scenario.samples
@@ -148,7 +150,7 @@ class AvrLibrary:
         :meth:`run` does.
         """
         cell = _symbols(self.test)["cell"][0]
-        found = _simulated(self.test, b"\0", [cell, 1, 4, cell, 0], _TEST_CYCLES, _TEST_SECONDS)
+        found = _simulated(self.test, b"\0", [cell, cell, 1, 4, cell, 0], _TEST_CYCLES, _TEST_SECONDS)
         made: int = struct.unpack_from("<I", found)[0]
         return made
 
@@ -175,8 +177,8 @@ class AvrLibrary:
 
 
 def _simulated(elf: bytes, inputs: bytes, places: list[int], most: int, seconds: float) -> bytes:
-    """What simavr gives for ``inputs``; ``places``: CELL, IN, OUT, STATE and SIZE of simavr_run.c, ``most``
-    million cycles an answer. Raises TargetFault where the program crashes or does not return.
+    """What simavr gives for ``inputs``; ``places``: CELL, EVENT, IN, OUT, STATE and SIZE of simavr_run.c,
+    ``most`` million cycles an answer. Raises TargetFault where the program crashes or does not return.
     """
     numbers = [*places, _symbols(elf)["_end"][0], most]
     with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:

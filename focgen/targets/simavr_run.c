@@ -1,11 +1,11 @@
 /* Feeds a program that simavr emulates with samples, and takes its results; see avr.c.jinja.
  *
- *   simavr_run ELF MCU CELL IN OUT STATE SIZE PAINT LONGEST INPUTS RESULTS
+ *   simavr_run ELF MCU CELL EVENT IN OUT STATE SIZE PAINT LONGEST INPUTS RESULTS
  *
- * CELL: address of the inputs, IN bytes of them, OUT bytes of results behind; STATE, SIZE: the state; PAINT:
- * where free memory begins; LONGEST: million cycles that an answer may take. INPUTS holds IN bytes a sample. RESULTS gets, a sample, OUT bytes and 4 of cycles, then
- * the state's bytes where the sample's event (the byte behind three signals) has bit 3; at the end 4 bytes: how
- * much of the stack was used.
+ * CELL: address of the inputs, IN bytes of them, OUT bytes of results behind; EVENT: that of the event's byte;
+ * STATE, SIZE: the state; PAINT: where free memory begins; LONGEST: million cycles that an answer may take.
+ * INPUTS holds IN bytes a sample. RESULTS gets, a sample, OUT bytes and 4 of cycles, then the state's bytes where
+ * the sample's event has bit 3; at the end 4 bytes: how much of the stack was used.
  *
  * Ends with 3 where an answer takes longer, with 4 where the program crashes.
  */
@@ -22,7 +22,7 @@
 #define GPIOR1 0x4a
 #define PAINT 0xa5
 
-static uint32_t cell, in_bytes, out_bytes, state, state_bytes, paint;
+static uint32_t cell, event, in_bytes, out_bytes, state, state_bytes, paint;
 static uint64_t begin, cycles, asked, longest;
 static FILE *inputs, *results;
 static int finished;
@@ -36,8 +36,7 @@ static void put32(uint32_t value)
 
 static void exchange(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param)
 {
-    const uint32_t event = cell + (uint32_t)(uintptr_t)param;
-
+    (void)param;
     avr->data[address] = value;
     if (value == 1) {
         asked = avr->cycle;
@@ -70,17 +69,18 @@ int main(int argc, char **argv)
     uint32_t deepest;
     avr_t *avr;
 
-    if (argc != 12) {
+    if (argc != 13) {
         return 2;
     }
     memset(&firmware, 0, sizeof firmware);
     if (elf_read_firmware(argv[1], &firmware) != 0 || (avr = avr_make_mcu_by_name(argv[2])) == 0) {
         return 2;
     }
-    cell = (uint32_t)atol(argv[3]), in_bytes = (uint32_t)atol(argv[4]), out_bytes = (uint32_t)atol(argv[5]);
-    state = (uint32_t)atol(argv[6]), state_bytes = (uint32_t)atol(argv[7]), paint = (uint32_t)atol(argv[8]);
-    longest = (uint64_t)atol(argv[9]) * 1000000u;
-    inputs = fopen(argv[10], "rb"), results = fopen(argv[11], "wb");
+    cell = (uint32_t)atol(argv[3]), event = (uint32_t)atol(argv[4]);
+    in_bytes = (uint32_t)atol(argv[5]), out_bytes = (uint32_t)atol(argv[6]);
+    state = (uint32_t)atol(argv[7]), state_bytes = (uint32_t)atol(argv[8]), paint = (uint32_t)atol(argv[9]);
+    longest = (uint64_t)atol(argv[10]) * 1000000u;
+    inputs = fopen(argv[11], "rb"), results = fopen(argv[12], "wb");
     if (inputs == 0 || results == 0) {
         return 2;
     }
@@ -88,7 +88,7 @@ int main(int argc, char **argv)
     avr->log = LOG_NONE;
     firmware.frequency = 16000000;
     avr_load_firmware(avr, &firmware);
-    avr_register_io_write(avr, GPIOR0, exchange, (void *)(uintptr_t)((in_bytes - 1) / 7 * 3));
+    avr_register_io_write(avr, GPIOR0, exchange, 0);
     avr_register_io_write(avr, GPIOR1, count, 0);
     memset(avr->data + paint, PAINT, avr->ramend + 1u - paint);
     while (!finished) {

@@ -17,7 +17,7 @@ from tests.equality.table import table
 
 _LANES, _SAMPLES = 384, 2048
 _CORE_LANES, _CORE_SAMPLES = 8, 2048
-_EVERY = 40  # a controller in so many runs on the emulated cores, too
+_EVERY = 37  # a controller in so many runs on the emulated cores, too: of every kind and arithmetic in turn
 _AVR = 0.1  # of what the other cores are given
 
 

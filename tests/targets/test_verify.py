@@ -14,6 +14,7 @@ import pytest
 
 from focgen.cli.main import main
 from focgen.codegen.generate import folder_files, generate
+from focgen.control.controller import Tunable
 from focgen.control.files import controller_text
 from focgen.errors import PlanError
 from focgen.output import write_files
@@ -286,6 +287,17 @@ def test_an_avr_says_the_same(arithmetic, tmp_path):
     path = folder / "filter.c"
     path.write_text(path.read_text().replace("s->error[s->error_now] = e;", "(void)e;"))
     assert verify(folder, 300, target="avr", edited=True).targets["avr"].mismatches > 0
+
+
+@pytest.mark.parametrize("arithmetic", ("q31", "f32"))
+def test_a_tunable_controller_runs_on_an_avr(arithmetic, tmp_path):
+    """Its samples carry parameters behind the event, as many as it has."""
+    tunable = replace(paper_controller(12), tunable=Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0)))
+    folder = generate(tunable, tmp_path, arithmetic, tunable=True).folder
+    if avr.missing(read_folder(folder).plan):
+        pytest.skip(avr.missing(read_folder(folder).plan))
+    found = verify(folder, 300, target="avr").targets["avr"]
+    assert found.sound and found.samples > 300
 
 
 @pytest.mark.parametrize("arithmetic", ("q15", "q31", "f32"))
