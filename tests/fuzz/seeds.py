@@ -333,27 +333,36 @@ def costs() -> list[bytes]:
 
 @cache
 def study() -> bytes:
-    """Both files of a study, as one object that has the keys of both."""
-    controller = tomllib.loads(_LEAD)
-    band = {"low": 0.1, "high": 10.0, "why": "chosen"}
-    whole = {
-        "controller": controller,
-        "rows": [],
-        "ideal": [],
-        "plant": None,
+    """Both files of a study in one object, by their names without the suffix."""
+    row = {"memory": "short", "arithmetic": "q15", "sample_time": 0.01, "length": 5, "tolerance": None}
+    told = {
+        "controller": "lead",
         "rig": None,
-        "band": band,
+        "band": {"low": 0.1, "high": 10.0, "why": "chosen"},
         "setpoints": [0.01],
         "samples": 100,
+        "rows": [{**row, "horizon": None, "error": 0.1, "errors": {"step": 0.1}, "multiplies": 6}],
+        "ideal": [],
+        "plant": None,
         "pareto": {"multiplies": [0]},
-        "recommendation": None,
+        "recommendation": "short",
         "notes": ["short"],
         "operators": [],
-        "outputs": [],
-        "time": [],
-        "exact": [],
     }
-    return json.dumps(whole).encode()
+    drawn = {
+        "omega": [1.0, 2.0],
+        "phase_deg": [0.1, 0.2],
+        "magnitude_db": [0.0, 0.1],
+        "time": [],
+        "output": [],
+    }
+    curves = {
+        "controller": tomllib.loads(_LEAD),
+        "rows": [drawn | {"reference": None}],
+        "ideal": [],
+        "plant": None,
+    }
+    return json.dumps({"study": told, "curves": curves}).encode()
 
 
 def path_of(folder: Path, name: str, data: bytes) -> Path:

@@ -186,8 +186,13 @@ def _drawn(data: bytes, place: Path) -> None:
 
 
 def _study(data: bytes, place: Path) -> None:
-    for name in ("study.json", "curves.json"):
-        seeds.path_of(place, name, data)
+    try:
+        whole = json.loads(data)
+        parts = {name: json.dumps(whole[name]).encode() for name in ("study", "curves")}
+    except (ValueError, TypeError, KeyError, RecursionError):
+        parts = dict.fromkeys(("study", "curves"), data)
+    for name, part in parts.items():
+        (place / f"{name}.json").write_bytes(part)
     read_study(place)
 
 

@@ -220,4 +220,4 @@ def test_a_stage_of_no_size_is_refused(tmp_path, capsys):
     rig.write_text("\n".join(line for line in text.splitlines() if not line.startswith("curvature")))
     (tmp_path / "out").mkdir()
     line = refused(["identify", str(STEPS), "--rig", str(rig), "--to", "8"], tmp_path / "out", capsys)
-    assert "sensor: cannot be simulated (its time constants are too far apart" in line
+    assert "[sensor] [den]: has a term of order 0.001; give orders of 0, or of 0.01 to 20" in line

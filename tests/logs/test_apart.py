@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from focgen.children import environment
 from focgen.cli.main import main
 from focgen.errors import LogError, MissingExtra
 from focgen.logs import reader, subprocess_reader
@@ -70,7 +71,7 @@ def test_a_file_that_ends_the_reader_is_an_error_of_one_line(tmp_path, capsys):
     crashing(path)
     alone = "import sys, pathlib; from focgen.logs import mat_file; mat_file.read(pathlib.Path(sys.argv[1]))"
     command = [sys.executable, "-c", alone, str(path)]
-    died = subprocess.run(command, capture_output=True, env=subprocess_reader._environment())
+    died = subprocess.run(command, capture_output=True, env=environment())
     if died.returncode >= 0:
         pytest.skip("this version of scipy does not crash on the file")
     rig = shipped("examples") / "rig.toml"
@@ -133,7 +134,7 @@ def test_the_process_may_not_take_all_memory():
         "try:\n    bytearray(1 << 30)\nexcept MemoryError:\n    print('refused')"
     )
     command = [sys.executable, "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, env=subprocess_reader._environment())
+    done = subprocess.run(command, capture_output=True, text=True, env=environment())
     assert done.stdout == "refused\n", done.stderr
 
 
