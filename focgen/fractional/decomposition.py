@@ -104,7 +104,7 @@ def _to_the_cut(place: complex) -> float:
 
 
 def _rational(num: Polynomial, den: Polynomial, horizon: float) -> list[Chain]:
-    top, bottom = _dense(num), _dense(den)
+    top, bottom = dense(num), dense(den)
     poles = np.roots(bottom).astype(complex)  # not polished one by one: near poles are accurate as a set
 
     def image(s: Complex) -> Complex:
@@ -118,7 +118,8 @@ def _rational(num: Polynomial, den: Polynomial, horizon: float) -> list[Chain]:
     return polar_part(image, poles, 2.0 / horizon, isolated, lambda _: math.inf)
 
 
-def _dense(terms: Polynomial) -> Array:
-    dense = np.zeros(int(terms[0].order) + 1)
-    dense[[int(terms[0].order - t.order) for t in terms]] = [t.coefficient for t in terms]
-    return dense
+def dense(terms: Polynomial) -> Array:
+    """The coefficients (highest order + 1,) of a polynomial of whole orders, highest first."""
+    found = np.zeros(int(terms[0].order) + 1)
+    found[[int(terms[0].order - t.order) for t in terms]] = [t.coefficient for t in terms]
+    return found

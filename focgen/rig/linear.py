@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from focgen.arrays import Array, Bytes
+from focgen.fractional.decomposition import dense
 from focgen.fractional.delay import split_delay
 from focgen.fractional.simulation import Convolution
-from focgen.fractional.transfer import Term, TransferFunction
+from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.logs.between import Between
 from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
@@ -275,11 +275,8 @@ def _by_exponential(num: Array, den: Array, h: float, held: bool) -> tuple[Array
     return np.atleast_2d(b)[0], a
 
 
-def _coefficients(terms: Sequence[Term]) -> Array:
-    dense = np.zeros(int(terms[0].order) + 1 if terms else 1)
-    for term in terms:
-        dense[-1 - int(term.order)] = term.coefficient
-    return dense
+def _coefficients(terms: Polynomial) -> Array:
+    return dense(terms) if terms else np.zeros(1)
 
 
 @lru_cache(maxsize=64)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from focgen.errors import RigError
+from focgen.fractional.decomposition import dense
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig import linear
@@ -58,11 +59,7 @@ def check_bounded(rig: Rig, seconds: float) -> None:
 def _growth(transfer: TransferFunction, h: float, seconds: float) -> float:
     """The largest real part of a pole, 1/s, that shows in so many seconds; 0 where none is positive."""
     if transfer.is_integer:
-        lowest, highest = transfer.den[-1].order, transfer.den[0].order
-        dense = np.zeros(int(highest - lowest) + 1)
-        for term in transfer.den:
-            dense[int(highest - term.order)] = term.coefficient
-        poles = list(np.roots(dense))
+        poles = list(np.roots(dense(transfer.den)))
     else:
         poles = linear.fractional_poles(transfer, 1e-3 / seconds, 30.0 / h)
     return max((float(pole.real) for pole in poles), default=0.0)
