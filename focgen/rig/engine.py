@@ -65,7 +65,8 @@ def slot_in(form: Form, stage: str) -> str:
     if form.slot in SLOTS[stage]:
         return form.slot
     first, *_, last = SLOTS[stage]
-    ahead = form.slot in (*SLOTS["regulator"], "load", "drive", *(("strain",) * (stage == "regulator")))
+    ahead = form.slot in (*SLOTS["regulator"], "load", "drive")
+    ahead = ahead or (form.slot == "strain" and stage == "regulator")
     return first if ahead and not form.response else last
 
 
