@@ -173,7 +173,8 @@ def _check_wishes(
     tolerance: float,
 ) -> None:
     if settling is not None and not SMALLEST <= settling <= LARGEST:
-        raise DesignError("--settling", f"is {settling:g}", f"give a time above 0 s, from {SMALLEST:g} on")
+        remedy = f"give a time above 0 s, from {SMALLEST:g} to {LARGEST:g}"
+        raise DesignError("--settling", f"is {settling:g}", remedy)
     if overshoot is not None and not (math.isfinite(overshoot) and overshoot >= 0.0):
         raise DesignError("--overshoot", f"is {overshoot:g}", "give percent, 0 or more")
     check_choice("--arithmetic", arithmetic, ARITHMETICS, DesignError)
