@@ -18,6 +18,7 @@
 
 enum { BALANCED = 2, DIPS = 3 };
 static const double NEAR = 0.1, BESIDE = 0.03; /* how far Taylor series go: of q, as a part of it; of powers and exponentials */
+static const double SAME = 0.01;    /* part of its steepness by which q's differs along a displacement that is as good as another */
 static const double FEW = 0.1;      /* part of its steepness that q loses where it is taken from the way since 0 */
 static const double NOTHING = 40.0; /* speeds at which an exponential is 0 */
 
@@ -152,6 +153,22 @@ static void wind(const Plant *p, State *s, double move)
     s->grown = grown(p, s->q, was, s->grown);
 }
 
+/* The state after a displacement of `move` instead of `moved`, for which q is known: by q's Taylor series there, where `move` is as good
+ * as `moved`; else from `was` on. */
+static void wound(const Plant *p, State *s, const State *was, double move, double moved)
+{
+    double side = moved < 0.0 ? -1.0 : 1.0, more = side * (move - moved), at = side * s->q;
+    if (p->soft == 0.0) return;
+    double one = steepness(p, at, s->grown), bent = p->power * (one - 1.0);
+    if (fabs(more * bent) < SAME * fabs(at) && move * side >= 0.0) {
+        s->q += side * more * one * (1.0 + 0.5 * more * bent / at);
+        s->grown = grown(p, s->q, side * at, s->grown);
+    } else {
+        s->q = was->q, s->grown = was->grown;
+        wind(p, s, move);
+    }
+}
+
 /* The state after a step of `level` with the input `d` (4 coefficients over the step), friction at `sign` times `slide`. */
 static State stepped(const Plant *p, State s, const double *d, int level, int sign)
 {
@@ -161,6 +178,7 @@ static State stepped(const Plant *p, State s, const double *d, int level, int si
     double at_end = d[0] + d[1] + d[2] + d[3] - borne, slope = 0.0;
     double before = p->curved ? yielded(p, &s, sign, d[0], span, &slope) : 0.0;
     double then = before + slope, steep = slope;
+    double moved = 0.0;
     State to = s;
     for (int round = 0; round < (p->curved ? 2 : 1); round++) {
         double g[4] = {f[0] - before, f[1] - slope, f[2] - 3.0 * (then - before) + 2.0 * slope + steep,
@@ -168,8 +186,8 @@ static State stepped(const Plant *p, State s, const double *d, int level, int si
         to.y = t[0] * s.y + t[1] * s.v + t[4] * g[0] + t[5] * g[1] + t[6] * g[2] + t[7] * g[3];
         if (p->order == 2) to.v = t[2] * s.y + t[3] * s.v + t[8] * g[0] + t[9] * g[1] + t[10] * g[2] + t[11] * g[3];
         if (!p->curved) break;
-        to.q = s.q, to.grown = s.grown;
-        wind(p, &to, to.y - s.y);
+        if (round == 0) wind(p, &to, moved = to.y - s.y);
+        else wound(p, &to, &s, to.y - s.y, moved);
         then = yielded(p, &to, sign, at_end + borne, span, &steep);
     }
     if (p->order == 1) to.v = (at_end - p->k * to.y - taken(p, &to)) / p->m;
