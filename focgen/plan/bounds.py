@@ -78,14 +78,17 @@ class _Found:
 
 
 def _operator(account: Account) -> _Found:
-    """Where in the schedule's range it is worst."""
-    v = account.filtered()
-    grown = v.growth if account.early else v.ceiling
-    found = []
+    """Where in the schedule's range it is worst.
+
+    The machine's own v is as far from what is exact for its own e and z as all that is settled; its z is
+    within the same clamp.
+    """
+    v, found = account.filtered(), []
+    reach = account.reach + v.settled
     for piece in account.pieces():
         parts = {cause: piece.largest * value for cause, value in v.static.items()}
-        parts["gain"] = piece.error * (account.reach + v.settled + grown)
-        parts["product"] = account.product_error(piece.largest * (account.reach + v.settled + grown))
+        parts["gain"] = piece.error * reach
+        parts["product"] = account.product_error(piece.largest * reach)
         found.append(_Found(parts, piece.largest * v.ceiling * _SLACK, piece.largest * v.growth * _SLACK))
     return max(found, key=lambda one: one.first if account.early else one.settled + one.ceiling)
 

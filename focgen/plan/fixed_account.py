@@ -21,6 +21,7 @@ class Fixed(Account):
 
     @property
     def input_error(self) -> float:
+        """Half a count of either input, and the set point's."""
         return self.plan.error.lsb + set_point_error(self.plan)
 
     def sum_error(self, made: Sum | None, table: Table | None, span: Span) -> float:
@@ -31,12 +32,15 @@ class Fixed(Account):
         return (0.5 * aligned + drive_error(made)) * made.total.lsb
 
     def inner_edge(self) -> float:
+        """Half a count."""
         return 0.5 * present(self.plan.inner).state.lsb
 
     def inner_rounding(self) -> float:
+        """None: counts add up exactly."""
         return 0.0
 
     def filtered(self) -> FilteredError:
+        """With the rounding of each alignment."""
         plan, tables = self.plan, self.tables
         inner = self.inner()
         half_wide = 0.5 * plan.wide.lsb * bool(plan.inner and plan.inner.to_wide)
@@ -63,6 +67,7 @@ class Fixed(Account):
         return lsb * (rounding + reset_error(self.plan) * max(1.0, self.M * at_rest(self.plan)))
 
     def pieces(self) -> list[Piece]:
+        """One, for all of the schedule."""
         return [Piece(self.gain_error(), largest_gain(self.plan.controller))]
 
     def gain_error(self) -> float:
@@ -77,6 +82,7 @@ class Fixed(Account):
         return table_error(plan, lsb) + 0.5 * lsb + inputs
 
     def product_error(self, reach: float) -> float:
+        """Half a count, where anything is shifted out."""
         return 0.5 * self.plan.increment.lsb / self.half_step * bool(self.plan.gain_shift)
 
     def output(self, static: float, operator: float) -> float:

@@ -101,6 +101,7 @@ class Floating(Account):
         return made + half_place(r * 1.01, self.u) + half_place((self.clamp + r) * 1.01, self.u)
 
     def filtered(self) -> FilteredError:
+        """With every rounding of a step that is not the feedback's."""
         plan, tables = self.plan, self.tables
         inner = self.inner()
         rounding = self.sum_error(plan.direct, tables.direct, self.machine_e)
@@ -168,6 +169,7 @@ class Floating(Account):
         return 2.0 * gamma(count, _DOUBLE) * sums * self.E
 
     def pieces(self) -> list[Piece]:
+        """Those of the schedule."""
         return floating_pieces(self.plan, self.half_step, self.u)
 
     def product_error(self, reach: float) -> float:

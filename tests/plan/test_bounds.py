@@ -13,10 +13,10 @@ import pytest
 from focgen.control.controller import ControllerRanges, GainSchedule
 from focgen.errors import PlanError
 from focgen.fractional.transfer import TransferFunction
-from focgen.plan.fixed_account import Fixed
 from focgen.plan.build import build_plan
 from focgen.plan.canonical import tables
 from focgen.plan.execute import execute
+from focgen.plan.fixed_account import Fixed
 from focgen.plan.ideal import ideal
 from focgen.plan.plan import Plan
 from focgen.plan.proofs import at_rest, reset_error
