@@ -33,6 +33,7 @@ from focgen.arrays import Kind, Numbers
 from focgen.errors import PlanError
 from focgen.plan.formats import nearest, shift
 from focgen.plan.plan import Plan, SetPoint
+from focgen.plan.rounding import half_place
 from focgen.plan.scenario import Scenario
 from focgen.plan.usable import usable
 from focgen.present import present
@@ -81,9 +82,24 @@ def set_point_error(plan: Plan) -> float:
     if not plan.reference.floating:
         off = abs(plan.set_point.rate * 2.0**-_UP - q) / q
         return plan.reference.lsb + 1.01 * (off * reach + double)
-    u = _UNIT[plan.reference.ctype]
-    own = (4.0 * u * reach + plan.set_point.drop) / q + 2.0 * u * (reach + largest)
-    return 1.01 * (own + double)
+    return 1.01 * double + _lag_error(plan, q, high - low, largest)
+
+
+def _lag_error(plan: Plan, q: float, width: float, largest: float) -> float:
+    """Of λ for ever and of y = r − λ, floating. With w what the reference can move by, |x| ≤ w:
+
+    ε ← (1 − q) (ε + the difference's rounding + x's) + that of q x and of λ, (q̂ − q) x, and the drop.
+
+    The machine's own x is longer by ε at most, which 4 u w / q are more than enough for.
+    """
+    made, u = present(plan.set_point), _UNIT[plan.reference.ctype]
+    width += 4.0 * u * largest  # of the rounded reference
+    spare = (4.1 * u * width + made.drop) / q
+    far = width + spare
+    each = (1.0 - q) * (half_place(width, u) + half_place(far, u))
+    each += half_place(float(made.rate) * far, u) + half_place((1.0 - q) * far * (1.0 + 2.0 * u), u)
+    each += abs(float(made.rate) - q) * far + made.drop
+    return 1.0001 * (each / q + half_place(largest + spare, u))
 
 
 def start_of(plan: Plan) -> int | float:

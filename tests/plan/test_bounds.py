@@ -13,10 +13,10 @@ import pytest
 from focgen.control.controller import ControllerRanges, GainSchedule
 from focgen.errors import PlanError
 from focgen.fractional.transfer import TransferFunction
-from focgen.plan.bounds import _Fixed
 from focgen.plan.build import build_plan
 from focgen.plan.canonical import tables
 from focgen.plan.execute import execute
+from focgen.plan.fixed_account import Fixed
 from focgen.plan.ideal import ideal
 from focgen.plan.plan import Plan
 from focgen.plan.proofs import at_rest, reset_error
@@ -113,7 +113,7 @@ def test_an_inner_integral_takes_up_every_error_of_its_addends(arithmetic):
     weights = np.abs(np.array(rest.values) - exact).sum() * 2.0
     aligned = 0.5 * sum(block.align > 0 for block in rest.blocks) * rest.total.lsb
     assert min(inputs, weights) > 0.05 * max(inputs, weights), "each of them is seen"
-    growth = _Fixed(plan, tables(controller, 20)).inner().growth
+    growth = Fixed(plan, tables(controller, 20)).inner().growth
     assert growth == pytest.approx(2.0 * (inputs + weights + aligned), rel=1e-3)
 
 
