@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 
-from tests.mutants.change import read
+from tests.mutants.change import Change, read
 from tests.mutants.known import Known, copy_to, known, measure
 from tests.mutants.sample import ROOMS, all_changes, drawn
 from tests.mutants.table import table
@@ -50,19 +51,23 @@ def _results(folder: Path) -> list[dict]:
 
 def _try_all(place: Path, folder: Path, asked: argparse.Namespace) -> None:
     restored(place)
-    tests, done = known(folder), {r["key"] for r in _results(folder)}
+    tests, results = known(folder), _results(folder)
+    done = {r["key"] for r in results}
+    killed = Counter((r["room"], r["by"]) for r in results if r["outcome"] == "killed")
     for room, change in drawn(place, asked.seed, asked.count, tuple(asked.rooms)):
         text = read(place, change.file)
         if change.key(text) not in done:
-            line = _tried(place, tests, room, change, text)
+            before = Counter({test: count for (where, test), count in killed.items() if where == room})
+            line = _tried(place, tests, before, room, change, text)
+            killed[room, line["by"]] += line["outcome"] == "killed"
             with open(folder / "tried.jsonl", "a", encoding="utf-8") as out:
                 out.write(json.dumps(line) + "\n")
             print(f"{line['outcome']:10} {line['seconds']:6.1f} s  {line['file']}:{line['line']}", flush=True)
     shutil.rmtree(place / "scratch", ignore_errors=True)
 
 
-def _tried(place: Path, tests: Known, room: str, change, text: str) -> dict:
-    chosen = tests.tests(change, text)
+def _tried(place: Path, tests: Known, killed: Counter[str], room: str, change: Change, text: str) -> dict:
+    chosen = tests.tests(change, text, killed)
     patience = 60.0 + 4.0 * sum(tests.seconds[t] for t in chosen)
     found = tried(place, change, chosen, patience)
     line = {"key": change.key(text), "room": room, **asdict(change), "line": change.line(text)}
