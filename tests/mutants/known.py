@@ -25,8 +25,6 @@ ASKED = (
 """Folders of tests that are measured: those of the rooms, and of what runs their C."""
 ASIDE = ("golden", "same_bytes", "mutants", "docs", "distribution", "misra", "lto", "twin_headers")
 """Tests that tell of any change, a right one as well, or of none in what is computed: they do not judge."""
-PATIENCE = 60.0
-"""Seconds of tests that one change is worth."""
 _START = 0.3
 """Seconds that are counted for each test beside its own: what opens its file, and chance."""
 
@@ -40,9 +38,11 @@ class Known:
     runs: dict[str, dict[int, list[str]]]
     reads: dict[str, list[str]]
 
-    def tests(self, change: Change, text: str, killed: Counter[str]) -> list[str]:
-        """Those that could tell of a change, as many as ``PATIENCE`` allows; ``killed``: how many changes of
-        the same room each test has told of already."""
+    def tests(self, change: Change, text: str, killed: Counter[str], patience: float) -> list[str]:
+        """Those that could tell of a change, the best first, as many as ``patience`` (seconds) allows.
+
+        ``killed``: how many changes of the same room each test has told of already.
+        """
         if change.file.endswith(".py"):
             lines = self.runs.get(change.file, {})
             found = {t for line in lines_of(text, change.line(text)) for t in lines.get(line, ())}
@@ -52,7 +52,7 @@ class Known:
             found = set(self.reads.get(change.file, ()))
         chosen, spent = [], 0.0
         for test in self._in_turn(found, killed):
-            if not chosen or spent + self.seconds[test] <= PATIENCE:
+            if not chosen or spent + self.seconds[test] <= patience:
                 chosen.append(test)
                 spent += self.seconds[test]
         return chosen
