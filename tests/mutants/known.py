@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
@@ -18,12 +19,14 @@ from tests.mutants.of_python import lines_of
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("focgen", "templates", "c_runtime", "tests", "examples", "docs", "tools")
 """What a scratch copy holds, besides the files of the root."""
-ASKED = ("fractional", "plan", "codegen", "verification", "control", "running", "targets")
+ASKED = (
+    "fractional", "plan", "codegen", "verification", "control", "running", "targets", "testing", "equality",
+)  # fmt: skip
 """Folders of tests that are measured: those of the rooms, and of what runs their C."""
-ASIDE = ("golden", "same_bytes", "mutants", "docs", "distribution", "misra", "lto")
+ASIDE = ("golden", "same_bytes", "mutants", "docs", "distribution", "misra", "lto", "twin_headers")
 """Tests that tell of any change, a right one as well, or of none in what is computed: they do not judge."""
-PATIENCE = 40.0
-"""Seconds of tests that one change is worth."""
+_START = 0.3
+"""Seconds that are counted for each test beside its own: what opens its file, and chance."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +38,11 @@ class Known:
     runs: dict[str, dict[int, list[str]]]
     reads: dict[str, list[str]]
 
-    def tests(self, change: Change, text: str) -> list[str]:
-        """Those that could tell of a change, as many as ``PATIENCE`` allows: the fastest of each file, then
-        the next fastest. A file tells of what the others do not look at."""
+    def tests(self, change: Change, text: str, killed: Counter[str], patience: float) -> list[str]:
+        """Those that could tell of a change, the best first, as many as ``patience`` (seconds) allows.
+
+        ``killed``: how many changes of the same room each test has told of already.
+        """
         if change.file.endswith(".py"):
             lines = self.runs.get(change.file, {})
             found = {t for line in lines_of(text, change.line(text)) for t in lines.get(line, ())}
@@ -46,18 +51,26 @@ class Known:
         else:
             found = set(self.reads.get(change.file, ()))
         chosen, spent = [], 0.0
-        for test in self._in_turn(found):
-            if not chosen or spent + self.seconds[test] <= PATIENCE:
+        for test in self._in_turn(found, killed):
+            if not chosen or spent + self.seconds[test] <= patience:
                 chosen.append(test)
                 spent += self.seconds[test]
         return chosen
 
-    def _in_turn(self, tests: Iterable[str]) -> Iterator[str]:
-        """The fastest of each file, the fastest file first, then the second of each …"""
+    def _in_turn(self, tests: Iterable[str], killed: Counter[str]) -> Iterator[str]:
+        """The best test of each file, the best file first, then the second of each …: a file tells of what
+        the others do not look at. Best is what has told of most, a second that it takes; one that has told of
+        nothing yet counts as if it had told of one."""
+
+        def worth(told: int, test: str) -> tuple[float, str]:
+            return -(1.0 + told) / (_START + self.seconds[test]), test
+
         files: dict[str, list[str]] = {}
-        for test in sorted(tests, key=lambda t: self.seconds[t]):
+        for test in sorted(tests, key=lambda t: worth(killed[t], t)):
             files.setdefault(test.split("::")[0], []).append(test)
-        return (test for turn in zip_longest(*files.values()) for test in turn if test)
+        of_file = Counter({name: sum(killed[t] for t in own) for name, own in files.items()})
+        ordered = sorted(files.items(), key=lambda one: worth(of_file[one[0]], one[1][0]))
+        return (test for turn in zip_longest(*(own for _, own in ordered)) for test in turn if test)
 
 
 def copy_to(place: Path) -> Path:

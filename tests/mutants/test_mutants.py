@@ -9,6 +9,7 @@ import json
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -126,9 +127,18 @@ def test_the_fastest_tests_of_a_line_come_first():
     known = Known(
         {"slow": 9.0, "fast": 1.0, "huge": 99.0}, {"focgen/a.py": {2: ["huge", "slow", "fast"]}}, {}
     )
-    assert known.tests(change, text) == ["fast", "slow"]
+    assert known.tests(change, text, Counter(), 40.0) == ["fast", "slow"]
     reading = Known({"slow": 9.0}, {}, {"c_runtime/a.h": ["slow"]})
-    assert reading.tests(Change("c_runtime/a.h", 0, "x", "y", ""), text) == ["slow"]
+    assert reading.tests(Change("c_runtime/a.h", 0, "x", "y", ""), text, Counter(), 40.0) == ["slow"]
+
+
+def test_what_has_told_of_others_comes_before_what_is_fast():
+    seconds = {"a::fast": 1.0, "a::slow": 3.0, "b::slow": 2.0, "b::told": 4.0}
+    known = Known(seconds, {}, {"c_runtime/a.h": sorted(seconds)})
+    change = Change("c_runtime/a.h", 0, "x", "y", "")
+    assert known.tests(change, "", Counter(), 40.0) == ["a::fast", "b::slow", "a::slow", "b::told"]
+    told = known.tests(change, "", Counter({"b::told": 5}), 40.0)
+    assert told == ["b::told", "a::fast", "b::slow", "a::slow"]
 
 
 def test_shares_and_their_intervals():
