@@ -230,8 +230,8 @@ def table_error(plan: Plan, lsb: float) -> float:
 
 
 def tuned_error(plan: Plan, lsb: float) -> float:
-    """Largest difference of a tunable plan's gain in integers from the controller's with the same physical factors,
-    whatever they are, but for the step's own rounding. ``lsb`` is the physical size of a gain count.
+    """Largest difference of a tunable plan's gain, in integers, from the controller's with the same physical
+    factors, whatever they are, but for the step's own rounding. ``lsb``: the physical size of a gain count.
 
     Half a count each of the factor, the nominal gain and their product, what interpolation may leave the
     gains by, and breakpoints that are half a count off.
