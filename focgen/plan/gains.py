@@ -213,11 +213,6 @@ def steepest(controller: Controller) -> float:
     return float(np.max(np.max(rises, axis=0) / runs))
 
 
-def longest_segment(controller: Controller) -> float:
-    """Largest distance of two breakpoints."""
-    return float(np.max(np.diff(controller.schedule.breakpoints)))
-
-
 def table_error(plan: Plan, lsb: float) -> float:
     """Largest difference of a plan's schedule, not rounded further, from the controller's.
 
@@ -235,20 +230,14 @@ def table_error(plan: Plan, lsb: float) -> float:
 
 
 def tuned_error(plan: Plan, lsb: float) -> float:
-    """Largest difference of a tunable plan's gain from the controller's with the same physical factors,
-    whatever they are, but for the step's own rounding. ``lsb`` is the physical size of a gain count.
+    """Largest difference of a tunable plan's gain, in integers, from the controller's with the same physical
+    factors, whatever they are, but for the step's own rounding. ``lsb``: the physical size of a gain count.
 
-    Integers: half a count each of the factor, the nominal gain and their product, what interpolation may
-    leave the gains by, and breakpoints that are half a count off. Floating: the relative error of every
-    operation between.
+    Half a count each of the factor, the nominal gain and their product, what interpolation may leave the
+    gains by, and breakpoints that are half a count off.
     """
     box, controller = present(plan.tuning), plan.controller
     largest, slope = largest_gain(controller), steepest(controller) if controller.scheduled else 0.0
-    reach = max(map(abs, present(controller.ranges.schedule))) if controller.scheduled else 0.0
-    if plan.floating:
-        unit = float(np.finfo(np.float32 if plan.arithmetic == "f32" else np.float64).eps)
-        longest = longest_segment(controller) if controller.scheduled else 0.0
-        return unit * (8.0 * (largest + slope * longest) + 2.0 * slope * reach)
     factor = 0.5 * box.factor.lsb * largest / controller.factors[1]
     nominal = 0.5 * controller.factors[1] * box.nominal_lsb * lsb / plan.gain.lsb
     spare = max(int(plan.gain.high) - max(i.high for i in gain_intervals(box)), 0)
