@@ -37,3 +37,20 @@ def test_a_step_that_is_none_is_refused_at_once(fmpy, fmi, tmp_path):  # noqa: F
     for unit in units:
         unit.terminate()
         unit.freeInstance()
+
+
+@pytest.mark.parametrize("arithmetic", ("f32", "q15"))
+@pytest.mark.parametrize("fmi", (2, 3))
+def test_a_start_that_is_no_number_is_a_limit(fmpy, arithmetic, fmi, tmp_path):  # noqa: F811
+    controller = seed_controller(5, name="filter")
+    assert controller.integrator
+    unit, numbers = instantiated(fmpy, made(tmp_path, controller, arithmetic, fmi))
+    get, put = (unit.getReal, unit.setReal) if fmi == 2 else (unit.getFloat64, unit.setFloat64)
+    put([numbers["u0"]], [math.nan])
+    unit.setBoolean([numbers["reset"]], [True])
+    unit.exitInitializationMode()
+    low, high = controller.ranges.output
+    (u,) = get([numbers["u"]])
+    assert low <= u <= high and abs(u - low) < 1e-3 * (high - low)
+    unit.terminate()
+    unit.freeInstance()

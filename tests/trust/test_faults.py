@@ -174,7 +174,22 @@ def test_a_pipe_that_goes_away_hides_no_failed_check(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize(
     "spoilt",
-    ["length = " + "9" * 5000 + "\n", "a = " + "[" * 3000, "a\0b", "\ufeff", "length = 1e999\n", "[" * 70000],
+    [
+        *(
+            "length = " + "9" * 5000 + "\n",
+            "a = " + "[" * 3000,
+            "a\0b",
+            "\ufeff",
+            "length = 1e999\n",
+            "[" * 70000,
+        ),
+        *(
+            start + "a." * 10**6 + "b" + end
+            for start, end in (("", " = 1\n"), ("[", "]\n"), ("x = {", " = 1}\n"))
+        ),
+        "\"a\" . 'b' . " * 10**5 + "c = 1\n",
+    ],
+    ids=range(10),
 )
 def test_no_toml_is_a_traceback(tmp_path, scratch, spoilt, capsys):
     path = tmp_path / "c.toml"
