@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import stat
@@ -61,11 +62,20 @@ def new_folder(target: str | Path, inputs: Iterable[Any] = (), old: Old = tuple)
             target.mkdir(parents=True, exist_ok=True)
             journal.finish(target)
             scratch = stack.enter_context(scratch_folder(target))
-            (scratch / journal.FILES).mkdir()
+            _own_folder(scratch / journal.FILES)
         except OSError as reason:
             raise _unwritable(target, reason) from None
         yield scratch / journal.FILES
         _move(scratch, target, tuple(inputs), old)
+
+
+def _own_folder(path: Path) -> None:
+    """Make a folder that can be read. Else what is put into it would not be found: nothing would be written,
+    and nobody would say so."""
+    path.mkdir()
+    if not os.access(path, os.R_OK | os.W_OK | os.X_OK):
+        path.rmdir()
+        raise PermissionError(errno.EACCES, "the umask takes your own rights away", None)
 
 
 def _unwritable(target: Path, reason: OSError) -> InputError:

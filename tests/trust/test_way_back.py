@@ -40,8 +40,21 @@ def test_a_place_that_cannot_be_written_leaves_the_earlier_result(tmp_path, monk
     assert content(tmp_path) == BEFORE and not (tmp_path / "sub").exists()
 
 
+def test_a_umask_that_takes_reading_away_is_said(tmp_path, monkeypatch):
+    """What was made was not found then, and nothing was written at exit status 0. Rights are asked as they
+    stand, since root has all of them."""
+    monkeypatch.setattr(os, "access", lambda path, mode: os.stat(path).st_mode & 0o700 == 0o700)
+    before = os.umask(0o444)
+    try:
+        with pytest.raises(InputError, match="umask"):
+            output.write_files(tmp_path, {"a": "1", "b/c": "1"})
+    finally:
+        os.umask(before)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_plan_that_cannot_be_read_back_is_no_success(tmp_path, monkeypatch):
-    """As with a umask that takes reading away: the files were left where they were, at exit status 0."""
+    """As where there are no more files to open: the moves are those that were planned."""
     monkeypatch.setattr(journal, "_plan", lambda whole: None)
     output.write_files(tmp_path, {"a": "1"})
     assert content(tmp_path) == {"a": b"1"}
