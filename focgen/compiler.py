@@ -55,7 +55,7 @@ def compile_shared(
         str(target),
         "-lm",
     ]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = subprocess.run(command, capture_output=True, errors="replace")
     if done.returncode:
         raise BuildError(
             str(sources[0]),

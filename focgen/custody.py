@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import tomlkit
 
 from focgen.errors import InputError
 from focgen.textfile import LARGEST_SETTING, check_regular, read_regular
+from focgen.tomlfile import parsed
 
 TABLE = "identified_from"
 _MOST = 64  # files of one link that are followed
@@ -104,6 +104,6 @@ def _found(name: Any, places: Iterable[Path]) -> Path | None:
 def _table(path: Path) -> dict[str, Any]:
     """A file of TOML; empty where it is none."""
     try:
-        return tomllib.loads(read_regular(path, LARGEST_SETTING).decode("utf-8"))
+        return parsed(read_regular(path, LARGEST_SETTING).decode("utf-8"))
     except (OSError, ValueError, RecursionError, InputError):
         return {}

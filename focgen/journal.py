@@ -8,6 +8,9 @@ alone.
 
 A plan counts only in the folder that it was written in, by its number on the disk, and where that is the
 user's alone: a folder that came out of an archive moves nothing.
+
+Where a place cannot be written to, the files that have been moved by then go back: what stood there is kept
+in ``before`` until all have their places, and the plan is exchanged for the way back.
 """
 
 from __future__ import annotations
@@ -27,11 +30,18 @@ from focgen.jsontext import fits, read_json
 from focgen.scratch import as_before, lock, own, synced, unlock, waited_for
 
 FILES, NEW, OLD = "files", "new", "old"
-_PLAN = "plan.json"
+_BEFORE = "before"
+_PLAN, _BACK = "plan.json", "back.json"
 _LAST = "manifest.json"  # what tells of the others
 _WHOLE = re.compile(r"\.focgen-[0-9a-f]{16}\.whole")
 _DIGEST = (re.compile(r"[0-9a-f]{64}"), None)
-_SHAPE = {"folder": [int], "files": dict, "old": dict, "replaced": (str, None)}
+_SHAPE = {
+    "folder": [int],
+    "source?": re.compile(f"{FILES}|{_BEFORE}"),
+    "files": dict,
+    "old": dict,
+    "replaced": (str, None),
+}
 
 
 @contextmanager
@@ -54,41 +64,94 @@ def finish(folder: Path) -> None:
 
 def put(scratch: Path, target: Path, names: Sequence[Path], old: Iterable[Path] = ()) -> None:
     """Move ``scratch``/files/NAME to ``target``/NAME for each of ``names``, and remove ``old`` files of
-    ``target``: all of it, at once or in the next run.
+    ``target``: all of it, at once or in the next run, or nothing.
 
     To be called ``alone``. Raises OSError where that cannot be.
     """
-    for name in names:
-        (target / name).parent.mkdir(parents=True, exist_ok=True)
+    made = [parent for name in names for parent in _new_folders((target / name).parent)]
     plan = {
+        "source": FILES,
         "files": {name.as_posix(): _digest(target / name) for name in names},
         "old": {path.relative_to(target).as_posix(): _digest(path) for path in old},
         "replaced": None,
     }
-    _carry_out(_committed(scratch, plan), target)
+    try:
+        back = _way_back(scratch, target, plan)
+        whole = _committed(scratch, plan)
+        try:
+            _carry_out(whole, plan, target)
+        except OSError:
+            _write_plan(whole, back, _BACK)
+            os.replace(whole / _BACK, whole / _PLAN)
+            _carry_out(whole, back, target)
+            raise
+    except OSError:
+        for folder in reversed(made):
+            with suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+def _new_folders(folder: Path) -> list[Path]:
+    """Make a folder; it and those above it that there were not, the uppermost first."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing[::-1]
+
+
+def _way_back(scratch: Path, target: Path, plan: dict[str, Any]) -> dict[str, Any]:
+    """The plan that undoes ``plan``; what stands in the places is kept for it."""
+    stood = {name: digest for name, digest in {**plan["files"], **plan["old"]}.items() if digest is not None}
+    for name in stood:
+        kept = scratch / _BEFORE / name
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        _kept(target / name, kept)
+    made = {name: _digest(scratch / FILES / name) for name in plan["files"]}
+    back = {name: made.get(name) for name in stood}
+    gone = {name: digest for name, digest in made.items() if name not in stood}
+    return {"source": _BEFORE, "files": back, "old": gone, "replaced": None}
+
+
+def _kept(path: Path, place: Path) -> None:
+    """One more name of a file, or a copy where the file system has one name a file."""
+    try:
+        os.link(path, place)
+    except OSError:
+        shutil.copy2(path, place)
 
 
 def put_folder(scratch: Path, target: Path) -> None:
     """Put the folder ``scratch``/new where ``target`` stands, which goes. To be called ``alone`` in its
     parent.
 
-    Raises OSError where that cannot be.
+    Raises OSError where that cannot be; then what stood there stands there.
     """
-    plan = {"files": {}, "old": {}, "replaced": target.name}
-    _carry_out(_committed(scratch, plan), target.parent)
+    plan = {"source": FILES, "files": {}, "old": {}, "replaced": target.name}
+    whole = _committed(scratch, plan)
+    try:
+        _carry_out(whole, plan, target.parent)
+    except OSError:
+        if (whole / OLD).exists() and not target.exists():
+            os.rename(whole / OLD, target)
+        shutil.rmtree(whole, ignore_errors=True)
+        raise
 
 
 def _committed(scratch: Path, plan: dict[str, Any]) -> Path:
     """The scratch under the name that makes it count."""
-    number = os.stat(scratch)
-    text = json.dumps({"folder": [number.st_dev, number.st_ino], **plan})
-    (scratch / _PLAN).write_text(text, encoding="utf-8")
-    synced(scratch / _PLAN)
-    synced(scratch)
+    _write_plan(scratch, plan)
     whole = scratch.with_name(f"{scratch.name}.whole")
     os.rename(scratch, whole)
     synced(whole.parent)
     return whole
+
+
+def _write_plan(folder: Path, plan: dict[str, Any], name: str = _PLAN) -> None:
+    number = os.stat(folder)
+    text = json.dumps({"folder": [number.st_dev, number.st_ino], **plan})
+    (folder / name).write_text(text, encoding="utf-8")
+    synced(folder / name)
+    synced(folder)
 
 
 def _left(folder: Path) -> Iterator[Path]:
@@ -105,8 +168,8 @@ def _finish(folder: Path) -> None:
         if held is None:  # its process lives
             continue
         try:
-            if _counts(whole):
-                _carry_out(whole, folder)
+            if (plan := _counting(whole)) is not None:
+                _carry_out(whole, plan, folder)
         except OSError as reason:
             what = f"holds a result that is not whole, and cannot be finished ({reason.strerror})"
             raise InputError(str(folder), what, "make room, or let it be written to") from None
@@ -131,33 +194,41 @@ def _inside(name: str) -> bool:
     return bool(path.parts) and not path.is_absolute() and ".." not in path.parts and "\0" not in name
 
 
-def _counts(whole: Path) -> bool:
-    """Whether a plan was written here, by this user."""
+def _counting(whole: Path) -> dict[str, Any] | None:
+    """A plan that was written here, by this user; None of any other."""
     plan, found = _plan(whole), os.stat(whole)
-    return plan is not None and plan["folder"] == [found.st_dev, found.st_ino] and own(whole)
+    here = plan is not None and plan["folder"] == [found.st_dev, found.st_ino] and own(whole)
+    return plan if here else None
 
 
-def _carry_out(whole: Path, target: Path) -> None:
-    plan = _plan(whole)
-    if plan is None:
-        return
+def _carry_out(whole: Path, plan: dict[str, Any], target: Path) -> None:
     if plan["replaced"] is not None:
         _exchange(whole, target / plan["replaced"])
     for name in sorted(plan["files"], key=lambda name: (name == _LAST, name)):
-        _move(whole / FILES / name, target / name, plan["files"][name], target)
+        _move(whole / plan.get("source", FILES) / name, target / name, plan["files"][name], target)
     for name, digest in plan["old"].items():
         _remove(target / name, digest, target)
     for folder in {(target / name).parent for name in (*plan["files"], *plan["old"])} | {target}:
         synced(folder)
-    shutil.rmtree(whole, ignore_errors=True)
+    done = whole.with_suffix("")  # a kill from here on leaves what is cleared away, and no plan
+    os.rename(whole, done)
+    shutil.rmtree(done, ignore_errors=True)
 
 
 def _move(source: Path, place: Path, stood: str | None, target: Path) -> None:
     """To its place, unless it has been moved or something else stands there by now."""
-    if source.is_file() and _within(place, target) and _digest(place) in (stood, _digest(source)):
-        place.parent.mkdir(parents=True, exist_ok=True)
-        as_before(source, place)
+    if not source.is_file() or not _within(place, target):
+        return
+    found, ours = _digest(place), _digest(source)
+    if found not in (stood, ours):
+        return
+    place.parent.mkdir(parents=True, exist_ok=True)
+    as_before(source, place)
+    try:
         os.replace(source, place)
+    except OSError:
+        if found != ours:  # else nothing is missing there
+            raise
 
 
 def _remove(path: Path, stood: str | None, target: Path) -> None:

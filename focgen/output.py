@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import stat
@@ -61,15 +62,27 @@ def new_folder(target: str | Path, inputs: Iterable[Any] = (), old: Old = tuple)
             target.mkdir(parents=True, exist_ok=True)
             journal.finish(target)
             scratch = stack.enter_context(scratch_folder(target))
-            (scratch / journal.FILES).mkdir()
+            _own_folder(scratch / journal.FILES)
         except OSError as reason:
             raise _unwritable(target, reason) from None
         yield scratch / journal.FILES
         _move(scratch, target, tuple(inputs), old)
 
 
+def _own_folder(path: Path) -> None:
+    """Make a folder that can be read. Else what is put into it would not be found: nothing would be written,
+    and nobody would say so."""
+    path.mkdir()
+    if not os.access(path, os.R_OK | os.W_OK | os.X_OK):
+        path.rmdir()
+        raise PermissionError(errno.EACCES, "the umask takes your own rights away", None)
+
+
 def _unwritable(target: Path, reason: OSError) -> InputError:
-    return InputError(str(target), f"cannot be written ({reason.strerror})", "choose another --out")
+    """Names the file at whose place it failed, where it was at one."""
+    found = Path(str(reason.filename2 or reason.filename or target))
+    place = found if found.is_relative_to(target) and ".focgen-" not in str(found) else target
+    return InputError(str(place), f"cannot be written ({reason.strerror})", "choose another --out")
 
 
 def _remove_empty(folder: Path) -> None:
@@ -147,9 +160,18 @@ def write_files(
             raise InputError(str(target), f"{name!r} would be written outside of it", "choose another name")
     with new_folder(target, inputs, old) as folder:
         for name, content in files.items():
-            path = folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content if isinstance(content, bytes) else _bytes(content, Path(target) / name))
+            _write_one(folder / name, content, Path(target) / name)
+
+
+def _write_one(path: Path, content: str | bytes, place: Path) -> None:
+    """A file that will stand at ``place``. Raises InputError where there is no room for it."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else _bytes(content, place))
+    except OSError as reason:
+        raise InputError(
+            str(place), f"cannot be written ({reason.strerror})", "choose another --out"
+        ) from None
 
 
 def write_file(path: str | Path, text: str, inputs: Iterable[Any] = ()) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from pathlib import Path
 from typing import Any, overload
 
@@ -15,8 +16,24 @@ SMALLEST, LARGEST = 1e-60, 1e60
 """The size of a number in a file of TOML, but for 0."""
 MOST_ORDER = 20.0
 """The size of an order of s: powers of what is fast in a slow rig stay numbers."""
+MOST_TERMS = 256
+"""Terms of a transfer function, and coefficients of a polynomial: work grows with their square."""
 _SIZES = f"of a size from {SMALLEST:g} to {LARGEST:g}, or 0"
 _NONE = "not a finite number, or too small or too large"
+
+
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_DEEP = re.compile(rf"(?:^|[{{,\[])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{32}}", re.MULTILINE)
+"""A key of more tables in tables than any file here has: a parser takes them apart in the square of their
+number."""
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """The content of TOML. Raises TOMLDecodeError for what is none, ValueError for digits without end, and
+    RecursionError for what is nested too deeply."""
+    if _DEEP.search(text):
+        raise RecursionError
+    return tomllib.loads(text)
 
 
 class Table:
@@ -34,7 +51,7 @@ class Table:
         """Read a file. Raises ``error`` where it is missing or is not TOML."""
         try:
             text = read_regular(path, LARGEST_SETTING, error).decode("utf-8")
-            return cls(tomllib.loads(text.replace("\r\n", "\n")), str(path), error)
+            return cls(parsed(text.replace("\r\n", "\n")), str(path), error)
         except OSError as reason:
             raise error(str(path), f"cannot be read ({reason.strerror})", "check the path") from None
         except UnicodeDecodeError:
@@ -121,11 +138,17 @@ class Table:
         )
         if not right:
             raise self.fail(key, f"is {value!r}", "give a list of [coefficient, order of s] terms")
+        self.check_count(key, value)
         highest = max((order for _, order in value), key=abs)
         if abs(highest) > MOST_ORDER:
             what = f"has the order {highest:g}"
             raise self.fail(key, what, f"give orders from {-MOST_ORDER:g} to {MOST_ORDER:g}")
         return [(float(c), float(o)) for c, o in value]
+
+    def check_count(self, key: str, values: Sized) -> None:
+        """Raise for more terms than :data:`MOST_TERMS`."""
+        if len(values) > MOST_TERMS:
+            raise self.fail(key, f"has {len(values)} terms", f"give at most {MOST_TERMS}")
 
     def table(self, key: str) -> Table | None:
         """A sub-table, or None where absent."""

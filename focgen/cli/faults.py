@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import os
 import platform
+import re
 import signal
 import sys
 import tempfile
@@ -20,6 +22,7 @@ from focgen.terminal import for_terminal
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _UNLOADED = "failed to map segment", "annot allocate memory"  # words of the system's loader
+_ALIKE = str.maketrans({"−": "-", "–": "-", "→": "->", "…": "...", "≤": "<=", "≥": ">=", "±": "+-"})
 _SCARCE = (errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM)
 
 
@@ -36,7 +39,10 @@ def _foreseen(error: BaseException, command: str) -> FocgenError | None:
         return FocgenError(command, "takes more memory than there is", "ask for less, or cut the logs")
     if isinstance(error, RecursionError):
         return FocgenError(command, "is given something nested too deeply", "write it flatter")
-    if isinstance(error, BrokenExecutor):
+    if isinstance(error, UnicodeEncodeError):
+        what = f"meets a file name that is no UTF-8 ({error.object[:60]!r})"
+        return FocgenError(command, what, "rename that folder, or set TMPDIR to another one")
+    if isinstance(error, (BrokenExecutor, BrokenPipeError, ConnectionResetError)):
         what = "has lost one of its processes, which was ended or had no memory"
         return FocgenError(command, what, "run it again, with fewer --jobs: what was kept is not done again")
     if isinstance(error, ImportError) and any(words in str(error) for words in _UNLOADED):
@@ -131,22 +137,36 @@ def open_streams() -> None:
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 
 
-def write_out(text: str) -> None:
-    """Write a result to stdout, whole. Where the reader of a pipe has gone, nothing is wrong.
+def write_out(text: str, as_json: bool = False) -> None:
+    """Write a result to stdout, whole. Where the reader of a pipe has gone, nothing is wrong. A character
+    that the terminal's encoding lacks becomes one like it, or "?"; in JSON its number.
 
     Raises FocgenError where it cannot be written: nobody would have the result.
     """
     if sys.stdout is None:
         raise FocgenError("stdout", "is closed", "leave it open, or send it to a file")
     try:
-        sys.stdout.write(text)
+        sys.stdout.write(_in_encoding(text, sys.stdout.encoding or "utf-8", as_json))
         sys.stdout.flush()
     except BrokenPipeError:
         _discard_rest()
-    except (OSError, ValueError) as reason:  # a full disk; a character that the encoding lacks
+    except (OSError, ValueError) as reason:  # a full disk; a name that is no UTF-8
         why = getattr(reason, "strerror", None) or " ".join(str(reason).split())
         _discard_rest()
         raise FocgenError("stdout", f"cannot be written ({why})", "send it to another place") from None
+
+
+def _in_encoding(text: str, encoding: str, as_json: bool) -> str:
+    """Text whose characters an encoding has; those of UTF-8 as they are."""
+    if encoding.lower().replace("-", "") == "utf8":
+        return text
+    if as_json:  # only texts within it hold such characters
+        return re.sub(r"[^\x00-\x7f]", lambda found: json.dumps(found[0])[1:-1], text)
+    try:
+        text.encode(encoding)
+    except UnicodeEncodeError:
+        return text.translate(_ALIKE).encode(encoding, "replace").decode(encoding)
+    return text
 
 
 def _discard_rest() -> None:

@@ -142,5 +142,6 @@ def _run(argv: Sequence[str]) -> int:
         raise FocgenError(argv[0], "is no command", _meant(argv[0], commands(), "focgen"))
     args = parser(argv[0]).parse_args(argv)
     outcome = args.run(args)
-    write_out(to_json(outcome.payload) if args.json else for_terminal(outcome.text.rstrip("\n")) + "\n")
+    text = to_json(outcome.payload) if args.json else for_terminal(outcome.text.rstrip("\n")) + "\n"
+    write_out(text, args.json)
     return 0 if outcome.holds else 1

@@ -26,9 +26,7 @@ _CPP_KEYWORDS = """
 _HEADERS = """
     assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
     stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar
-    wchar wctype foc_rt foc_save foc_memory foc_tune foc_long foc_tiles
-    foc_ahead_q15 foc_ahead_q31 foc_ahead_f32
-    foc_m0_q15 foc_m0_q31 foc_m3_q15 foc_m3_q31 foc_m4_q15 foc_m4_f32
+    wchar wctype
 """.split()
 
 
@@ -69,6 +67,9 @@ _LETTERED = frozenset(f"{name}{end}" for name in _MATHS for end in "fl")  # sinf
 # Files of these names cannot be on Windows, whatever their ending.
 _DEVICES = re.compile(r"con|prn|aux|nul|com\d|lpt\d", re.IGNORECASE)
 
+_RUNTIME = "foc_"  # headers and functions that stand beside every controller
+_TEST = "_selftest"  # NAME_selftest.c stands beside NAME.c
+
 LONGEST = 63  # characters of a name that C tells apart
 
 
@@ -94,6 +95,10 @@ def _fault(name: str) -> str | None:
         return "is a keyword"
     if name.lower() in _HEADERS:
         return f"would hide the header {name.lower()}.h"
+    if name.lower().startswith(_RUNTIME):
+        return f"is reserved: files and functions of the runtime begin with {_RUNTIME}"
+    if name.lower().endswith(_TEST):
+        return f"is reserved: it would be the self-test of {name[: -len(_TEST)] or 'a controller'}"
     if name in _STANDARD or name in _MATHS or name in _LETTERED or _TYPES_AND_LIMITS.fullmatch(name):
         return "is a name of C's library"
     if _DEVICES.fullmatch(name):
@@ -110,5 +115,7 @@ def _short(name: str) -> str:
 def suggestion(name: str) -> str:
     """A name like ``name`` that is free."""
     letters = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")[:40].strip("_")
+    while letters.lower().startswith(_RUNTIME):
+        letters = letters[len(_RUNTIME) :]
     free = letters if letters and not letters[0].isdigit() else f"c{letters}"
     return free if _fault(free) is None else f"{free}_controller"

@@ -3,17 +3,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from focgen.codegen.manifest import read_manifest
 from focgen.codegen.names import check_name
+from focgen.codegen.packages.package import README, package_file
 from focgen.errors import InputError
-from focgen.textfile import LARGEST_CODE, read_regular
+from focgen.resources import shipped
+from focgen.textfile import LARGEST_CODE, holds, read_regular
 
 MANIFEST = "manifest.json"
 _OWN = (MANIFEST, "controller.toml")
+_PLAIN = ("controller.toml", README, "example/main.c")
+_SHARED = re.compile(r"foc_\w+\.h")
 
 
 def kept(folder: Path, name: str) -> dict[str, bytes]:
@@ -44,14 +49,28 @@ def manifest_of_controller(folder: Path, name: str) -> dict[str, Any]:
 
 
 def others(folder: Path, name: str) -> Iterator[tuple[str, frozenset[str]]]:
-    """Yield each other controller of a folder, and the names of its files."""
+    """Yield each other controller of a folder, and the names of its files: those that its manifest lists and
+    ``generate`` writes for a controller of that name."""
     for file in (MANIFEST, *_beside(folder)):
         manifest = read_manifest(folder, file)
         other = _name_of(manifest)
         if other is not None and other != name and file in (MANIFEST, f"{other}.{MANIFEST}"):
             files = manifest.get("files")
             own = {f"{other}.{part}" for part in _OWN} if file != MANIFEST else set()
-            yield other, frozenset(files if isinstance(files, dict) else ()) | own
+            listed = files if isinstance(files, dict) else ()
+            yield other, frozenset(one for one in listed if _writes(folder, one, other)) | own
+
+
+def _writes(folder: Path, file: str, name: str) -> bool:
+    """Whether a file is one that ``generate`` writes for the controller ``name``: a manifest may list any.
+
+    One of the runtime counts as it is shipped.
+    """
+    if _SHARED.fullmatch(file):
+        known = shipped("c_runtime") / file
+        return known.is_file() and holds(folder / file, known.read_bytes())
+    own = {f"{name}{part}.{end}" for part in ("", "_selftest") for end in "ch"}
+    return file in {*own, *_PLAIN} or package_file(file, name)
 
 
 def _beside(folder: Path) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -42,6 +41,7 @@ from focgen.rig.rig import Actuator, Rig
 from focgen.studies.kept import FILE as CURVES
 from focgen.studies.kept import read_study
 from focgen.textfile import LARGEST_SETTING, read_regular
+from focgen.tomlfile import parsed
 
 _TAKEN = (
     "name a rig or a controller (.toml), a folder of generate, study or diagnose, what `verify --json` "
@@ -173,7 +173,7 @@ def _take_folder(folder: Path, chain: _Chain) -> None:
 def _take_toml(path: Path, chain: _Chain) -> None:
     """A rig has signals, a controller a transfer function."""
     try:
-        controller = "transfer" in tomllib.loads(read_regular(path, LARGEST_SETTING).decode("utf-8"))
+        controller = "transfer" in parsed(read_regular(path, LARGEST_SETTING).decode("utf-8"))
     except (OSError, ValueError, RecursionError, InputError):
         controller = False  # the reader of rigs says what is wrong
     _take_object(read_controller(path) if controller else read_rig(path), str(path), chain)

@@ -173,7 +173,9 @@ def _actuator(table: Table | None) -> Actuator | LinearActuator | None:
         linear = LinearActuator(transfer, offset, table.number("bias", 0.0))
         table.done()
         return linear
-    actuator = Actuator(table.number("T", above=0.0), _alpha(table), table.numbers("gain"), offset)
+    gain = table.numbers("gain")
+    table.check_count("gain", gain)
+    actuator = Actuator(table.number("T", above=0.0), _alpha(table), gain, offset)
     table.done()
     return actuator
 

@@ -104,9 +104,12 @@ class Physical:
 
 
 def _number(name: str, value: Any) -> float:
+    """Of anything that is a number; text that reads like one is none."""
     try:
+        if isinstance(value, (str, bytes, bytearray)):
+            raise TypeError
         return float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(name, f"is {value!r}", "give one number") from None
 
 
@@ -119,15 +122,29 @@ def _floats(name: str, values: Numbers, form: Format) -> Numbers:
 def _as(name: str, values: Numbers, kind: type) -> Numbers:
     try:
         return values.astype(kind)
-    except (TypeError, ValueError):
-        raise InputError(name, "holds what is no number", "give numbers") from None
+    except (TypeError, ValueError, OverflowError):
+        raise _no_number(name) from None
 
 
 def _array(name: str, values: Any) -> Numbers:
-    found = np.asarray(values)
+    """Numbers as an array. A date, a text, a complex or a masked one would become a number that nobody
+    meant."""
+    try:
+        found = np.asarray(values)
+    except (TypeError, ValueError):  # rows of several lengths
+        raise _no_number(name) from None
+    texts = found.dtype.kind == "O" and any(isinstance(one, (str, bytes, bytearray)) for one in found.flat)
+    if found.dtype.kind not in "biufO" or texts:
+        raise _no_number(name)
+    if np.ma.is_masked(values):
+        raise InputError(name, "holds masked samples", "fill them, or leave them out")
     if found.ndim > 1:
         raise InputError(name, f"has {found.ndim} dimensions", "give one value for each sample")
     return found
+
+
+def _no_number(name: str) -> InputError:
+    return InputError(name, "holds what is no number", "give numbers")
 
 
 def _not_whole(name: str, value: Any, form: Format) -> InputError:

@@ -68,7 +68,9 @@ def missing(plan: Plan) -> str | None:
 
 def tools() -> str:
     """Names and versions of compiler and emulator."""
-    version = subprocess.run(["avr-gcc", "-dumpversion"], capture_output=True, text=True).stdout.strip()
+    version = subprocess.run(
+        ["avr-gcc", "-dumpversion"], capture_output=True, errors="replace"
+    ).stdout.strip()
     return f"avr-gcc {version}, simavr ({MCU})"
 
 
@@ -202,7 +204,7 @@ def _compiled(sources: list[Path], folder: Path, *more: str) -> bytes:
     with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
         target = Path(scratch) / "out.elf"
         parts = ["avr-gcc", *FLAGS, *more, f"-I{folder}", *map(str, sources), "-o", str(target), "-lm"]
-        done = subprocess.run(parts, capture_output=True, text=True)
+        done = subprocess.run(parts, capture_output=True, errors="replace")
         if done.returncode:
             said = [line for line in done.stderr.splitlines() if "error" in line] or ["it says nothing"]
             raise BuildError(str(sources[-1]), f"avr-gcc: {said[0].strip()}", "take a shorter memory or q15")

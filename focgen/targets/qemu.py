@@ -38,7 +38,7 @@ def absent(core: Core) -> str | None:
 @cache
 def title() -> str:
     """Name and version."""
-    said = subprocess.run([_NAME, "--version"], capture_output=True, text=True).stdout.split("\n")[0]
+    said = subprocess.run([_NAME, "--version"], capture_output=True, errors="replace").stdout.split("\n")[0]
     return f"QEMU {said.removeprefix('QEMU emulator version ').split(' ')[0]}"
 
 
@@ -83,7 +83,7 @@ def _run(program: Program, image: bytes, seconds: float) -> bytes:
                    "-semihosting-config", "enable=on,target=native", "-kernel", "program.elf", "-device",
                    f"loader,file=inputs.bin,addr={program.core.work:#x},force-raw=on"]  # fmt: skip
         try:
-            done = subprocess.run(command, cwd=base, capture_output=True, text=True, timeout=seconds)
+            done = subprocess.run(command, cwd=base, capture_output=True, errors="replace", timeout=seconds)
         except subprocess.TimeoutExpired:
             raise TargetFault(f"did not return within {seconds:g} s in QEMU") from None
         if done.returncode or not (base / "results.bin").is_file():

@@ -85,7 +85,7 @@ def _gcc_of(name: str) -> Toolchain | None:
 
 
 def _said(*command: str) -> str:
-    return subprocess.run(command, capture_output=True, text=True, timeout=60.0).stdout.strip()
+    return subprocess.run(command, capture_output=True, errors="replace", timeout=60.0).stdout.strip()
 
 
 def link(chain: Toolchain, core: Core, sources: Sequence[Path], script: Path, target: Path, entry: str,
@@ -117,7 +117,7 @@ def compile_object(chain: Toolchain, core: Core, source: Path, include: Sequence
 
 def _run(chain: Toolchain, core: Core, source: Path, parts: list[str]) -> None:
     try:
-        done = subprocess.run(parts, capture_output=True, text=True, env=_environment(), timeout=_SLOW)
+        done = subprocess.run(parts, capture_output=True, errors="replace", env=_environment(), timeout=_SLOW)
     except subprocess.TimeoutExpired:
         raise BuildError(str(source), f"{chain.name} did not end within {_SLOW:g} s",
                          "try again; the first build also makes Zig's runtime") from None  # fmt: skip

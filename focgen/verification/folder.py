@@ -130,7 +130,9 @@ def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Ite
     folders = {parent.as_posix() for name in files for parent in Path(name).parents}
     beside_it = dict(others(path, controller))
     for other in sorted(beside_it):
-        yield f"{other}: stands here as well and was not looked at; to verify it, give it its own folder"
+        its = sorted(name for name in beside_it[other] - files.keys() if (path / name).is_file())
+        what = f"stands here as well and was not looked at ({', '.join(its)})"
+        yield f"{other}: {what}; to verify it, give it its own folder"
     known = {
         *files,
         *folders,

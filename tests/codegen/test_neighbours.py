@@ -3,6 +3,7 @@
 Red when one controller replaces or removes a file of the other.
 """
 
+import hashlib
 import json
 
 import pytest
@@ -49,6 +50,22 @@ def test_verify_tells_of_the_one_and_names_the_other(tmp_path):
     assert note.startswith("one: stands here as well")
     (tmp_path / "stranger.c").write_text("mine")
     assert any("stranger.c" in note for note in read_folder(tmp_path).notes)
+
+
+def test_a_strangers_manifest_hides_no_file(tmp_path):
+    """Whatever it lists: what generate does not write is named, a header of the runtime that is another, too;
+    the other's own files are named with it."""
+    pair(tmp_path)
+    path = tmp_path / "one.manifest.json"
+    manifest = json.loads(path.read_text())
+    for name in ("math.h", "Makefile", "foc_m4_f32.h", "foc_own.h", "example/math.h"):
+        (tmp_path / name).write_text("mine")
+        manifest["files"][name] = hashlib.sha256(b"mine").hexdigest()
+    path.write_text(json.dumps(manifest))
+    neighbour, *strangers = read_folder(tmp_path).notes
+    assert "(one.c, one.controller.toml, one.h, one.manifest.json)" in neighbour
+    named = {note.partition(":")[0] for note in strangers}
+    assert named == {"math.h", "Makefile", "foc_m4_f32.h", "foc_own.h", "example/math.h"}
 
 
 def test_what_the_other_needs_stays(tmp_path):

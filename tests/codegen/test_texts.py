@@ -130,7 +130,7 @@ def test_contexts_carry_names_and_units_as_such(monkeypatch, tmp_path):
 REFUSED = {
     "is a name of C's library": "NULL printf INT32_MAX UINT8_C int32_t size_t sinf EOF main SIGINT".split(),
     "is a keyword": "int class restrict".split(),
-    "is reserved": "_Foo __x _".split(),
+    "is reserved": "_Foo __x _ foc_integral FOC_x foc_ x_selftest X_SELFTEST _selftest".split(),
     "cannot be a file on Windows": "con CON Aux nul com1 LPT9 prn".split(),
     "characters": ["x" * 64, "C" * 300],
     "is no C identifier": ["a b", "1a", "", "ü", "a\n", "a;b", "../x", "/abs", "a" * 300 + "."],

@@ -67,6 +67,8 @@ FAULTS = {
     "alpha too high": (RIG.replace("alpha = 0.6", "alpha = 2.0"), "order in (0, 2)"),
     "alpha 0": (RIG.replace("alpha = 0.6", "alpha = 0.0"), "above 0"),
     "T negative": (RIG.replace("T = 1.32", "T = -1.32"), "above 0"),
+    "gain endless": (RIG.replace("[0.0015, 0.345]", str([0.001] * 257)), "at most 256"),
+    "terms endless": (RIG.replace("[[152.48, 0.0]]", str([[1.0, 0.0]] * 257)), "at most 256"),
     "gain empty": (RIG.replace("[0.0015, 0.345]", "[]"), "list of finite numbers"),
     "gain infinite": (RIG.replace("[0.0015, 0.345]", "[inf]"), "list of finite numbers"),
     "misspelt key": (RIG.replace("alpha = 0.6", "alpha = 0.6\ngian = [1.0]"), "unknown key 'gian'"),

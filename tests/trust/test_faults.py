@@ -4,8 +4,10 @@ Red when bad input or a full disk brings a traceback, another exit status, or ha
 """
 
 import copy
+import errno
 import functools
 import gzip
+import io
 import json
 import operator
 import os
@@ -19,9 +21,11 @@ import pytest
 import tomlkit
 
 from focgen.cli import generate as command
+from focgen.cli.faults import write_out
 from focgen.cli.main import main
 from focgen.codegen.generate import generate
 from focgen.errors import InputError, LogError
+from focgen.jsontext import to_json
 from focgen.logs.table import read_table
 from focgen.plan.formats import exponent_for
 from focgen.textfile import read_regular
@@ -93,6 +97,8 @@ def test_a_fault_on_a_full_disk_still_is_a_line(scratch, monkeypatch, capsys):
         (OSError(28, "No space left on device"), "make room"),
         (OSError(24, "Too many open files"), "ulimit"),
         (BrokenExecutor("terminated abruptly"), "fewer --jobs"),
+        (BrokenPipeError(errno.EPIPE, "Broken pipe"), "fewer --jobs"),
+        (UnicodeEncodeError("utf-8", "/tmp/\udcff", 5, 6, "surrogates"), "set TMPDIR"),
         (ImportError("x.so: failed to map segment from shared object"), "ulimit -v"),
         (PermissionError(13, "Permission denied", "/etc/x"), "/etc/x: cannot be used"),
     ],
@@ -112,6 +118,30 @@ def test_a_result_that_cannot_be_written_is_no_success(tmp_path):
     done = run(f"FOCGEN {tmp_path}/fw >/dev/full")
     assert done.returncode == 2 and done.stderr.count("\n") == 1 and "No space left" in done.stderr
     assert run(f"FOCGEN {tmp_path}/fw >&- 2>&-").returncode == 2
+
+
+@pytest.mark.parametrize("encoding", ("ascii", "cp1252", "iso8859-9"))
+def test_a_terminal_that_lacks_characters_loses_no_result(tmp_path, monkeypatch, encoding):
+    """One of Windows or of an old locale: what is written is no failure for a minus sign that is shown."""
+    text = (EXAMPLES / "controller.toml").read_text().replace('"V"', '"V−☃"')
+    (tmp_path / "snow.toml").write_text(text, encoding="utf-8")
+    own = f"{sys.executable} -m focgen generate {tmp_path}/snow.toml --length 5 --out {tmp_path}/fw"
+    plain = run(f"PYTHONIOENCODING={encoding} {own} >{tmp_path}/said")
+    assert plain.returncode == 0 and b"V-?" in (tmp_path / "said").read_bytes()
+    stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    monkeypatch.setattr(sys, "stdout", stream)
+    write_out(to_json({"unit": "µV−☃😀"}), as_json=True)
+    assert json.loads(stream.buffer.getvalue().decode(encoding)) == {"unit": "µV−☃😀"}
+
+
+def test_a_compiler_may_say_what_is_no_text(tmp_path):
+    """The name of a folder, for instance, as bytes that are no UTF-8."""
+    compiler = tmp_path / "cc"
+    compiler.write_text("#!/bin/sh\nprintf 'b\\377d.c: error: no' >&2\nexit 1\n")
+    compiler.chmod(0o755)
+    generate(seed_controller(5), tmp_path / "fw", "q15")
+    done = run(f"CC={compiler} {sys.executable} -m focgen verify {tmp_path}/fw")
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "error: no" in done.stderr
 
 
 def test_streams_that_are_closed_are_missed_by_nobody(tmp_path):
@@ -144,7 +174,22 @@ def test_a_pipe_that_goes_away_hides_no_failed_check(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize(
     "spoilt",
-    ["length = " + "9" * 5000 + "\n", "a = " + "[" * 3000, "a\0b", "\ufeff", "length = 1e999\n", "[" * 70000],
+    [
+        *(
+            "length = " + "9" * 5000 + "\n",
+            "a = " + "[" * 3000,
+            "a\0b",
+            "\ufeff",
+            "length = 1e999\n",
+            "[" * 70000,
+        ),
+        *(
+            start + "a." * 10**6 + "b" + end
+            for start, end in (("", " = 1\n"), ("[", "]\n"), ("x = {", " = 1}\n"))
+        ),
+        "\"a\" . 'b' . " * 10**5 + "c = 1\n",
+    ],
+    ids=range(10),
 )
 def test_no_toml_is_a_traceback(tmp_path, scratch, spoilt, capsys):
     path = tmp_path / "c.toml"
