@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from focgen.arrays import Array
+from focgen.arrays import Array, Bools
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
@@ -95,8 +95,10 @@ def _shows(
     before, after = (_made(rig, placed, of, entry, leaves[-1]) for of in (logs, found))
     if float(np.sqrt(np.mean((after - before) ** 2))) <= _SEEN * float(np.max(np.abs(before))):
         return False
-    idle = np.concatenate([_still(log, entry) & log.before(entry).known for log in found])
-    return bool(np.sum((y - after)[idle] ** 2) < np.sum((y - before)[idle] ** 2))
+    idle = np.concatenate([_still(log, entry) for log in found if log.before(entry).known])
+    known = np.concatenate([np.full(len(log), log.before(entry).known) for log in found])
+    after, before = (y - after)[known][idle], (y - before)[known][idle]
+    return bool(np.sum(after**2) < np.sum(before**2))
 
 
 def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry: str, leaves: str) -> Array:
@@ -108,8 +110,8 @@ def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry:
     return made
 
 
-def _still(log: Experiment, role: str) -> Array:
+def _still(log: Experiment, role: str) -> Bools:
     """Which samples (n,) are ahead of the first at which the input is no longer 0."""
     x = np.abs(np.asarray(log[role], float))
-    made: Array = np.logical_and.accumulate(x <= _NOTHING * float(np.max(x)))
+    made: Bools = np.logical_and.accumulate(x <= _NOTHING * float(np.max(x)))
     return made
