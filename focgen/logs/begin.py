@@ -12,14 +12,16 @@ from focgen.arrays import Array
 @dataclass(frozen=True)
 class Begin:
     """A signal before the first sample: ``levels`` (k,) in its unit, the first held for ever, each up to
-    ``ago`` (k − 1,) s before that sample, latest last, and the last level up to it.
+    ``ago`` (k − 1,) s before that sample, latest last, and the last level up to it. ``known``: earlier logs
+    show it, and nothing of it is estimated.
 
     >>> Begin((0.0, 1.5), (3.0,))  # stepped from 0 to 1.5, 3 s before the log begins
-    Begin(levels=(0.0, 1.5), ago=(3.0,))
+    Begin(levels=(0.0, 1.5), ago=(3.0,), known=False)
     """
 
     levels: tuple[float, ...] = (0.0,)
     ago: tuple[float, ...] = ()
+    known: bool = False
 
     @property
     def at_rest(self) -> bool:

@@ -106,6 +106,8 @@ def _range(logs: Sequence[Experiment], role: str) -> tuple[float, float]:
 def _begun(
     rig: Rig, log: Experiment, placed: Sequence[Placed], entries: Iterable[str], scales: _Scales
 ) -> Experiment:
+    if any(begin.known for begin in log.begins.values()):
+        return log
     if len(log) < 2 * _FIRST or not all(np.all(np.isfinite(log[role])) for role in scales.sizes):
         return log
     found = {entry: _Setting(rig, log, entry, placed, scales).chosen() for entry in entries}

@@ -20,6 +20,7 @@ from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import begun
 from focgen.rig.plausibility import doubts
+from focgen.rig.recalled import RECALLED, recalled
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
 from focgen.shown import Shown
@@ -65,11 +66,21 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
     given = rig_of(rig)
     session = experiments(given, logs, from_, to)
     told = told_between(given, session)
-    session = begun(told, session, placed_in(told))
+    session = _with_past(told, session)
     simulated = simulate_session(told, session)
     results = {log.name: _compared(log, made) for log, made in zip(session, simulated)}
     made = {log.name: made for log, made in zip(session, simulated)}
     return Replay(results, made, notes_of(session), doubts(told, session), told, tuple(session))
+
+
+def _with_past(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments with what was before them: by their own beginnings, or by the logs of those before,
+    where that brings the output closer."""
+    found = begun(rig, logs, placed_in(rig))
+    known = recalled(rig, found, placed_in(rig))
+    if all(a is b for a, b in zip(known, found)) or not all("output" in log for log in logs):
+        return found
+    return known if _left(rig, known) < RECALLED * _left(rig, found) else found
 
 
 def experiments(

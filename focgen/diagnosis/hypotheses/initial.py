@@ -22,6 +22,7 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.initial import begun
+from focgen.rig.recalled import RECALLED, recalled
 from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
@@ -35,8 +36,19 @@ def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...
     """The experiments with what their signals were before, where the data ask for it; a session at rest as it
     is.
 
-    Begins that leave the refitted rig no better than a rest does are none.
+    Begins that leave the refitted rig no better than a rest does are none; and what earlier experiments left
+    has to bring the refitted rig closer.
     """
+    found = _told(rig, logs)
+    known = recalled(rig, found)
+    if all(a is b for a, b in zip(known, found)):
+        return found
+    closer = _refitted(rig, known)[1] < RECALLED * _refitted(rig, found)[1]
+    return known if closer else found
+
+
+def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments with the begins that their own first samples tell."""
     found = begun(rig, logs)
     if not any(log.begins for log in found):
         return found
@@ -70,7 +82,7 @@ def loosened(rig: Rig, segment: Segment) -> Segment:
         return segment
     columns = []
     for (first, last), begin in zip(segment.run.spans, segment.run.begins):
-        for way in _ways(rig, segment, first, last, begin) if not begin.at_rest else ():
+        for way in () if begin.at_rest or begin.known else _ways(rig, segment, first, last, begin):
             column = np.zeros(len(segment.x))
             column[first:last] = way
             columns.append(column)

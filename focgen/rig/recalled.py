@@ -1,0 +1,117 @@
+"""What the experiments of a session left in the rig, where it rested too short between two to forget them.
+
+The clock of the session says how long ago each earlier experiment was, and what the input was then is in the
+logs. Between two logs it counts as 0. A fractional actuator forgets by a power of time only: after a rest of
+five response times its output is still off by some per cent. The input's past is given as levels, means over
+windows that are the longer, the longer they are ago: what is left of it changes no faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from focgen.arrays import Array, Bools
+from focgen.logs.begin import Begin
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run
+from focgen.rig.engine import STAGES, Chain, Placed, between_of
+from focgen.rig.initial import ENTERS, LEAVES
+from focgen.rig.response import integrations, longest, response_time
+from focgen.rig.rig import Rig
+
+NOTE = "begins before the rig has come to rest: the experiments before are simulated ahead of it"
+RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers
+_LONGEST = 250.0  # response times: what is longer ago counts as 0
+_WIDTH = 0.1  # of how long ago it is: a window
+_NOTHING = 0.06  # of the input's largest magnitude: what counts as 0, as in focgen.rig.initial
+_SEEN = 2e-3  # of the output's largest magnitude, in root mean square: less does not show
+_FIRST = 5  # samples that tell where the input begins
+
+
+def recalled(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
+    """The experiments, each that begins with an input of 0 with what the earlier ones put in; as they are
+    where that would not show, or in a rig that integrates."""
+    if len(logs) < 2 or not all(map(len, logs)) or integrations(rig):
+        return tuple(logs)
+    past = _LONGEST * response_time(rig, logs[0].sample_time, longest(logs))
+    found = tuple(_recalled(log, [other for other in logs if _end(other) <= log.start], past) for log in logs)
+    return found if _shows(rig, placed, logs, found) else tuple(logs)
+
+
+def _end(log: Experiment) -> float:
+    """When the last sample of an experiment was, on the session's clock, s."""
+    return log.start + (len(log) - 1) * log.sample_time
+
+
+def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float) -> Experiment:
+    roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
+    begins = {role: _begin(log, earlier, role, past) for role in roles if _idle(log, earlier, role)}
+    begins = {role: begin for role, begin in begins.items() if not begin.at_rest}
+    return replace(log, begins=begins, notes=(*log.notes, NOTE)) if begins else log
+
+
+def _idle(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
+    """Whether an input is 0 where the experiment begins."""
+    largest = max(float(np.max(np.abs(each[role]))) for each in (log, *earlier))
+    return abs(float(np.mean(log[role][:_FIRST]))) <= _NOTHING * largest
+
+
+def _begin(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Begin:
+    """An input's past, by the logs of the ``earlier`` experiments, up to so many s before this one."""
+    ago = np.concatenate([np.zeros(0), *(_ago(log, other) for other in earlier)])
+    x = np.concatenate([np.zeros(0), *(np.asarray(other[role], float) for other in earlier)])
+    seen = ago <= past
+    if not seen.any():
+        return Begin()
+    edges = [max(float(ago[seen].min()) - log.sample_time, log.sample_time)]
+    while edges[-1] < ago[seen].max():
+        edges.append(edges[-1] * (1.0 + _WIDTH) + log.sample_time)
+    sums, _ = np.histogram(ago[seen], edges, weights=x[seen])
+    means = sums * log.sample_time / np.diff(edges)
+    return Begin((0.0, *map(float, means[::-1]), 0.0), tuple(edges[::-1]), known=True)
+
+
+def _ago(log: Experiment, other: Experiment) -> Array:
+    """How long before this experiment the samples of another one were, s."""
+    made: Array = log.start - other.start - other.sample_time * np.arange(len(other))
+    return made
+
+
+def _shows(
+    rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], found: Sequence[Experiment]
+) -> bool:
+    """Whether what was before changes what is measured, and comes closer to it while the input is still 0.
+
+    A rig that was reset cannot have moved there, whatever its parameters are.
+    """
+    entry = next(role for role in ENTERS if role in logs[0])
+    leaves = [s for s in STAGES[STAGES.index(ENTERS[entry]) :] if all(LEAVES[s] in log for log in logs)]
+    if not leaves or not any(log.before(entry).known for log in found):
+        return False
+    y = np.concatenate([np.asarray(log[LEAVES[leaves[-1]]], float) for log in logs])
+    before, after = (_made(rig, placed, of, entry, leaves[-1]) for of in (logs, found))
+    if float(np.sqrt(np.mean((after - before) ** 2))) <= _SEEN * float(np.max(np.abs(before))):
+        return False
+    idle = np.concatenate([_still(log, entry) for log in found if log.before(entry).known])
+    known = np.concatenate([np.full(len(log), log.before(entry).known) for log in found])
+    after, before = (y - after)[known][idle], (y - before)[known][idle]
+    return bool(np.sum(after**2) < np.sum(before**2))
+
+
+def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry: str, leaves: str) -> Array:
+    """What the rig makes (n,) of all experiments, from the input ``entry`` on."""
+    x = np.concatenate([np.asarray(log[entry], float) for log in logs])
+    begins, starts = [log.before(entry) for log in logs], [log.start for log in logs]
+    run = Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins)
+    made: Array = Chain(rig, tuple(placed)).run(x, ENTERS[entry], leaves, run, between_of(rig, entry))
+    return made
+
+
+def _still(log: Experiment, role: str) -> Bools:
+    """Which samples (n,) are ahead of the first at which the input is no longer 0."""
+    x = np.abs(np.asarray(log[role], float))
+    made: Bools = np.logical_and.accumulate(x <= _NOTHING * float(np.max(x)))
+    return made

@@ -1,0 +1,126 @@
+"""A rig that rested too short between two experiments to forget the first.
+
+The rig here is not the library's: its fractional integral is a bank of relaxations, by the Stieltjes form of
+the kernel t^(α − 1)/Γ(α). Red when what an earlier experiment left is lost, or is put into a rig that was reset.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.hypotheses.initial import begun_session
+from focgen.logs.experiment import Experiment
+from focgen.rig.files import read_rig
+from focgen.rig.recalled import recalled
+from focgen.rig.replay import replay, simulate_session
+from focgen.rig.rig import Rig
+
+H, T, ALPHA, GAIN, NOISE = 0.05, 1.0, 0.6, 3.0, 0.01
+TEXT = """
+name = "short rests"
+sample_time = 0.05
+[signals]
+time = "t_s"
+run = "run"
+pressure = "p_bar"
+output = "x_mm"
+[actuator]
+T = {T}
+alpha = {alpha}
+gain = [3.0]
+"""
+
+
+def _fractional(x: np.ndarray) -> np.ndarray:
+    """T D^α y + y = K x by implicit steps of H/10, the input in straight lines."""
+    h, n = H / 10, len(x)
+    fine = np.interp(np.arange(10 * n) / 10, np.arange(n), x)
+    rates = np.geomspace(1e-5, 1e4, 80)
+    weights = np.sin(np.pi * ALPHA) / np.pi * rates ** (1.0 - ALPHA) * np.log(rates[1] / rates[0])
+    weights, kept = weights * h / (1.0 + h * rates), 1.0 / (1.0 + h * rates)
+    z, now, y = np.zeros(80), float(weights.sum()), np.zeros(10 * n)
+    for k, value in enumerate(fine):
+        y[k] = (float(kept @ z) + now / T * GAIN * value) / (1.0 + now / T)
+        z = kept * z + weights * (GAIN * value - y[k]) / T
+    return y[::10]
+
+
+def _session(rest: float) -> tuple[np.ndarray, np.ndarray, list[tuple[int, int]]]:
+    """Three experiments on one clock, with rests that no log shows: input, reading, spans."""
+    held = int(8.0 / H)
+    one = np.concatenate([np.zeros(20), *(np.full(held, v) for v in (0.6, 0.0, 1.0, 0.3))])
+    gap = np.zeros(int(rest / H))
+    x = np.concatenate([one, gap, one * 0.8, gap, one])
+    noise = np.random.default_rng(4).normal(0.0, NOISE, len(x))
+    starts = [k * (len(one) + len(gap)) for k in range(3)]
+    return x, _fractional(x) + noise, [(s, s + len(one)) for s in starts]
+
+
+def _logs(rest: float) -> list[Experiment]:
+    x, y, spans = _session(rest)
+    x = x.copy()
+    return [
+        Experiment(f"run {k}", H, {"pressure": x[a:b], "output": y[a:b]}, start=a * H)
+        for k, (a, b) in enumerate(spans)
+    ]
+
+
+def _rig(folder: Path, text: str = TEXT.format(T=T, alpha=ALPHA)) -> Rig:
+    (folder / "rig.toml").write_text(text)
+    return read_rig(folder / "rig.toml")
+
+
+def _left(rig: Rig, logs: list[Experiment]) -> float:
+    made = simulate_session(rig, logs)
+    return float(np.sqrt(np.mean([np.mean((a["output"] - b["output"]) ** 2) for a, b in zip(logs, made)])))
+
+
+def test_what_was_before_is_simulated_ahead_of_an_experiment(tmp_path: Path) -> None:
+    rig, logs = _rig(tmp_path), _logs(rest=10.0)
+    told = begun_session(rig, logs)
+    assert [log.before("pressure").known for log in told] == [False, True, True]
+    assert _left(rig, logs) > 3.0 * NOISE
+    assert _left(rig, list(told)) < 1.2 * NOISE
+
+
+def test_replay_does_the_same(tmp_path: Path) -> None:
+    frame = {key: np.concatenate(parts) for key, parts in _columns(_logs(rest=10.0)).items()}
+    found = replay(_rig(tmp_path), frame)
+    assert all(each.rmse < 1.25 * NOISE for each in found.logs.values())
+    assert any("before the rig has come to rest" in note for note in found.notes)
+
+
+def _columns(logs: list[Experiment]) -> dict[str, list[np.ndarray]]:
+    return {
+        "run": [np.full(len(log), k) for k, log in enumerate(logs)],
+        "t_s": [log.start + log.time for log in logs],
+        "p_bar": [np.asarray(log["pressure"]) for log in logs],
+        "x_mm": [np.asarray(log["output"]) for log in logs],
+    }
+
+
+def test_a_rig_that_forgets_is_left_as_it_is(tmp_path: Path) -> None:
+    rig = _rig(tmp_path, TEXT.format(T=0.5, alpha=1.0))
+    logs = tuple(_logs(rest=10.0))
+    assert all(a is b for a, b in zip(logs, recalled(rig, logs)))
+
+
+def test_experiments_that_each_began_at_rest_are_believed(tmp_path: Path) -> None:
+    """What the clock says is a guess: a rig that was reset between two experiments remembers nothing."""
+    rig, logs = _rig(tmp_path), _logs(rest=10.0)
+    reset = [
+        Experiment(log.name, H, {**log.signals, "output": made["output"]}, start=log.start)
+        for log, made in zip(logs, simulate_session(rig, logs))
+    ]
+    assert all(a is b for a, b in zip(reset, recalled(rig, reset)))
+    assert any(log.before("pressure").known for log in begun_session(rig, logs))
+    assert not any(log.before("pressure").known for log in begun_session(rig, reset))
+
+
+@pytest.mark.parametrize("rest", [3.0, 30.0])
+def test_windows_hold_what_went_in(tmp_path: Path, rest: float) -> None:
+    """The past that is put ahead has the integral of what the logs hold."""
+    logs = _logs(rest)
+    begin = recalled(_rig(tmp_path), logs)[1].before("pressure")
+    assert begin.samples(H).sum() == pytest.approx(np.sum(logs[0]["pressure"]), rel=0.01)
