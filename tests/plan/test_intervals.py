@@ -1,4 +1,4 @@
-"""Proofs from their ground: intervals against every number in them, and a box of parameters against its corners.
+"""Proofs from their ground: intervals against every number in them, a box of parameters at its corners.
 
 Red when an interval lacks a number that can come, or has one that cannot.
 """
@@ -6,7 +6,7 @@ Red when an interval lacks a number that can come, or has one that cannot.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -74,6 +74,6 @@ def test_the_box_of_parameters_is_proved_at_its_corners(arithmetic):
     assert proofs["tuned gain product"] == max(abs(p) for both in made for p in both) + half
     steep = [
         (max(abs(b - a) for a, b in product(*pair)) * abs(int(per)), (1 << by) >> 1)
-        for pair, per, by in zip(zip(gains, gains[1:]), box.reciprocals, box.to_slopes)
+        for pair, per, by in zip(pairwise(gains), box.reciprocals, box.to_slopes)
     ]
     assert proofs["tuned slope product"] == max(s for s, _ in steep) + max(h for _, h in steep)
