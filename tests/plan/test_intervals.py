@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from focgen.control.controller import Tunable
+from focgen.errors import PlanError
 from focgen.plan.banks import departure
 from focgen.plan.build import build_plan
 from focgen.plan.formats import Interval, shift
@@ -77,3 +78,9 @@ def test_the_box_of_parameters_is_proved_at_its_corners(arithmetic):
         for pair, per, by in zip(pairwise(gains), box.reciprocals, box.to_slopes)
     ]
     assert proofs["tuned slope product"] == max(s for s, _ in steep) + max(h for _, h in steep)
+
+
+@pytest.mark.parametrize("wrong", ({"tolerance": 1}, {"horizon": 1000.5}))
+def test_either_number_of_a_memory_is_held_to_its_type(wrong):
+    with pytest.raises(PlanError, match="the tolerance .* and the horizon"):
+        build_plan(paper_controller(20), "q31", memory="exponential", **wrong)
