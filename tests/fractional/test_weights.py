@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from focgen.fractional.weights import (
+    _BERNOULLI,
     gl_weights,
     gl_weights_at,
     short_memory_bias,
@@ -77,3 +78,10 @@ def test_short_memory_bias_sums_the_weights_and_tends_to_its_asymptote():
 def test_what_has_no_weights_is_refused(order, count):
     with pytest.raises(ValueError):
         gl_weights(order, count)
+
+
+def test_the_polynomials_are_bernoullis():
+    """Against mpmath's, at as many places as fix them."""
+    for degree, coefficients in _BERNOULLI.items():
+        for x in np.linspace(-2.0, 2.0, degree + 2):
+            assert np.polyval(coefficients, x) == pytest.approx(float(mp.bernpoly(degree, x)), abs=1e-9)

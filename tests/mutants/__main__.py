@@ -40,7 +40,7 @@ def _asked() -> argparse.Namespace:
     given.add_argument("--seed", type=int, default=1)
     given.add_argument("--rooms", nargs="+", default=list(ROOMS), choices=list(ROOMS))
     given.add_argument("--patience", type=float, nargs="+", default=[15.0, 60.0], metavar="SECONDS",
-                       help="of tests that a change is worth; what survives is tried again for the next")  # fmt: skip
+                       help="of tests that a change is worth; survivors are given the next")  # fmt: skip
     given.add_argument("--folder", type=Path, default=Path("build/mutants"), help="kept from run to run")
     given.add_argument("--again", action="store_true", help="measure the tests and begin anew")
     given.add_argument("--report", action="store_true", help="only print what was tried")
