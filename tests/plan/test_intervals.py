@@ -11,13 +11,15 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from focgen.control.controller import Tunable
+from focgen.control.controller import ControllerRanges, Tunable
 from focgen.errors import PlanError
+from focgen.fractional.transfer import TransferFunction
 from focgen.plan.banks import departure
 from focgen.plan.build import build_plan
 from focgen.plan.formats import Interval, shift
 from focgen.plan.stability import inverse
 from tests.conftest import paper_controller
+from tests.controllers import simple
 
 SPANS = [Interval(*ends) for ends in ((-7, 5), (-3, -3), (0, 6), (2, 9), (-9, -2), (-1, 0))]
 
@@ -84,3 +86,16 @@ def test_the_box_of_parameters_is_proved_at_its_corners(arithmetic):
 def test_either_number_of_a_memory_is_held_to_its_type(wrong):
     with pytest.raises(PlanError, match="the tolerance .* and the horizon"):
         build_plan(paper_controller(20), "q31", memory="exponential", **wrong)
+
+
+@pytest.mark.parametrize("arithmetic", ("q31", "q15"))
+def test_a_sum_reaches_what_its_worst_pasts_give(arithmetic):
+    """Errors of unlike ends, so that no end stands for the other."""
+    ranges = ControllerRanges((-1.0, -0.1), (-1.0, 1.0), (-10.0, 10.0))
+    controller = simple(TransferFunction([(1.0, 0.0), (0.3, 0.5)]), ranges=ranges, length=200)
+    plan = build_plan(controller, arithmetic)
+    low, high = int(plan.error.low), int(plan.error.high)
+    assert -low != high and len(plan.direct.blocks) > 3
+    for least, most, reached in ((low, high, plan.direct.total.low), (high, low, plan.direct.total.high)):
+        sums = [sum(int(w) * (least if w > 0 else most) for w in b.weights) for b in plan.direct.blocks]
+        assert reached == sum(shift(total, b.align) for total, b in zip(sums, plan.direct.blocks))
