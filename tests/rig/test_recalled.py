@@ -1,7 +1,9 @@
 """A rig that rested too short between two experiments to forget the first.
 
 The rig here is not the library's: its fractional integral is a bank of relaxations, by the Stieltjes form of
-the kernel t^(α − 1)/Γ(α). Red when what an earlier experiment left is lost, or is put into a rig that was reset.
+the kernel t^(α − 1)/Γ(α).
+
+Red when what an earlier experiment left is lost, or is put into a rig that was reset.
 """
 
 from pathlib import Path
