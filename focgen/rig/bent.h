@@ -13,10 +13,12 @@ static double bent(const double *spring, double y, double *slope)
     return y < 0.0 ? -size : size;
 }
 
-/* The same with an obstacle: `spring` goes on with {place, stiffness}, and beyond y = place it takes stiffness (y - place). */
+/* The same with an obstacle: `spring` goes on with {place, stiffness}, and beyond y = place it takes stiffness (y - place). A place below
+ * 0 stands for obstacles on both sides, as far away. */
 static double pull(const double *spring, double y, double *slope)
 {
-    double taken = bent(spring, y, slope);
-    if (y > spring[3]) taken += spring[4] * (y - spring[3]), *slope += spring[4];
+    double taken = bent(spring, y, slope), place = spring[3], side = place < 0.0 && y < 0.0 ? -1.0 : 1.0;
+    double beyond = side * y - fabs(place);
+    if (beyond > 0.0) taken += side * spring[4] * beyond, *slope += spring[4];
     return taken;
 }

@@ -64,9 +64,10 @@ class Dynamics:
 
     Of T D^α y + y = x: every rate is multiplied by ``unloading`` while the load falls short of the response,
     and a mass has a damper weaker by that factor while it falls back to 0;
-    beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place). Of that and of any other
-    spring y follows ``bend``, and dry friction, the ``drag``, takes away from x, in its unit.
-    So does a ``preload``, which presses the spring against a seat at 0. A ``mass`` in s² adds mass·D² y. Of a
+    beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place); a ``place`` below 0 stands
+    for one on either side, as far away. Of that and of any other spring y follows ``bend``, and dry friction,
+    the ``drag``, takes away from x, in its unit. So does a ``preload``, which presses the spring against a
+    seat at 0. A ``mass`` in s² adds mass·D² y. Of a
     :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag.
     """
 

@@ -94,7 +94,7 @@ def respond(
     unloading, longest = dynamics.unloading, 2.0 ** np.ceil(np.log2(duration))
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
-    if dynamics.bend != STRAIGHT or dynamics.preload:
+    if dynamics.bend != STRAIGHT or dynamics.preload or dynamics.place < 0.0:
         made = kernels.bent_modes(x, rest, a, b0, b1, pair, through, switching, dynamics.bending())
     else:
         obstacle = dynamics.place, dynamics.stiffness

@@ -103,9 +103,35 @@ def test_an_obstacle_against_an_integrator(m, stiffness):
     np.testing.assert_allclose(made, exact.y[0], atol=1e-3 * np.max(exact.y[0]))
 
 
+@pytest.mark.parametrize("m", [0.05, 0.0])
+def test_stops_on_both_sides_against_an_integrator(m):
+    """A mass on a spring, and a lag."""
+    t, place, stiffness = H * np.arange(600), 0.4, 12.0
+    x = 0.9 * np.sin(2.3 * t) - 0.3 * np.sin(0.7 * t)
+
+    def slope(now, state):
+        pushed = stiffness * (state[0] - np.clip(state[0], -place, place))
+        left = np.interp(now, t, x) - state[0] - pushed
+        return [state[1], (left - 0.7 * state[1]) / m] if m else [left / 0.7]
+
+    begin = [0.0, 0.0] if m else [0.0]
+    exact = solve_ivp(slope, (0, t[-1]), begin, t_eval=t, method="LSODA", rtol=1e-9, atol=1e-12, max_step=H)
+    stops = Dynamics(place=-place, stiffness=stiffness)
+    if m:
+        made = respond(Plant(2, m, 0.7, 1.0), x, rest(600), H, stops, Between.STRAIGHT)
+    else:
+        made = lag(x, rest(600), H, 0.7, 1.0, 6.0, stops)
+    assert exact.y[0].max() > place and exact.y[0].min() < -place
+    np.testing.assert_allclose(made, exact.y[0], atol=2e-3 * np.max(exact.y[0]))
+
+
 @pytest.mark.parametrize(
     ("effect", "form", "value"),
-    [("dead_zone", "preloaded", (0.3,)), ("contact", "spring", (0.4, 3.0))],
+    [
+        ("dead_zone", "preloaded", (0.3,)),
+        ("contact", "spring", (0.4, 3.0)),
+        ("contact", "both_ways", (0.4, 3.0)),
+    ],
 )
 def test_a_rig_of_either_kind_has_it(effect, form, value):
     """A lag and a mass on a spring with the same gain come to the same rest."""

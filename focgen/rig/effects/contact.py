@@ -44,6 +44,12 @@ def _spring(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, place=place, stiffness=stiffness)
 
 
+def _both_ways(x: Dynamics, values: Values, run: None) -> Dynamics:
+    place, stiffness = values
+    return replace(x, place=-place, stiffness=stiffness)
+
+
+_WALL = Parameter("stiffness", lower=0.02, upper=200.0, starts=(1.0, 1.0, 10.0), log=True)
 _STIFFNESS = Parameter("stiffness", level=-1, lower=0.1, upper=1e3, starts=(5.0, 5.0), log=True)
 
 EFFECT = Effect(
@@ -83,12 +89,9 @@ EFFECT = Effect(
             _knee,
         ),
         # it pushes the actuator itself, which comes to rest the sooner; a wall is as stiff as it likes
-        Form(
-            "spring",
-            "dynamics",
-            (_PLACE, Parameter("stiffness", lower=0.02, upper=200.0, starts=(1.0, 1.0, 10.0), log=True)),
-            _spring,
-        ),
+        Form("spring", "dynamics", (_PLACE, _WALL), _spring),
+        # stops at both ends of a stroke
+        Form("both_ways", "dynamics", (_PLACE, _WALL), _both_ways),
         Form("gradual", "response", (_PLACE, _STIFFNESS), _gradual),
         Form("hertz", "response", (_PLACE, _STIFFNESS), _hertz),
     ],
