@@ -27,11 +27,14 @@ class Change:
         return text.count("\n", 0, self.begin) + 1
 
     def key(self, text: str) -> str:
-        """A name that stays while nothing of the line changes: it holds no number of a line."""
+        """A name that stays while nothing of the line changes: it holds no number of a line, but how many
+        like it come before."""
         lines = text.splitlines()
         here = self.line(text) - 1
         column = self.begin - (text.rfind("\n", 0, self.begin) + 1)
         about = "\0".join([self.file, lines[here], str(column), self.old, self.new])
+        before = lines[:here].count(lines[here])
+        about += f"\0{before}" if before else ""
         return hashlib.sha256(about.encode()).hexdigest()[:12]
 
 

@@ -132,6 +132,12 @@ def test_the_fastest_tests_of_a_line_come_first():
     assert reading.tests(Change("c_runtime/a.h", 0, "x", "y", ""), text, Counter(), 40.0) == ["slow"]
 
 
+def test_lines_alike_are_changes_apart():
+    text = "i = 0\nj = 1\ni = 0\n"
+    first, second = (Change("x.c", place, "0", "1", "constant") for place in (4, 16))
+    assert first.key(text) == first.key(text + "i = 0\n") != second.key(text)
+
+
 def test_what_has_told_of_others_comes_before_what_is_fast():
     seconds = {"a::fast": 1.0, "a::slow": 3.0, "b::slow": 2.0, "b::told": 4.0}
     known = Known(seconds, {}, {"c_runtime/a.h": sorted(seconds)})
