@@ -57,7 +57,7 @@ FINGER = ROOT / "tests" / "golden" / "finger.toml"
         (["--name", "my-rig"], "--name my_rig"),
         (["--name", "7up"], "--name c7up"),
         (["--name", "stdint"], "hide the header stdint.h"),
-        (["--name", "FOC_RT"], "foc_rt.h"),
+        (["--name", "FOC_RT"], "the runtime begin with foc_"),
         (["--name", ""], "--name"),
         (["--name", "größe"], "is no C identifier"),
     ],

@@ -34,6 +34,11 @@ def made(whole, tmp_path) -> Path:
     return tmp_path
 
 
+def heeding() -> None:
+    """A shell that runs the tests in the background has them ignore interrupts, and their children, too."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def begun(folder: Path) -> subprocess.Popen:
     """``trial run``, as soon as it diagnoses its first case."""
     words = ("-m", "focgen", "trial", "run", str(folder / "t"), "--jobs", "1")
@@ -42,6 +47,7 @@ def begun(folder: Path) -> subprocess.Popen:
         python(*words),
         env=environment(TMPDIR=str(scratch)),
         start_new_session=True,
+        preexec_fn=heeding,
         stderr=subprocess.PIPE,
         text=True,
     )
