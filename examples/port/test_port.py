@@ -1,6 +1,6 @@
 """C written by hand, and a few lines of Python, against the controller that focgen would have generated.
 
-pytest examples/port
+    pytest examples/port
 """
 
 from pathlib import Path

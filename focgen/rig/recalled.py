@@ -8,7 +8,7 @@ windows that are the longer, the longer they are ago: what is left of it changes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,12 +23,25 @@ from focgen.rig.response import integrations, longest, response_time
 from focgen.rig.rig import Rig
 
 NOTE = "begins before the rig has come to rest: the experiments before are simulated ahead of it"
-RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers
+_RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers
 _LONGEST = 250.0  # response times: what is longer ago counts as 0
 _WIDTH = 0.1  # of how long ago it is: a window
 _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0, as in focgen.rig.initial
 _SEEN = 2e-3  # of the output's largest magnitude, in root mean square: less does not show
 _FIRST = 5  # samples that tell where the input begins
+
+
+def with_recalled(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    left: Callable[[Sequence[Experiment]], float],
+    placed: Sequence[Placed] = (),
+) -> tuple[Experiment, ...]:
+    """The experiments as :func:`recalled` has them where that leaves less by ``left``, a mean square; else as
+    they are."""
+    known = recalled(rig, logs, placed)
+    asked = any(a is not b for a, b in zip(known, logs))
+    return known if asked and left(known) < _RECALLED * left(logs) else tuple(logs)
 
 
 def recalled(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:

@@ -20,7 +20,7 @@ from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import begun
 from focgen.rig.plausibility import doubts
-from focgen.rig.recalled import RECALLED, recalled
+from focgen.rig.recalled import with_recalled
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
 from focgen.shown import Shown
@@ -77,10 +77,9 @@ def _with_past(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with what was before them: by their own beginnings, or by the logs of those before,
     where that brings the output closer."""
     found = begun(rig, logs, placed_in(rig))
-    known = recalled(rig, found, placed_in(rig))
-    if all(a is b for a, b in zip(known, found)) or not all("output" in log for log in logs):
+    if not all("output" in log for log in logs):
         return found
-    return known if _left(rig, known) < RECALLED * _left(rig, found) else found
+    return with_recalled(rig, found, lambda session: _left(rig, session), placed_in(rig))
 
 
 def experiments(

@@ -22,7 +22,7 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.initial import begun
-from focgen.rig.recalled import RECALLED, recalled
+from focgen.rig.recalled import with_recalled
 from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
@@ -39,12 +39,7 @@ def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...
     Begins that leave the refitted rig no better than a rest does are none; and what earlier experiments left
     has to bring the refitted rig closer.
     """
-    found = _told(rig, logs)
-    known = recalled(rig, found)
-    if all(a is b for a, b in zip(known, found)):
-        return found
-    closer = _refitted(rig, known)[1] < RECALLED * _refitted(rig, found)[1]
-    return known if closer else found
+    return with_recalled(rig, _told(rig, logs), lambda found: _refitted(rig, found)[1])
 
 
 def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
