@@ -169,3 +169,13 @@ def test_the_steps_of_a_converter_are_read_off_its_levels(levels):
     assert found == pytest.approx(step, rel=1e-3) and abs(phase) < 1e-2 * step
     assert seen(fine) is None
     assert seen(np.repeat(fine[::500], 500) + np.interp(np.arange(4000) % 500, [0, 60], [-step, 0.0])) is None
+
+
+@pytest.mark.parametrize("name", ["hysteresis", "sensor_hysteresis"])
+def test_the_widest_loop_of_bouc_and_wen_comes_round_within_the_range(name):
+    """One that does not is a curve, and another one each way."""
+    form = next(f for f in library()[name].forms if f.name == "bouc_wen")
+    width = next(p for p in form.parameters if p.name == "width").upper  # of a range of 1
+    x = np.r_[np.linspace(0.0, 1.0, 500), np.linspace(1.0, 0.0, 500)]
+    lost = x - form.act(x, (1.0, width), Run.of((1000,), [0.0], 0.05))
+    assert lost[499] > 0.95 and lost[-1] < -0.9

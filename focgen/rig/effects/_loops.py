@@ -9,7 +9,9 @@ from focgen.rig.effects._effect import LARGEST, Form, Parameter, Run, Values
 _SHARE = Parameter("share", lower=0.0, upper=0.7, starts=(0.2, 0.2), zero=0.0)
 _WIDTH = Parameter("width", level=1, lower=2e-3, upper=0.6, starts=(0.05, 0.2), log=True)
 
-
+# Bouc and Wen's loop takes four widths to come round by 95 %: one that cannot within the range is but a bent
+# line, and a different one each way
+_CLOSING = Parameter("width", level=1, lower=2e-3, upper=0.25, starts=(0.05, 0.15), log=True)
 # the broad one, four times as wide, must still be reversed: wider than that, it is but a bent line
 _NARROW = Parameter("width", level=1, lower=2e-3, upper=0.12, starts=(0.04, 0.1), log=True)
 
@@ -65,7 +67,7 @@ def forms(slot: str) -> list[Form]:
             slot,
             (
                 Parameter("size", level=1, lower=-1.0, upper=1.0, starts=(0.05, 0.05), zero=0.0),
-                _WIDTH,
+                _CLOSING,
             ),
             _bouc_wen,
         ),
@@ -75,7 +77,7 @@ def forms(slot: str) -> list[Form]:
             (
                 Parameter("size", level=1, lower=-1.0, upper=1.0, starts=(0.05, 0.05), zero=0.0),
                 Parameter("growing", lower=-1.0, upper=1.0, starts=(0.05, 0.05), zero=0.0),
-                _WIDTH,
+                _CLOSING,
             ),
             _loaded,
         ),
