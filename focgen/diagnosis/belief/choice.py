@@ -23,5 +23,4 @@ def likeliest(ground: Ground, tried: Sequence[Fit]) -> tuple[Fit, float]:
     explains: nominal parameters that come closer to those given choose among effects, and ask for none."""
     odds = [ground.odds(f) + prior(f.problem.candidates[-1].effect, ground.base) for f in tried]
     best = int(np.argmax(odds))
-    closer = max(ground.base.prior_penalty - tried[best].prior_penalty, 0.0)
-    return tried[best], odds[best] - closer
+    return tried[best], odds[best] - ground.closer(tried[best])

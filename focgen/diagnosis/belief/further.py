@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
-from focgen.diagnosis.fitting.fit import Fit, Weighing, innovations
+from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, innovations
 from focgen.diagnosis.numbers import NUMBERS
+
+_AWAY = 4.0  # nats against nominal parameters: from there it is asked whether they have to be as far off
+_STEPS = 6  # iterations of the fit that asks
 
 
 @dataclass(frozen=True)
@@ -31,13 +34,19 @@ class Ground:
     """What candidates for one more effect are weighed against.
 
     ``base``: the fit without it; ``floor``: a sum of squares that only noise leaves; ``changed``: what the
-    effects of ``base`` change, nats; ``scale``: of the misfit that is no wonder.
+    effects of ``base`` change, nats; ``scale``: of the misfit that is no wonder; ``weighing``: of residuals.
+
+    Fits make the misfit least, each nat of it as dear as one against the nominal parameters. Here a misfit is
+    judged more mildly, for every form is a little wrong. So a fit that has moved them far is made anew, with
+    what is known of them weighed as much more, and the better one speaks for the hypothesis.
     """
 
     base: Fit
     floor: float
     changed: float
     scale: Scale
+    weighing: Weighing
+    _found: dict[Fit, Fit] = field(default_factory=dict, init=False)
 
     @classmethod
     def of(
@@ -56,7 +65,7 @@ class Ground:
         floor = best.sse * (1.0 - told)
         before = _square(first, weighing) if base.problem.candidates else base.sse
         scale = Scale(surroundings.nats(count, noise))
-        return cls(base, floor, _nats(before - base.sse, floor, count), scale)
+        return cls(base, floor, _nats(before - base.sse, floor, count), scale, weighing)
 
     def misfit(self, of: Fit) -> float:
         """Nats by which a fit leaves more than noise."""
@@ -65,13 +74,36 @@ class Ground:
     def odds(self, of: Fit, most: int | None = None) -> float:
         """Log odds, before any prior, of a fit with one more effect over ``base``; at most ``most`` of its
         free values are counted. Own parameters closer to those given speak for it."""
-        left, better = self.misfit(self.base), self.misfit(of)
-        gained = max(left - better, 0.0)
+        return self._speaks(self._best(of), most) - self._speaks(self._best(self.base), None)
+
+    def closer(self, of: Fit) -> float:
+        """The nats of its odds that a fit has for nominal parameters closer to those given."""
+        return max(self._best(self.base).prior_penalty - self._best(of).prior_penalty, 0.0)
+
+    def _best(self, of: Fit) -> Fit:
+        """A fit, or the same with its nominal parameters kept closer to those given, if that speaks more."""
+        if of.prior_penalty < _AWAY:
+            return of
+        if of not in self._found:
+            self._found[of] = max(of, self._kept(of), key=lambda f: self._speaks(f, None))
+        return self._found[of]
+
+    def _gained(self, of: Fit) -> float:
+        return max(self.misfit(self.base) - self.misfit(of), 0.0)
+
+    def _speaks(self, of: Fit, most: int | None) -> float:
+        """What speaks for a fit, nats."""
+        gained, better = self._gained(of), self.misfit(of)
         scale = self.scale.of(self.changed + gained)
-        found = log_likelihood(better, scale) - log_likelihood(left, self.scale.of(self.changed))
         free = of.size - self.base.size
-        found -= paid(free if most is None else min(free, most), gained, better, scale)
-        return found + self.base.prior_penalty - of.prior_penalty
+        cost = paid(free if most is None else min(free, most), gained, better, scale)
+        return log_likelihood(better, scale) - cost - of.prior_penalty
+
+    def _kept(self, of: Fit) -> Fit:
+        """A fit made anew that keeps nominal parameters closer to those given: as if each nat against them
+        were as dear as the nats of misfit that are as unlikely."""
+        dear = (self.scale.of(self.changed + self._gained(of)) + self.misfit(of)) / NUMBERS.turns
+        return fit(replace(of.problem, weight=max(dear, 1.0)), of.vector, self.weighing, _STEPS)
 
 
 def _told(best: Fit) -> float:

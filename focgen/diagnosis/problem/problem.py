@@ -62,6 +62,7 @@ class Problem:
     most ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in
     standard deviations; how far the begins of experiments are, likewise; where readings are ``uneven``, the
     zero of each experiment's, likewise), then every candidate effect's parameters, all of order one.
+    ``weight``: of what is known of nominal parameters beforehand, against the data.
     """
 
     segment: Segment
@@ -72,6 +73,7 @@ class Problem:
     slack: float = 1.0
     gauge: float = 0.0
     uneven: bool = False
+    weight: float = 1.0
 
     def __post_init__(self) -> None:
         self.nominal_start = self.nominals.start()
@@ -138,7 +140,7 @@ class Problem:
     @cached_property
     def known(self) -> tuple[np.ndarray, np.ndarray]:
         """What every entry is expected to be beforehand, and how well that is known: 1/variance."""
-        own, aligned = self.nominals.precision, (self.slack * _ALIGNED) ** -2.0
+        own, aligned = self.weight * self.nominals.precision, (self.slack * _ALIGNED) ** -2.0
         free, effects = self.nuisances - 1 - self.zeros, sum(len(c.form.parameters) for c in self.candidates)
         precision = np.r_[own, aligned, np.zeros(free), np.ones(self.zeros), np.zeros(effects)]
         return np.pad(self.nominal_start, (0, len(precision) - len(own))), precision
