@@ -18,10 +18,20 @@ from focgen.diagnosis.numbers import NUMBERS
 _COUNT = 10_000
 
 
-def _fit(square, effects=(), predictable_share=0.0, size=None):
+class _Fit(SimpleNamespace):
+    __hash__ = object.__hash__
+
+
+class _Ground(Ground):
+    def _kept(self, of):
+        """The fit made anew, which a test gives, or ``of`` where that could not do better."""
+        return getattr(of, "kept", of)
+
+
+def _fit(square, effects=(), predictable_share=0.0, size=None, **more):
     """A fit that leaves the mean square ``square``, in units of the noise's."""
     candidates = tuple(SimpleNamespace(effect=name) for name in effects)
-    return SimpleNamespace(
+    made = _Fit(
         innovations=np.zeros(_COUNT),
         sse=_COUNT * square,
         weighed=np.full(4, np.sqrt(square)),
@@ -30,13 +40,15 @@ def _fit(square, effects=(), predictable_share=0.0, size=None):
         prior_penalty=0.0,
         predictable_share=predictable_share,
     )
+    vars(made).update(more)
+    return made
 
 
 def _ground(base, tried, changed=0.0, **around):
     """``base``, whose effects change a mean square of ``changed``, and what was tried beside it."""
     bare = SimpleNamespace(**{**vars(base), "problem": SimpleNamespace(candidates=(), families=())})
     ground = Ground.of(bare, bare, tried, None, Surroundings(**around))
-    return Ground(base, ground.floor, 0.5 * _COUNT * changed, ground.scale)
+    return _Ground(base, ground.floor, 0.5 * _COUNT * changed, ground.scale, None)
 
 
 def test_evidence_saturates_between_good_forms():
@@ -68,6 +80,27 @@ def test_a_refit_that_is_strained_asks_for_no_effect():
     base.prior_penalty, tried[0].prior_penalty = 20.0, 20.0
     best, odds = likeliest(_ground(base, tried), tried)
     assert best is tried[1] and odds < 0.0
+
+
+@pytest.mark.parametrize("left, there", [(1.1, True), (15.0, False)])
+def test_a_fit_that_strains_nominal_parameters_is_asked_whether_it_has_to(left, there):
+    """The second effect is 50 nats off. Kept close it leaves a little more, or nearly all of the gap."""
+    kept = _fit(left, ["leak", "resonance"], prior_penalty=1.0)
+    second = _fit(1.0, ["leak", "resonance"], prior_penalty=50.0, kept=kept)
+    base = _fit(16.0, ["leak"])
+    best, odds = likeliest(_ground(base, [second], 100.0), [second])
+    assert best is second and (odds > 0.0) == there
+
+
+def test_so_is_what_was_found_without_it():
+    """Kept close, what was found without the effect leaves hardly more: an effect has nothing to mend."""
+    strained = _fit(2.0, ["leak"], prior_penalty=40.0)
+    second = _fit(1.0, ["leak", "resonance"])
+    odds = [
+        _ground(base, [second], 100.0).odds(second)
+        for base in (strained, _fit(2.0, ["leak"], prior_penalty=40.0, kept=_fit(2.1, ["leak"])))
+    ]
+    assert odds[0] > 30.0 and odds[1] < 10.0
 
 
 def test_what_takes_nothing_but_noise_away_is_no_effect():

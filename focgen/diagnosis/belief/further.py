@@ -11,7 +11,7 @@ from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, innovations
 from focgen.diagnosis.numbers import NUMBERS
 
-_AWAY = 4.0  # nats against nominal parameters: from there it is asked whether they have to be as far off
+_AWAY = 10.0  # nats against nominal parameters: from there it is asked whether they have to be that far off
 _STEPS = 6  # iterations of the fit that asks
 
 
