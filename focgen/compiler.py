@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import shlex
 import shutil
-import subprocess
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 from focgen.children import python
 from focgen.errors import BuildError
+from focgen.programs import ran
 
 _USUAL = ("cc", "gcc", "clang")
 _REMEDY = "install gcc or clang, or pip install 'focgen[targets]'"
@@ -55,7 +55,7 @@ def compile_shared(
         str(target),
         "-lm",
     ]
-    done = subprocess.run(command, capture_output=True, errors="replace")
+    done = ran(command)
     if done.returncode:
         raise BuildError(
             str(sources[0]),
