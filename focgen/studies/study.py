@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from focgen.arguments import checked
 from focgen.codegen.kernels import TARGETS
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding, rest
@@ -39,6 +40,7 @@ SAMPLES = 10_000  # of the open-loop inputs
 
 
 @respelled({"memories": "memory", "arithmetics": "arithmetic"})
+@checked
 def study(
     subject: str,
     controller: ControllerLike,
