@@ -9,13 +9,12 @@ from __future__ import annotations
 import atexit
 import functools
 import os
-import shutil
 import stat
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 from focgen.progress import say
+from focgen.scratch import new_temporary, remove_temporary, scratch_folder
 
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
@@ -40,14 +39,11 @@ def kept(name: str, build: Callable[[Path], None]) -> Path:
     target = cache_folder() / name
     if _is_own(target, stat.S_ISREG):
         return target
-    handle, part = tempfile.mkstemp(prefix=f".{name}.", dir=target.parent)
-    os.close(handle)
-    try:
-        build(Path(part))
+    with scratch_folder(target.parent) as scratch:
+        part = scratch / name
+        build(part)
         os.chmod(part, 0o700)
         os.replace(part, target)
-    finally:
-        Path(part).unlink(missing_ok=True)
     return target
 
 
@@ -101,12 +97,12 @@ def _is_own(path: Path, kind: Callable[[int], bool]) -> bool:
 @functools.cache
 def _temporary() -> Path:
     """A new folder of a name that nobody could foresee; it goes with the process that made it."""
-    folder, maker = tempfile.mkdtemp(prefix="focgen-"), os.getpid()
-    atexit.register(_remove, folder, maker)
-    return Path(folder)
+    (folder, held), maker = new_temporary(), os.getpid()
+    atexit.register(_remove, folder, held, maker)
+    return folder
 
 
-def _remove(folder: str, maker: int) -> None:
+def _remove(folder: Path, held: int | None, maker: int) -> None:
     """Not by a process that was forked from the one that made it."""
     if os.getpid() == maker:
-        shutil.rmtree(folder, ignore_errors=True)
+        remove_temporary(folder, held)

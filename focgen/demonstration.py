@@ -8,6 +8,7 @@ import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from focgen.arguments import checked
 from focgen.codegen.generate import Generated, generate
 from focgen.control.controller import ARITHMETICS
 from focgen.diagnosis.diagnose import diagnose
@@ -64,6 +65,7 @@ class Demo:
         return self.design.holds and self.simulation.holds and all(v.holds for v in self.verified.values())
 
 
+@checked
 def demo(out: str | Path) -> Demo:
     """Identify, design, simulate, generate in four arithmetics, verify, and diagnose, into the folder
     ``out``.

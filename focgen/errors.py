@@ -14,9 +14,11 @@
 The command line prints ``focgen: error: WHERE: WHAT; REMEDY`` and exits with status 2.
 """
 
+import re
 from collections.abc import Iterable
 from typing import Self
 
+_BREAKS = re.compile(r"\s*[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]\s*")
 _LONGEST = 600  # characters of a part of a message: a value from a file may have millions
 
 
@@ -38,7 +40,8 @@ class FocgenError(Exception):
 
 
 def _short(text: str) -> str:
-    """A part of the message, without the middle of what is too long to be read."""
+    """A part of the message on one line, without the middle of what is too long to be read."""
+    text = _BREAKS.sub(" ", text)
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from focgen import journal
 from focgen.errors import InputError
 from focgen.scratch import as_before, scratch_file, scratch_folder, synced
-from focgen.textfile import holds
+from focgen.textfile import LARGEST_JSON, holds
 
 Old = Callable[[], Iterable[Path]]
 """What goes from a folder as a result takes its place there."""
@@ -100,7 +100,10 @@ def _move(scratch: Path, target: Path, inputs: tuple[Any, ...], old: Old) -> Non
             synced(made / name)
         with journal.alone(target):
             _check_places(made, target, files, inputs)
-            journal.put(scratch, target, files, tuple(old()))
+            going = tuple(old())
+            for path in (*(target / name for name in files), *going):
+                _check_size(path)
+            journal.put(scratch, target, files, going)
     except OSError as reason:
         raise _unwritable(target, reason) from None
 
@@ -116,6 +119,14 @@ def _check_places(made: Path, target: Path, files: list[Path], inputs: tuple[Any
         for parent in list(name.parents)[:-1]:
             if (target / parent).exists() and not (target / parent).is_dir():
                 raise InputError(str(target / parent), "is a file where a folder belongs", "move it away")
+
+
+def _check_size(path: Path) -> None:
+    """Raise InputError where what stands at a place is larger than any result: it would be read for hours,
+    to know it again after a kill."""
+    if path.is_file() and path.stat().st_size > LARGEST_JSON:
+        what = f"has more than {LARGEST_JSON >> 20} MiB, which no result has"
+        raise InputError(str(path), what, "move it away")
 
 
 def _check_no_device(path: Path) -> None:

@@ -1,7 +1,8 @@
 """Places to write to before a result is whole: of names that are new, and gone after a kill.
 
 A scratch is locked as long as its process lives. What the lock does not hold was left by one that was killed,
-and the next that writes to the same folder removes it.
+and the next that writes to the same folder removes it. The same holds of what is put into the system's
+temporary folder.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import re
 import secrets
 import shutil
 import stat
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -27,6 +29,8 @@ PATIENCE = 60.0
 _TRIES = 100  # at a new folder, until nobody else takes it away
 _HELD = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)  # what a lock of another process answers
 _OURS = re.compile(r"\.focgen-[0-9a-f]{16}(\.part)?")
+_TEMPORARY = re.compile(r"focgen-([a-z]+-)?[0-9a-f]{16}")
+_INNER = "own"  # in the locked one: whoever writes into a folder locks it for himself
 _swept: set[tuple[int, str]] = set()  # by process: looking once is enough
 
 
@@ -42,11 +46,43 @@ def scratch_folder(place: Path) -> Iterator[Path]:
         unlock(held)
 
 
-def _new_folder(place: Path) -> tuple[Path, int | None]:
+@contextmanager
+def temporary_folder(kind: str = "") -> Iterator[Path]:
+    """Yield a new folder of this user's alone in the system's temporary folder, which goes at the end;
+    ``kind`` stands in its name. Raises OSError where none can be made.
+    """
+    path, held = new_temporary(kind)
+    try:
+        yield path
+    finally:
+        remove_temporary(path, held)
+
+
+def new_temporary(kind: str = "") -> tuple[Path, int | None]:
+    """The folder of :func:`temporary_folder` and what holds its lock, until :func:`remove_temporary`."""
+    place = Path(tempfile.gettempdir())
+    clear(place, _TEMPORARY)
+    locked, held = _new_folder(place, f"focgen-{kind}-" if kind else "focgen-")
+    inner = locked / _INNER
+    try:
+        inner.mkdir(mode=0o700)
+    except OSError:
+        remove_temporary(inner, held)
+        raise
+    return inner, held
+
+
+def remove_temporary(inner: Path, held: int | None) -> None:
+    """Remove what :func:`new_temporary` has made."""
+    shutil.rmtree(inner.parent, ignore_errors=True)
+    unlock(held)
+
+
+def _new_folder(place: Path, begins: str = ".focgen-") -> tuple[Path, int | None]:
     """A new folder and what holds its lock. Until that is had, another process may take it for one that was
     left: then there is a further one. Where the file system has no locks, nothing is taken for left."""
     for _ in range(_TRIES):
-        path = place / _name()
+        path = place / _name(begins)
         path.mkdir(mode=0o700)
         os.chmod(path, 0o700)  # whatever the umask takes away: what cannot be opened cannot be locked
         held = lock(path)
@@ -91,15 +127,17 @@ def _new_file(place: Path) -> tuple[Path, int]:
     raise _taken_away(place)
 
 
-def clear(place: Path) -> None:
-    """Remove what killed processes have left in ``place``; what another one still writes to stays."""
-    key = os.getpid(), str(place)
+def clear(place: Path, ours: re.Pattern[str] = _OURS) -> None:
+    """Remove what killed processes have left in ``place``, by its names; what another one still writes to
+    stays, and in a temporary folder what is another user's."""
+    key = os.getpid(), f"{ours.pattern} {place}"
     if fcntl is None or key in _swept:
         return
     _swept.add(key)
     with suppress(OSError):
         for entry in os.scandir(place):
-            if _OURS.fullmatch(entry.name) and not entry.is_symlink():
+            found = ours.fullmatch(entry.name) and not entry.is_symlink()
+            if found and (ours is _OURS or own(Path(entry.path))):
                 _clear_one(Path(entry.path))
 
 
@@ -133,8 +171,8 @@ def as_before(new: Path, place: Path) -> None:
             os.chmod(new, stat.S_IMODE(mode))
 
 
-def _name() -> str:
-    return f".focgen-{secrets.token_hex(8)}"
+def _name(begins: str = ".focgen-") -> str:
+    return begins + secrets.token_hex(8)
 
 
 def lock(path: Path) -> int | None:

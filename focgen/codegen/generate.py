@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.arguments import checked
 from focgen.codegen.edited import check_unedited
 from focgen.codegen.folder import example_context, readme_context
 from focgen.codegen.header import header_context
@@ -47,6 +48,7 @@ class Generated(Shown):
 
 
 @respelled({"package": "for_"})
+@checked
 def generate(
     controller: ControllerLike,
     out: str | Path,

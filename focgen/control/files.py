@@ -54,6 +54,7 @@ from typing import Any
 
 import tomlkit
 
+from focgen.arguments import checked
 from focgen.control.controller import (
     ARITHMETICS,
     MEMORIES,
@@ -90,6 +91,7 @@ def controller_from(given: ControllerLike) -> Controller:
     return read_controller(given)
 
 
+@checked
 def read_controller(path: str | Path | Mapping[str, Any]) -> Controller:
     """Read a controller from its file, or from a dictionary of the same shape. Raises ControllerError naming
     file, table, key and remedy."""
@@ -292,6 +294,7 @@ def source_table(source: Source) -> dict[str, Any]:
     return {"file": source.file, "sha256": source.sha256, **({"options": given} if given else {})}
 
 
+@checked
 def write_controller(controller: Controller, path: str | Path) -> None:
     """Write a controller so that :func:`read_controller` gives an equal one.
 

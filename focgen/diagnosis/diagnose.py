@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from focgen.arguments import checked
 from focgen.control.files import ControllerLike, controller_from
 from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
@@ -41,6 +42,7 @@ WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml") 
 
 
 @rig_then_logs
+@checked
 def diagnose(
     rig: RigLike,
     logs: Logs,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from focgen.arguments import checked
 from focgen.custody import identified_from
 from focgen.errors import FitError, check_choice
 from focgen.identification.caveats import warnings_of
@@ -44,6 +45,7 @@ _COMPROMISE = (
 
 
 @rig_then_logs
+@checked
 def identify(
     rig: RigLike,
     logs: Logs,

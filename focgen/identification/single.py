@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
-from focgen.children import workers
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit, fit_fractional
@@ -16,6 +14,7 @@ from focgen.identification.identification import ExperimentFit
 from focgen.identification.integer import IntegerFit, fit_integer_models
 from focgen.identification.past import Past
 from focgen.identification.quality import gof
+from focgen.pools import pool
 from focgen.progress import track
 
 _STEADY = 0.1  # of the step: nearer to its level than this, the input is at it
@@ -87,8 +86,8 @@ def _integer_models(done: list[tuple[Excitation, FractionalFit]]) -> list[tuple[
     count = min(len(runs), os.cpu_count() or 1)
     if count < 2 or sum(map(len, runs)) < _WORTH_PROCESSES:
         return [fit_integer_models(x, o) for x, o in track(list(zip(runs, offsets)), "integer orders")]
-    with workers(), ProcessPoolExecutor(count) as pool:
-        found = pool.map(fit_integer_models, [x.bare() for x in runs], offsets)
+    with pool(count) as called:
+        found = called.map(fit_integer_models, [x.bare() for x in runs], offsets)
         return list(track(found, "integer orders", len(runs)))
 
 

@@ -46,18 +46,45 @@ class Dialect:
         return ", ".join(said)
 
 
-def rows_of(lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:
+@dataclass
+class Comments:
+    """Comments that could be rows: ``count`` of them have ``width`` cells, the first in line ``first``,
+    counted from 1. Nothing is counted before ``width`` is set, as the header is known.
+    """
+
+    delimiter: str
+    width: int = 0
+    count: int = 0
+    first: int = 0
+
+    def see(self, number: int, line: str) -> None:
+        """A comment has been passed over."""
+        if self.width < 2 or len(line.split(None if self.delimiter == " " else self.delimiter)) != self.width:
+            return
+        self.count += 1
+        self.first = self.first or number
+
+
+def rows_of(lines: Iterable[str], delimiter: str, comments: Comments | None = None) -> Iterator[list[str]]:
     """Yield the cells of every line, without blanks around them; none for an empty line or a comment.
 
     Raises csv.Error where quotes do not close.
     """
+    plain = _plain(lines, comments or Comments(delimiter))
     if delimiter == " ":
-        yield from ([] if _is_comment(line) else line.split() for line in lines)
+        yield from (line.split() for line in plain)
         return
-    plain = ("\n" if _is_comment(line) else line for line in lines)
     for row in csv.reader(plain, delimiter=delimiter, skipinitialspace=delimiter != "\t"):
         cells = [cell.strip() for cell in row]
         yield cells if any(cells) else []
+
+
+def _plain(lines: Iterable[str], comments: Comments) -> Iterator[str]:
+    for number, line in enumerate(lines, start=1):
+        if _is_comment(line):
+            comments.see(number, line)
+            line = "\n"
+        yield line
 
 
 def lines_of(text: str) -> Iterator[str]:

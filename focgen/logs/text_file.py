@@ -19,7 +19,7 @@ from pathlib import Path
 from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs.cells import Gathered, Lines
-from focgen.logs.dialect import SAMPLE, Dialect, is_number, lines_of, rows_of, sniffed
+from focgen.logs.dialect import SAMPLE, Comments, Dialect, is_number, lines_of, rows_of, sniffed
 from focgen.logs.table import LogTable
 from focgen.textfile import log_parts, open_log
 
@@ -49,10 +49,12 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
         sample = "".join(_first(lines()))
         dialect = sniffed(sample)
         if not any(rows_of(lines_of(sample), dialect.delimiter)):
-            raise LogError(str(path), "is empty", "give a log with a header and one row a sample")
-        rows = rows_of(lines(), dialect.delimiter)
+            raise _without_rows(path, sample)
+        comments = Comments(dialect.delimiter)
+        rows = rows_of(lines(), dialect.delimiter, comments)
         ahead = list(islice(rows, dialect.data))
         header = _header(path, ahead, dialect)
+        comments.width = len(header)
         numbers, cells, header = _body(path, rows, ahead, dialect, header)
     except csv.Error as reason:
         raise LogError(str(path), f"is not CSV ({reason})", "save it as comma-separated text") from None
@@ -64,8 +66,26 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
         decimal=dialect.decimal,
         units=units,
         aliases=aliases,
-        notes=_taken(ahead, dialect, guessed),
+        notes=(*_taken(ahead, dialect, guessed), *_left_out(comments)),
     )
+
+
+def _without_rows(path: Path, sample: str) -> LogError:
+    if sample.strip():
+        what = "has nothing but lines that begin with #, % or //, which are comments"
+        return LogError(str(path), what, 'write the first cell of a row in quotes, as in "#1"')
+    return LogError(str(path), "is empty", "give a log with a header and one row a sample")
+
+
+def _left_out(comments: Comments) -> tuple[str, ...]:
+    """Rows that are switched off, or whose first cell only looks like a comment: both begin alike."""
+    if not comments.count:
+        return ()
+    lines = f"{comments.count} line{'s' * (comments.count > 1)} as wide as the rows"
+    what = (
+        f"{lines}, the first being line {comments.first}, begin with #, % or // and were left out as comments"
+    )
+    return (f'{what}; write the first cell in quotes, as in "#1", where they are rows',)
 
 
 def _first(lines: Iterable[str]) -> Iterator[str]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from focgen.arguments import checked
 from focgen.control.controller import ARITHMETICS, Controller, Source
 from focgen.control.equilibrium import Equilibrium
 from focgen.control.files import controller_text
@@ -111,6 +112,7 @@ class Design(Shown):
     rig: Rig | None = field(default=None, metadata=UNWRITTEN, compare=False)
 
 
+@checked
 def design(
     rig: RigLike,
     out: str | Path | None = None,

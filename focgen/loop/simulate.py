@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from focgen.arguments import checked
 from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest, within_reach
@@ -100,6 +101,7 @@ class Simulation(Shown):
         return f"{self.states} exponentials" if self.states else f"memory {self.length}"
 
 
+@checked
 def simulate(
     rig: RigLike,
     controller: ControllerLike,

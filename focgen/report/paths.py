@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from focgen.arguments import checked
 from focgen.codegen.generate import Generated
 from focgen.control.controller import Controller
 from focgen.control.files import read_controller
@@ -85,6 +86,7 @@ Part = str | Path | Rig | Controller | Proposal | Identification | Design | Gene
 """A part of a page: a path, or what the commands of the chain make in memory."""
 
 
+@checked
 def report(paths: Part | Sequence[Part], out: str | Path) -> Path:
     """Write one self-contained HTML page of ``paths`` to the file ``out``, and return it.
 
@@ -94,6 +96,8 @@ def report(paths: Part | Sequence[Part], out: str | Path) -> Path:
     simulated; nothing is compiled or run. Raises InputError for what is none of these, MissingExtra where
     Bokeh is not installed.
     """
+    if isinstance(paths, (list, tuple)) and not paths:
+        raise InputError("report", "is given nothing to show", _TAKEN)
     parts = [_part(one) for one in (paths if isinstance(paths, (list, tuple)) else (paths,))]
     places = [part for part in parts if isinstance(part, Path)]
     library()  # before anything takes time

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from focgen.arguments import checked
 from focgen.custody import TABLE
 from focgen.errors import RigError
 from focgen.fractional.terms import read_transfer, terms_of
@@ -247,6 +248,7 @@ def _effects(top: Table) -> tuple[Mapping[str, Any], ...]:
     return tuple(effects)
 
 
+@checked
 def write_rig(rig: Rig, path: str | Path) -> None:
     """Write a rig so that :func:`read_rig` gives an equal one.
 

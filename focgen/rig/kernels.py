@@ -8,7 +8,6 @@ been held for ever, and else 0; it returns a new array of shape (n,).
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 from focgen.arrays import Array, Bytes
 from focgen.compiler import compile_shared
 from focgen.errors import BuildError
+from focgen.scratch import temporary_folder
 
 BALANCED = 2
 _SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c")]
@@ -62,8 +62,8 @@ def _library() -> tuple[Any, Any]:
 
     ffi = FFI()
     ffi.cdef(_DECLARATIONS)
-    with tempfile.TemporaryDirectory(prefix="focgen-") as folder:
-        target = str(Path(folder) / "kernels.so")
+    with temporary_folder() as folder:
+        target = str(folder / "kernels.so")
         try:
             compile_shared(_SOURCES, target, [*_FLAGS, "-march=native"])
         except BuildError:

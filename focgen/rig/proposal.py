@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from focgen.arguments import checked
 from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs import clock
@@ -63,6 +64,7 @@ class _Time:
     doubts: tuple[str, ...] = ()
 
 
+@checked
 def init(
     logs: Logs, out: str | Path | None = None, ask: Ask | None = None, name: str | None = None
 ) -> Proposal:
@@ -73,6 +75,8 @@ def init(
     no time, input or output, InputError where ``out`` is one of them.
     """
     given = each_of(logs)
+    if not given:
+        raise LogError("logs", "none is given", "name at least one log")
     if out is not None:
         check_apart([out], given)
     tables = tables_of(given)

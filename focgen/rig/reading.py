@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar, cast
 
+from focgen.arguments import checked
 from focgen.logs import read
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import Logs
@@ -32,6 +33,7 @@ def _once_by_signals(function: Callable[P, R]) -> Callable[P, R]:
 
 @_once_by_signals
 @rig_then_logs
+@checked
 def read_logs(
     rig: RigLike, logs: Logs, from_: float | None = None, to: float | None = None
 ) -> tuple[Experiment, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from focgen.arguments import checked
 from focgen.arrays import Array
 from focgen.errors import LogError, RigError
 from focgen.jsontext import UNWRITTEN
@@ -57,6 +58,7 @@ class Replay(Shown):
 
 
 @rig_then_logs
+@checked
 def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | None = None) -> Replay:
     """Run the rig on each experiment's ``command`` where it is logged, else on its ``pressure``.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from focgen.arguments import checked
 from focgen.errors import InputError
 from focgen.running.controller import LoadedController, ScheduledController
 from focgen.running.machine import Machine
@@ -12,6 +13,7 @@ from focgen.verification.folder import read_folder, sources
 __all__ = ["LoadedController", "ScheduledController", "load"]
 
 
+@checked
 def load(
     folder: str | Path, *, raw: bool = False, edited: bool = False
 ) -> LoadedController | ScheduledController:

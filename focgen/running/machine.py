@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 from focgen.plan.plan import Plan
 from focgen.plan.scenario import Params
+from focgen.scratch import temporary_folder
 from focgen.targets.driver import DTYPES
 from focgen.verification.host import FLAGS
 
@@ -92,8 +92,8 @@ class Machine:
 
 
 def _loaded(ffi: FFI, plan: Plan, folder: Path) -> Any:
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-        glue, target = Path(scratch) / "glue.c", Path(scratch) / f"{plan.name}.so"
+    with temporary_folder() as scratch:
+        glue, target = scratch / "glue.c", scratch / f"{plan.name}.so"
         glue.write_text(render("loaded.c.jinja", _Glue(plan.name, plan.schedule is not None)))
         compile_shared([folder / f"{plan.name}.c", glue], target, FLAGS, [folder])
         try:

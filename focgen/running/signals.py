@@ -7,6 +7,7 @@ the type's end, which the C then takes for the end of its range. In the floating
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -44,8 +45,8 @@ class Counts:
         if form.floating:
             return _number(name, value)
         try:
-            count: int = value.__index__()
-        except AttributeError:
+            count: int = operator.index(value)
+        except TypeError:
             raise _not_whole(name, value, form) from None
         top = 1 << (form.bits - 1)
         if not -top <= count < top:
@@ -94,7 +95,8 @@ class Physical:
         found = _as(name, found, float)
         if np.isnan(found).any():
             raise _no_count(name, form)
-        return nearest_raw(found, form).astype(DTYPES[form.ctype])
+        with np.errstate(over="ignore"):  # what is beyond all numbers is the type's end, too
+            return nearest_raw(found, form).astype(DTYPES[form.ctype])
 
     def back(self, raw: Any, form: Format) -> Any:
         """What the C returned, in physical units."""
@@ -106,7 +108,7 @@ class Physical:
 def _number(name: str, value: Any) -> float:
     """Of anything that is a number; text that reads like one is none."""
     try:
-        if isinstance(value, (str, bytes, bytearray)):
+        if isinstance(value, (str, bytes, bytearray)) or np.ma.is_masked(value):
             raise TypeError
         return float(value)
     except (TypeError, ValueError, OverflowError):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import platform
-import subprocess
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,8 @@ from focgen.errors import BuildError, FocgenError
 from focgen.output import write_files
 from focgen.plan.plan import Plan
 from focgen.present import present
+from focgen.programs import ran
+from focgen.scratch import temporary_folder
 from focgen.targets.cost import object_sizes
 from focgen.verification.costs import cost
 
@@ -50,9 +50,9 @@ def costs(plan: Plan, target: str | None) -> Costs:
     counted = multiplies(plan), size["state_bytes"], size["table_bytes"]
     try:
         files = folder_files(plan, controller_text(plan.controller).encode("utf-8"), kernels=kernels)
-        with tempfile.TemporaryDirectory(prefix="focgen-study-") as folder:
+        with temporary_folder("study") as folder:
             write_files(folder, files)
-            compiled = _on_host(Path(folder), plan.name) if target is None else _on_target(folder, target)
+            compiled = _on_host(folder, plan.name) if target is None else _on_target(str(folder), target)
         return replace(Costs(*counted), **compiled)
     except FocgenError as reason:
         return Costs(*counted, note=f"not compiled: {reason}")
@@ -82,7 +82,7 @@ def _on_host(folder: Path, name: str) -> dict[str, Any]:
     """Code, constants and data of the compiled C."""
     made, source = folder / f"{name}.o", folder / f"{name}.c"
     command = [*find_compiler(), *_FLAGS, "-c", str(source), "-o", str(made)]
-    if subprocess.run(command, capture_output=True).returncode:
+    if ran(command).returncode:
         raise BuildError("flash", "the C does not compile here", "set CC to another compiler")
     found, _ = object_sizes(made.read_bytes())
     return {"flash_bytes": sum(found.values()) - found["save"], "compiled_for": f"{platform.machine()}, -Os"}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from focgen.arguments import checked
 from focgen.codegen.kernels import TARGETS
 from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding, rest
@@ -20,6 +20,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.files import read_rig
 from focgen.rig.rig import Rig
+from focgen.scratch import temporary_folder
 from focgen.spelling import respelled
 from focgen.studies.grid import Grid, grid_of
 from focgen.studies.jobs import Job, read_ideal, read_plant, read_row
@@ -39,6 +40,7 @@ SAMPLES = 10_000  # of the open-loop inputs
 
 
 @respelled({"memories": "memory", "arithmetics": "arithmetic"})
+@checked
 def study(
     subject: str,
     controller: ControllerLike,
@@ -97,8 +99,8 @@ def _folder(out: str | Path | None) -> Iterator[Path]:
     if out is not None:
         yield Path(out)
         return
-    with tempfile.TemporaryDirectory(prefix="focgen-study-") as scratch:
-        yield Path(scratch)
+    with temporary_folder("study") as scratch:
+        yield scratch
 
 
 def _fractional(given: ControllerLike) -> Controller:

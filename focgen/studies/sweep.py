@@ -5,19 +5,15 @@ Every worker has one thread, so that the last digit does not depend on how many 
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager
-from multiprocessing.process import BaseProcess
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Any
 
-from focgen.children import workers
 from focgen.errors import InputError, MissingExtra
+from focgen.pools import pool
 from focgen.progress import track
 from focgen.studies.jobs import Job, answer
 from focgen.studies.store import Store
@@ -66,28 +62,9 @@ def sweep(jobs: Sequence[Job], store: Store, workers: Workers) -> list[dict[str,
     return found
 
 
-@contextmanager
-def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Fresh processes of one thread each, which end with this one however it ends."""
-    with workers(dict.fromkeys(_ONE_THREAD, "1")):
-        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin)
-        try:
-            yield pool
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _begin() -> None:
-    """In a new process: leave interrupts to the parent, and do not outlive it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
+def _pool(count: int) -> AbstractContextManager[ProcessPoolExecutor]:
+    """Fresh processes of one thread each."""
+    return pool(count, dict.fromkeys(_ONE_THREAD, "1"), "spawn")
 
 
 @contextmanager
@@ -103,9 +80,9 @@ def _no_script() -> Iterator[None]:
         vars(script).update(before)
 
 
-def _from_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job]) -> Iterator[tuple[int, dict[str, Any]]]:
+def _from_pool(called: ProcessPoolExecutor, jobs: Sequence[Job]) -> Iterator[tuple[int, dict[str, Any]]]:
     with _no_script():  # processes start as jobs are handed over
-        places = {pool.submit(answer, job): place for place, job in enumerate(jobs)}
+        places = {called.submit(answer, job): place for place, job in enumerate(jobs)}
     for done in as_completed(places):
         yield places[done], done.result()
 

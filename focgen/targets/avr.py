@@ -11,7 +11,6 @@ import io
 import shutil
 import struct
 import subprocess
-import tempfile
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -29,6 +28,8 @@ from focgen.errors import BuildError
 from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.present import present
+from focgen.programs import ran
+from focgen.scratch import temporary_folder
 from focgen.targets.driver import DTYPES, RESUME, Answers, driver_context, given_width, lane_of
 from focgen.targets.emulator import TargetFault
 
@@ -68,9 +69,7 @@ def missing(plan: Plan) -> str | None:
 
 def tools() -> str:
     """Names and versions of compiler and emulator."""
-    version = subprocess.run(
-        ["avr-gcc", "-dumpversion"], capture_output=True, errors="replace"
-    ).stdout.strip()
+    version = ran(["avr-gcc", "-dumpversion"]).stdout.strip()
     return f"avr-gcc {version}, simavr ({MCU})"
 
 
@@ -89,7 +88,7 @@ def _compile_simulator(target: Path) -> None:
     """Raises BuildError where simavr's library is not installed."""
     source = Path(__file__).with_name("simavr_run.c")
     command = [*find_compiler(), "-O2", "-I/usr/include/simavr", str(source), "-o", str(target)]
-    if subprocess.run([*command, "-lsimavr", "-lelf"], capture_output=True).returncode:
+    if ran([*command, "-lsimavr", "-lelf"]).returncode:
         raise BuildError("simavr", "its library is not installed", APT)
 
 
@@ -104,8 +103,8 @@ class AvrLibrary:
 
     def __init__(self, plan: Plan, folder: Path, selftest: bool = False) -> None:
         self.plan, self.folder, self.test = plan, folder, b""
-        with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-            feeder, idle = Path(scratch) / "feeder.c", Path(scratch) / "idle.c"
+        with temporary_folder() as scratch:
+            feeder, idle = scratch / "feeder.c", scratch / "idle.c"
             feeder.write_text(render("avr.c.jinja", driver_context(plan)))
             idle.write_text("int main(void) { for (;;) { } }\n")
             own = folder / f"{plan.name}.c"
@@ -183,14 +182,13 @@ def _simulated(elf: bytes, inputs: bytes, places: list[int], most: int, seconds:
     ``most`` million cycles an answer. Raises TargetFault where the program crashes or does not return.
     """
     numbers = [*places, _symbols(elf)["_end"][0], most]
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-        base = Path(scratch)
+    with temporary_folder() as scratch:
+        base = scratch
         (base / "avr.elf").write_bytes(elf)
         (base / "inputs").write_bytes(inputs)
         command = [str(_simulator()), str(base / "avr.elf"), MCU, *map(str, numbers)]
         try:
-            done = subprocess.run([*command, str(base / "inputs"), str(base / "results")],
-                                  capture_output=True, timeout=seconds)  # fmt: skip
+            done = ran([*command, str(base / "inputs"), str(base / "results")], seconds)
         except subprocess.TimeoutExpired:
             raise TargetFault(f"did not return within {seconds:g} s") from None
         if done.returncode:
@@ -201,10 +199,10 @@ def _simulated(elf: bytes, inputs: bytes, places: list[int], most: int, seconds:
 
 def _compiled(sources: list[Path], folder: Path, *more: str) -> bytes:
     """A program, or with -c an object file."""
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-        target = Path(scratch) / "out.elf"
+    with temporary_folder() as scratch:
+        target = scratch / "out.elf"
         parts = ["avr-gcc", *FLAGS, *more, f"-I{folder}", *map(str, sources), "-o", str(target), "-lm"]
-        done = subprocess.run(parts, capture_output=True, errors="replace")
+        done = ran(parts)
         if done.returncode:
             said = [line for line in done.stderr.splitlines() if "error" in line] or ["it says nothing"]
             raise BuildError(str(sources[-1]), f"avr-gcc: {said[0].strip()}", "take a shorter memory or q15")

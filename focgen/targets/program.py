@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import tempfile
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from typing import Any
 from focgen.codegen.render import render
 from focgen.errors import MissingExtra
 from focgen.plan.plan import Plan
+from focgen.scratch import temporary_folder
 from focgen.targets.cores import Core
 from focgen.targets.toolchains import EXACT, Toolchain, link
 
@@ -126,8 +126,8 @@ def build(core: Core, chain: Toolchain, plans: Sequence[Plan], folders: Sequence
     names = tuple(plan.name for plan in plans)
     increments = tuple((p.name, p.increment.ctype) for p in plans)
     context = TargetContext(names, increments, core.work, core.results, STACK, core.single, selftest)
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-        base, sources = Path(scratch), []
+    with temporary_folder() as scratch:
+        base, sources = scratch, []
         (base / "target.c").write_text(render("target.c.jinja", context))
         memory = LinkContext(FLASH, FLASH_SIZE, RAM, RAM_SIZE)
         (base / "target.ld").write_text(render("target.ld.jinja", memory))

@@ -9,16 +9,16 @@ from __future__ import annotations
 import shutil
 import struct
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Trace
 from focgen.present import present
+from focgen.programs import ran
+from focgen.scratch import temporary_folder
 from focgen.targets.cores import Core
 from focgen.targets.emulator import TargetFault
 from focgen.targets.library import Work, results
@@ -38,7 +38,7 @@ def absent(core: Core) -> str | None:
 @cache
 def title() -> str:
     """Name and version."""
-    said = subprocess.run([_NAME, "--version"], capture_output=True, errors="replace").stdout.split("\n")[0]
+    said = ran([_NAME, "--version"]).stdout.split("\n")[0]
     return f"QEMU {said.removeprefix('QEMU emulator version ').split(' ')[0]}"
 
 
@@ -74,8 +74,8 @@ def _trace(program: Program, plan: Plan, scenario: Scenario) -> Trace:
 
 def _run(program: Program, image: bytes, seconds: float) -> bytes:
     """Start the board, let it run to its end; the results it has written."""
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-        base = Path(scratch)
+    with temporary_folder() as scratch:
+        base = scratch
         (base / "program.elf").write_bytes(program.elf)
         (base / "inputs.bin").write_bytes(image)
         command = [_NAME, "-nographic", "-M", present(program.core.board),
@@ -83,7 +83,7 @@ def _run(program: Program, image: bytes, seconds: float) -> bytes:
                    "-semihosting-config", "enable=on,target=native", "-kernel", "program.elf", "-device",
                    f"loader,file=inputs.bin,addr={program.core.work:#x},force-raw=on"]  # fmt: skip
         try:
-            done = subprocess.run(command, cwd=base, capture_output=True, errors="replace", timeout=seconds)
+            done = ran(command, seconds, cwd=base)
         except subprocess.TimeoutExpired:
             raise TargetFault(f"did not return within {seconds:g} s in QEMU") from None
         if done.returncode or not (base / "results.bin").is_file():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -16,6 +15,8 @@ from focgen.cache import cache_folder
 from focgen.children import python
 from focgen.compiler import first_complaint
 from focgen.errors import BuildError, MissingExtra
+from focgen.programs import ran
+from focgen.scratch import temporary_folder
 from focgen.targets.cores import Core
 
 EXACT = ("-O2", "-std=c99", "-ffp-contract=off")
@@ -85,7 +86,7 @@ def _gcc_of(name: str) -> Toolchain | None:
 
 
 def _said(*command: str) -> str:
-    return subprocess.run(command, capture_output=True, errors="replace", timeout=60.0).stdout.strip()
+    return ran(command, 60.0).stdout.strip()
 
 
 def link(chain: Toolchain, core: Core, sources: Sequence[Path], script: Path, target: Path, entry: str,
@@ -108,8 +109,8 @@ def compile_object(chain: Toolchain, core: Core, source: Path, include: Sequence
     """One C file as an object file for a core. Raises BuildError with the compiler's first complaint."""
     own = (*core.zig, *_ZIG) if chain.command[-1] == "cc" else (*core.gcc, *_GCC)
     folders = [f"-I{folder}" for folder in include]
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-        target = Path(scratch) / "object.o"
+    with temporary_folder() as scratch:
+        target = scratch / "object.o"
         parts = [*chain.command, *own, *flags, *folders, "-c", str(source), "-o", str(target)]
         _run(chain, core, source, parts)
         return target.read_bytes()
@@ -117,7 +118,7 @@ def compile_object(chain: Toolchain, core: Core, source: Path, include: Sequence
 
 def _run(chain: Toolchain, core: Core, source: Path, parts: list[str]) -> None:
     try:
-        done = subprocess.run(parts, capture_output=True, errors="replace", env=_environment(), timeout=_SLOW)
+        done = ran(parts, _SLOW, env=_environment())
     except subprocess.TimeoutExpired:
         raise BuildError(str(source), f"{chain.name} did not end within {_SLOW:g} s",
                          "try again; the first build also makes Zig's runtime") from None  # fmt: skip

@@ -68,14 +68,20 @@ def candidate_of(given: Any, plan: Plan) -> Candidate:
         return Candidate(repr(given), _checked(given, plan, repr(given)).counts, isolated=True)
     if not isinstance(given, type) and hasattr(given, "step"):
         _check_object(given, plan)
-        return Candidate(repr(given), lambda: given, isolated=bool(getattr(given, "isolated", False)))
+        return Candidate(repr(given), lambda: given, isolated=_is_c(given))
     if not callable(given):
         raise InputError("the candidate", f"is {given!r}", _WANTED)
     name = getattr(given, "__name__", repr(given))
     if isinstance(given, type) or not _required(given):
-        _check_object(given(), plan)
-        return Candidate(name, given)
+        made = given()
+        _check_object(made, plan)
+        return Candidate(name, given, isolated=_is_c(made))
     return Candidate(name, lambda: _Function(given), plain=True)
+
+
+def _is_c(made: Any) -> bool:
+    """Whether what steps is compiled C, whoever made it."""
+    return isinstance(made, LoadedController) or bool(getattr(made, "isolated", False))
 
 
 class _Function:

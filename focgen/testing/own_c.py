@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from focgen.codegen.render import render
 from focgen.compiler import compile_shared
 from focgen.errors import BuildError, InputError
 from focgen.plan.scenario import Params
+from focgen.scratch import temporary_folder
 from focgen.verification.host import FLAGS
 
 _CALLS = ("init", "reset", "step", "track", "flags", "tune")
@@ -157,8 +157,8 @@ def _compiled(
 ) -> tuple[Any, FFI]:
     ffi = FFI()
     ffi.cdef(_declarations(glue))
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
-        main, target = Path(scratch) / "glue.c", Path(scratch) / "candidate.so"
+    with temporary_folder() as scratch:
+        main, target = scratch / "glue.c", scratch / "candidate.so"
         main.write_text(render("candidate.c.jinja", glue))
         try:
             compile_shared([*sources, main], target, (*flags, _STRICT), folders)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +30,7 @@ from focgen.progress import track
 from focgen.rig.files import read_rig, rig_table
 from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
+from focgen.scratch import temporary_folder
 from focgen.textfile import LARGEST_LOG, read_regular
 from focgen.trials.cases import Case
 from focgen.trials.facts import Facts, diagnosis_in, outcome_in
@@ -88,11 +88,11 @@ def _ask_case(folder: Path, facts: Facts, number: str, label: dict[str, Any]) ->
     if case.bench is None:
         return
     rng = np.random.default_rng([facts.seed, int(number), 1])
-    with tempfile.TemporaryDirectory(prefix="focgen-asked-") as scratch:
-        found = Path(scratch) / "found"
+    with temporary_folder("asked") as scratch:
+        found = scratch / "found"
         for asked in _experiments(folder, number):
             columns = case.bench.further(asked.command, rng)
-            blind = Path(scratch) / asked.which
+            blind = scratch / asked.which
             _lay_out(folder / "cases" / number, blind, case, asked, columns)
             blind_diagnosis(blind, found / asked.which, _LIMIT)
         replace_folder(found, folder / "asked" / number, folder)

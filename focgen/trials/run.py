@@ -12,7 +12,6 @@ import os
 import shutil
 import stat
 import subprocess
-import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -26,6 +25,7 @@ from focgen.children import environment, python
 from focgen.errors import InputError
 from focgen.output import replace_folder
 from focgen.progress import say, track
+from focgen.scratch import temporary_folder
 from focgen.textfile import LARGEST_LOG
 from focgen.trials.facts import facts_of, outcome_in
 
@@ -33,6 +33,7 @@ _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 _LOOK = 0.2  # s between looks whether the run is to end
+_GRACE = 5.0  # s that a diagnosis may take to end in order
 _ended = threading.Event()
 
 
@@ -133,8 +134,8 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
     Raises InputError where the case cannot be read, or the results' place lies outside the trial.
     """
     case, target = trial / "cases" / number, trial / kind / number
-    with tempfile.TemporaryDirectory(prefix="focgen-trial-") as scratch:
-        blind, out = Path(scratch) / "case", Path(scratch) / "out"
+    with temporary_folder("trial") as scratch:
+        blind, out = scratch / "case", scratch / "out"
         _check_plain(case, trial)
         try:
             shutil.copytree(case, blind)
@@ -189,6 +190,9 @@ def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> 
             with suppress(subprocess.TimeoutExpired):
                 child.wait(min(_LOOK, left))
         in_time = child.poll() is not None
+        child.terminate()  # so that what it has begun ends, too
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(_GRACE)
         child.kill()
     if _ended.is_set():
         raise Ended

@@ -8,14 +8,13 @@ over cases. A case without a diagnosis counts as a miss in every row; one not ye
 from __future__ import annotations
 
 import json
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from focgen.children import workers
 from focgen.errors import FocgenError, InputError
 from focgen.output import write_file
+from focgen.pools import pool
 from focgen.progress import say, track
 from focgen.shown import Shown
 from focgen.textfile import LARGEST_SETTING, read_regular
@@ -102,8 +101,10 @@ def _scored(folder: Path, asked: tuple[bool, bool], baseline: bool, partial: boo
         _ask_oracle(folder, labels, jobs)
     if proposals:
         ask(folder, facts, labels, jobs)
-    with workers(), ProcessPoolExecutor(jobs) as pool:
-        waiting = [pool.submit(_judged, folder, number, label, baseline) for number, label in labels.items()]
+    with pool(jobs) as called:
+        waiting = [
+            called.submit(_judged, folder, number, label, baseline) for number, label in labels.items()
+        ]
         judged = [one.result() for one in track(waiting, "trial score")]
     scores = Scores(
         str(folder),

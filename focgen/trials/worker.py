@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import signal
 import sys
 import threading
 import time
@@ -16,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import focgen
+
+_GRACE = 5.0  # s to end in order
 
 
 def oracle_possible() -> bool:
@@ -47,9 +50,18 @@ def _end_with(parent: int) -> None:
     """Not to go on when nobody waits any more."""
     while os.getppid() == parent:
         time.sleep(1.0)
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(_GRACE)
     os._exit(1)
 
 
+def _end(number: int, _: object) -> None:
+    """In order: a compiler that has been begun ends, scratch goes."""
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(1)
+
+
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     main(Path(sys.argv[1]), Path(sys.argv[2]), tuple(sys.argv[3:]))

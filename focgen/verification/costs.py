@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from focgen.arguments import checked
 from focgen.codegen.kernels import TARGETS
 from focgen.errors import InputError, MissingExtra, check_choice
 from focgen.jsontext import read_json
@@ -50,6 +51,7 @@ class Costs(Shown):
     controllers: tuple[ControllerCost, ...]
 
 
+@checked
 def cost(folder: str | Path, target: str | Sequence[str] = "all", compiler: str = "zig",
          against: str | Path | None = None, edited: bool = False) -> Costs:  # fmt: skip
     """Count what a step costs on emulated cores, and what flash, RAM and stack are used.

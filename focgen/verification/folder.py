@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -22,6 +21,7 @@ from focgen.journal import finish
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.plan import ErrorBound, Plan
+from focgen.scratch import temporary_folder
 from focgen.textfile import LARGEST_SETTING, holds, read_regular
 from focgen.verification.recorded import AGAIN, Recorded, read_recorded
 
@@ -90,9 +90,9 @@ def sources(read: GeneratedFolder) -> Iterator[Path]:
     if read.differences:
         yield read.path
         return
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+    with temporary_folder() as scratch:
         write_files(scratch, read.files)
-        yield Path(scratch)
+        yield scratch
 
 
 def _bytes(path: Path) -> bytes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from focgen.compiler import compile_shared
 from focgen.errors import BuildError
 from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Trace
+from focgen.scratch import temporary_folder
 from focgen.targets.driver import DTYPES, Answers, driver, header_scales, lane_of, steps_alone
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
@@ -36,17 +36,17 @@ class Library:
     ) -> None:
         self._ffi = FFI()
         self.alignment = max(self._ffi.alignof(ctype) for ctype in ("int64_t", "double"))
-        with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+        with temporary_folder() as scratch:
             sources = []
             for plan, folder in zip(plans, folders):
-                drive = Path(scratch) / f"{plan.name}_driver.c"
+                drive = scratch / f"{plan.name}_driver.c"
                 drive.write_text(driver(plan))
                 sources += [Path(folder) / f"{plan.name}.c", drive]
                 self._ffi.cdef(_declaration(plan))
                 if selftest:
                     sources.append(Path(folder) / f"{plan.name}_selftest.c")
                     self._ffi.cdef(f"uint32_t {plan.name}_selftest(void);")
-            target = Path(scratch) / "controllers.so"
+            target = scratch / "controllers.so"
             compile_shared(sources, target, flags, list(dict.fromkeys(folders)))
             try:
                 self._library = self._ffi.dlopen(str(target))

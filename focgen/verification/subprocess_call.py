@@ -59,7 +59,11 @@ def _answer(sender: Connection, function: Callable[..., Any], arguments: tuple[A
         answer = function(*arguments), None
     except Exception as error:  # noqa: BLE001 - raised again in the parent
         answer = None, error
-    sender.send(answer)
+    try:
+        sender.send(answer)
+    except Exception as unsent:  # noqa: BLE001 - pickling calls what the answer defines
+        said = answer[1] or unsent
+        sender.send((None, RuntimeError(f"{type(said).__name__}: {said}")))
     sender.close()
 
 

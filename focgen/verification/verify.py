@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from focgen.arguments import checked
 from focgen.codegen.kernels import TARGETS as CORES
 from focgen.errors import InputError
 from focgen.shown import Shown
@@ -49,6 +50,7 @@ class Verification(Shown):
         return self.agrees and not self.differences
 
 
+@checked
 def verify(
     folder: str | Path,
     samples: int | None = None,

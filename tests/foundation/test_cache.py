@@ -5,6 +5,7 @@ Red when a program is run from a folder that another user can write.
 
 import os
 import stat
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -23,7 +24,7 @@ def anew(monkeypatch, tmp_path):
     cache._folder.cache_clear()
     cache._temporary.cache_clear()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     yield tmp_path
     cache._folder.cache_clear()
     cache._temporary.cache_clear()

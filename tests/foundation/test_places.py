@@ -113,3 +113,14 @@ def test_a_name_without_characters_is_told_of(tmp_path):
         with pytest.raises(InputError, match="no UTF-8"):
             write()
     assert not names(tmp_path)
+
+
+@pytest.mark.parametrize("which", ["replaced", "removed"])
+def test_a_terabyte_in_the_place_of_a_result_is_not_read(tmp_path, which):
+    """What stands there is remembered by its digest, in case of a kill: that took hours of nothing."""
+    with open(tmp_path / "study.json", "wb") as file:
+        file.truncate(1 << 40)
+    files = {"study.json": "new"} if which == "replaced" else {"other.json": "new"}
+    with pytest.raises(InputError, match="which no result has"):
+        write_files(tmp_path, files, old=lambda: [tmp_path / "study.json"])
+    assert names(tmp_path) == ["study.json"] and (tmp_path / "study.json").stat().st_size == 1 << 40

@@ -5,6 +5,7 @@ Red when such a thing raises anything but InputError, or is taken for a number.
 
 import datetime
 import decimal
+import warnings
 
 import numpy as np
 import pytest
@@ -21,6 +22,9 @@ ONE = {
     "complex": 1j,
     "signalling NaN": decimal.Decimal("sNaN"),
     "nothing": None,
+    "masked": np.ma.masked,
+    "a class": int,
+    "an array": np.array([0.01, 0.02]),
 }
 MANY = {
     "rows of several lengths": [[1.0], [1.0, 2.0]],
@@ -52,6 +56,24 @@ def test_one_that_is_no_number_is_refused(controller, kind):
     with pytest.raises(InputError, match="ref"):
         controller.step(ONE[kind], 0.0, *_scheduled(controller))
     assert controller._machine.content(controller._state) == state
+
+
+@pytest.mark.parametrize("kind", ONE)
+def test_one_that_is_no_count_is_refused(controller, kind):
+    """In counts a number of a format is whole."""
+    counting = controller.counts()
+    sched = (0,) if controller.scheduled else ()
+    with pytest.raises(InputError, match="ref") as told:
+        counting.step(ONE[kind], 0, *sched)
+    assert "\n" not in str(told.value)
+
+
+def test_numbers_beyond_all_are_ends_without_a_warning(controller):
+    """As infinity is."""
+    sched = (0.0,) if controller.scheduled else ()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isfinite(controller.new().run([1e308, -1e308], 0.0, *sched)).all()
 
 
 @pytest.mark.parametrize("kind", MANY)

@@ -165,6 +165,32 @@ def test_c_that_does_not_come_back_is_a_failed_test(folders, tmp_path, monkeypat
         assert_equivalent(folders / "filter_q31", own(tmp_path, body), samples=10)
 
 
+def test_c_that_a_factory_makes_is_run_apart_as_well(folders, tmp_path):
+    """It ended the tests themselves."""
+    crashing = "return *(volatile int32_t *)0;"
+    with pytest.raises(AssertionError, match="crashed .SIGSEGV"):
+        assert_equivalent(folders / "filter_q31", lambda: own(tmp_path, crashing), samples=10)
+
+
+class Unsendable(Exception):
+    """It does not fit through a pipe between processes."""
+
+    def __reduce__(self):
+        raise TypeError("not to be sent")
+
+
+def test_an_error_that_cannot_be_sent_is_told_in_words(folders, tmp_path, capfd):
+    one = own(tmp_path)
+    one.step = raising
+    with pytest.raises(RuntimeError, match="Unsendable: of my own"):
+        assert_equivalent(folders / "filter_q31", one, samples=10)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def raising(*counts):
+    raise Unsendable("of my own")
+
+
 @pytest.mark.parametrize(
     "options, error, said",
     (

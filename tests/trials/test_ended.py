@@ -52,7 +52,7 @@ def begun(folder: Path) -> subprocess.Popen:
         text=True,
     )
     end = time.monotonic() + 60.0
-    while not list(scratch.glob("focgen-trial-*/case/rig.toml")) and time.monotonic() < end:
+    while not list(scratch.glob("focgen-trial-*/own/case/rig.toml")) and time.monotonic() < end:
         time.sleep(0.01)
     time.sleep(0.5)  # until its own process has begun
     return process

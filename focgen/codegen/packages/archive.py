@@ -11,7 +11,6 @@ import io
 import os
 import platform
 import re
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -21,6 +20,7 @@ from pathlib import Path
 from focgen.compiler import compile_shared
 from focgen.custody import sha256_within
 from focgen.present import present
+from focgen.scratch import temporary_folder
 from focgen.textfile import LARGEST_CODE, holds
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can tell
@@ -78,12 +78,12 @@ def _is_source(file: str, name: str) -> bool:
 
 
 def _binary(name: str, inside: Mapping[str, bytes], fmi: int) -> bytes:
-    with tempfile.TemporaryDirectory(prefix="focgen-") as scratch:
+    with temporary_folder() as scratch:
         for file in inside:
             if file.startswith("sources/"):
-                (Path(scratch) / Path(file).name).write_bytes(inside[file])
-        sources = [Path(scratch) / f"{name}_fmi{fmi}.c", Path(scratch) / f"{name}.c"]
-        target = Path(scratch) / f"{name}.library"
+                (scratch / Path(file).name).write_bytes(inside[file])
+        sources = [scratch / f"{name}_fmi{fmi}.c", scratch / f"{name}.c"]
+        target = scratch / f"{name}.library"
         compile_shared(sources, target, _FLAGS, [scratch])
         return target.read_bytes()
 
