@@ -117,8 +117,5 @@ _WANTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Sequence[float]": (_each(_is_number), "give a list of numbers"),
     "Sequence[int]": (_each(_is_whole), "give a list of whole numbers"),
     "Sequence[str]": (_each(_is_text), "give a list of texts"),
-    "str | Sequence[str]": (
-        lambda value: _is_text(value) or _each(_is_text)(value),
-        "give a text or several",
-    ),
+    "str | Sequence[str]": (_is_text_or_several, "give a text or several"),
 }
