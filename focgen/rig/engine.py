@@ -288,7 +288,7 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
 
 
 # what effects may change of a lag; of a mass on a spring, beside bend and drag, and run in steps
-_OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "mass", "bend", "drag"})
+_OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "mass", "bend", "drag", "loss"})
 _IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unloading", "mass"})
 
 
