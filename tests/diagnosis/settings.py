@@ -19,6 +19,7 @@ CONSTANTS = {
     "fitting/repeats.py": ["_ALIKE", "_AS_WELL", "_CELL", "_CLOSES", "_LATER", "_MOVED", "_ONE_SENSE"],
     "hypotheses/bootstrap.py": ["_RARE"],
     "hypotheses/input_covariance.py": ["_FLAT"],
+    "hypotheses/converter.py": ["_EASED", "_PINNED"],
     "hypotheses/disturbance.py": ["SLOWEST"],
     "hypotheses/explain.py": ["_BELIEVED", "_KEPT"],
     "hypotheses/initial.py": ["_LEVEL", "_SEEN", "_TIME"],
