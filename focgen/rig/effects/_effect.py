@@ -118,6 +118,7 @@ class Form:
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is
     linear, None where not. ``wanders``: it follows the session's time through free values, so that it
     predicts nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
+    ``leads``: linear though it is, away from home it stays ahead of the actuator's gain, which may be bent.
     """
 
     name: str
@@ -129,6 +130,7 @@ class Form:
     response: Callable[[Values, Complex], Complex] | None = None
     wanders: bool = False
     jumps: bool = False
+    leads: bool = False
 
     @property
     def begun(self) -> bool:
