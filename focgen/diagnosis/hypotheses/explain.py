@@ -14,6 +14,7 @@ from focgen.diagnosis.fitting.realign import realigned
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria, select
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
+from focgen.diagnosis.hypotheses.left import remembers, unleft
 from focgen.diagnosis.hypotheses.nuisances import seems_more, uncertain, ways
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
@@ -200,6 +201,10 @@ def _explained(
     best = _dropped(rankings[-1].base, weighing, threshold)
     best = realigned(best if asked.granted else foretelling(best, weighing), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
+    errors = rankings[0].errors
+    if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
+        best, nominal = (_moved_to(f, seen, weighing) for f in (best, nominal))
+        best, rankings = _dropped(best, weighing, threshold), []
     beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted)
     best, causes = reexamined(best, beside)
     if converter is not None:
@@ -217,7 +222,7 @@ def _explained(
         causes,
         predictability(segment, best.weighed, response),
         predictability(segment, nominal.weighed, response),
-        rankings[0].errors,
+        errors,
         converter,
     )
 

@@ -175,7 +175,8 @@ class Effect:
     """A family. ``stage`` is the usual one, ``also`` others it may sit in, where those at home leave much.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
-    ``bends``: its curves leave the gain at zero as it is, and change it elsewhere.
+    ``bends``: its curves leave the gain at zero as it is, and change it elsewhere. ``remembers``: it stays
+    where an experiment left it, whatever rest follows.
     """
 
     name: str
@@ -187,6 +188,7 @@ class Effect:
     forms: Sequence[Form]
     also: tuple[str, ...] = ()
     bends: bool = False
+    remembers: bool = False
 
     @property
     def tonal(self) -> bool:
