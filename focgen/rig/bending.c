@@ -1,8 +1,10 @@
 /* Plants whose spring bends: what they take from the input depends on the response itself, which is solved for at every sample.
  * `spring` = {first, second, scale, place, stiffness}: the spring takes y (first q + second q^2), q = |y|/scale, from the input, and
  * beyond q = FAR no more than its slope there; an obstacle beyond y = `place` takes stiffness (y - place).
- * Two more numbers, `slide` and `stick`, are of dry friction, as in kernels.c. The last, `preload`, presses the spring against a seat at
- * y = 0: what is there stays until more than that pushes it, and what moves back comes to rest there.
+ * Two more numbers, `slide` and `stick`, are of dry friction, as in kernels.c. The next, `preload`, presses the spring against a seat at
+ * y = 0: what is there stays until more than that pushes it, and what moves back comes to rest there. The last two, `share` and
+ * `power`, are of a spring or an outflow that goes with a power of y: that share of what is linear in y goes with q^power instead, which
+ * is as much at q = 1. Below q = LOW it is straight, for a power below 1 has no slope at 0.
  * `rest` is as in kernels.c.
  */
 #include <math.h>
@@ -11,12 +13,26 @@
 
 enum { BALANCED = 2, TURNS = 40 };
 static const double FLAT = 0.05, CLOSE = 1e-7; /* Newton's step squares what is missing */
+static const double LOW = 0.003;               /* of the scale: 1 mm of a tank that is filled to 0.3 m */
 
-/* y = still + gain (x - pull(y)), by Newton's rule from `y`; a spring that gives way altogether is kept from it. */
+/* What spring and obstacle take at y, and what goes with a power of it more than in a line. */
+static double drawn(const double *spring, double y, double *slope)
+{
+    double taken = pull(spring, y, slope), share = spring[8], power = spring[9], q = fabs(y) / spring[2];
+    if (share == 0.0) return taken;
+    double straight = pow(q > LOW ? q : LOW, power - 1.0);
+    *slope += share * ((q > LOW ? power : 1.0) * straight - 1.0);
+    return taken + share * (straight - 1.0) * y;
+}
+
+/* y = still + gain (x - drawn(y)), by Newton's rule from `y`; a spring that gives way altogether is kept from it. What goes with a power
+ * is steepest at 0: a step that passes that is begun anew from there. */
 static double solved(const double *spring, double still, double gain, double x, double y)
 {
+    double goal = still + gain * x;
     for (int turn = 0; turn < TURNS; turn++) {
-        double slope, miss = still + gain * (x - pull(spring, y, &slope)) - y, steep = 1.0 + gain * slope;
+        if (spring[8] != 0.0 && y * goal < 0.0) y = 0.0;
+        double slope, miss = goal - gain * drawn(spring, y, &slope) - y, steep = 1.0 + gain * slope;
         y += miss / (steep > FLAT ? steep : FLAT);
         if (fabs(miss) <= CLOSE * (fabs(y) + spring[2])) break;
     }
@@ -35,7 +51,7 @@ static double moved(const double *spring, double still, double gain, double x, d
 {
     double slope, drag = 0.0, slide = spring[5], stick = spring[6], preload = spring[7];
     if (stick > 0.0) {
-        double pushed = x - (last - still) / gain, pulled = pull(spring, last, &slope);
+        double pushed = x - (last - still) / gain, pulled = drawn(spring, last, &slope);
         pulled += seated(preload, last, pushed - pulled);
         if (fabs(pushed - pulled) <= (*moving ? slide : stick)) {
             *moving = 0, *taken = pushed;
@@ -49,7 +65,7 @@ static double moved(const double *spring, double still, double gain, double x, d
         return 0.0;
     }
     double y = solved(spring, still, gain, x - drag - held, last);
-    *taken = pull(spring, y, &slope) + drag + held;
+    *taken = drawn(spring, y, &slope) + drag + held;
     return y;
 }
 
@@ -74,7 +90,7 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
         if (rest[k] == BALANCED) {
             double gr, gi, gain = gain_at_rest(m, a, b0, b1, pair, through, &gr, &gi);
             last = solved(spring, 0.0, gain, came(spring, x[k]), 0.0);
-            past = came(spring, x[k]) - pull(spring, last, &slope);
+            past = came(spring, x[k]) - drawn(spring, last, &slope);
             settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
@@ -109,7 +125,7 @@ void focgen_bent_filter(int n, const double *x, double *y, const unsigned char *
             double up = 0.0, down = 0.0;
             for (int i = 0; i <= m; i++) up += b[i], down += a[i];
             last = solved(spring, 0.0, up / down, came(spring, x[k]), 0.0);
-            taken = pull(spring, last, &slope) + x[k] - came(spring, x[k]);
+            taken = drawn(spring, last, &slope) + x[k] - came(spring, x[k]);
             for (int i = m; i >= 1; i--) w[i - 1] = b[i] * x[k] - c[i] * taken - a[i] * last + (i < m ? w[i] : 0.0);
         }
         last = y[k] = moved(spring, w[0] + b[0] * x[k], c[0], 0.0, last, &moving, &taken);

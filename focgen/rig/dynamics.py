@@ -47,6 +47,16 @@ class Bend:
 
 
 @dataclass(frozen=True)
+class Power:
+    """A ``share`` of what pulls back, or flows out, goes with q to this ``power``, and not with
+    q = |y|/``scale`` itself: 1/2 through an orifice, 4 for what radiates. At q = 1 it is the same."""
+
+    share: float = 0.0
+    power: float = 1.0
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
 class Rise:
     """What friction rises by as it moves, ``size`` (1 − exp(−|y'|/``speed``)), in units of the input; below 0
     it falls, as in lubricated bearings (R. Stribeck, Z. VDI 46, 1902)."""
@@ -55,7 +65,7 @@ class Rise:
     speed: float = 1.0
 
 
-STRAIGHT, NO_FRICTION, LINEAR, LEVEL = Bend(), Friction(), Spring(), Rise()
+STRAIGHT, NO_FRICTION, LINEAR, LEVEL, EVEN = Bend(), Friction(), Spring(), Rise(), Power()
 
 
 @dataclass(frozen=True)
@@ -67,7 +77,7 @@ class Dynamics:
     beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place); a ``place`` below 0 stands
     for one on either side, as far away. Of that and of any other spring y follows ``bend``, and dry friction,
     the ``drag``, takes away from x, in its unit. So does a ``preload``, which presses the spring against a
-    seat at 0. A ``mass`` in s² adds mass·D² y. Of a
+    seat at 0. A ``mass`` in s² adds mass·D² y. A ``loss`` goes with a power of y. Of a
     :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag.
     """
 
@@ -78,6 +88,7 @@ class Dynamics:
     preload: float = 0.0
     mass: float = 0.0
     bend: Bend = STRAIGHT
+    loss: Power = EVEN
     spring: Spring = LINEAR
     rise: Rise = LEVEL
 
@@ -87,11 +98,14 @@ class Dynamics:
         return frozenset(name for name, value in vars(self).items() if value != getattr(UNCHANGED, name))
 
     def bending(self, gain: float = 1.0) -> tuple[float, ...]:
-        """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, and
-        of what bears a part of the input."""
-        bend = self.bend
+        """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, of
+        what bears a part of the input, and of a loss: of a plant that answers 1 with 1, and of the scale of
+        the bend where there is one, too."""
+        bend, loss = self.bend, self.loss
+        scale = loss.scale if bend == STRAIGHT else bend.scale
         obstacle = self.place, self.stiffness / gain
-        return bend.first / gain, bend.second / gain, bend.scale, *obstacle, *self.drag.held, self.preload
+        parts = bend.first / gain, bend.second / gain, scale, *obstacle, *self.drag.held, self.preload
+        return *parts, loss.share, loss.power
 
 
 UNCHANGED = Dynamics()

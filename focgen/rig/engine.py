@@ -60,14 +60,14 @@ def slot_in(form: Form, stage: str) -> str:
     """The slot of ``form`` in ``stage``: its own, or where it is not at home the first for what is at home
     ahead of the actuator, the last for what is behind it, and for the actuator's own the one on the same side
     of the dynamics. What is linear may stand on either side: behind, where a delay interpolates what is
-    smooth. Of a regulator alone the output is what its own gauge reads: behind it, the memory of a sensor of
-    its own would stand for whatever fills and vents at another pace."""
+    smooth, unless it leads. Of a regulator alone the output is what its own gauge reads: behind it, the
+    memory of a sensor of its own would stand for whatever fills and vents at another pace."""
     if form.slot in SLOTS[stage]:
         return form.slot
     first, *_, last = SLOTS[stage]
     ahead = form.slot in (*SLOTS["regulator"], "load", "drive")
     ahead = ahead or (form.slot == "strain" and stage == "regulator")
-    return first if ahead and not form.response else last
+    return first if ahead and (form.leads or not form.response) else last
 
 
 Step = tuple[tuple[Hashable, ...], Callable[[Array, Run], Array], Placed | None]
@@ -162,6 +162,8 @@ class Chain:
         next."""
         early, late = ("command", "load", "strain"), ("supply", "response", "reading")
         here = [p for p in self.placed if p.stage == stage]
+        if any(p.form.leads and p.slot in early for p in here):
+            between = Between.STRAIGHT  # what was held is smooth behind a lag
         steps = [_effect(p) for p in here if p.slot in early]
         steps += self._core(stage, here, between)
         steps += [_effect(p) for p in here if p.slot in late]
@@ -288,7 +290,7 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
 
 
 # what effects may change of a lag; of a mass on a spring, beside bend and drag, and run in steps
-_OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "mass", "bend", "drag"})
+_OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "mass", "bend", "drag", "loss"})
 _IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unloading", "mass"})
 
 

@@ -209,7 +209,7 @@ def bent_modes(
     switching: bool,
     spring: Sequence[float],
 ) -> Array:
-    """As :func:`modes`, with the input less what ``spring`` (8,) takes: see ``bending.c``."""
+    """As :func:`modes`, with the input less what ``spring`` (10,) takes: see ``bending.c``."""
     *pointers, own, room = _doubles(a, b0, b1, pair, np.array(spring, float), np.empty(a.shape[1]))
     return _call(
         "focgen_bent_modes",
@@ -225,7 +225,7 @@ def bent_modes(
 
 
 def bent_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, spring: Sequence[float]) -> Array:
-    """As :func:`rational`, with ``c`` the numerator for what ``spring`` (8,) takes from the input."""
+    """As :func:`rational`, with ``c`` the numerator for what ``spring`` (10,) takes from the input."""
     order = max(len(a), len(b), len(c)) - 1
     scratch, *tables = np.zeros((4, order + 1))
     for table, values in zip(tables, (b, c, a)):

@@ -19,7 +19,7 @@ from focgen.arrays import Array, Bytes
 from focgen.fractional.delay import split_delay
 from focgen.rig import kernels
 from focgen.rig.delay import delayed, shifted
-from focgen.rig.dynamics import STRAIGHT, UNCHANGED, Dynamics
+from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
 
@@ -94,7 +94,7 @@ def respond(
     unloading, longest = dynamics.unloading, 2.0 ** np.ceil(np.log2(duration))
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
-    if dynamics.bend != STRAIGHT or dynamics.preload or dynamics.place < 0.0:
+    if dynamics.changed & {"bend", "loss", "preload"} or dynamics.place < 0.0:
         made = kernels.bent_modes(x, rest, a, b0, b1, pair, through, switching, dynamics.bending())
     else:
         obstacle = dynamics.place, dynamics.stiffness

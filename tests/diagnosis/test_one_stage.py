@@ -17,7 +17,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import form_of
 from focgen.rig.engine import slot_in
-from focgen.rig.rig import LinearActuator, Rig, Signals
+from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 
 H, T, GAIN, NOISE = 0.05, 0.6, 2.0, 0.1
 LAG = TransferFunction([(0.95 * GAIN, 0.0)], [(1.06 * T, 1.0), (1.0, 0.0)])
@@ -54,6 +54,30 @@ def test_a_limit_is_found_on_its_side_of_the_dynamics(where, effect):
     assert found.causes[0].candidates[0].confidence > 0.8
 
 
+@pytest.mark.parametrize("where, effect", [("ahead", "slow_regulator"), ("behind", "sensor_lag")])
+def test_a_lag_is_found_on_its_side_of_a_bent_gain(where, effect):
+    """T y' + y = 2 u², and a lag of a fifth of T ahead of the square or behind everything."""
+    film = Rig("film", H, Signals("t", "y", "u"), Actuator(1.05 * T, 1.0, (0.0, 1.9)))
+    rng, t, kept = np.random.default_rng(8), np.arange(800) * H, np.exp(-H / (0.2 * T))
+
+    def late(x: np.ndarray) -> np.ndarray:
+        return lfilter([0.0, 1.0 - kept], [1.0, -kept], x)
+
+    logs = []
+    for i, command in enumerate(
+        (np.abs(np.repeat((0.0, *LEVELS), [30, *[70] * 11])), 6 - 6 * np.cos(1.5 * t))
+    ):
+        drive = (late(command) if where == "ahead" else command) / 6.0
+        made = answered(6.0 * drive**2)
+        made = (late(made) if where == "behind" else made) + 0.05 * rng.normal(size=800)
+        logs.append(
+            replace(Experiment(str(i), H, {"command": command / 6.0, "output": made}), start=50.0 * i)
+        )
+    film = replace(film, actuator=Actuator(1.05 * T, 1.0, (0.0, 6.0 * 1.9)))
+    found = diagnose(film, logs, only=("slow_regulator", "sensor_lag"))
+    assert [c.candidates[0].effect for c in found.causes] == [effect]
+
+
 @pytest.mark.parametrize(
     "effect, form, slots",
     [
@@ -61,6 +85,8 @@ def test_a_limit_is_found_on_its_side_of_the_dynamics(where, effect):
         ("sensor_nonlinearity", "quadratic", ("command", "response", "strain")),
         ("gain_nonlinearity", "cubic", ("command", "drive", "strain")),
         ("transport_delay", "delay", ("supply", "response", "reading")),
+        ("slow_regulator", "one_lag", ("supply", "load", "strain")),
+        ("sensor_lag", "one_lag", ("supply", "response", "strain")),
         ("contact", "knee", ("supply", "response", "reading")),
     ],
 )

@@ -1,6 +1,7 @@
-"""A spring that yields without memory is a bent gain, not a hysteresis.
+"""A spring that yields without memory, or an outflow by the root, is a bent gain, and nothing beside it.
 
-Red when the hysteretic spring, which may lose its loop in a fit, is named for what has none.
+Red when the hysteretic spring, which may lose its loop in a fit, is named for what has none, or a seat for a
+root's steepness at 0.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
@@ -55,6 +57,26 @@ def test_an_orifice_that_drains_a_tank_is_a_bent_gain():
     found = diagnose(TANKS, session())
     assert [c.candidates[0].effect for c in found.causes] == ["gain_nonlinearity"]
     assert found.shrink is not None and found.shrink > 0.8
+
+
+@pytest.mark.parametrize("seed, laminar", [(1, 0.1), (2, 0.4)])
+def test_a_tank_of_one_lag_that_drains_by_the_root_has_no_dead_zone(seed, laminar):
+    """3 dh/dt = 2 u - outflow; the seat of a preloaded spring would hold it at 0 as the root does."""
+    rng, logs = np.random.default_rng(seed), []
+    steps, t = np.r_[np.zeros(10), np.repeat(LEVELS, 70)], np.arange(640) * H
+    for i, pump in enumerate((steps, 2.5 - 2.5 * np.cos(0.2 * t))):
+        level, seen = 0.0, []
+        for u in pump:
+            seen.append(level)
+            for _ in range(10):
+                out = laminar * level + (1.0 - laminar) * float(np.sqrt(max(level, 0.0) * FULL))
+                level += H / 30.0 * (2.0 * u - out)
+        roles = {"command": pump, "output": np.array(seen) + 0.05 * rng.normal(size=640)}
+        logs.append(replace(Experiment(str(i), H, roles), start=150.0 * i))
+    lag = LinearActuator(TransferFunction([(1.9, 0.0)], [(3.2, 1.0), (1.0, 0.0)]))
+    found = diagnose(Rig("tank", H, TANKS.signals, lag), logs)
+    assert [c.candidates[0].effect for c in found.causes] == ["gain_nonlinearity"]
+    assert found.shrink is not None and found.shrink > 0.9
 
 
 def test_it_is_the_hysteretic_spring_without_its_loop():

@@ -53,6 +53,24 @@ def test_a_first_order_plant_solves_its_own_equation():
         np.testing.assert_allclose(made_by(actuator), exact, atol=2e-4)
 
 
+@pytest.mark.parametrize("power", [0.5, 1.7])
+def test_what_goes_with_a_power_of_the_level_solves_its_own_equation(power):
+    """A share of 0.7 flows out as level**power, 2 in full: from empty, to full, and to empty again."""
+    x = np.interp(T, [0, 1, 2, 4, 5, 6], [0.0, 0.0, 0.9, 0.2, 1.0, 0.0])
+
+    def slope(t, y):
+        q = np.maximum(y, 0.0) / 2.0
+        return (2.0 * np.interp(t, T, x) - 0.3 * y - 0.7 * 2.0 * q**power) / 0.5
+
+    exact = solve_ivp(slope, (0, T[-1]), [0.0], t_eval=T, max_step=H / 20, rtol=1e-8, atol=1e-10).y[0]
+    form = form_of("gain_nonlinearity", "power")
+    placed = (Placed("gain_nonlinearity", form, "actuator", (0.7, power, 2.0)),)
+    for actuator in (FIRST, Actuator(0.5, 1.0, (2.0,))):
+        made = Chain(rig_of(actuator), placed).run(x, "actuator", "actuator", RUN)
+        np.testing.assert_allclose(made, exact, atol=2e-3)
+    assert not fits_in(form, "actuator", rig_of(SECOND))
+
+
 def test_a_second_order_plant_solves_its_own_equation():
     def slope(t, s):
         return s[1], (3.0 * np.interp(t, T, X) - 0.4 * s[1] - 2.0 * spring(s[0])) / 0.02

@@ -8,15 +8,22 @@ effect changes by less than that could be the converter's as well.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
+from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.rivals import Cause, Rival, share_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.rig.effects._effect import Run, Values
 from focgen.rig.engine import slot_in
+
+_SHARP = 20_000  # parts of the range: what readings may lie off a level that is one
+_PINNED = 0.25 * FIXED  # of a reference: what is held may move either way
+_REFITTED = 6  # iterations
+_EASED = (0.2, 0.06)  # of a step: what it rises in, as it is fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +50,33 @@ class Converter:
         """With the rounding put to what was found without it: a cause, and where it brings the model closer
         a part of it."""
         problem = best.problem.with_candidates([*best.problem.candidates, self.candidate])
-        both = fit(problem, np.r_[best.vector, self.entries], weighing, 0)
+        both = self._refitted(problem, best.vector, weighing)
         rival = Rival(self.candidate.effect, self.candidate.stage, 0.0, 0.0, both)
         closer = rms(both.weighed) < rms(best.weighed)
         return both if closer else best, (*causes, Cause((rival,), 0.0, share_of(nominal, best, both)))
+
+    def _refitted(self, problem: Problem, vector: np.ndarray, weighing: Weighing) -> Fit:
+        """``problem``, whose last effect is the rounding, from ``vector`` without it: what was fitted to
+        coarse steps as if they were the reading lies off by part of a step. Steps have no slope, so they are
+        rounded off, first much and then little."""
+        start = np.r_[vector, self.entries]
+        found = [fit(problem, start, weighing, 0)]
+        for width in _EASED:
+            eased = replace(self.candidate, form=replace(self.candidate.form, act=partial(_eased, width)))
+            soft = problem.with_candidates([*problem.candidates[:-1], eased])
+            start = fit(soft, start, WHITE, _REFITTED).vector
+            found.append(fit(problem, np.r_[start[: len(vector)], self.entries], weighing, 0))
+        return min(found, key=lambda f: rms(f.weighed))
+
+
+def _eased(width: float, x: np.ndarray, values: Values, run: Run) -> np.ndarray:
+    """Steps of ``values`` (step, phase), each risen in a part ``width`` of it, by a hyperbolic tangent."""
+    step, phase = values
+    whole = np.floor((x - phase) / step)
+    part = (x - phase) / step - whole
+    risen = np.tanh((part - 0.5) / width) / np.tanh(0.5 / width)
+    made: np.ndarray = step * (whole + 0.5 + 0.5 * risen) + phase
+    return made
 
 
 def rms(values: np.ndarray) -> float:
@@ -55,12 +85,37 @@ def rms(values: np.ndarray) -> float:
 
 
 def converter_of(problem: Problem, candidates: Sequence[CandidateEffect]) -> Converter | None:
-    """The one whose levels the segment's output shows, if any."""
+    """The one whose levels the segment's output shows, if any. Levels that noise has widened may be rests of
+    the rig as well: then rounding has to bring its refitted model closer."""
     for candidate in candidates:
         values = candidate.form.seen(problem.segment.y) if candidate.form.seen else None
         if values is not None:
             slot = slot_in(candidate.form, candidate.stage)
             scales = [problem.references.scale(p, slot) for p in candidate.form.parameters]
             entries = tuple(v / s for v, s in zip(values, scales))
-            return Converter(candidate, entries, values[0] / problem.segment.level_out)
+            held = _held(candidate, entries)
+            found = Converter(held, entries, values[0] / problem.segment.level_out)
+            return found if _is_sharp(problem, candidate, values) or _is_closer(problem, found) else None
     return None
+
+
+def _held(candidate: CandidateEffect, entries: Sequence[float]) -> CandidateEffect:
+    """The rounding with its parameters where they were seen: no fit moves them, for steps have no slope."""
+    ends = ((e - _PINNED, e + _PINNED) for e in entries)
+    own = zip(candidate.form.parameters, ends)
+    parameters = tuple(replace(p, lower=low, upper=high) for p, (low, high) in own)
+    return replace(candidate, form=replace(candidate.form, parameters=parameters))
+
+
+def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> bool:
+    """Whether most readings are levels, but for the rounding of the file."""
+    y = problem.segment.y
+    away = np.abs(y - candidate.form.act(y, values, problem.segment.run))
+    return bool(_SHARP * np.median(away) < np.ptp(y))
+
+
+def _is_closer(problem: Problem, found: Converter) -> bool:
+    """Whether a rounding leaves less of what the rig's nominal parameters do not explain."""
+    nominal = fit(problem, problem.nominal(), WHITE, _REFITTED)
+    both, _ = found.beside(nominal, nominal, (), WHITE)
+    return rms(both.weighed) < NUMBERS.unlikely * rms(nominal.weighed)

@@ -14,6 +14,7 @@ from focgen.diagnosis.fitting.realign import realigned
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria, select
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
+from focgen.diagnosis.hypotheses.left import remembers, unleft
 from focgen.diagnosis.hypotheses.nuisances import seems_more, uncertain, ways
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
@@ -25,7 +26,7 @@ from focgen.logs.experiment import Experiment
 from focgen.present import present
 from focgen.rig.effects import Effect, library
 from focgen.rig.engine import between_of, fits_in, slot_in
-from focgen.rig.rig import Rig
+from focgen.rig.rig import Actuator, Rig
 
 _DEPTH = 4
 _KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
@@ -89,8 +90,9 @@ class Explanation:
 
 def candidates_for(segment: Segment, rig: Rig) -> list[CandidateEffect]:
     """Every form that may act in this segment. In a rig of one stage every family may, but of those that
-    share a formula and its place, or a linear one, only the one at home there. Where every experiment begins
-    at rest, none that says where something lay before."""
+    share a formula and its place, or a linear one, only the one at home there; where the gain is bent, ahead
+    of it is another place than behind. Where every experiment begins at rest, none that says where something
+    lay before."""
     every = _placed_in(segment, rig)
     return every if segment.run.begins else [c for c in every if not c.form.begun]
 
@@ -104,12 +106,13 @@ def _placed_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
             for form in e.forms
             if fits_in(form, stage, rig)
         ]
-    stage = present(owner(rig))
+    stage, bent = present(owner(rig)), isinstance(rig.actuator, Actuator) and any(rig.actuator.gain[1:])
     found: dict[Hashable, CandidateEffect] = {}
     for effect in sorted(library().values(), key=lambda e: e.stage != stage):
         for form in effect.forms:
             if fits_in(form, stage, rig):
-                slot = None if form.response else slot_in(form, stage)
+                anywhere = form.response and not (form.leads and bent)
+                slot = None if anywhere else slot_in(form, stage)
                 found.setdefault((form.act, form.begun, slot), CandidateEffect(effect.name, form, stage))
     return list(found.values())
 
@@ -198,6 +201,10 @@ def _explained(
     best = _dropped(rankings[-1].base, weighing, threshold)
     best = realigned(best if asked.granted else foretelling(best, weighing), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
+    errors = rankings[0].errors
+    if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
+        best, nominal = (_moved_to(f, seen, weighing) for f in (best, nominal))
+        best, rankings = _dropped(best, weighing, threshold), []
     beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted)
     best, causes = reexamined(best, beside)
     if converter is not None:
@@ -215,7 +222,7 @@ def _explained(
         causes,
         predictability(segment, best.weighed, response),
         predictability(segment, nominal.weighed, response),
-        rankings[0].errors,
+        errors,
         converter,
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
+from focgen.diagnosis.verdict.moments import Changed, changed_at_once, is_timed
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.sizes import estimates
@@ -79,8 +80,20 @@ def _cautions(rig: Rig, summary: _Summary, unknown: Sequence[Explanation]) -> It
             f"the {candidate.effect} wanders: followed through this session, its next turn cannot be "
             "predicted, and nothing of it is promised"
         )
+    for e in unknown:
+        if (changed := changed_at_once(e)) is not None and changed.odds > 0.0:
+            yield f"{e.segment.entry} to {e.segment.exit}: {_at_once(changed)}"
     for e in unknown if summary.causes else ():
         yield f"{e.segment.entry} to {e.segment.exit}: no effect explains what is left there{_nearest(e)}"
+
+
+def _at_once(changed: Changed) -> str:
+    """When it became another, by how much, and what to do about it."""
+    said = (
+        f"{m.within:.4g} s into {m.experiment} by {m.rms:.3g} (root mean square; on average {m.mean:+.3g})"
+        for m in changed.moments
+    )
+    return f"not slowly, but at once it becomes another: {', '.join(said)}; diagnose the parts by themselves"
 
 
 def _nearest(e: Explanation) -> str:
@@ -221,9 +234,18 @@ def _found(
 ) -> Found:
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
+    sure = sure * _slowly(e, cause)
     lost = _share_lost(cause, rigs, logs, squares, floor, total or Improvement(0.0, (0.0, 0.0)))
     candidates = tuple(_candidate(r, float(p), rigs.fitted) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
+
+
+def _slowly(e: Explanation, cause: Cause) -> float:
+    """How likely a cause that moves with the session's clock is what it says, and no change at once."""
+    best = cause.rivals[0]
+    timed = (c.effect == best.effect and is_timed(c.form) for c in e.best.problem.candidates)
+    changed = changed_at_once(e) if any(timed) else None
+    return 1.0 - changed.sure if changed is not None else 1.0
 
 
 def _share_lost(
@@ -288,7 +310,7 @@ def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
     found: dict[str, object] = {}
     for e in unknown:
         parts, noise = {k: v for k, v in e.nominal_predictability.depends.items() if v > 0.02}, disturbed(e)
-        found[f"{e.segment.entry} to {e.segment.exit}"] = {
+        said: dict[str, object] = {
             "depends_on": sorted(parts, key=lambda k: -parts[k]) or ["nothing"],
             "share": e.nominal_predictability.share,
             "bursts": noise.bursts,
@@ -296,4 +318,7 @@ def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
             "tonal": noise.tonal,
             "pushed": noise.pushed,
         }
+        if (changed := changed_at_once(e)) is not None and changed.odds > 0.0:
+            said["moments"] = [asdict(m) for m in changed.moments]
+        found[f"{e.segment.entry} to {e.segment.exit}"] = said
     return found

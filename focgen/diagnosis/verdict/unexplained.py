@@ -8,19 +8,21 @@ from focgen.diagnosis.belief.unknown import is_none
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.verdict.moments import changed_at_once
 from focgen.diagnosis.verdict.outside import from_outside
 from focgen.rig.effects import library
 
 
 def is_unknown(e: Explanation) -> bool:
     """Whether much of what inputs predict of the nominal residual is still there after the effects, or what
-    hardly any of them explains is not just noise; unless a coarse converter explains it."""
+    hardly any of them explains is not just noise, or what moves with time moves at once; unless a coarse
+    converter explains it."""
     if e.converter is not None and e.converter.explains(e.best):
         return False
     left = disturbed(e)
     if _is_disturbed(e, left) or (e.segment.closed and _hidden(e, left)):
         return True
-    if e.causes and not is_rounded(e) and from_outside(e):
+    if e.causes and not is_rounded(e) and (from_outside(e) or _is_another(e)):
         return True
     if e.predictability.share < NUMBERS.left:
         return False
@@ -28,6 +30,12 @@ def is_unknown(e: Explanation) -> bool:
         return True
     before, after = _squares(e)
     return is_none(after * e.predictability.share, before - after)
+
+
+def _is_another(e: Explanation) -> bool:
+    """Whether the rig became another at a moment, rather than slowly."""
+    changed = changed_at_once(e)
+    return changed is not None and changed.odds > 0.0
 
 
 def disturbed(e: Explanation) -> Disturbance:

@@ -118,6 +118,7 @@ class Form:
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is
     linear, None where not. ``wanders``: it follows the session's time through free values, so that it
     predicts nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
+    ``leads``: linear though it is, away from home it stays ahead of the actuator's gain, which may be bent.
     """
 
     name: str
@@ -129,6 +130,7 @@ class Form:
     response: Callable[[Values, Complex], Complex] | None = None
     wanders: bool = False
     jumps: bool = False
+    leads: bool = False
 
     @property
     def begun(self) -> bool:
@@ -173,7 +175,8 @@ class Effect:
     """A family. ``stage`` is the usual one, ``also`` others it may sit in, where those at home leave much.
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
-    ``bends``: its curves leave the gain at zero as it is, and change it elsewhere.
+    ``bends``: its curves leave the gain at zero as it is, and change it elsewhere. ``remembers``: it stays
+    where an experiment left it, whatever rest follows.
     """
 
     name: str
@@ -185,6 +188,7 @@ class Effect:
     forms: Sequence[Form]
     also: tuple[str, ...] = ()
     bends: bool = False
+    remembers: bool = False
 
     @property
     def tonal(self) -> bool:

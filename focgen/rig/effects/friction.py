@@ -34,6 +34,7 @@ EFFECT = Effect(
     reveals="slow motion that turns round, rests at several levels, small steps: it stays where it was",
     confused_with=("hysteresis", "dead_zone", "valve_stiction", "sensor_hysteresis", "sensor_nonlinearity"),
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
+    remembers=True,
     forms=[
         Form("coulomb", "dynamics", (_FORCE,), _coulomb),
         Form("rising", "dynamics", (_FORCE, _RISE, _SPEED), _rising),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.rig.dynamics import Bend, Dynamics, Spring
+from focgen.rig.dynamics import Bend, Dynamics, Power, Spring
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 
@@ -42,12 +42,19 @@ def _yielding(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, spring=Spring(share, yielding / scale, -yielding / scale, power, scale))
 
 
+def _power(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, loss=Power(*values))
+
+
 _FIRST = Parameter("first", lower=-0.45, upper=20.0, starts=(0.2, -0.1, 1.0), zero=0.0)
 _SECOND = Parameter("second", lower=-0.3, upper=50.0, starts=(0.0, 0.0, 1.0), zero=0.0)
 # a share of the stiffness, and what of it a spring wound to the largest displacement has lost
 _SHARE = Parameter("share", lower=0.0, upper=1.0, starts=(0.5, 0.8), zero=0.0)
 _YIELDING = Parameter("yielding", lower=-3.0, upper=30.0, starts=(0.5, 2.0))
 _POWER = Parameter("power", lower=0.5, upper=4.0, starts=(1.0, 1.0))
+# of what flows out, or pulls back; through an orifice it goes with the root
+_LOST = Parameter("share", lower=0.0, upper=1.0, starts=(0.3, 0.8), zero=0.0)
+_POWER_OF = Parameter("power", lower=0.25, upper=4.0, starts=(0.5, 0.5))
 
 EFFECT = Effect(
     name="gain_nonlinearity",
@@ -87,6 +94,8 @@ EFFECT = Effect(
         ),
         Form("bent_spring", "dynamics", (_FIRST, _SECOND, LARGEST), _bent_spring),
         Form("yielding", "dynamics", (_SHARE, _YIELDING, _POWER, LARGEST), _yielding),
+        # of a lag: the less there is, the slower it moves on
+        Form("power", "dynamics", (_LOST, _POWER_OF, LARGEST), _power),
         _curves.quartic("drive"),
         _curves.spline("drive"),
     ],

@@ -45,6 +45,7 @@ EFFECT = Effect(
         "gain_nonlinearity",
     ),
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
+    remembers=True,
     forms=[
         *_loops.forms("drive"),
         Form("spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, LARGEST), _spring),

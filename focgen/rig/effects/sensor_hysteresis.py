@@ -10,5 +10,6 @@ EFFECT = Effect(
     reveals="slow cycles with the curvature logged beside the reading",
     confused_with=("hysteresis", "valve_stiction", "sensor_relaxation", "sensor_nonlinearity"),
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
+    remembers=True,
     forms=_loops.forms("strain"),
 )

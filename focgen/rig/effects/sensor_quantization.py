@@ -8,6 +8,15 @@ from focgen.rig.effects._effect import STEP, Effect, Form, Parameter, Run, Value
 _COARSE = 0.006  # of the range: finer steps are the resolution of any converter
 _COVERED = 0.6  # of the samples lie on a few levels
 _COVERED_BY_TWO = 0.999  # the same of two levels, which may be rests of a finer reading
+# of the noise of a reading whose levels are blurred
+_OF_NOISE = 0.954  # what half of all steps between neighbours are below, where both are noise
+_BIN = 1.5  # a bin of the histogram
+_APART = 12.0  # two levels, at least
+_WIDE = 6.0  # a level, either way
+_FEW, _SELDOM = 4, 5e-4  # samples, of all, in a bin that is no passage
+_LEVELS = 3  # at least: two may be the rests of a rig
+_PASSES = 2  # samples between two levels, for each change of level: what resampling leaves there
+_EVEN = 0.08  # of a step: what levels may lie off
 
 
 def _round(x: Array, values: Values, run: Run) -> Array:
@@ -16,6 +25,38 @@ def _round(x: Array, values: Values, run: Run) -> Array:
 
 
 def _seen(y: Array) -> Values | None:
+    """Step and phase where most samples lie on a few evenly spaced levels, or about them: what is noisy
+    behind the converter, as a wire is, blurs its levels."""
+    return _exactly(y) or _blurred(y)
+
+
+def _blurred(y: Array) -> Values | None:
+    """The same of levels that noise has widened, wide apart against that, between which the reading jumps."""
+    noise = float(np.median(np.abs(np.diff(y)))) / _OF_NOISE
+    span = float(np.ptp(y))
+    if not 0.0 < _APART * noise < span:
+        return None
+    count = int(span / (_BIN * noise)) + 1
+    where = np.minimum((y - y.min()) / (_BIN * noise), count - 1).astype(int)
+    full = np.bincount(where, minlength=count) >= max(_FEW, _SELDOM * len(y))
+    clump = np.cumsum(np.diff(np.r_[0, full.astype(int)]) == 1)[where] - 1
+    held = full[where]
+    centres = np.array([np.mean(y[held & (clump == i)]) for i in range(clump.max() + 1)])
+    jumps = np.count_nonzero(np.diff(clump[held]))
+    if len(centres) < _LEVELS or np.count_nonzero(~held) > _PASSES * jumps:
+        return None
+    step = float(np.min(np.diff(centres)))
+    about = np.abs(y[held] - centres[clump[held]]) < _WIDE * noise
+    if step < _APART * noise or np.mean(about) < _COVERED_BY_TWO:
+        return None
+    number = np.round((centres - centres[0]) / step)
+    step, phase = np.polyfit(number, centres, 1)
+    if np.max(np.abs(centres - step * number - phase)) > _EVEN * step:
+        return None
+    return float(step), float((phase / step - np.round(phase / step)) * step)
+
+
+def _exactly(y: Array) -> Values | None:
     """Step and phase where most samples lie on a few evenly spaced levels."""
     span = float(np.ptp(y))
     values, counts = np.unique(np.round((y - y.min()) / max(span, 1e-300) * 20_000), return_counts=True)
@@ -45,7 +86,7 @@ EFFECT = Effect(
             "reading",
             (
                 Parameter(
-                    STEP, level=1, lower=0.0, upper=0.9, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0
+                    STEP, level=1, lower=0.0, upper=2.0, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0
                 ),
                 Parameter("phase", level=1, lower=-0.5, upper=0.5, starts=(0.0,)),
             ),

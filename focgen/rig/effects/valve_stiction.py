@@ -46,6 +46,7 @@ EFFECT = Effect(
     reveals="slow ramps with reversals and small steps about an offset, with the pressure logged",
     confused_with=("hysteresis", "dead_zone", "valve_asymmetry", "sensor_quantization"),
     needs=lambda e: None if e.reversals else "the input never turns round above zero",
+    remembers=True,
     forms=[
         Form("play", "command", (_BAND,), _play),
         Form("stick", "command", (_BAND,), _stick, jumps=True),

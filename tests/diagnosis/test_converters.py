@@ -1,0 +1,73 @@
+"""A coarse reading on a noisy wire: its levels are blurred, and it still reads in steps.
+
+Red when steps of a third of the span are named a bent curve because noise behind the converter hides that the
+levels are few, when a fit moves the steps that were seen, or when rests of a rig pass for steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import form_of
+from focgen.rig.rig import LinearActuator, Rig, Signals
+
+H = 0.05
+LAG = TransferFunction([(1.9, 0.0)], [(1.06 * 0.8, 1.0), (1.0, 0.0)])
+HEATER = Rig("heater", H, Signals("t", "y", "u"), LinearActuator(LAG))
+LEVELS = (4.0, 0.0, 7.0, 2.0, 12.0, 5.0, 10.0, 0.0, 6.0, 12.0, 1.0, 8.0, 3.0, 0.0)
+SEEN = form_of("sensor_quantization", "rounding").seen
+
+
+def answered(drive: np.ndarray, time: float = 0.8) -> np.ndarray:
+    """2/(time s + 1) of a drive (n,) held from sample to sample."""
+    kept = np.exp(-H / time)
+    return lfilter([0.0, 2.0 * (1.0 - kept)], [1.0, -kept], drive)
+
+
+def session(step: float, noise: float, seed: int) -> list[Experiment]:
+    """Steps and a slow sine, read in steps and carried by a noisy wire."""
+    rng, t = np.random.default_rng(seed), np.arange(840) * H
+    logs = []
+    for i, pump in enumerate((np.repeat(LEVELS, 60), 6.0 - 6.0 * np.cos(0.4 * t))):
+        read = step * np.round(answered(pump) / step) + noise * rng.normal(size=840)
+        logs.append(replace(Experiment(str(i), H, {"command": pump, "output": read}), start=60.0 * i))
+    return logs
+
+
+@pytest.mark.parametrize("step, seed, told", [(8.0, 1, None), (12.0, 2, ("sensor_quantization",))])
+def test_steps_of_a_third_and_half_of_the_span_are_steps(step, seed, told):
+    found = diagnose(HEATER, session(step, 0.1, seed), only=told)
+    (cause,) = found.causes
+    assert [c.effect for c in cause.candidates] == ["sensor_quantization"]
+    assert cause.candidates[0].parameters["step"].value == pytest.approx(step, rel=0.01)
+    assert found.gap.explained < 0.5 * found.gap.refitted
+
+
+def test_levels_are_seen_through_noise_and_only_levels():
+    t = np.arange(4000) * H
+    rng = np.random.default_rng(3)
+    smooth, noise = 12.0 - 12.0 * np.cos(0.1 * t), 0.1 * rng.normal(size=4000)
+    step, _ = SEEN(3.0 * np.round(smooth / 3.0) + noise)
+    assert step == pytest.approx(3.0, rel=0.01)
+    assert SEEN(smooth + noise) is None
+    assert SEEN(0.5 * np.round(smooth / 0.5) + noise) is None  # drowned
+    assert (
+        SEEN(answered(np.repeat((0.0, 4.0, 8.0, 4.0), 1000)) + noise) is None
+    )  # it passes between its rests
+
+
+def test_rests_of_a_rig_that_answers_within_a_sample_are_no_steps():
+    quick = TransferFunction([(1.9, 0.0)], [(0.005, 1.0), (1.0, 0.0)])
+    rig, rng = replace(HEATER, actuator=LinearActuator(quick)), np.random.default_rng(4)
+    pump = np.repeat((0.0, 4.0, 8.0, 12.0, 8.0, 4.0, 0.0), 60)
+    seen = answered(pump, 0.004) + 0.1 * rng.normal(size=420)
+    assert SEEN(seen) is not None  # by sight they may be
+    found = diagnose(rig, [Experiment("stairs", H, {"command": pump, "output": seen})])
+    assert "sensor_quantization" not in [c.candidates[0].effect for c in found.causes]
