@@ -11,7 +11,6 @@ from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, innovations
 from focgen.diagnosis.numbers import NUMBERS
 
-_AWAY = 10.0  # nats against nominal parameters: from there it is asked whether they have to be that far off
 _STEPS = 6  # iterations of the fit that asks
 
 
@@ -37,8 +36,9 @@ class Ground:
     effects of ``base`` change, nats; ``scale``: of the misfit that is no wonder; ``weighing``: of residuals.
 
     Fits make the misfit least, each nat of it as dear as one against the nominal parameters. Here a misfit is
-    judged more mildly, for every form is a little wrong. So a fit that has moved them far is made anew, with
-    what is known of them weighed as much more, and the better one speaks for the hypothesis.
+    judged more mildly, for every form is a little wrong. So a fit that has moved them further than noise does
+    is made anew, with what is known of them weighed as much more, and the better one speaks for the
+    hypothesis.
     """
 
     base: Fit
@@ -82,7 +82,7 @@ class Ground:
 
     def _best(self, of: Fit) -> Fit:
         """A fit, or the same with its nominal parameters kept closer to those given, if that speaks more."""
-        if of.prior_penalty < _AWAY:
+        if of.prior_penalty < NUMBERS.nats:
             return of
         if of not in self._found:
             self._found[of] = max(of, self._kept(of), key=lambda f: self._speaks(f, None))
