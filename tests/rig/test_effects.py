@@ -179,3 +179,17 @@ def test_the_widest_loop_of_bouc_and_wen_comes_round_within_the_range(name):
     x = np.r_[np.linspace(0.0, 1.0, 500), np.linspace(1.0, 0.0, 500)]
     lost = x - form.act(x, (1.0, width), Run.of((1000,), [0.0], 0.05))
     assert lost[499] > 0.95 and lost[-1] < -0.9
+
+
+def test_a_reading_relaxes_from_what_is_there_or_to_it():
+    """Right at once and low at rest, or high at once and right at rest: a data sheet may give either gain."""
+    x, run = np.ones(4000), Run.of((4000,), [0.0], 0.05)
+    read = {f.name: f.act(x, (0.3, 5.0), run) for f in library()["sensor_relaxation"].forms}
+    for name in ("one_time", "spread"):
+        assert read[name][0] == pytest.approx(1.3, abs=0.01) and read[name][-1] == pytest.approx(
+            1.0, abs=1e-3
+        )
+    for name in ("fading", "fading_spread"):
+        assert read[name][0] == pytest.approx(1.0, abs=0.01) and read[name][-1] == pytest.approx(
+            0.7, abs=1e-3
+        )

@@ -6,6 +6,8 @@ from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import lag_response
 
 _SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1, 0.1), zero=0.0)
+# of a reading right at once, which is too low at rest: the gain that is given may be either
+_LOST = Parameter("share", lower=0.0, upper=0.9, starts=(0.1, 0.1, 0.1), zero=0.0)
 _TIME = Parameter("time", time=1, lower=0.02, upper=100.0, starts=(0.3, 2.0, 10.0), log=True)
 
 
@@ -20,6 +22,16 @@ def _spread(x: Array, values: Values, run: Run) -> Array:
     return x + share * (x - slow)
 
 
+def _fading(x: Array, values: Values, run: Run) -> Array:
+    share, tau = values
+    return x - share * kernels.lag(x, run.rest, run.h, tau, tau)
+
+
+def _fading_spread(x: Array, values: Values, run: Run) -> Array:
+    share, tau = values
+    return x - share * sum(kernels.lag(x, run.rest, run.h, t, t) for t in (tau / 4, tau, 4 * tau)) / 3.0
+
+
 def _one_response(values: Values, s: Complex) -> Complex:
     share, tau = values
     return 1.0 + share * (1.0 - lag_response(tau, s))
@@ -29,6 +41,16 @@ def _spread_response(values: Values, s: Complex) -> Complex:
     share, tau = values
     quick, middle, slow = (lag_response(t, s) for t in (tau / 4, tau, 4 * tau))
     return 1.0 + share * (1.0 - (quick + middle + slow) / 3.0)
+
+
+def _fading_response(values: Values, s: Complex) -> Complex:
+    share, tau = values
+    return 1.0 - share * lag_response(tau, s)
+
+
+def _fading_spread_response(values: Values, s: Complex) -> Complex:
+    share, tau = values
+    return 1.0 - share * sum(lag_response(t, s) for t in (tau / 4, tau, 4 * tau)) / 3.0
 
 
 EFFECT = Effect(
@@ -41,5 +63,7 @@ EFFECT = Effect(
     forms=[
         Form("one_time", "strain", (_SHARE, _TIME), _one, response=_one_response),
         Form("spread", "strain", (_SHARE, _TIME), _spread, response=_spread_response),
+        Form("fading", "strain", (_LOST, _TIME), _fading, response=_fading_response),
+        Form("fading_spread", "strain", (_LOST, _TIME), _fading_spread, response=_fading_spread_response),
     ],
 )
