@@ -1,4 +1,4 @@
-"""The search for exponential memories: its optimum by every lag, its parts by 40 digits and linear programmes.
+"""The search for exponential memories: its optimum by every lag, its parts by linear programmes.
 
 Red when a fit is not the best there is, or what is left of a tolerance goes elsewhere than it should.
 """
@@ -52,7 +52,7 @@ def test_each_rung_of_the_ladder_is_the_best_by_its_alternation(beta, horizon):
 @pytest.mark.parametrize("beta", [1e-7, 0.1, 0.55, 0.999, 1.0 - 1e-7])
 @pytest.mark.parametrize("horizon", HORIZONS)
 def test_the_ladder_goes_on_to_the_smallest_tolerance(beta, horizon):
-    """One mode more a rung, none left out on the way, within 16 exp(−π² n / ln 8R) (Braess, Hackbusch 2005)."""
+    """One mode more a rung, none left out, within 16 exp(−π² n / ln 8R) (Braess and Hackbusch 2005)."""
     last = 1.005
     for modes, fit in enumerate(ladder(beta, horizon), 1):
         assert fit.modes == modes
@@ -74,7 +74,7 @@ def test_the_ladder_is_climbed_once_by_all_who_ask():
     "order, horizon, states", [(0.6, 3000, 6), (0.2, 1000, 4), (1.4, 5000, 7), (-0.5, 900, 5)]
 )
 def test_with_states_given_the_last_lags_err_six_times_as_much(order, horizon, states):
-    """The error at lag j is within (1 + 5 j/horizon)(1 − 0.875/j) of one number, which it takes at both ends."""
+    """The error at lag j is within (1 + 5 j/horizon)(1 − 0.875/j) of one number, and alternates there."""
     memory = fit_states(order, horizon, states)
     lags = np.arange(1, horizon + 1)
     error = memory.kernel(lags) / gl_weights(-memory.beta, horizon)[1:] - 1.0
