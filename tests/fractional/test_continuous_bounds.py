@@ -102,8 +102,9 @@ def test_chords_add_one_per_cent(order, states):
 
 
 @pytest.mark.parametrize("rate, weight, kept", [
-    (1.0, 1.0, True), (1e-300, 1.0, True), (0.0, 1.0, False), (1.0 + 1e-15, 1.0, False), 
-    (-0.5, 1.0, False), (math.nan, 1.0, False), (0.5, math.inf, False), (0.5, math.nan, False), (0.5, -1.0, True), (0.5, 0.0, True),
+    (1.0, 1.0, True), (1e-300, 1.0, True), (0.0, 1.0, False), (1.0 + 1e-15, 1.0, False),
+    (-0.5, 1.0, False), (math.nan, 1.0, False), (0.5, math.inf, False), (0.5, math.nan, False),
+    (0.5, -1.0, True), (0.5, 0.0, True),
 ])  # fmt: skip
 def test_rates_and_weights_are_taken_to_their_limits(rate, weight, kept):
     for rates, weights in (([rate], [1.0, weight]), ([0.3, rate], [weight, 1.0, 0.1])):
