@@ -224,13 +224,20 @@ def test_what_is_said_to_be_within_reach_is_kept(monkeypatch):
     assert tolerance < fit_band(0.6, 0.03, 0.3, reach, coarse).tolerance <= reach < 2.2 * tolerance
 
 
-@pytest.mark.parametrize("states, kept", [(2, True), (20, True), (1, False), (21, False)])
+@pytest.mark.parametrize("states, kept", [(2, True), (1, False), (21, False)])
 def test_states_are_taken_to_their_limits(states, kept):
     if kept:
-        assert fit_band_states(0.6, *((0.03, 0.3) if states == 2 else (1e-4, 0.1)), states).states == states
+        assert fit_band_states(0.6, 0.03, 0.3, states).states == states
     else:
         with pytest.raises(ValueError, match=f"{states} modes are not 2 to 20"):
             fit_band_states(0.6, 0.03, 0.3, states)
+
+
+def test_the_largest_number_of_states_is_taken(monkeypatch):
+    monkeypatch.setattr(continuous, "MOST_STATES", 3)
+    assert fit_band_states(0.6, 0.02, 0.3, 3).states == 3
+    with pytest.raises(ValueError, match="4 modes are not 2 to 3"):
+        fit_band_states(0.6, 0.02, 0.3, 4)
 
 
 @pytest.mark.parametrize("low, high, said", [
