@@ -91,8 +91,8 @@ def fit_band(
     ``order`` in (−1, 2), not whole; ``low`` and ``high`` in rad per sample, a factor of 10 to 1e6 apart, the
     latter at most π/2; ``tolerance`` 1e-6 … 0.1. ``rounded`` takes rates 1 − p, falling, to those that a
     machine can hold; the weights are found, and the certificate is, for these.
-    Raises ValueError outside these ranges, and where ``MOST_STATES`` exponentials miss the tolerance; where it
-    says what is within reach, that would be kept.
+    Raises ValueError outside these ranges, and where ``MOST_STATES`` exponentials miss the tolerance; what it
+    says is within reach would be kept.
     """
     _check(order, low, high)
     if not _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]:
