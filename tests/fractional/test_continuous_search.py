@@ -170,6 +170,12 @@ def test_what_is_held_back_grows_less_and_follows_less():
     assert most[1] < 0.9 * most[0]
 
 
+def test_the_default_band_is_four_decades_up_to_a_tenth_of_the_nyquist_frequency():
+    assert continuous.DEFAULT_BAND == pytest.approx((1e-5 * math.pi, 0.1 * math.pi), rel=1e-15)
+    assert math.log10(continuous.DEFAULT_BAND[1] / continuous.DEFAULT_BAND[0]) == pytest.approx(4.0)
+    assert continuous.DEFAULT_TOLERANCE == 1e-3 and math.pi / 2 == continuous.HIGHEST
+
+
 def test_growth_above_the_band_is_limited_by_the_order():
     assert [growth_limit(order) for order in (-0.5, 0.9, 1.0, 1.1, 1.9)] == [2.0, 2.0, 2.0, 4.0, 4.0]
 
@@ -242,7 +248,7 @@ def test_the_largest_number_of_states_is_taken(monkeypatch):
 
 @pytest.mark.parametrize("low, high, said", [
     (0.03, 0.3, ""), (0.03000001, 0.3, "factor of 10 to 1e[+]06 apart"), (3e-7, 0.3, ""),
-    (2.99999e-7, 0.3, "factor"), (0.1, math.pi / 2, ""), (0.1, 1.001 * math.pi / 2, "half of the Nyquist"),
+    (2.9999986e-7, 0.3, "factor"), (0.1, math.pi / 2, ""), (0.1, 1.001 * math.pi / 2, "half of the Nyquist"),
     (0.0, 0.3, "rise from above 0"), (-0.1, 0.3, "rise"), (0.3, 0.3, "rise"), (math.nan, 0.3, "rise"),
     (0.03, math.nan, "rise"),
 ])  # fmt: skip
