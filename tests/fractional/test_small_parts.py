@@ -3,13 +3,17 @@
 Red when a digit is lost at an end of a range, or a text does not say what it stands for.
 """
 
+import importlib.util
 import math
+import subprocess
+import sys
 from fractions import Fraction
 
 import mpmath as mp
 import numpy as np
 import pytest
 
+import focgen.fractional
 from focgen.fractional import convert, elementary, simulation, weights
 from focgen.fractional.discrete import gl_frequency_response
 from focgen.fractional.recursion import ExponentialRecursion
@@ -195,6 +199,24 @@ def test_corners_are_where_two_terms_balance():
     assert found[[0, -1]] == pytest.approx([0.025 / 100.0, 300.0 * 100.0]) and len(found) == 400
     assert np.diff(np.log(found)) == pytest.approx(np.full(399, math.log(300.0 / 0.025 * 1e4) / 399))
     assert convert.corners(TransferFunction([(3, 1)]))[[0, -1]] == pytest.approx([0.01, 100.0])
+
+
+def test_python_control_is_not_needed_before_it_is_used(monkeypatch):
+    monkeypatch.setitem(sys.modules, "control", None)
+    found = importlib.util.find_spec("focgen.fractional.convert")
+    again = importlib.util.module_from_spec(found)
+    found.loader.exec_module(again)
+    assert again.corners(LAG)[0] > 0.0
+
+
+def test_every_public_name_is_loaded_where_it_is_first_used():
+    """Nothing before: scipy takes its time. In a process of its own, which has loaded nothing yet."""
+    script = "import sys, focgen.fractional as f; assert 'scipy' not in sys.modules and 'bode' in dir(f)"
+    subprocess.run([sys.executable, "-c", script], check=True)
+    assert set(focgen.fractional.__all__) == set(focgen.fractional._NAMES)
+    for name in focgen.fractional.__all__:
+        assert getattr(focgen.fractional, name).__name__ == name or name == "Simulator"
+    assert not hasattr(focgen.fractional, "nothing")
 
 
 def test_limits_of_frequencies_and_delays():
