@@ -108,3 +108,12 @@ def test_coefficients_of_any_length_are_looked_at_closely_enough():
         a[-1] = -2.0
         assert poles_outside(a) == degree
     assert poles_outside([3.0]) == 0 and poles_outside([-3.0, 1.0]) == 0
+
+
+@pytest.mark.parametrize("length", [3, 257, 270, 281, 300])
+@pytest.mark.parametrize("side", [-1e-3, 1e-3])
+def test_poles_next_to_minus_one_are_not_missed_however_long_the_recursion(length, side):
+    """Two there, zeros behind them: the circle is closed at z = −1 for transforms of any size."""
+    a = np.zeros(length)
+    a[:3] = np.poly([-1.0 - side, -1.0 - side])
+    assert poles_outside(a) == (2 if side > 0 else 0)

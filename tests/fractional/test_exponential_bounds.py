@@ -3,6 +3,7 @@
 Red when a bound is below what the weights give, or looser than the grid of lags accounts for.
 """
 
+import itertools
 import math
 
 import mpmath as mp
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from focgen.fractional.exponential import fit_exponential
-from focgen.fractional.exponential_certificate import Certificate, _lags, certify
+from focgen.fractional.exponential_certificate import Certificate, _Error, _lags, certify
 from focgen.fractional.weights import gl_weights
 from tests.fractional.test_exponential import bounds, truths
 
@@ -93,6 +94,36 @@ def test_beyond_the_horizon_what_is_forgotten_is_counted_once():
     e = np.where(lags == 0, 0.0, memory.kernel(lags) - gl_weights(-0.4, count))
     reached = np.abs(np.diff(e))[100:].sum() + gl_weights(-0.4, count)[-1]
     assert reached <= memory.certificate.beyond <= 1.0001 * reached
+
+
+@pytest.mark.parametrize("m", [0, 1])
+def test_between_lags_the_error_is_bounded_as_it_is_argued(m):
+    """(b − a)²/8 (|∇^(m+2) e_(a+2)| + (b − a) max(|∇^(m+3) g_(a+3)|, |∇^(m+3) h_(a+3)|)), in 40 digits."""
+    beta, poles, weights = 0.4, (0.3, 0.99), (0.25, 0.03)
+    grid = np.array([10, 11, 13, 20, 40])
+    error = _Error(beta, np.array(poles), np.array(weights))
+    with mp.workdps(40):
+
+        def modelled(k, j):
+            return mp.fsum(
+                w * (mp.mpf(p) - 1) ** k * mp.mpf(p) ** (j - 1 - k) for p, w in zip(poles, weights)
+            )
+
+        def exact(k, j):
+            return weight(k - mp.mpf(beta), j)
+
+        apart, sizes, total = [], [], mp.mpf(0)
+        for a, b in itertools.pairwise(grid.tolist()):
+            second = abs(modelled(m + 2, a + 2) - exact(m + 2, a + 2))
+            third = max(abs(exact(m + 3, a + 3)), abs(modelled(m + 3, a + 3)))
+            apart.append((b - a) ** 2 / mp.mpf(8) * (second + (b - a) * third) if b > a + 1 else 0)
+            ends = [abs(modelled(m, j) - exact(m, j)) for j in (a, b)]
+            sizes.append(max(ends) + apart[-1])
+            # the trapezoid from a to b without the end a: half of the ends, and half of what b has more
+            total += mp.mpf(b - a) / 2 * sum(ends) + (ends[1] - ends[0]) / 2 + (b - a) * apart[-1]
+    assert error.off_chord(m, grid) == pytest.approx([float(x) for x in apart], rel=1e-10)
+    assert error.sizes(m, grid) == pytest.approx([float(x) for x in sizes], rel=1e-10)
+    assert error.total(m, grid) == pytest.approx(float(total), rel=1e-10)
 
 
 @pytest.mark.parametrize("first, last, gap", [(4096, 4097, 2e-3), (4096, 10**6, 3e-4), (100, 10**6, 2e-3)])
