@@ -63,16 +63,29 @@ def test_beyond_its_radii_one_term_outweighs_the_others_twice(seed):
         assert own == pytest.approx(2.0 * len(sizes) * max(sizes), rel=1e-9)
 
 
-@pytest.mark.parametrize("size", [1e-40, 1.0, 1e40])
-def test_poles_on_the_very_edge_are_on_one_side(size):
-    """Two pairs there, and a term between that makes it fractional: both pairs or none, and no complaint."""
-    edge, inner = pair(size, SECTOR), pair(1.7 * size, 2.0)
-    far = TransferFunction([(1, 0)], [((1e3 * size) ** -0.3, 0.3), (1, 0)])
-    found = first_sheet_zeros((edge * inner * far).den, SECTOR)
-    expected = 1.7 * size * np.exp(1j * np.array([2.0, -2.0]))
-    assert len(found) in (2, 4)
-    for place in expected:
+@pytest.mark.parametrize("beside", [[0.0], [0.0, 0.01], [0.0, -0.01]])
+@pytest.mark.parametrize("size", [1e-20, 1.0, 1e20])
+def test_poles_on_the_very_edge_are_on_one_side(size, beside):
+    """Pairs there, or a hundredth beside it, and a term that makes it fractional: each is told or not, and
+    no complaint is made."""
+    made = pair(1.7 * size, 2.0) * TransferFunction([(1, 0)], [((1e3 * size) ** -0.3, 0.3), (1, 0)])
+    for angle in beside:
+        made = made * pair(size, SECTOR + angle)
+    found = first_sheet_zeros(made.den, SECTOR)
+    assert len(found) in range(2, 2 * len(beside) + 3, 2)
+    for place in 1.7 * size * np.exp(1j * np.array([2.0, -2.0])):
         assert np.abs(found - place).min() < 1e-9 * size
+
+
+@pytest.mark.parametrize("decades", [-9, 9])
+@pytest.mark.parametrize("inside", [0.025, 0.05])
+def test_an_edge_is_followed_closely_wherever_poles_are_next_to_it(decades, inside):
+    """Nine decades to either side of what makes it fractional: there its argument turns at once."""
+    two = pair(1.0, SECTOR - inside)
+    far = TransferFunction([(1, 0)], [(10.0 ** (-0.3 * decades), 0.3), (1, 0)])
+    found = first_sheet_zeros((two * two * far).den, SECTOR)
+    assert len(found) == 4
+    assert np.abs(np.abs(np.angle(found)) - (SECTOR - inside)).max() < 1e-5
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
