@@ -64,7 +64,7 @@ def test_beyond_its_radii_one_term_outweighs_the_others_twice(seed):
 
 
 @pytest.mark.parametrize("beside", [[0.0], [0.0, 0.01], [0.0, -0.01]])
-@pytest.mark.parametrize("size", [1e-20, 1.0, 1e20])
+@pytest.mark.parametrize("size", [1.0, 1e20])
 def test_poles_on_the_very_edge_are_on_one_side(size, beside):
     """Pairs there, or a hundredth beside it, and a term that makes it fractional: each is told or not, and
     no complaint is made."""
