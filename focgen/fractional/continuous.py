@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from focgen.arrays import Array, Complex
+from focgen.fractional import elementary
 from focgen.fractional.continuous_certificate import BandCertificate, certify_band
 from focgen.fractional.continuous_fit import Band, best_rates, best_weights
 
@@ -90,7 +91,8 @@ def fit_band(
     ``order`` in (−1, 2), not whole; ``low`` and ``high`` in rad per sample, a factor of 10 to 1e6 apart, the
     latter at most π/2; ``tolerance`` 1e-6 … 0.1. ``rounded`` takes rates 1 − p, falling, to those that a
     machine can hold; the weights are found, and the certificate is, for these.
-    Raises ValueError outside these ranges, and where ``MOST_STATES`` exponentials miss the tolerance.
+    Raises ValueError outside these ranges, and where ``MOST_STATES`` exponentials miss the tolerance; what it
+    says is within reach would be kept.
     """
     _check(order, low, high)
     if not _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]:
@@ -100,14 +102,14 @@ def fit_band(
     for states in range(2, MOST_STATES + 1):
         _, error = best_rates(band, states, _HELD_BACK[0], _SCREENED)
         if error > _PROMISING * tolerance:
-            smallest = min(smallest, error)
             continue
         for memory in _candidates(band, states, rounded, _SPARED * tolerance):
             smallest = min(smallest, memory.tolerance)
             if memory.tolerance <= tolerance:
                 return memory
-    reach = f"{smallest:.2g} is within reach"
-    raise ValueError(f"{MOST_STATES} modes miss the tolerance {tolerance:g} in this band, {reach}")
+    # only what is proved keeps its word: errors of a search tell nothing of growth above the band
+    reach = f"{elementary.rounded_up(smallest, 2):g} is within reach" if smallest < math.inf else "allow more"
+    raise ValueError(f"{MOST_STATES} modes miss the tolerance {tolerance:g} in this band; {reach}")
 
 
 @functools.lru_cache(maxsize=256)

@@ -38,6 +38,11 @@ def test_an_integrator_however_written(transfer):
     assert from_scipy(to_scipy(transfer)) == TransferFunction([(3, 0)], [(1, 1)])
 
 
+def test_no_power_of_s_is_cancelled_on_the_way():
+    made = to_control(TransferFunction([(2, 1)], [(1, 3), (4, 1)]))
+    assert made.num[0][0].tolist() == [2.0, 0.0] and made.den[0][0].tolist() == [1.0, 0.0, 4.0, 0.0]
+
+
 def test_zero_and_constants():
     assert from_scipy(to_scipy(TransferFunction([(2.5, 0)]))) == TransferFunction([(2.5, 0)])
     assert from_control(to_control(TransferFunction([]))).num == ()

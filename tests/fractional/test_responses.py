@@ -38,6 +38,7 @@ CASES = {
     "integrator of order 0.6 with feedthrough": TransferFunction([(1, 0.6), (2, 0)], [(1, 0.6)]),
     "lightly damped": TransferFunction([(1, 0)], [(1, 2), (1e-3, 0.5), (1, 0)]),
     "unstable": TransferFunction([(1, 0)], [(1, 0.8), (-0.2, 0.31), (-1, 0)]),
+    "double pole to the right of the cut": lag(-0.5) * lag(-0.5) * ACTUATOR,
     "whole: slow real poles": lag(1) * lag(0.01) * lag(1e-3) * TransferFunction([(1, 2), (3, 1), (1, 0)]),
     "whole: a lag next to an integrator": TransferFunction([(1, 0)], [(1, 2), (1e-8, 1)]),
     "whole: five poles nearly coincide": lag(2) * lag(2) * lag(2) * lag(2.001) * lag(2.1),
