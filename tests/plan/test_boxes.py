@@ -56,7 +56,7 @@ def test_the_nearest_whole_number():
 def test_the_smallest_exponent_that_holds_a_number():
     rng = np.random.default_rng(2)
     for counts in (20, 2**15 - 1, 2**15 - 4, 2**31 - 1, 2**63 - 2**59 - 1):
-        edges = [counts, counts + 0.5, counts + 0.499, 1.0, 2.0, 2.0**-40 * counts]
+        edges = [*map(float, (counts, counts + 0.5, counts + 0.499, 1.0, 2.0, 2.0**-40 * counts))]
         for x in [*(10.0 ** rng.uniform(-9, 9, 60)).tolist(), *edges]:
             k = exponent_for(x, counts, "here", "it")
             held = [int(Fraction(x) / Fraction(2) ** e + Fraction(1, 2)) for e in (k, k - 1)]
