@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from decimal import Context, Decimal, localcontext
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.signal import lfilter
@@ -162,3 +162,12 @@ def planned(controller: Controller, arithmetic: str, **memory) -> Plan | None:
         return build_plan(controller, arithmetic, tunable=controller.tunable is not None, **memory)
     except PlanError:
         return None
+
+
+@cache
+def plans(seeds: range, arithmetic: str) -> tuple[Plan, ...]:
+    """Of short memory, and one with modes."""
+    found = [planned(dressed(seed), arithmetic) for seed in seeds]
+    modes = {"memory": "exponential", "tolerance": 0.05, "horizon": 10**5 if seeds.start == 0 else 100}
+    found.append(planned(dressed(seeds.start + 1), arithmetic, **modes))
+    return tuple(plan for plan in found if plan)

@@ -5,7 +5,6 @@ Red when a proof is of less than a node can reach, or of more; or when half of a
 
 from __future__ import annotations
 
-import functools
 import math
 from fractions import Fraction
 from itertools import pairwise
@@ -14,22 +13,13 @@ import numpy as np
 import pytest
 
 from focgen.plan.plan import Plan, Sum
-from tests.plan.derived import Weights, dressed, planned, truth
+from tests.plan.derived import Weights, plans, truth
 from tests.plan.ledger import half, hull, minus, plus, reached, shift, shifted, span, times, worst
 
 SUMS = {16: 32, 32: 64}
 SEEDS = [range(a, a + 10) for a in range(0, 40, 10)]
 of_seeds = pytest.mark.parametrize("seeds", SEEDS, ids=lambda seeds: str(seeds.start))
 fixed = pytest.mark.parametrize("arithmetic", ("q15", "q31"))
-
-
-@functools.cache
-def plans(seeds: range, arithmetic: str) -> list[Plan]:
-    """Of short memory, and one with modes."""
-    found = [planned(dressed(seed), arithmetic) for seed in seeds]
-    modes = {"memory": "exponential", "tolerance": 0.05, "horizon": 10**5 if seeds.start == 0 else 100}
-    found.append(planned(dressed(seeds.start + 1), arithmetic, **modes))
-    return [plan for plan in found if plan]
 
 
 def top(bits: int) -> int:
