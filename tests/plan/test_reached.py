@@ -6,14 +6,18 @@ Red when a proof is of less than a node can reach, or of more; or when half of a
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from focgen.fractional.transfer import TransferFunction
+from focgen.plan.banks import drive_error
 from focgen.plan.plan import Plan, Sum
-from tests.plan.derived import Weights, plans, truth
+from tests.controllers import simple
+from tests.plan.derived import Weights, planned, plans, truth
 from tests.plan.ledger import half, hull, minus, plus, reached, shift, shifted, span, times, worst
 
 SUMS = {16: 32, 32: 64}
@@ -297,3 +301,54 @@ def lost_in_32(plan: Plan, product: tuple[int, int]) -> bool:
     )
     few = 0.0 < slowest < 16 * plan.product.lsb * 2**by
     return few or worst(shifted(product, by)) < 2**16
+
+
+@of_seeds
+def test_what_a_recursion_is_proved_to_reach_is_its_inputs_norm_and_its_roundings(seeds):
+    """In 16 bits, where single counts are seen: of the integer weights, run sample by sample."""
+    seen = 0
+    for plan in (p for p in plans(seeds, "q15") if p.feedback):
+        table, lsb, direct = plan.feedback.table, plan.filtered.lsb, plan.direct
+        held = replace(truth(plan), den=_held(table))
+        M, carried = held.norm([1.0]), held.norm([1.0, -1.0])
+        if M is None:
+            continue
+        rest, e = held.den.total, worst(span(plan.error))
+        reach = held.norm(_held(direct).response(512) if direct else [0.0]) * e * plan.error.lsb / lsb
+        if plan.inner:
+            reach += M * worst(span(plan.inner.state)) * plan.inner.state.lsb / lsb
+        sums = [s for s in (direct, table) if s]
+        aligned = sum(part.align > 0 for s in sums for part in (*s.blocks, *s.banks))
+        drives = sum(abs(c) * b.drive.lsb for s in sums for b in s.banks for c in b.values) / plan.wide.lsb
+        each = (0.5 * (aligned + bool(plan.inner)) + drives) * plan.wide.lsb / lsb
+        exact = (sum(direct.values) if direct else 0.0) / rest * plan.error.lsb / lsb
+        reset = 0.5 + abs(exact - plan.feedback.steady / 2**plan.feedback.steady_shift) * e
+        reach += M * each + 0.5 * carried + reset * max(1.0, M * rest)
+        proved = next(p.worst for p in plan.proofs if p.node == "v")
+        assert reach * (1.0 - 1e-6) <= proved <= reach * (1.0 + 1e-5) + 1.0
+        seen += 1
+    assert seen >= 2
+
+
+def _held(table: Sum) -> Weights:
+    """The integer weights of a sum; 1 at lag 0 of a recursion's."""
+    taps = np.array([0.0] * table.first + list(table.values))
+    if table.first:
+        taps[0] = 1.0
+    modes = [(b.differences, q, c) for b in table.banks for q, c in zip(b.real_rates, b.values)]
+    return Weights(taps, taps, tuple(modes))
+
+
+@fixed
+def test_what_drives_round_is_a_count_of_each_and_what_their_means_shift_out(arithmetic):
+    """Half a count of D at once, half of the past; half a count of L every sample, which q takes away."""
+    slow = simple(TransferFunction([(1.32, 0.6), (1.0, 0.0)]))
+    plan, shift_seen = planned(slow, arithmetic, memory="exponential", tolerance=1e-2, horizon=10**7), 0
+    cost = 0.0
+    for bank in plan.direct.banks:
+        shift_seen += bank.rate_shift > 0
+        for c, q in zip(bank.values, bank.real_rates):
+            cost += abs(c) * bank.drive.lsb
+            cost += abs(c) * 0.5 * bank.state.lsb / q * (bank.rate_shift > 0)
+    assert drive_error(plan.direct) == pytest.approx(cost / plan.direct.total.lsb, rel=1e-12)
+    assert len(plan.direct.banks) == 2 and shift_seen == (arithmetic == "q31")
