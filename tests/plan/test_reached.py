@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from focgen.control.controller import ControllerRanges, GainSchedule
 from focgen.fractional.transfer import TransferFunction
-from focgen.plan.banks import drive_error
 from focgen.plan.plan import Plan, Sum
 from tests.controllers import simple
 from tests.plan.derived import Weights, planned, plans, truth
@@ -156,6 +156,11 @@ def test_p_and_v_are_as_fine_as_their_types_allow(arithmetic, seeds):
             assert span(plan.filtered) == shifted(span(plan.wide), plan.narrow) and plan.filtered.bits == 32
             assert worst(span(plan.filtered)) <= top(32)
             assert plan.narrow == 0 or worst(shifted(span(plan.wide), plan.narrow - 1)) > top(32)
+        else:
+            made = [shifted(span(plan.inner.state), plan.inner.to_wide)] if plan.inner else []
+            made += [finer(plan.direct, 0)] if plan.direct else []
+            carry = half(plan.narrow)
+            assert span(plan.wide) == plus(minus(plus(*made), finer(plan.feedback.table, 0)), (-carry, carry))
         if min(shifts(plan)) == 0:
             continue
         half_a_count = []
@@ -340,15 +345,10 @@ def _held(table: Sum) -> Weights:
 
 
 @fixed
-def test_what_drives_round_is_a_count_of_each_and_what_their_means_shift_out(arithmetic):
-    """Half a count of D at once, half of the past; half a count of L every sample, which q takes away."""
-    slow = simple(TransferFunction([(1.32, 0.6), (1.0, 0.0)]))
-    plan, shift_seen = planned(slow, arithmetic, memory="exponential", tolerance=1e-2, horizon=10**7), 0
-    cost = 0.0
-    for bank in plan.direct.banks:
-        shift_seen += bank.rate_shift > 0
-        for c, q in zip(bank.values, bank.real_rates):
-            cost += abs(c) * bank.drive.lsb
-            cost += abs(c) * 0.5 * bank.state.lsb / q * (bank.rate_shift > 0)
-    assert drive_error(plan.direct) == pytest.approx(cost / plan.direct.total.lsb, rel=1e-12)
-    assert len(plan.direct.banks) == 2 and shift_seen == (arithmetic == "q31")
+def test_a_flat_schedule_is_proved_likewise(arithmetic):
+    """Its slopes are 0, and so is their product."""
+    ranges = ControllerRanges((-1.0, 1.0), (-1.0, 1.0), (-10.0, 10.0), (0.0, 1.0))
+    flat = simple(TransferFunction([(1.0, 0.0)]), gain=GainSchedule((0.2, 0.7), (2.0, 2.0)), ranges=ranges)
+    plan = planned(flat, arithmetic)
+    proofs = {proof.node: proof.worst for proof in plan.proofs}
+    assert proofs == reached(plan, proofs["v"]) and proofs["slope product"] == 0
