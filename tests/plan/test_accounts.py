@@ -74,7 +74,7 @@ def test_every_part_of_a_bound_is_what_its_roundings_add_up_to(arithmetic, seeds
 @pytest.mark.parametrize(
     ("arithmetic", "seed"),
     [
-        *((a, seed) for a in ARITHMETICS for seed in (1, 2, 11)),
+        *((a, seed) for a in ARITHMETICS for seed in (2, 11)),
         ("q15", 4),
         ("f32", 4),
         ("q31", 9),

@@ -106,7 +106,7 @@ def long_enough(plan: Plan, node: str, response: np.ndarray, samples: int) -> bo
 def test_it_runs_at_the_largest_gain_that_there_is(arithmetic):
     """Whichever segment has it; of the slope's product likewise. With factors they are the largest."""
     tried = 0
-    for plan in plans(range(40), arithmetic):
+    for plan in plans(range(20), arithmetic):
         node = "v" if plan.floating else "gain product"
         raw = worst_case_input(plan, node)
         if plan.tuning:
@@ -131,7 +131,7 @@ def test_it_runs_at_the_largest_gain_that_there_is(arithmetic):
         tried += 1
         if arithmetic == "q15" and any(proof.node == "slope product" for proof in plan.proofs):
             check_slope(plan)
-    assert tried > 8
+    assert tried > 4
 
 
 def check_slope(plan: Plan) -> None:
