@@ -18,6 +18,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.proofs import prove
 from focgen.plan.slewing import slewed
+from focgen.plan.stability import inverse
 from tests.controllers import simple
 from tests.plan.accounts import Real, Whole
 from tests.plan.derived import planned, truth
@@ -181,3 +182,35 @@ def test_a_schedule_too_steep_names_its_breakpoints():
         made = planned(simple(UNIT, gain=GainSchedule(points, (1.0, 9.0, 2.0)), ranges=RANGES), "q31")
         assert made.schedule.signal.low <= min(made.schedule.breakpoints)
         assert max(made.schedule.breakpoints) <= made.schedule.signal.high
+
+
+@pytest.mark.parametrize("sign", (1.0, -1.0))
+def test_a_recursion_is_bounded_with_all_that_is_left_out_of_it(sign):
+    """1/(1 - 0.5 z^-1 - 0.1 z^-9), its last coefficient left out: 2.5, and no more than that is told."""
+    found = inverse(np.array([1.0, -0.5]), 0.1)
+    response, whole = np.zeros(4000), np.array([1.0, -0.5] + [0.0] * 7 + [-0.1 * sign])
+    for k in range(len(response)):
+        past = response[max(0, k - 9) : k][::-1]
+        response[k] = (k == 0) - whole[1 : len(past) + 1] @ past
+    assert np.abs(response).sum() <= found.norm * (1.0 + 1e-9) and found.norm == pytest.approx(2.5, rel=1e-5)
+    assert inverse(np.array([1.0, -0.5]), 0.44) is not None, "a residual of 0.88"
+    assert inverse(np.array([1.0, -0.5]), 0.46) is None
+    alone = inverse(np.array([1.0, -0.5]))
+    assert alone.norm_after(np.array([1.0, 1.0])) == pytest.approx(4.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("time", (0.05, 0.6))
+def test_a_recursion_leaves_the_counts_free_that_its_rounding_needs(time):
+    """In 16 bits an input may reach so far that v and all its rounding just fit; one count more does not."""
+    kept = {}
+    for n in range(32740, 32768):
+        reach = ControllerRanges((-n / 2**14, n / 2**14), (0.0, 0.0), (-10.0, 10.0))
+        plan = planned(simple(TransferFunction([(1.0, 0.0)], [(time, 1.0), (1.0, 0.0)]), ranges=reach), "q15")
+        kept[n] = plan.filtered.lsb == 2.0**-14
+    last = max(n for n in kept if kept[n])
+    assert all(kept[n] for n in range(32740, last + 1)) and not any(kept[n] for n in range(last + 1, 32768))
+    direct, back = plan.direct.values[0], plan.feedback.table.values[0]  # as they are held
+    norm, carried = 1.0 / (1.0 + back), 2.0  # of 1/A, and behind 1 - 1/z
+    drops = 0.5 * 2.0**-plan.narrow * norm * 3.0
+    noise = 0.5 * carried + drops + 2.0 * max(1.0, norm * (1.0 + back))
+    assert abs(norm * direct * last + noise - 32766) <= 1.1
