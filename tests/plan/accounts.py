@@ -242,7 +242,7 @@ class Real(Walk):
     def input_error(self) -> float:
         own = self.set_point
         if self.plan.arithmetic == "f32":
-            own += half_place(self.refs, self.u) + half_place(self.meas, self.u)
+            own += half_place(self.refs, self.u, 0.0) + half_place(self.meas, self.u, 0.0)
         return own + half_place(self.far + own, self.u) + U64 * (self.refs + self.meas)
 
     def sum(self, made: Sum, exact: Weights, low: float, high: float) -> float:

@@ -10,11 +10,11 @@ from focgen.plan.plan import Plan
 U64 = 2.0**-53
 
 
-def half_place(largest: float, u: float) -> float:
-    """Half of the last place of the numbers up to ``largest``, and of those that are hardly beyond it."""
+def half_place(largest: float, u: float, beyond: float = 2.0**-40) -> float:
+    """Half of the last place of the numbers up to ``largest``, and up to a share ``beyond`` it."""
     if largest <= 0.0:
         return 0.0
-    mantissa, exponent = math.frexp(largest * (1.0 + 2.0**-40))
+    mantissa, exponent = math.frexp(largest * (1.0 + beyond))
     return u * 2.0 ** (exponent - 1 - (mantissa == 0.5))
 
 

@@ -6,14 +6,20 @@ loose is red as well as one that no longer holds.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from focgen.control.controller import ControllerRanges, GainSchedule
+from focgen.fractional.transfer import TransferFunction
 from focgen.plan.plan import Plan
 from focgen.plan.setpoint import set_point_error
+from tests.controllers import simple
 from tests.plan.accounts import Found, Real, Walk, Whole
 from tests.plan.derived import dressed, planned, truth
 
 ARITHMETICS = ("q15", "q31", "f32", "f64")
+RANGES = ControllerRanges((-0.9, 0.9), (-0.9, 0.9), (-10.0, 10.0))
 NEAR = {"q15": 5e-4, "q31": 5e-4, "f32": 5e-4, "f64": 0.012}
 """By how much a part may be above; in f64 the doubles of tables and reference are as coarse as the type."""
 ABOVE = {("f64", "gain"): 0.1}
@@ -84,3 +90,17 @@ def test_every_part_of_a_bound_is_what_its_roundings_add_up_to(arithmetic, seeds
 def test_every_part_of_a_bound_with_modes_is_likewise(arithmetic, seed):
     plan = planned(dressed(seed), arithmetic, memory="exponential", tolerance=0.05, horizon=100)
     assert plan is not None and plan.states and check(plan)
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("worst", (0, 1, 2))
+@pytest.mark.parametrize("reach", [(0.0, 0.9), (-0.5, 0.9), (0.0, 1.35)])
+def test_a_gain_is_looked_at_where_it_is_held_worst(arithmetic, worst, reach):
+    """Of three breakpoints one gain is almost half a count off, the others not at all; the signal ends at the
+    outer ones or goes beyond them."""
+    bits = {"q15": 14, "q31": 30, "f32": 23, "f64": 52}[arithmetic]
+    gains = [0.875, 0.625, 0.75]
+    gains[worst] += 0.499 * 2.0**-bits
+    schedule, ranges = GainSchedule((0.0, 0.45, 0.9), tuple(gains)), replace(RANGES, schedule=reach)
+    plan = planned(simple(TransferFunction([(0.9, 0.0)]), gain=schedule, ranges=ranges), arithmetic)
+    assert check(plan)

@@ -64,6 +64,7 @@ def test_the_smallest_exponent_that_holds_a_number():
     assert exponent_for(0.0, 10, "here", "it") == -150
     assert exponent_for(2.0**149, 1, "here", "it") == 149
     assert exponent_for(2.0**-148, 1, "here", "it") == -148
+    assert exponent_for(1.5 * 2.0**-149, 1, "here", "it") == -148
     for far in (2.0**150, 2.0**-150, math.inf):
         with pytest.raises(PlanError, match=r"here.*it reaches .*no fixed-point format.*nearer to 1"):
             exponent_for(far, 1, "here", "it")

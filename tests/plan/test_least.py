@@ -59,6 +59,16 @@ def test_integrals_in_counts_are_as_fine_as_61_bits_allow():
     assert tiny.integrator.state.lsb == 2.0**-126, "a count is a normal float"
 
 
+@pytest.mark.parametrize("places", (-4, 0, 1, 4))
+def test_an_increment_is_never_more_than_it_may_be(places):
+    """Just above a power of two, or a share of a millionth that its bound may be off by below it."""
+    ranges = ControllerRanges((-1.0, 1.0), (-1.0, 1.0), (-1e-5, 1e-5))
+    gain = 1.0 + places * 2.0**-23
+    plan = build_plan(integral(gain, step=2.0**-10, ranges=ranges), "f32")
+    increment = 2.0 * float(np.float32(gain * 2.0**-11))
+    assert increment <= MOST * plan.integrator.state.lsb and plan.integrator.state.lsb == 2.0**-70
+
+
 def check_counts(plan: Plan, state: Format, increment: float) -> str:
     """Which of both decides; the largest float is less than twice 2^60 counts."""
     ends = max(-state.low, state.high) * state.lsb

@@ -130,6 +130,7 @@ def test_every_rate_is_held_by_the_speed_that_is_made_for_it(arithmetic):
         counts, unit = speed.nearest(rates[place]), 2.0 ** -(speed.to_drive + speed.rate_shift)
         top = 2 ** (speed.rate_bits - 1) - 1
         assert counts.min() >= 1 and counts.max() <= top and np.all(counts == np.rint(counts))
+        assert speed.nearest(np.array([10.0, 1e-30])).tolist() == [top, 1]
         free = (counts > 1) & (counts < top)
         assert np.abs(counts[free] * unit - rates[place][free]).max() <= 0.5 * unit
     held = ROUNDED[arithmetic](rates)
