@@ -16,6 +16,7 @@ from focgen.control.controller import ControllerRanges, GainSchedule
 from focgen.errors import PlanError
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
+from focgen.plan.canonical import realise
 from focgen.plan.proofs import prove
 from focgen.plan.slewing import slewed
 from focgen.plan.stability import inverse
@@ -214,3 +215,40 @@ def test_a_recursion_leaves_the_counts_free_that_its_rounding_needs(time):
     drops = 0.5 * 2.0**-plan.narrow * norm * 3.0
     noise = 0.5 * carried + drops + 2.0 * max(1.0, norm * (1.0 + back))
     assert abs(norm * direct * last + noise - 32766) <= 1.1
+
+
+@pytest.mark.parametrize("highest", ("num", "den"))
+def test_orders_end_at_8_over_the_lowest(highest):
+    """Of either polynomial; the lowest is of the denominator."""
+    for lowest, order, kept in ((0.0, 8.0, True), (0.0, 8.25, False), (1.5, 9.5, True), (1.5, 9.75, False)):
+        other = [(1.0, lowest)]
+        one = [(1e-14, order), (1.0, lowest)]
+        made = simple(TransferFunction(*((one, other) if highest == "num" else (other, one))), length=12)
+        if kept:
+            assert realise(made).den[-1].order == 0.0
+            assert max(t.order for t in (*realise(made).direct, *realise(made).den)) == 8.0
+        else:
+            with pytest.raises(
+                PlanError, match=rf"has the order {order - lowest:g} over its lowest.*orders up to 8"
+            ):
+                realise(made)
+
+
+def test_one_integral_may_be_left_over():
+    for order, kept in ((-1.0, True), (-1.25, False)):
+        for integrator, remedy in (
+            (True, "leave one integral"),
+            (False, "set integrator = true and multiply"),
+        ):
+            made = simple(TransferFunction([(1.0, order)]), integrator=integrator)
+            if kept:
+                assert realise(made).rest == ((1.0, 0.0),)
+            else:
+                with pytest.raises(PlanError, match=rf"integrates more than once \(order -1.25\).*{remedy}"):
+                    realise(made)
+
+
+def test_an_order_is_whole_within_a_billionth():
+    for off, whole in ((0.9e-9, True), (-0.9e-9, True), (1.1e-9, False)):
+        den = realise(simple(TransferFunction([(1.0, 0.0)], [(1.0, 1.0 + off), (1.0, 0.0)]))).den
+        assert (den[0].order == 1.0) == whole
