@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 from focgen.control.controller import ControllerRanges
 from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
+from focgen.plan.canonical import normaliser
 from focgen.plan.plan import Plan
 from tests.controllers import simple
 from tests.plan.derived import Truth, dressed, planned, truth
@@ -142,3 +143,14 @@ def test_in_a_band_it_is_what_tolerances_can_do_to_the_quotient(num, den):
         worst = max(worst, (b + (size(direct) + size(rest) / w) / whole * a) / (whole - a))
     value = 1.7 * 2.5 * worst
     assert value * (1.0 - 1e-6) <= plan.error_bound.truncation <= 1.01 * value
+
+
+@pytest.mark.parametrize("den", [den for _, den in BAND if len(den) > 1])
+def test_the_weight_of_the_present_v_has_the_memories_leads(den):
+    """A fitted power weighs the present sample with a number of its own."""
+    given = dict(memory="exponential", operator="continuous", tolerance=0.02, band=(1.0, 40.0))
+    plan = build_plan(simple(TransferFunction([(1.0, 0.0)], den)), "f64", **given)
+    leads = {m.order: m.lead for m in plan.memories}
+    assert min(abs(lead - 1.0) for lead in leads.values()) > 0.01
+    assert normaliser(plan.controller, leads) == pytest.approx(scale_of(plan), rel=1e-12)
+    assert normaliser(plan.controller, {}) == pytest.approx(sum(c * 0.01**-o for c, o in den), rel=1e-12)
