@@ -104,3 +104,13 @@ def test_a_gain_is_looked_at_where_it_is_held_worst(arithmetic, worst, reach):
     schedule, ranges = GainSchedule((0.0, 0.45, 0.9), tuple(gains)), replace(RANGES, schedule=reach)
     plan = planned(simple(TransferFunction([(0.9, 0.0)]), gain=schedule, ranges=ranges), arithmetic)
     assert check(plan)
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("reach", [(-0.9, 0.9), (0.2, 0.7)])
+def test_modes_of_two_differences_are_counted_likewise(arithmetic, reach):
+    """What drives them is a difference, which is rounded, once and as much in their means."""
+    ranges = ControllerRanges(reach, (0.0, 0.0), (-10.0, 10.0))
+    made = simple(TransferFunction([(0.9, 0.0), (0.003, 1.4)]), ranges=ranges)
+    plan = planned(made, arithmetic, memory="exponential", tolerance=0.05, horizon=100)
+    assert {bank.differences for bank in plan.direct.banks} == {2} and check(plan)
