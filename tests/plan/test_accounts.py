@@ -6,17 +6,20 @@ loose is red as well as one that no longer holds.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
 
 from focgen.control.controller import ControllerRanges, GainSchedule
 from focgen.fractional.transfer import TransferFunction
+from focgen.plan.gain_errors import floating_pieces
 from focgen.plan.plan import Plan
 from focgen.plan.setpoint import set_point_error
 from tests.controllers import simple
 from tests.plan.accounts import Found, Real, Walk, Whole
 from tests.plan.derived import dressed, planned, truth
+from tests.plan.gain_walk import U64, pieces
 
 ARITHMETICS = ("q15", "q31", "f32", "f64")
 RANGES = ControllerRanges((-0.9, 0.9), (-0.9, 0.9), (-10.0, 10.0))
@@ -49,7 +52,7 @@ def check(plan: Plan) -> bool:
         more = ABOVE.get((plan.arithmetic, cause), near)
         assert value * (1.0 - less) <= part <= value * (1.0 + more) + loose * 1.01, cause
     assert parts.get("inner integral", 0.0) == pytest.approx(found.ceiling, rel=1e-5)
-    assert sum(parts.values()) == pytest.approx(bound.operator, rel=1e-6)
+    assert math.fsum(parts.values()) <= bound.operator <= (1.0 + 1e-6) * math.fsum(parts.values())
     assert bound.output_per_sample == pytest.approx(
         walk.output(bound.operator_per_sample or bound.operator, bound.operator), rel=max(near, 0.011)
     )
@@ -114,3 +117,15 @@ def test_modes_of_two_differences_are_counted_likewise(arithmetic, reach):
     made = simple(TransferFunction([(0.9, 0.0), (0.003, 1.4)]), ranges=ranges)
     plan = planned(made, arithmetic, memory="exponential", tolerance=0.05, horizon=100)
     assert {bank.differences for bank in plan.direct.banks} == {2} and check(plan)
+
+
+def test_a_gain_in_double_is_known_to_its_own_roundings():
+    """Breakpoints and gains that are dyadic: no table is off, and what is left is counted to a hundredth."""
+    schedule = GainSchedule((0.1875, 0.40625, 0.6875), (0.8125, -0.625, 0.375))
+    ranges = replace(RANGES, schedule=(0.0625, 0.96875))
+    made = simple(TransferFunction([(0.9, 0.0)]), gain=schedule, ranges=ranges)
+    plan = planned(made, "f64")
+    found, counted = floating_pieces(plan, 1.0, U64), pieces(plan, 1.0, U64)
+    assert len(found) == len(counted) == 4
+    for one, (error, largest) in zip(found, counted):
+        assert error <= one.error * (1.0 + 1e-9) and one.error <= 1.012 * error and one.largest == largest

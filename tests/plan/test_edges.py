@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from focgen.control.controller import ControllerRanges, GainSchedule
 from focgen.errors import PlanError
@@ -200,21 +201,39 @@ def test_a_recursion_is_bounded_with_all_that_is_left_out_of_it(sign):
     assert alone.norm_after(np.array([1.0, 1.0])) == pytest.approx(4.0, rel=1e-5)
 
 
-@pytest.mark.parametrize("time", (0.05, 0.6))
-def test_a_recursion_leaves_the_counts_free_that_its_rounding_needs(time):
+@pytest.mark.parametrize(
+    "den", ([(0.05, 1.0), (1.0, 0.0)], [(0.6, 1.0), (1.0, 0.0)], [(0.01, 2.0), (0.01, 1.0), (1.0, 0.0)])
+)
+def test_a_recursion_leaves_the_counts_free_that_its_rounding_needs(den):
     """In 16 bits an input may reach so far that v and all its rounding just fit; one count more does not."""
-    kept = {}
-    for n in range(32740, 32768):
-        reach = ControllerRanges((-n / 2**14, n / 2**14), (0.0, 0.0), (-10.0, 10.0))
-        plan = planned(simple(TransferFunction([(1.0, 0.0)], [(time, 1.0), (1.0, 0.0)]), ranges=reach), "q15")
-        kept[n] = plan.filtered.lsb == 2.0**-14
-    last = max(n for n in kept if kept[n])
-    assert all(kept[n] for n in range(32740, last + 1)) and not any(kept[n] for n in range(last + 1, 32768))
-    direct, back = plan.direct.values[0], plan.feedback.table.values[0]  # as they are held
-    norm, carried = 1.0 / (1.0 + back), 2.0  # of 1/A, and behind 1 - 1/z
-    drops = 0.5 * 2.0**-plan.narrow * norm * 3.0
-    noise = 0.5 * carried + drops + 2.0 * max(1.0, norm * (1.0 + back))
-    assert abs(norm * direct * last + noise - 32766) <= 1.1
+    made = simple(TransferFunction([(1.0, 0.0)], den))
+
+    def of(n: int):
+        reach = ControllerRanges((-n / 2**14, n / 2**14), (0.0, 0.0), (-9.0, 9.0))
+        return planned(replace(made, ranges=reach), "q15")
+
+    low, high, coarse = 16400, 32767, of(32767).filtered.lsb
+    assert of(low).filtered.lsb < coarse
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if of(middle).filtered.lsb < coarse else (low, middle)
+    plan = of(low)
+    back = np.array([1.0, *plan.feedback.table.values])  # as they are held
+    response, direct = lfilter([1.0], back, np.eye(1, 1 << 14)[0]), np.array(plan.direct.values)
+    norm = np.abs(response).sum()
+    carried = np.abs(np.diff(response, prepend=0.0)).sum()
+    aligned = len(plan.direct.blocks) + len(plan.feedback.table.blocks) + 1
+    noise = 0.5 * carried + 0.5 * aligned * 2.0**-plan.narrow * norm + 2.0 * max(1.0, norm * back.sum())
+    reach = np.abs(np.convolve(direct, response)).sum() * low * 2.0**-14 / plan.filtered.lsb
+    step = reach / low
+    assert reach + noise <= 32766.5 and reach + step + noise > 32765.5
+
+
+@pytest.mark.parametrize("arithmetic", FIXED)
+def test_a_recursion_may_rest_at_nothing(arithmetic):
+    """Of a derivative: its steady gain is 0, of the finest count that a product has room for."""
+    plan = planned(simple(TransferFunction([(0.1, 1.0)], [(0.05, 1.0), (1.0, 0.0)])), arithmetic)
+    assert (plan.feedback.steady, plan.feedback.steady_shift) == (0, 2 * plan.error.bits - 2)
 
 
 @pytest.mark.parametrize("highest", ("num", "den"))

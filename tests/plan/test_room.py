@@ -135,9 +135,9 @@ def test_every_rate_is_held_by_the_speed_that_is_made_for_it(arithmetic):
         assert np.abs(counts[free] * unit - rates[place][free]).max() <= 0.5 * unit
     held = ROUNDED[arithmetic](rates)
     assert np.array_equal(ROUNDED[arithmetic](held), held)
-    coarse = {"q15": 2.0**-7, "q31": 2.0**-12, "f32": 2.0**-24, "f64": 0.0}[arithmetic]
-    near = rates > 1e-7
-    assert np.abs(held / rates - 1.0)[near].max() <= coarse or arithmetic == "q15"
+    coarse = {"q15": 2.0**-8, "q31": 2.0**-13, "f32": 2.0**-24, "f64": 0.0}[arithmetic]
+    near = (rates > 1e-7) & (rates < 0.99)  # half of the fewest counts that a bank begins with
+    assert np.abs(held / rates - 1.0)[near].max() <= coarse
 
 
 def test_which_modes_are_compensated_and_how_wide_their_state_is():
