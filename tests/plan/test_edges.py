@@ -271,3 +271,12 @@ def test_an_order_is_whole_within_a_billionth():
     for off, whole in ((0.9e-9, True), (-0.9e-9, True), (1.1e-9, False)):
         den = realise(simple(TransferFunction([(1.0, 0.0)], [(1.0, 1.0 + off), (1.0, 0.0)]))).den
         assert (den[0].order == 1.0) == whole
+
+
+def test_v_that_rounds_up_beyond_its_type_is_narrowed_once_more():
+    """(2^31 - 1) 2^30 and seven eighths of 2^30 are 61 bits; without their last 30 they are 2^31."""
+    least = 2.0**-31
+    made = simple(TransferFunction([(1.0 - 0.125 * least, 0.0), (-0.875 * least, 1.0)]), sample_time=1.0)
+    plan = planned(replace(made, ranges=ControllerRanges((-0.5, 0.5), (0.0, 0.0), (-9.0, 9.0))), "q31")
+    assert plan.wide.high == (2**31 - 1) * 2**30 + 7 * 2**27
+    assert (plan.narrow, plan.filtered.high) == (31, 2**30)
