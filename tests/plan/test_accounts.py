@@ -97,14 +97,14 @@ def test_every_part_of_a_bound_with_modes_is_likewise(arithmetic, seed):
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("worst", (0, 1, 2))
-@pytest.mark.parametrize("reach", [(0.0, 0.9), (-0.5, 0.9), (0.0, 1.35)])
+@pytest.mark.parametrize("reach", [(0.0, 0.875), (-0.5, 0.875), (0.0, 1.35)])
 def test_a_gain_is_looked_at_where_it_is_held_worst(arithmetic, worst, reach):
     """Of three breakpoints one gain is almost half a count off, the others not at all; the signal ends at the
     outer ones or goes beyond them."""
-    bits = {"q15": 14, "q31": 30, "f32": 23, "f64": 52}[arithmetic]
+    bits = {"q15": 15, "q31": 31, "f32": 24, "f64": 53}[arithmetic]
     gains = [0.875, 0.625, 0.75]
     gains[worst] += 0.499 * 2.0**-bits
-    schedule, ranges = GainSchedule((0.0, 0.45, 0.9), tuple(gains)), replace(RANGES, schedule=reach)
+    schedule, ranges = GainSchedule((0.0, 0.4375, 0.875), tuple(gains)), replace(RANGES, schedule=reach)
     plan = planned(simple(TransferFunction([(0.9, 0.0)]), gain=schedule, ranges=ranges), arithmetic)
     assert check(plan)
 
