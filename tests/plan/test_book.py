@@ -8,12 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from focgen.fractional.transfer import TransferFunction
 from focgen.plan.ending import endings
 from focgen.plan.execute import execute
 from focgen.plan.plan import Plan
-from focgen.plan.scenario import Scenario, to_raw
+from focgen.plan.scenario import Reset, Scenario, Track, to_raw
 from focgen.verification.scenarios import mistuned, mixed
 from focgen.verification.unusable import strewn
+from tests.controllers import simple
 from tests.plan.book import Machine, by_the_book
 from tests.plan.derived import dressed, planned
 
@@ -82,3 +84,20 @@ def test_the_reference_does_with_modes_what_is_written(arithmetic, seed):
     plan = planned(dressed(seed, 12), arithmetic, memory="exponential", tolerance=0.05, horizon=100)
     assert plan.states
     check(plan, seed)
+
+
+@pytest.mark.parametrize("arithmetic", ("f32", "f64"))
+@pytest.mark.parametrize("order", ("track, reset", "reset, track", "track, track", "reset, reset"))
+def test_what_is_called_between_steps_that_are_left_out_counts_in_its_order(arithmetic, order):
+    """Ahead of one good sample: a reset forgets a track, a track moves what a reset has set."""
+    plan = planned(simple(TransferFunction([(1.0, 0.0), (0.01, 0.5)]), integrator=True, length=5), arithmetic)
+    kind = np.float32 if arithmetic == "f32" else np.float64
+    ref = np.full((1, 7), 0.3, kind)
+    ref[0, 2:5] = np.nan
+    events = [(word.strip(), k) for k, word in zip((3, 4), order.split(","))]
+    resets = tuple(Reset(0, k, kind(0.1), kind(0.2), kind(3.0 + k)) for word, k in events if word == "reset")
+    tracks = tuple(Track(0, k, kind(-2.0 - k)) for word, k in events if word == "track")
+    raw = Scenario(ref, np.zeros_like(ref), None, resets, tracks)
+    u, d, flags, _ = by_the_book(plan, raw)
+    made = execute(plan, raw)
+    assert np.array_equal(made.u, u) and np.array_equal(made.d, d) and np.array_equal(made.flags, flags)

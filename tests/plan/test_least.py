@@ -255,3 +255,13 @@ def test_counts_and_floats():
     assert taken_in(np.int64(5), state) == 5 and taken_in(np.float32(2.0**-38), state) == 4
     floating = Format("float", 1.0, -1.0, 1.0)
     assert taken_in(np.float32(0.3), floating) == np.float32(0.3)
+
+
+@pytest.mark.parametrize("ends", [(-12.0, 3.0), (-3.0, 12.0)])
+def test_in_double_an_error_moves_the_integral_wherever_it_stands(ends):
+    """A quarter of the last place of its farther end, since two increments are added, and halves rounded."""
+    ranges = ControllerRanges((-1.0, 1.0), (-1.0, 1.0), ends)
+    plan = build_plan(integral(1.0, ranges=ranges), "f64")
+    d = smallest_error(plan) * plan.constant_gain
+    end = max(ends, key=abs)
+    assert abs(end) + 2.0 * d * 1.01 != abs(end) and abs(end) + 2.0 * d * 0.99 == abs(end)

@@ -14,7 +14,7 @@ from focgen.plan.banks import drive_error
 from focgen.plan.plan import Bank
 from tests.controllers import simple
 from tests.plan.derived import planned, plans
-from tests.plan.ledger import half, hull, minus, shifted, span, weighted, worst
+from tests.plan.ledger import half, hull, minus, reached, shifted, span, weighted, worst
 from tests.plan.test_reached import SUMS, finer, fixed, of_seeds, top
 
 
@@ -30,6 +30,8 @@ def test_what_drives_round_is_a_count_of_each_and_what_their_means_shift_out(ari
             cost += abs(c) * bank.drive.lsb
             cost += abs(c) * 0.5 * bank.state.lsb / q * (bank.rate_shift > 0)
     assert drive_error(plan.direct) == pytest.approx(cost / plan.direct.total.lsb, rel=1e-12)
+    proofs = {proof.node: proof.worst for proof in plan.proofs}
+    assert proofs == reached(plan, proofs["v"])
     assert len(plan.direct.banks) == 2 and shift_seen == (arithmetic == "q31")
 
 

@@ -19,9 +19,11 @@ from focgen.plan.execute import execute
 from focgen.plan.formats import WORDS
 from focgen.plan.gains import _slope
 from focgen.plan.plan import Plan
+from focgen.plan.rounding import products_error
 from focgen.plan.scenario import Scenario, to_raw
 from tests.controllers import simple
 from tests.plan.derived import plans, truth
+from tests.plan.ledger import reached
 
 UNIT = TransferFunction([(1.0, 0.0)])
 RANGES = ControllerRanges((-1.0, 1.0), (-1.0, 1.0), (-10.0, 10.0), (0.0, 1.0))
@@ -126,3 +128,37 @@ def test_bounds_hold_where_products_underflow(arithmetic):
     for k in range(60):
         exact = Fraction(0.9) * sum(w * x[9 + k - j] for j, w in enumerate(weights))
         assert abs(Fraction(float(trace.d[0, k])) - exact) <= Fraction(plan.error_bound.operator)
+
+
+def test_products_just_above_a_power_of_two_have_its_last_place():
+    """(1 + 2^-42) x for x up to 1, in double: some are rounded by more than a number below 1 could be."""
+    w, rng = 1.0 + 2.0**-42, np.random.default_rng(6)
+    errors = []
+    for x in (1.0 - rng.integers(0, 900, 400) * 2.0**-53).tolist():
+        errors.append(abs(Fraction(w * x) - Fraction(w) * Fraction(x)))
+    assert 2.0**-54 < max(errors) <= products_error(np.array([w]), 1.0, 2.0**-53) <= 2.0**-53
+
+
+@pytest.mark.parametrize("arithmetic", ("q15", "q31"))
+@pytest.mark.parametrize("output", [(-1.0, 10.0), (-10.0, 1.0)])
+def test_an_integral_alone_reaches_its_own_ends(arithmetic, output):
+    """Nothing is added to it: the proof of p is of the end that is farther, and of no count more or less."""
+    made = simple(TransferFunction([(1.0, -0.5)]), ranges=replace(RANGES, output=output), length=9)
+    plan = build_plan(made, arithmetic)
+    proofs = {proof.node: proof.worst for proof in plan.proofs}
+    assert plan.direct is None and proofs == reached(plan, proofs["v"])
+
+
+@pytest.mark.parametrize("arithmetic", ("f32", "f64"))
+def test_formats_that_nothing_bounds_go_both_ways(arithmetic):
+    plan = build_plan(simple(UNIT, integrator=True), arithmetic)
+    for form in (
+        plan.wide,
+        plan.filtered,
+        plan.product,
+        plan.direct.total,
+        plan.error,
+        plan.output,
+        plan.gain,
+    ):
+        assert form.low <= form.high
