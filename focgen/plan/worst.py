@@ -32,9 +32,8 @@ def worst_case_input(plan: Plan, node: str) -> Scenario:
         known = ", ".join(nodes)
         raise PlanError(plan.name, f"has no node {node!r}", f"choose one of {known}")
     response = _response(plan, node)
-    errors = np.where(response[::-1] > 0.0, plan.error.high, plan.error.low)
-    others = np.where(response[::-1] > 0.0, plan.error.low, plan.error.high)
-    signs = np.stack([errors, others]) > 0
+    up = response[::-1] > 0.0
+    signs = np.stack([up, ~up])
     ref = np.where(signs, plan.reference.high, plan.reference.low)
     meas = np.where(signs, plan.measurement.low, plan.measurement.high)
     return Scenario(ref, meas, _schedule(plan, node, ref.shape), _resets(plan, node), tunes=_largest(plan))

@@ -55,10 +55,10 @@ def judged() -> dict[str, dict]:
 
 
 def counted(results: list[dict], weights: dict[str, int]) -> dict[str, Count]:
-    """By room; stillborn ones do not count."""
+    """By room; stillborn ones and those that no test was run for do not count."""
     known, found = judged(), {}
     for room, weight in weights.items():
-        own = [r for r in results if r["room"] == room and r["outcome"] != "stillborn"]
+        own = [r for r in results if r["room"] == room and r["outcome"] not in ("stillborn", "not run")]
         outcomes = Counter(r["outcome"] for r in own)
         left = [r for r in own if r["outcome"] in ("survived", "no test")]
         equal = sum(known.get(r["key"], {}).get("verdict") == "equivalent" for r in left)

@@ -153,7 +153,7 @@ def test_shares_and_their_intervals():
     equal = next(key for key, told in judged().items() if told["verdict"] == "equivalent")
     results = [{"room": "plan", "outcome": "killed", "key": str(i)} for i in range(9)]
     results += [{"room": "plan", "outcome": how, "key": key} for how, key in
-                (("survived", "x"), ("survived", equal), ("stillborn", "y"))]  # fmt: skip
+                (("survived", "x"), ("survived", equal), ("stillborn", "y"), ("not run", "z"))]  # fmt: skip
     counts = counted(results, {"plan": 100, "runtime": 50})
     assert (counts["plan"].tried, counts["plan"].killed, counts["plan"].live) == (11, 9, 10)
     share, low, high = weighted(list(counts.values()))

@@ -23,12 +23,14 @@ _WARM = ("numpy", "scipy.signal", "scipy.optimize", "scipy.linalg", "scipy.speci
          "tomlkit", "pint", "hypothesis", "mpmath")  # fmt: skip
 _CHANGED = "changed.json"
 _STILLBORN = "does not compile"
+_NOT_RUN = 4  # of pytest: a test asked for is not there
 
 
 @dataclass(frozen=True)
 class Tried:
-    """``outcome``: "killed", "timed out" (killed, too), "survived", "no test" where none runs it, or
-    "stillborn", which no compiler takes and nobody counts. ``by``: the test that told."""
+    """``outcome``: "killed", "timed out" (killed, too), "survived", "no test" where none runs it, or, counted
+    by nobody, "stillborn", which no compiler takes, and "not run", as tests that were measured are no longer
+    there. ``by``: the test that told."""
 
     outcome: str
     seconds: float
@@ -153,4 +155,6 @@ def _told(status: int | None, log: str, seconds: float) -> Tried:
         return Tried("survived", seconds)
     if _STILLBORN in log:
         return Tried("stillborn", seconds, by)
+    if status == _NOT_RUN:
+        return Tried("not run", seconds, by)
     return Tried("killed", seconds, by or f"exit status {status}")
