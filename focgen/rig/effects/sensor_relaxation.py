@@ -50,7 +50,8 @@ def _fading_response(values: Values, s: Complex) -> Complex:
 
 def _fading_spread_response(values: Values, s: Complex) -> Complex:
     share, tau = values
-    return 1.0 - share * sum(lag_response(t, s) for t in (tau / 4, tau, 4 * tau)) / 3.0
+    quick, middle, slow = (lag_response(t, s) for t in (tau / 4, tau, 4 * tau))
+    return 1.0 - share * (quick + middle + slow) / 3.0
 
 
 EFFECT = Effect(
