@@ -7,15 +7,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from focgen.diagnosis.belief.choice import likeliest
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.belief.standing import behind, least_set, probabilities, tied_within
 from focgen.diagnosis.belief.unknown import is_none
+from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.segments import make
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Actuator, Rig, Signals
 
-_COUNT = 10_000
+_COUNT, H = 10_000, 0.05
 
 
 class _Fit(SimpleNamespace):
@@ -101,6 +108,22 @@ def test_so_is_what_was_found_without_it():
         for base in (strained, _fit(2.0, ["leak"], prior_penalty=40.0, kept=_fit(2.1, ["leak"])))
     ]
     assert odds[0] > 30.0 and odds[1] < 10.0
+
+
+def test_a_fit_kept_close_to_what_was_given_moves_less_and_leaves_more():
+    """A pump twice as slow as given: its time moves as far as it may, and what is known holds it back."""
+    regulator = TransferFunction([(1.0, 0.0)], [(0.4, 1.0), (1.0, 0.0)])
+    rig = Rig("bench", H, Signals("t", "y", "u", pressure="p"), Actuator(0.8, 0.9, (1.0,)), regulator)
+    rng, asked = np.random.default_rng(1), np.repeat([0.0, 3.0, 1.0, 5.0, 2.0, 0.0], 100)
+    slow = lfilter([1 - np.exp(-H / 0.8)], [1.0, -np.exp(-H / 0.8)], asked)
+    roles = {"command": asked, "pressure": slow + 0.01 * rng.normal(size=600), "output": slow}
+    logs = [Experiment("steps", H, roles)]
+    bare = uncertain(rig, make(logs, "command", "pressure"), logs)
+    free = fit(bare, bare.nominal(), WHITE, 20)
+    ground = Ground.of(free, free, [free], WHITE, Surroundings())
+    kept = ground._kept(free)
+    assert 0.0 < kept.prior_penalty < 0.9 * free.prior_penalty
+    assert kept.sse > free.sse and kept.problem.candidates == free.problem.candidates
 
 
 def test_what_takes_nothing_but_noise_away_is_no_effect():

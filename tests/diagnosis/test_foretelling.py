@@ -10,20 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
-from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.fitting.folds import folds
 from focgen.diagnosis.hypotheses.foretelling import foretelling
-from focgen.diagnosis.hypotheses.nuisances import problem_of, uncertain
+from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.search import evidence
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import make
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
-from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
+from focgen.rig.rig import LinearActuator, Rig, Signals
 
 H, NOISE, TOPS = 0.05, 0.05, (2.0, 3.0, 4.0, 6.0, 6.0)
 LAG = TransferFunction([(6.0, 0.0)], [(2.0, 1.0), (1.0, 0.0)])
@@ -84,19 +82,3 @@ def test_two_effects_that_are_there_stay(seed):
 def test_parts_are_neighbouring_experiments_or_quarters():
     assert folds([5, 5, 5, 5]).tolist() == [0] * 5 + [1] * 5 + [2] * 5 + [3] * 5
     assert folds([8]).tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
-
-
-def test_a_fit_kept_close_to_what_was_given_moves_less_and_leaves_more():
-    """A pump twice as slow as given: its time moves as far as it may, and what is known holds it back."""
-    regulator = TransferFunction([(1.0, 0.0)], [(0.4, 1.0), (1.0, 0.0)])
-    rig = Rig("bench", H, Signals("t", "y", "u", pressure="p"), Actuator(0.8, 0.9, (1.0,)), regulator)
-    rng, asked = np.random.default_rng(1), np.repeat([0.0, 3.0, 1.0, 5.0, 2.0, 0.0], 100)
-    slow = lfilter([1 - np.exp(-H / 0.8)], [1.0, -np.exp(-H / 0.8)], asked)
-    roles = {"command": asked, "pressure": slow + 0.01 * rng.normal(size=600), "output": slow}
-    logs = [Experiment("steps", H, roles)]
-    bare = uncertain(rig, make(logs, "command", "pressure"), logs)
-    free = fit(bare, bare.nominal(), WHITE, 20)
-    ground = Ground.of(free, free, [free], WHITE, Surroundings())
-    kept = ground._kept(free)
-    assert 0.0 < kept.prior_penalty < 0.9 * free.prior_penalty
-    assert kept.sse > free.sse and kept.problem.candidates == free.problem.candidates

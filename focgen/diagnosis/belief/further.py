@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
-from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, innovations
+from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, square_by
 from focgen.diagnosis.numbers import NUMBERS
 
 _STEPS = 6  # iterations of the fit that asks
@@ -63,7 +63,7 @@ class Ground:
         count = len(base.innovations)
         noise = float(np.mean(best.weighed**2)) * (1.0 - told)
         floor = best.sse * (1.0 - told)
-        before = _square(first, weighing) if base.problem.candidates else base.sse
+        before = square_by(first, weighing) if base.problem.candidates else base.sse
         scale = Scale(surroundings.nats(count, noise))
         return cls(base, floor, _nats(before - base.sse, floor, count), scale, weighing)
 
@@ -109,12 +109,6 @@ class Ground:
 def _told(best: Fit) -> float:
     """The share of what a fit leaves that is more than noise, for inputs predict it."""
     return min(max(best.predictable_share - NUMBERS.chance, 0.0), 1.0 - 1e-9)
-
-
-def _square(of: Fit, weighing: Weighing) -> float:
-    """The sum of squares of a fit made to another colour of the noise, in this one."""
-    found = innovations(of.problem, of.vector, weighing)
-    return float(found @ found)
 
 
 def _nats(square: float, floor: float, count: int) -> float:

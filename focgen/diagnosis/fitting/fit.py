@@ -197,3 +197,9 @@ def _step(
 def problem_residual(of: Fit) -> np.ndarray:
     """Measured less simulated (n,)."""
     return of.problem.residual(of.vector)
+
+
+def square_by(of: Fit, weighing: Weighing) -> float:
+    """The sum of squares of a fit, which may have been made to another colour of the noise, in this one."""
+    found = innovations(of.problem, of.vector, weighing)
+    return float(found @ found)

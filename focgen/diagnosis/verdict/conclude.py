@@ -21,7 +21,7 @@ from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
-from focgen.diagnosis.verdict.moments import Changed, changed_at_once, is_timed
+from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once, is_timed
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.sizes import estimates
@@ -81,7 +81,7 @@ def _cautions(rig: Rig, summary: _Summary, unknown: Sequence[Explanation]) -> It
             "predicted, and nothing of it is promised"
         )
     for e in unknown:
-        if (changed := changed_at_once(e)) is not None and changed.odds > 0.0:
+        if changed := another(e):
             yield f"{e.segment.entry} to {e.segment.exit}: {_at_once(changed)}"
     for e in unknown if summary.causes else ():
         yield f"{e.segment.entry} to {e.segment.exit}: no effect explains what is left there{_nearest(e)}"
@@ -318,7 +318,7 @@ def _description(unknown: Sequence[Explanation]) -> dict[str, object]:
             "tonal": noise.tonal,
             "pushed": noise.pushed,
         }
-        if (changed := changed_at_once(e)) is not None and changed.odds > 0.0:
+        if changed := another(e):
             said["moments"] = [asdict(m) for m in changed.moments]
         found[f"{e.segment.entry} to {e.segment.exit}"] = said
     return found

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
-from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, innovations, jacobian
+from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, innovations, jacobian, square_by
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import left_out
 from focgen.diagnosis.numbers import NUMBERS
@@ -73,6 +73,12 @@ def changed_at_once(e: Explanation) -> Changed | None:
         bases.append(_Pieces.of(left_out(e.best, timed, Weighing(e.ar)), e))
     found = [_judged(e, base, cuts) for base in bases for cuts in base.best()]
     return max((c for c in found if c is not None), key=lambda c: c.odds, default=None)
+
+
+def another(e: Explanation) -> Changed | None:
+    """What changed at once, where that is likelier than what was found."""
+    changed = changed_at_once(e)
+    return changed if changed is not None and changed.odds > 0.0 else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +147,7 @@ def _judged(e: Explanation, base: _Pieces, best: tuple[float, tuple[int, ...]]) 
     if not np.isfinite(square):
         return None
     weighing = Weighing(e.ar)
-    before, after = (_square(f, weighing) for f in (e.nominal, e.best))
+    before, after = (square_by(f, weighing) for f in (e.nominal, e.best))
     floor = max(min(after * (1.0 - e.predictability.share), square), 1e-300)
     count = len(e.segment.y)
     families = len(e.best.problem.families)
@@ -150,11 +156,6 @@ def _judged(e: Explanation, base: _Pieces, best: tuple[float, tuple[int, ...]]) 
     found = _log_odds(before, after, floor, count, e.best.size, families)
     cut = _log_odds(before, square, floor, count, size, others + len(cuts))
     return Changed(_told(base, cuts), cut - found)
-
-
-def _square(of: Fit, weighing: Weighing) -> float:
-    found = innovations(of.problem, of.vector, weighing)
-    return float(found @ found)
 
 
 def _log_odds(before: float, left: float, floor: float, count: int, free: int, things: int) -> float:

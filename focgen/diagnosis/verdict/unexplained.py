@@ -8,7 +8,7 @@ from focgen.diagnosis.belief.unknown import is_none
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.verdict.moments import changed_at_once
+from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.outside import from_outside
 from focgen.rig.effects import library
 
@@ -22,7 +22,7 @@ def is_unknown(e: Explanation) -> bool:
     left = disturbed(e)
     if _is_disturbed(e, left) or (e.segment.closed and _hidden(e, left)):
         return True
-    if e.causes and not is_rounded(e) and (from_outside(e) or _is_another(e)):
+    if e.causes and not is_rounded(e) and (from_outside(e) or another(e)):
         return True
     if e.predictability.share < NUMBERS.left:
         return False
@@ -30,12 +30,6 @@ def is_unknown(e: Explanation) -> bool:
         return True
     before, after = _squares(e)
     return is_none(after * e.predictability.share, before - after)
-
-
-def _is_another(e: Explanation) -> bool:
-    """Whether the rig became another at a moment, rather than slowly."""
-    changed = changed_at_once(e)
-    return changed is not None and changed.odds > 0.0
 
 
 def disturbed(e: Explanation) -> Disturbance:

@@ -1,5 +1,7 @@
 """A reading that overshoots with the rate of strain, then relaxes."""
 
+import numpy as np
+
 from focgen.arrays import Array, Complex
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
@@ -11,47 +13,59 @@ _LOST = Parameter("share", lower=0.0, upper=0.9, starts=(0.1, 0.1, 0.1), zero=0.
 _TIME = Parameter("time", time=1, lower=0.02, upper=100.0, starts=(0.3, 2.0, 10.0), log=True)
 
 
+def _followed(x: Array, taus: tuple[float, ...], run: Run) -> Array:
+    """The mean of lags of x."""
+    made: Array = np.sum([kernels.lag(x, run.rest, run.h, t, t) for t in taus], axis=0) / len(taus)
+    return made
+
+
+def _followed_response(taus: tuple[float, ...], s: Complex) -> Complex:
+    made: Complex = np.sum([lag_response(t, s) for t in taus], axis=0) / len(taus)
+    return made
+
+
+def _around(tau: float) -> tuple[float, float, float]:
+    return tau / 4, tau, 4 * tau
+
+
 def _one(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
-    return x + share * (x - kernels.lag(x, run.rest, run.h, tau, tau))
+    return x + share * (x - _followed(x, (tau,), run))
 
 
 def _spread(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
-    slow = sum(kernels.lag(x, run.rest, run.h, t, t) for t in (tau / 4, tau, 4 * tau)) / 3.0
-    return x + share * (x - slow)
+    return x + share * (x - _followed(x, _around(tau), run))
 
 
 def _fading(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
-    return x - share * kernels.lag(x, run.rest, run.h, tau, tau)
+    return x - share * _followed(x, (tau,), run)
 
 
 def _fading_spread(x: Array, values: Values, run: Run) -> Array:
     share, tau = values
-    return x - share * sum(kernels.lag(x, run.rest, run.h, t, t) for t in (tau / 4, tau, 4 * tau)) / 3.0
+    return x - share * _followed(x, _around(tau), run)
 
 
 def _one_response(values: Values, s: Complex) -> Complex:
     share, tau = values
-    return 1.0 + share * (1.0 - lag_response(tau, s))
+    return 1.0 + share * (1.0 - _followed_response((tau,), s))
 
 
 def _spread_response(values: Values, s: Complex) -> Complex:
     share, tau = values
-    quick, middle, slow = (lag_response(t, s) for t in (tau / 4, tau, 4 * tau))
-    return 1.0 + share * (1.0 - (quick + middle + slow) / 3.0)
+    return 1.0 + share * (1.0 - _followed_response(_around(tau), s))
 
 
 def _fading_response(values: Values, s: Complex) -> Complex:
     share, tau = values
-    return 1.0 - share * lag_response(tau, s)
+    return 1.0 - share * _followed_response((tau,), s)
 
 
 def _fading_spread_response(values: Values, s: Complex) -> Complex:
     share, tau = values
-    quick, middle, slow = (lag_response(t, s) for t in (tau / 4, tau, 4 * tau))
-    return 1.0 - share * (quick + middle + slow) / 3.0
+    return 1.0 - share * _followed_response(_around(tau), s)
 
 
 EFFECT = Effect(
