@@ -21,15 +21,20 @@ P = ParamSpec("P")
 R = TypeVar("R")
 _NO_LIST = (str, bytes, bytearray, Mapping)
 _LONGEST = 80  # characters of a value that is shown
+_PATH = "str | Path"
+Wanted = tuple[Callable[[Any], bool], str]  # whether a value is of a kind; the remedy where it is not
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that raises InputError where a path, text, number, or a sequence of them is none.
+    """A function that raises InputError where a path, text, number, a sequence of them, or an object of
+    our own is none.
 
     Other kinds, and values that only the function can judge, are its own affair.
     """
     signature, call_it = inspect.signature(function), cast(Callable[..., R], function)
-    wanted = {name: _WANTED[kind] for name, kind in _kinds(signature) if kind in _WANTED}
+    scope = getattr(function, "__globals__", {})
+    found = {name: _wanted(kind, scope) for name, kind in _kinds(signature)}
+    wanted = {name: one for name, one in found.items() if one is not None}
 
     @wraps(function)
     def call(*args: Any, **kwargs: Any) -> R:
@@ -47,6 +52,25 @@ def _kinds(signature: inspect.Signature) -> Iterable[tuple[str, str]]:
     """Names of the arguments and what they are, without "or None"."""
     for name, parameter in signature.parameters.items():
         yield name, str(parameter.annotation).removesuffix(" | None")
+
+
+def _wanted(kind: str, scope: Mapping[str, Any]) -> Wanted | None:
+    """What an annotation asks for, its names being read in ``scope``; None where that is not known."""
+    if kind in _WANTED:
+        return _WANTED[kind]
+    paths = kind.startswith(_PATH)
+    names = kind.removeprefix(_PATH + " | ").split(" | ")
+    classes: Any = tuple(scope.get(name) for name in names)
+    if not all(map(_is_own, classes)):
+        return None
+    remedy = "give a " + " or a ".join([*(["path"] if paths else []), *names])
+    return lambda value: isinstance(value, classes) or (paths and _is_path(value)), remedy
+
+
+def _is_own(kind: Any) -> bool:
+    """Whether this is a class of the package, and not only the shape that objects of any class may have."""
+    own = isinstance(kind, type) and kind.__module__.startswith(f"{__package__}.")
+    return own and not getattr(kind, "_is_protocol", False)
 
 
 def _shown(value: Any) -> str:
@@ -108,8 +132,8 @@ def _is_text_or_several(value: Any) -> bool:
     return _is_text(value) or _each(_is_text)(value)
 
 
-_WANTED: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "str | Path": (_is_path, "give a path"),
+_WANTED: dict[str, Wanted] = {
+    _PATH: (_is_path, "give a path"),
     "str": (_is_text, "give a text"),
     "float": (_is_number, "give a number"),
     "int": (_is_whole, "give a whole number"),

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from focgen.arguments import checked
 from focgen.arrays import Numbers
 from focgen.control.controller import Controller
 from focgen.control.files import read_controller
@@ -57,6 +58,7 @@ class Judged:
     wrong: Numbers
 
 
+@checked
 def assert_equivalent(
     reference: str | Path | Controller | LoadedController,
     candidate: Any,
@@ -113,15 +115,12 @@ def _check_numbers(samples: int, seed: int) -> None:
         raise InputError("seed", f"is {seed!r}", "give 0 or more")
 
 
-def _plan(reference: Any) -> tuple[Plan, str]:
+def _plan(reference: str | Path | Controller | LoadedController) -> tuple[Plan, str]:
     """The plan that is the reference, and its name."""
     if isinstance(reference, LoadedController):
         return reference.plan, reference.name
     if isinstance(reference, Controller):
         return build_plan(reference), reference.name
-    if not isinstance(reference, (str, Path)):
-        remedy = "give a generated folder, a loaded controller, or a controller.toml"
-        raise InputError("the reference", f"is {reference!r}", remedy)
     if Path(reference).is_file():
         return build_plan(read_controller(reference)), str(reference)
     read = read_folder(reference)

@@ -16,7 +16,12 @@ import pytest
 
 import focgen
 from focgen.arguments import _WANTED, checked
+from focgen.control.controller import Controller
+from focgen.control.files import read_controller, write_controller
 from focgen.errors import FitError, FocgenError, InputError
+from focgen.rig.files import write_rig
+from focgen.rig.rig import Rig
+from focgen.testing import assert_equivalent
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 WORDS = "cost design demo diagnose generate identify init load read_logs replay report simulate study verify"
@@ -115,3 +120,32 @@ def test_a_name_of_several_lines_in_a_rig_is_told_on_one():
     with pytest.raises(FocgenError) as told:
         focgen.read_logs(rig, {"a\nb": [1.0, 2.0], "c": [1.0, 2.0]})
     assert "\n" not in str(told.value)
+
+
+@checked
+def owned(rig: Rig, controller: str | Path | Controller = "", several: list[Rig] | None = None):
+    return rig, controller, several
+
+
+def test_objects_of_our_own_are_told_from_others(tmp_path):
+    rig, controller = focgen.read_rig(EXAMPLES / "rig.toml"), read_controller(EXAMPLES / "controller.toml")
+    assert owned(rig, controller, [1]) == (rig, controller, [1]) and owned(rig, tmp_path)[1] == tmp_path
+    for odd in [*ODD, controller, Rig]:
+        with pytest.raises(InputError, match="owned: rig: .*; give a Rig"):
+            owned(odd)
+    for odd in [*ODD, *NO_PATH, rig, Controller]:
+        with pytest.raises(InputError, match="owned: controller: .*; give a path or a Controller"):
+            owned(rig, odd)
+
+
+@pytest.mark.parametrize("write", [write_rig, write_controller])
+def test_only_its_own_kind_is_written(tmp_path, write):
+    other = {write_rig: read_controller(EXAMPLES / "controller.toml"), write_controller: None}[write]
+    with pytest.raises(InputError, match="give a (Rig|Controller)"):
+        write(other, tmp_path / "x.toml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_reference_that_no_system_takes_for_a_path_is_refused():
+    with pytest.raises(InputError, match="give a path or a Controller or a LoadedController"):
+        assert_equivalent("/" + "a" * 5000, print)

@@ -296,7 +296,7 @@ def test_the_reference_may_be_a_controller(folders, tmp_path):
         (lambda f: (f / "spba_q31", type("T", (), {"reset": len, "step": len})()), "has no track"),
         (lambda f: (f / "spba_q31", from_c(PORT / "mirrored.c", "mirrored")), "takes no scheduling signal"),
         (lambda f: (f / "nothing", 5), "is no folder"),
-        (lambda f: (5, f / "spba_q31"), "the reference: is 5"),
+        (lambda f: (5, f / "spba_q31"), "reference: is 5; give a path"),
         (lambda f: (f / "spba_q31", f / "spba_q31", "bit"), "choose one of bits, bound"),
         (lambda f: (f / "spba_q31", f / "spba_q31", "bits", 0), "samples: is 0"),
         (lambda f: (f / "spba_q31", f / "spba_q31", "bits", 5, -1), "seed: is -1"),
