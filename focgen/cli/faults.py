@@ -23,6 +23,7 @@ from focgen.terminal import for_terminal
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _UNLOADED = "failed to map segment", "annot allocate memory"  # words of the system's loader
 _ALIKE = str.maketrans({"−": "-", "–": "-", "→": "->", "…": "...", "≤": "<=", "≥": ">=", "±": "+-"})
+_DIGITS = 11  # of seconds: up to the year 5138
 _SCARCE = (errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM)
 
 
@@ -135,6 +136,17 @@ def open_streams() -> None:
     # those that were closed as the interpreter began; a closed stdout is a fault, for want of the result
     sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115 - as long as the process
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+
+
+def check_epoch() -> None:
+    """Raise FocgenError where SOURCE_DATE_EPOCH is no date: libraries read it as they are imported, and fail.
+
+    Seconds of UTC, https://reproducible-builds.org/specs/source-date-epoch/.
+    """
+    given = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    if not (given.isascii() and given.isdigit() and len(given) <= _DIGITS):
+        what = f"is {given[:60]!r}"
+        raise FocgenError("SOURCE_DATE_EPOCH", what, f"unset it, or give seconds of at most {_DIGITS} digits")
 
 
 def write_out(text: str, as_json: bool = False) -> None:

@@ -13,7 +13,15 @@ from typing import Any, NoReturn
 import focgen
 import focgen.cli
 from focgen.cli.completion import SHELLS, PrintCompletion
-from focgen.cli.faults import Ended, as_one_line, ending_in_order, open_streams, say_error, write_out
+from focgen.cli.faults import (
+    Ended,
+    as_one_line,
+    check_epoch,
+    ending_in_order,
+    open_streams,
+    say_error,
+    write_out,
+)
 from focgen.errors import FocgenError
 from focgen.jsontext import to_json
 from focgen.terminal import for_terminal
@@ -140,6 +148,7 @@ def _run(argv: Sequence[str]) -> int:
         return 0
     if not argv[0].startswith("-") and argv[0] not in commands():
         raise FocgenError(argv[0], "is no command", _meant(argv[0], commands(), "focgen"))
+    check_epoch()
     args = parser(argv[0]).parse_args(argv)
     outcome = args.run(args)
     text = to_json(outcome.payload) if args.json else for_terminal(outcome.text.rstrip("\n")) + "\n"

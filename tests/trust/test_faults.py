@@ -354,3 +354,15 @@ def test_no_number_of_a_rig_ends_as_nan(tmp_path, way, capsys):
                 assert "fault of its own" not in err or "(RuntimeWarning)" in err, err
                 continue
             json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} at exit {status}"))
+
+
+@pytest.mark.parametrize("given", ["junk", "", "-1", "1e9", "9" * 400, "٣"])
+def test_a_date_of_the_surroundings_that_is_none_is_named(tmp_path, given):
+    """Libraries read it as they are imported, so in a fresh interpreter."""
+    steps = [*sorted((EXAMPLES / "logs").glob("*.csv")), "--rig", EXAMPLES / "rig.toml"]
+    line = [sys.executable, "-m", "focgen", "identify", *map(str, steps), "--out", str(tmp_path / "rig.toml")]
+    done = subprocess.run(
+        line, env={**os.environ, "SOURCE_DATE_EPOCH": given}, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "unset it" in done.stderr, done.stderr
+    assert "SOURCE_DATE_EPOCH" in done.stderr and not list(tmp_path.iterdir())
