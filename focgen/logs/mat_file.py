@@ -1,11 +1,13 @@
 """Logs in .mat (version 5 to 7.3): vectors, the columns of matrices, and the fields of structures.
 
-A structure's fields go by their own names, and by "structure.field"; a matrix x of k columns gives x_1 … x_k.
-A structure that Simulink wrote ("with time") goes by the labels of its signals.
+A structure's fields go by their own names, by "structure.field", and by the whole way; those of a
+structure array by "structure(1).field"; a matrix x of k columns gives x_1 … x_k. A structure that Simulink wrote
+("with time") goes by the labels of its signals.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -33,7 +35,7 @@ def read(path: Path) -> LogTable:
     except (ValueError, TypeError, MatReadError, EOFError, KeyError, IndexError):
         raise LogError(str(path), "is not a whole MAT file", _REMEDY) from None
     named = {name: value for name, value in content.items() if not name.startswith(("__", "#"))}
-    columns, aliases = _by_name(list(_vectors(named)))
+    columns, aliases = _by_name(list(_vectors(named)), path)
     lengths = {len(column) for column in columns.values()}
     if not columns:
         raise LogError(str(path), "holds no vectors", _REMEDY)
@@ -64,21 +66,32 @@ def _of_group(group: Any, path: Path) -> dict[str, Any]:
     for name in group:
         elsewhere = hasattr(group.get(name, getlink=True), "filename")
         item = None if elsewhere else group.get(name)
-        if elsewhere or (item is not None and _lies_elsewhere(item, group)):
-            raise LogError(f"{path} [{name}]", "lies in another file", "save all of it in one")
+        if elsewhere:
+            raise _elsewhere(path, name)
         found[name] = _of_hdf5(item, path)
     return found
 
 
-def _lies_elsewhere(item: Any, group: Any) -> bool:
+def _elsewhere(path: Path, name: str) -> LogError:
+    return LogError(f"{path} [{name}]", "lies in another file", "save all of it in one")
+
+
+def _lies_elsewhere(item: Any, path: Path) -> bool:
     stored = getattr(item, "external", None) or getattr(item, "is_virtual", False)
-    return bool(stored) or item.file.filename != group.file.filename
+    return bool(stored) or Path(item.file.filename) != path
 
 
 def _of_hdf5(item: Any, path: Path) -> Any:
-    """A group as a dictionary; an array, whose axes HDF5 has in reverse, as MATLAB has it; else None."""
+    """A group as a dictionary; an array, whose axes HDF5 has in reverse, as MATLAB has it; cells, which are
+    named elsewhere in the file, as an array of objects; else None."""
+    if item is not None and _lies_elsewhere(item, path):
+        raise _elsewhere(path, item.name)
     if item is None or not hasattr(item, "dtype"):
         return _of_group(item, path) if hasattr(item, "items") else None
+    if item.dtype.metadata and "ref" in item.dtype.metadata:
+        cells = np.empty(item.size, object)
+        cells[:] = [_of_hdf5(item.file[to] if to else None, path) for to in item[()].T.flat]
+        return cells
     values = item[()] if item.dtype.kind in "fiub" else None
     if values is None or item.attrs.get("MATLAB_empty", 0):
         return None
@@ -86,21 +99,29 @@ def _of_hdf5(item: Any, path: Path) -> Any:
     return "".join(map(chr, np.ravel(values))) if text else np.squeeze(np.asarray(values).T)
 
 
-def _vectors(content: dict[str, Any], owner: str = "") -> Iterator[tuple[str, str, Array]]:
-    """Yield (owner, name, column) of all that is inside; scalars (settings, counters) are left out."""
+def _vectors(content: dict[str, Any], way: str = "") -> Iterator[tuple[str, str, Array]]:
+    """Yield (way to its owner, name, column) of all inside; scalars (settings, counters) are left out."""
     label = content.get("label")
     for name, value in content.items():
-        if hasattr(value, "_fieldnames"):
-            value = {field: getattr(value, field) for field in value._fieldnames}
-        if isinstance(value, dict):
-            yield from _vectors(value, name)
-        elif isinstance(value, np.ndarray) and value.dtype == object:
-            for part in value.ravel():
-                if hasattr(part, "_fieldnames"):
-                    yield from _vectors({f: getattr(part, f) for f in part._fieldnames}, name)
-        elif isinstance(value, np.ndarray):
-            own = label if name == "values" and isinstance(label, str) and label else name
-            yield from ((owner, own + mark, column) for mark, column in _columns(value))
+        own = label if name == "values" and isinstance(label, str) and label else name
+        yield from _within(value, way, own)
+
+
+def _within(value: Any, way: str, name: str) -> Iterator[tuple[str, str, Array]]:
+    """The same of one value: a structure, an array of structures or of cells, or an array of numbers."""
+    if hasattr(value, "_fieldnames") or isinstance(value, dict):
+        yield from _vectors(_fields(value), f"{way}.{name}" if way else name)
+    elif isinstance(value, np.ndarray) and value.dtype == object:
+        for k, part in enumerate(value.ravel()):
+            yield from _within(part, way, f"{name}({k + 1})")
+    elif isinstance(value, np.ndarray):
+        yield from ((way, name + mark, column) for mark, column in _columns(value))
+
+
+def _fields(structure: Any) -> dict[str, Any]:
+    if isinstance(structure, dict):
+        return structure
+    return {field: getattr(structure, field) for field in structure._fieldnames}
 
 
 def _columns(value: Array) -> Iterator[tuple[str, Array]]:
@@ -114,14 +135,27 @@ def _columns(value: Array) -> Iterator[tuple[str, Array]]:
         yield from ((f"_{k + 1}", value[:, k]) for k in range(value.shape[1]))
 
 
-def _by_name(found: list[tuple[str, str, Array]]) -> tuple[dict[str, Array], dict[str, str]]:
-    """Columns by their own name where no other has it, else by "owner.name"; and the aliases."""
-    names = [name for _, name, _ in found]
+def _by_name(found: list[tuple[str, str, Array]], path: Path) -> tuple[dict[str, Array], dict[str, str]]:
+    """Columns by the shortest of their names that no other has, and the longer ones as aliases.
+
+    Raises LogError where two have one name in full: neither could be asked for.
+    """
+    named = [(_names(way, name), column) for way, name, column in found]
+    times = Counter(name for names, _ in named for name in names)
     columns: dict[str, Array] = {}
     aliases: dict[str, str] = {}
-    for owner, name, column in found:
-        whole = f"{owner}.{name}" if owner else name
-        own = name if names.count(name) == 1 else whole
-        columns[own] = column
-        aliases |= {whole: own} if whole != own else {}
+    for names, column in named:
+        free = [name for name in names if times[name] == 1]
+        if not free:
+            what = f"holds two columns called {names[-1]!r}"
+            raise LogError(str(path), what, "rename one; a matrix x has the columns x_1, x_2 …")
+        columns[free[0]] = column
+        aliases |= dict.fromkeys(free[1:], free[0])
     return columns, aliases
+
+
+def _names(way: str, name: str) -> list[str]:
+    """Its own name, "structure.field", and the whole way, each once."""
+    whole = f"{way}.{name}" if way else name
+    owner = way.rpartition(".")[2]
+    return list(dict.fromkeys([name, f"{owner}.{name}" if owner else name, whole]))

@@ -223,6 +223,12 @@ def _virtual(file, h5py):
     file.create_virtual_dataset("y", layout)
 
 
+def _celled(file, h5py):
+    _virtual(file, h5py)
+    file.move("y", "#refs#/a")
+    file["cells"] = np.array([file["#refs#/a"].ref], dtype=h5py.ref_dtype)
+
+
 def _linked(file, h5py):
     file["out"] = h5py.ExternalLink("secret.mat", "/")
     file["y"] = h5py.SoftLink("/out/u")
@@ -235,6 +241,7 @@ ELSEWHERE = {
         "y", (20,), "f8", external=[("secret.bin", 0, 160)]
     ),
     "a virtual array": _virtual,
+    "a cell that is one": _celled,
 }
 
 

@@ -256,6 +256,76 @@ def test_mat(tmp_path, version, shape):
         assert "log.p_bar" in read_table(path)
 
 
+def write_cells_73(path, cells):
+    """A structure array and cells, as MATLAB's -v7.3 has them: references to what stands in #refs#."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, columns in cells.items():
+            for k, column in enumerate(columns):
+                file[f"#refs#/{name.replace('/', '_')}{k}"] = column[np.newaxis, :]
+            made = [file[f"#refs#/{name.replace('/', '_')}{k}"].ref for k in range(len(columns))]
+            file.create_dataset(name, (len(made), 1), h5py.ref_dtype)[:, 0] = made
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+
+
+TWO = [{name: column + k for name, column in COLUMNS.items()} for k in (0.0, 100.0)]
+"""Two experiments whose columns have the same names."""
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_experiments_in_an_array_of_structures_are_told_apart(tmp_path, version):
+    from scipy.io import savemat
+
+    path = tmp_path / "steps.mat"
+    if version == "7.3":
+        write_cells_73(path, {f"rec/{name}": [one[name] for one in TWO] for name in COLUMNS})
+        names = "t_s(2)", "u_V(2)", "p_bar(2)", "rec.kappa_per_mm(2)"
+    else:
+        made = np.zeros(2, dtype=[(name, object) for name in COLUMNS])
+        made[0], made[1] = (tuple(one.values()) for one in TWO)
+        savemat(path, {"rec": made})
+        names = "rec(2).t_s", "rec(2).u_V", "rec(2).p_bar", "rec(2).kappa_per_mm"
+    found = read_table(path)
+    for name, column in zip(names, ("t_s", "u_V", "p_bar", "kappa_per_mm"), strict=True):
+        assert np.array_equal(found.numbers(name), TWO[1][column])
+        assert np.array_equal(found.numbers(name.replace("(2)", "(1)")), TWO[0][column])
+    assert "t_s" not in found and len(found.columns) == 2 * len(COLUMNS)
+
+
+def test_fields_of_one_name_in_structures_of_one_name_are_told_apart(tmp_path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "log.mat", {f"exp{k}": {"data": one, "n": 3} for k, one in enumerate(TWO)})
+    found = read_table(tmp_path / "log.mat")
+    assert np.array_equal(found.numbers("exp0.data.p_bar"), TWO[0]["p_bar"])
+    assert np.array_equal(found.numbers("exp1.data.p_bar"), TWO[1]["p_bar"]) and "data.p_bar" not in found
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_cells_of_vectors_are_columns(tmp_path, version):
+    from scipy.io import savemat
+
+    path, columns = tmp_path / "log.mat", list(COLUMNS.values())
+    if version == "7.3":
+        write_cells_73(path, {"data": columns})
+    else:
+        cells = np.empty(len(columns), object)
+        cells[:] = columns
+        savemat(path, {"data": cells})
+    (log,) = read_logs([path], Signals("data(1)", "data(4)", "data(2)", "data(3)"), STEP)
+    assert np.array_equal(log["output"], COLUMNS["kappa_per_mm"])
+
+
+def test_a_vector_and_a_column_of_one_name_are_refused(tmp_path):
+    """Which of the two is meant by y_1 nobody can know."""
+    from scipy.io import savemat
+
+    savemat(tmp_path / "log.mat", {"t": TIME, "y": np.stack([TIME, -TIME], axis=1), "y_1": 5.0 * TIME})
+    with pytest.raises(LogError, match="holds two columns called 'y_1'.*rename one"):
+        read_table(tmp_path / "log.mat")
+
+
 def test_mat_73_without_h5py_names_the_extra(tmp_path, monkeypatch):
     import sys
 
