@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 
 from focgen.arrays import Array, Ints
-from focgen.logs.dialect import MISSING
+from focgen.logs.dialect import MISSING, grouped
 
 PART = 400_000
 """Cells that are held as texts before they are put away: of fewer, all stay as they stand in the file."""
@@ -51,10 +51,14 @@ class Levels(Sequence[str]):
 
 
 class Gathered:
-    """Rows put together to columns: ``add`` them one after the other, then take the ``columns``."""
+    """Rows put together to columns: ``add`` them one after the other, then take the ``columns``.
+
+    ``pointed``: of each column, which texts its points stand in.
+    """
 
     def __init__(self, width: int, decimal: str) -> None:
         self._columns = [_Growing(decimal) for _ in range(width)]
+        self.pointed = [Points() for _ in range(width)]
         self._rows: list[Sequence[str]] = []
         self._most = max(1, PART // max(width, 1))
 
@@ -67,15 +71,46 @@ class Gathered:
     def columns(self) -> list[Sequence[str] | Array]:
         """Each column (m,): texts as they stand; of a long table few texts as :class:`Levels`, others as
         numbers."""
+        self._look()
         if not any(column.begun for column in self._columns):
             return [list(cells) for cells in zip(*self._rows)] or [[] for _ in self._columns]
         self._put_away()
         return [column.taken() for column in self._columns]
 
+    def _look(self) -> None:
+        for pointed, cells in zip(self.pointed, zip(*self._rows)):
+            pointed.see(cells)
+
     def _put_away(self) -> None:
+        self._look()
         for column, cells in zip(self._columns, zip(*self._rows)):
             column.add(cells)
         self._rows = []
+
+
+class Points:
+    """Whether the points of a column stand between thousands, for all that its texts tell."""
+
+    def __init__(self) -> None:
+        self._whole = self._grouped = self._decimal = False
+
+    def see(self, cells: Iterable[str]) -> None:
+        """More of its texts. A point that is a decimal one for sure ends the matter."""
+        if self._decimal:
+            return
+        for cell in cells:
+            if "." not in cell:
+                self._whole = self._whole or cell.isdigit()
+            elif grouped(cell, "."):
+                self._grouped = True
+            elif cell[-1:].isdigit():
+                self._decimal = True
+                return
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether numbers like "1.200" stand beside whole ones like "999", and none like "0.5"."""
+        return self._whole and self._grouped and not self._decimal
 
 
 class _Growing:
@@ -144,6 +179,9 @@ class Lines:
             self._lines.append(line)
         self._count += 1
 
+    def __len__(self) -> int:
+        return self._count
+
     def of(self, row: int) -> str:
         """The words that find a row in the file."""
         at = int(np.searchsorted(self._rows, row, side="right")) - 1
@@ -156,6 +194,8 @@ def parsed(cells: Iterable[Any], decimal: str = ".") -> list[float]:
     if any(isinstance(cell, str) and "_" in cell for cell in cells):
         raise ValueError  # Python reads 1_000 as a number, nobody else does
     if decimal == ",":
+        if any(isinstance(cell, str) and grouped(cell, ".") for cell in cells):
+            raise ValueError  # a point between thousands, or a decimal point after all: a factor of 1000
         cells = [cell.replace(",", ".") if isinstance(cell, str) else cell for cell in cells]
     try:
         return list(map(float, cells))  # most columns miss nothing

@@ -95,11 +95,12 @@ def time_of(table: LogTable) -> str | None:
     rising = [name for name in table.columns if _rises(table, name)]
     named = [name for name in rising if set(Column(name, "s", np.empty(0)).words) & _TIME]
     dated = [name for name in rising if not isinstance(table.column(name), np.ndarray)]
-    best = named or [n for n in dated if _is_dated(table, n)] or rising
+    best = named or [n for n in dated if is_dated(table, n)] or rising
     return best[0] if best else None
 
 
-def _is_dated(table: LogTable, name: str) -> bool:
+def is_dated(table: LogTable, name: str) -> bool:
+    """Whether a column of time is one of dates or times of day, as texts."""
     try:
         table.numbers(name)
         return False

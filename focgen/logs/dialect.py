@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from focgen.logs.units import unit_named, unit_of
+
 SAMPLE = 1000
 """Lines that the dialect is read off."""
 _TAIL = 60  # of them, the last ones: surely data, behind whatever an instrument writes ahead
@@ -17,6 +19,7 @@ _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "bla
 _COMMENTS = ("#", "%", "//")
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _POINT_DECIMAL = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
+_GROUPED = {mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}(\{mark}\d{{3}})+") for mark in ",."}
 _BRACKETED = re.compile(r"[\[(].*[\])]")
 _UNIT = re.compile(
     r"[a-zA-Zµμ°Ω%Å]{1,4}([/*·^]?[-+0-9a-zA-Zµμ°²³⁻¹]{0,4}){0,3}|1/[a-zA-Zµμ°]{1,4}|-|\d/[a-z]+"
@@ -65,26 +68,44 @@ class Comments:
         self.first = self.first or number
 
 
-def rows_of(lines: Iterable[str], delimiter: str, comments: Comments | None = None) -> Iterator[list[str]]:
+def rows_of(
+    lines: Iterable[str], delimiter: str, comments: Comments | None = None, whole: bool = True
+) -> Iterator[list[str]]:
     """Yield the cells of every line, without blanks around them; none for an empty line or a comment.
 
-    Raises csv.Error where quotes do not close.
+    Raises csv.Error where a quoted cell of several lines does not end as one: a lone quote makes what follows
+    a part of its cell. A text that is not ``whole`` may end within a cell.
     """
-    plain = _plain(lines, comments or Comments(delimiter))
+    plain = _Plain(lines, comments or Comments(delimiter))
     if delimiter == " ":
-        yield from (line.split() for line in plain)
+        for line in plain:
+            plain.row.clear()
+            yield line.split()
         return
-    for row in csv.reader(plain, delimiter=delimiter, skipinitialspace=delimiter != "\t"):
+    spaced = delimiter != "\t"
+    for row in csv.reader(plain, delimiter=delimiter, skipinitialspace=spaced):
+        if whole and len(plain.row) > 1:
+            list(csv.reader(plain.row, delimiter=delimiter, skipinitialspace=spaced, strict=True))
+        plain.row.clear()
         cells = [cell.strip() for cell in row]
         yield cells if any(cells) else []
 
 
-def _plain(lines: Iterable[str], comments: Comments) -> Iterator[str]:
-    for number, line in enumerate(lines, start=1):
-        if _is_comment(line):
-            comments.see(number, line)
-            line = "\n"
-        yield line
+class _Plain:
+    """Lines, empty ones in the place of comments. ``row``: those of the row that is being read; one that goes
+    on with a quoted cell is no comment, whatever it begins with."""
+
+    def __init__(self, lines: Iterable[str], comments: Comments) -> None:
+        self._lines, self._comments = enumerate(lines, start=1), comments
+        self.row: list[str] = []
+
+    def __iter__(self) -> Iterator[str]:
+        for number, line in self._lines:
+            if not self.row and _is_comment(line):
+                self._comments.see(number, line)
+                line = "\n"
+            self.row.append(line)
+            yield line
 
 
 def lines_of(text: str) -> Iterator[str]:
@@ -93,11 +114,11 @@ def lines_of(text: str) -> Iterator[str]:
 
 
 def _rows(text: str, delimiter: str) -> list[list[str]]:
-    return list(rows_of(lines_of(text), delimiter))
+    return list(rows_of(lines_of(text), delimiter, whole=False))
 
 
 def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith(_COMMENTS)
+    return line.lstrip().startswith(_COMMENTS) or (line[:4].lower() == "sep=" and len(line.strip()) <= 5)
 
 
 def sniffed(sample: str) -> Dialect:
@@ -153,10 +174,23 @@ def _all_plain(rows: Sequence[Sequence[str]]) -> bool:
 
 
 def _decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
-    """A comma where cells have one inside a number, and none has a point there."""
-    tail = [cell for row in rows[-_TAIL:] for cell in row]
-    commas = any(_COMMA_DECIMAL.fullmatch(cell) for cell in tail)
-    return "," if commas and not any(_POINT_DECIMAL.fullmatch(cell) for cell in tail) else "."
+    """A comma where cells have one inside a number, and none has a point there. One that may stand between
+    thousands does not count; where all do, numbers with a comma are left to be refused."""
+    if any(
+        _POINT_DECIMAL.fullmatch(cell) and not grouped(cell, ".") for row in rows[-_TAIL:] for cell in row
+    ):
+        return "."
+    commas = (cell for row in rows for cell in row if _COMMA_DECIMAL.fullmatch(cell))
+    return "," if any(not grouped(cell, ",") for cell in commas) else "."
+
+
+def grouped(cell: str, mark: str) -> bool:
+    """Whether a number might have ``mark`` between its thousands: "1,600" might, "0,600" and "1,60" not.
+
+    >>> grouped("1,600", ","), grouped("-12.000.000", "."), grouped("0,600", ","), grouped("1,60", ",")
+    (True, True, False, False)
+    """
+    return _GROUPED[mark].fullmatch(cell) is not None
 
 
 def _places(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int | None, int | None, int]:
@@ -218,7 +252,10 @@ def _any_number(row: Sequence[str], numeric: Sequence[int], decimal: str) -> boo
 
 
 def _are_units(row: Sequence[str]) -> bool:
+    """Whether a row behind another one of words may hold their units: one at least is a unit for sure."""
     cells = [cell for cell in row if cell]
+    if not any(_BRACKETED.fullmatch(cell) or unit_of(cell) or unit_named(f"x_{cell}") for cell in cells):
+        return False
     return all(_BRACKETED.fullmatch(cell) or _UNIT.fullmatch(cell) for cell in cells)
 
 

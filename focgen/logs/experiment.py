@@ -23,7 +23,8 @@ class Experiment:
     ``raw_time`` has the logged time stamps (m,) in s before any resampling, ``rows`` the signals (m,) at
     those where they were resampled. ``notes`` says what was done to the log. ``continues``: the rig ran just
     before, in samples that are missing or cut out, so that the state in which it begins is unknown.
-    ``begins``: by role, what a signal was before the first sample; others were at rest at 0.
+    ``begins``: by role, what a signal was before the first sample; others were at rest at 0. ``anew``:
+    ahead of it the log's clock fell back.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Experiment:
     rows: Mapping[str, Array] | None = None
     continues: bool = False
     begins: Mapping[str, Begin] = field(default_factory=dict)
+    anew: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "begins", MappingProxyType(dict(self.begins)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.errors import LogError
-from focgen.logs.stamps import of_numpy
+from focgen.logs.stamps import is_time, of_numpy
 from focgen.logs.table import LogTable
 
 
@@ -35,37 +35,70 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     of one length.
     """
     columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
+    units = {str(key): unit for key in _keys(frame) if (unit := _unit(frame[key]))}
     index = getattr(frame, "index", None)
     clock: Array | None = None
     if index is not None and not callable(index) and str(index.name) not in columns:
         values = _column(index, name, "index")
         named = {} if index.name is None else {str(index.name): values}
         columns = named | columns
-        if isinstance(values, np.ndarray) and np.asarray(index).dtype.kind in "mM":
+        if isinstance(values, np.ndarray) and is_time(np.asarray(index)):
             clock = values
+            units |= dict.fromkeys(named, "s")
     if len({len(values) for values in columns.values()}) > 1:
         sizes = ", ".join(f"{key} {len(values)}" for key, values in columns.items())
         raise LogError(name, f"holds columns of different lengths ({sizes})", "give one value a sample")
     if not columns or not len(next(iter(columns.values()))):
         raise LogError(name, "holds no samples", "give one row a sample")
-    return LogTable(name, columns, clock=clock)
+    return LogTable(name, columns, units=units, clock=clock)
 
 
 def _keys(frame: Frame | Mapping[Any, Any]) -> list[Any]:
     return list(frame) if isinstance(frame, Mapping) else list(frame.columns)
 
 
-def _column(values: Any, name: str, key: str) -> Array | list[Any]:
+def _column(values: Any, name: str, key: str) -> Array | list[str]:
     """Numbers as float64, times in s, everything else as a list."""
     try:
-        array = np.asarray(values)
+        array = _vector(values)
     except (ValueError, TypeError):
         raise LogError(f"{name} [{key}]", "is no vector", "give one number a sample") from None
     if array.ndim != 1:
         raise LogError(f"{name} [{key}]", f"has the shape {array.shape}", "give one number a sample")
     array = of_numpy(array)
-    return array.astype(float) if array.dtype.kind in "fiub" else [_cell(cell) for cell in array.tolist()]
+    return array.astype(float) if array.dtype.kind in "fiub" else _cells(array.tolist())
 
 
-def _cell(cell: Any) -> Any:
-    return None if cell is None or cell != cell else cell if isinstance(cell, float | int) else str(cell)
+def _vector(values: Any) -> Array:
+    """As an array of numpy: NaN where a mask is, without the unit that a quantity has."""
+    values = getattr(values, "magnitude", values)
+    array = np.asarray(values)
+    if not np.ma.isMaskedArray(values):
+        return array
+    kind: Any = float if array.dtype.kind in "fiub" else object
+    made: Array = np.where(np.ma.getmaskarray(values), np.nan, array.astype(kind))
+    return made
+
+
+def _unit(values: Any) -> str | None:
+    """The unit of a column that has one of its own: of times, and of quantities."""
+    if hasattr(values, "magnitude") and hasattr(values, "units"):
+        return f"{values.units:~}" or None
+    return "s" if is_time(np.asarray(values)) else None
+
+
+def _cells(cells: list[Any]) -> Array | list[str]:
+    """Numbers as float64, NaN where one is missing; else all as texts, "" where one is missing."""
+    missing = [_is_missing(cell) for cell in cells]
+    known = [cell for cell, none in zip(cells, missing) if not none]
+    if known and all(isinstance(cell, float | int) for cell in known):
+        return np.array([np.nan if none else cell for cell, none in zip(cells, missing)], dtype=float)
+    return ["" if none else str(cell) for cell, none in zip(cells, missing)]
+
+
+def _is_missing(cell: Any) -> bool:
+    """Whether it is None, NaN, NaT or what pandas has for them, which cannot be compared."""
+    try:
+        return cell is None or bool(cell != cell)
+    except (TypeError, ValueError):
+        return True

@@ -111,10 +111,19 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
 
 
 def _clock(path: Path, segment: _Segment) -> Array:
+    """The time (m,) in s. Raises LogError where the file does not say it, or says another of each channel."""
+    count = len(segment.names) - 1
     try:
-        begin, step = (float(segment.settings[key][0].replace(",", ".")) for key in ("X0", "Delta_X"))
+        given = [
+            {float(cell.replace(",", ".")) for cell in segment.settings[key][:count]}
+            for key in ("X0", "Delta_X")
+        ]
+        (begin, *others), (step, *more) = given
         if not max(abs(begin), abs(step)) <= LARGEST:
             raise ValueError(step)
-    except (KeyError, IndexError, ValueError):
+    except (KeyError, ValueError):
         raise LogError(str(path), "has neither a column of time nor Delta_X", "log the time") from None
+    if others or more:
+        what = "gives its channels different X0 or Delta_X, so a row is not of one time"
+        raise LogError(str(path), what, "save it with one column of X values")
     return begin + step * np.arange(len(segment.lines))

@@ -1,8 +1,8 @@
 """Logs in .mat (version 5 to 7.3): vectors, the columns of matrices, and the fields of structures.
 
 A structure's fields go by their own names, by "structure.field", and by the whole way; those of a
-structure array by "structure(1).field"; a matrix x of k columns gives x_1 … x_k. A structure that Simulink wrote
-("with time") goes by the labels of its signals.
+structure array by "structure(1).field"; a matrix x of k columns gives x_1 … x_k. A structure that Simulink
+wrote ("with time") goes by the labels of its signals.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from typing import Any
 
 from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
-from focgen.logs.stamps import of_numpy
+from focgen.logs.stamps import is_time, of_numpy
 from focgen.logs.table import LogTable
 
 
@@ -25,10 +25,12 @@ def read(path: Path) -> LogTable:
         raise
     except (pyarrow.ArrowException, OSError):
         raise LogError(str(path), "is not a whole Parquet file", "write it again") from None
-    return LogTable(str(path), {name: _column(table.column(name)) for name in table.column_names})
+    columns = {name: table.column(name).to_numpy() for name in table.column_names}
+    units = {name: "s" for name, values in columns.items() if is_time(values)}
+    return LogTable(str(path), {name: _column(values) for name, values in columns.items()}, units=units)
 
 
-def _column(column: Any) -> Array | list[Any]:
+def _column(column: Array) -> Array | list[Any]:
     """Numbers as an array with NaN for nulls, time stamps in s, everything else as a list."""
-    values = of_numpy(column.to_numpy())
+    values = of_numpy(column)
     return values if values.dtype.kind in "fiu" else values.tolist()

@@ -16,6 +16,8 @@ from focgen.logs.experiment import Experiment
 from focgen.logs.mending import mended
 from focgen.logs.notes import Note
 
+_ANEW = "the clock starts anew, what follows is an experiment of its own"
+_SHORT = f"parts of fewer than {FEWEST} samples left out"
 Window = tuple[float | None, float | None]
 
 
@@ -64,19 +66,26 @@ def experiments_of(run: Raw, sample_time: float, window: Window) -> Iterator[Exp
     if len(run) < FEWEST:
         raise LogError(run.where, f"has {len(run)} samples", f"give at least {FEWEST}")
     number = 0
-    for rows in _long_enough(clock.sittings(run.time), run):
+    kept, notes = _long_enough(clock.sittings(run.time), run)
+    for rows in kept:
+        anew = rows is not kept[0]
         for part, continues in _uncut(_windowed(_counted(run.part(rows)), window), sample_time):
             number += 1
             name = run.name if number == 1 else f"{run.name} ({number})"
-            yield _experiment(replace(part, name=name), continues, sample_time)
+            said = replace(part, name=name).with_notes(*notes)
+            yield _experiment(said, continues, anew, sample_time)
+            anew, notes = False, ()
 
 
-def _long_enough(sittings: list[slice], run: Raw) -> list[slice]:
+def _long_enough(sittings: list[slice], run: Raw) -> tuple[list[slice], tuple[Note, ...]]:
+    """The parts between two beginnings of the clock that are experiments, and what to say of them."""
     kept = [rows for rows in sittings if rows.stop - rows.start >= FEWEST]
     if not kept:
         what = "has a clock that starts anew every few samples"
         raise LogError(run.where, what, "sort the rows, or name the column that tells the runs apart as run")
-    return kept
+    short = [rows for rows in sittings if rows not in kept]
+    told = [(_ANEW, kept[1:]), (_SHORT, short)]
+    return kept, tuple(Note(what, len(of), f"in {run.line(of[0].start)}") for what, of in told if of)
 
 
 def _counted(run: Raw) -> Raw:
@@ -155,8 +164,7 @@ def _hole_notes(time: Array, holes: Ints) -> list[Note]:
 
 def _short_notes(time: Array, spans: Sequence[slice]) -> list[Note]:
     short = [rows for rows in spans if rows.stop - rows.start < FEWEST]
-    what = f"parts of fewer than {FEWEST} samples left out"
-    return [Note(what, len(short), f"at {time[short[0].start]:g} s")] if short else []
+    return [Note(_SHORT, len(short), f"at {time[short[0].start]:g} s")] if short else []
 
 
 def _check_present(run: Raw, kept: missing.Kept) -> None:
@@ -170,10 +178,10 @@ def _check_present(run: Raw, kept: missing.Kept) -> None:
     raise LogError(run.where, what, "fill the column, or name another in [signals]")
 
 
-def _experiment(part: Raw, continues: bool, sample_time: float) -> Experiment:
+def _experiment(part: Raw, continues: bool, anew: bool, sample_time: float) -> Experiment:
     values, said = mended(part.time, part.values)
     step, even, more = clock.on_grid(part.time, values, sample_time, part.where)
     resampled = any(even[role] is not values[role] for role in values)
     notes = (*part.notes, *said, *more)
     start, rows = float(part.time[0]), values if resampled else None
-    return Experiment(part.name, step, even, start, part.time, notes, rows, continues)
+    return Experiment(part.name, step, even, start, part.time, notes, rows, continues, anew=anew)

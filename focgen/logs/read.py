@@ -19,6 +19,7 @@ from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.scales import Scale, known, same
 from focgen.logs.table import LogTable, read_table, stem
+from focgen.logs.units import unit_of
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
@@ -165,15 +166,19 @@ def _unit_note(table: LogTable, role: str, signals: Roles) -> str | None:
     column = signals.columns()[role]
     given, own, scale = table.unit(column), signals.units.get(role), signals.scales.get(role)
     taken = own if scale is None else scale.unit
-    if (
-        given is None
-        or taken is None
-        or given == taken
-        or not (known(given) and known(taken))
-        or same(given, taken)
-    ):
+    if given is None or taken is None or given == taken or _alike(given, taken):
         return None
-    return f"the log gives {column!r} in {given}, {role} is taken as {taken}: is it {{ unit = {given!r} }}?"
+    spelled = given if known(given) else (unit_of(given) or ("", ""))[1]
+    hint = f": is it {{ unit = {spelled!r} }}?" if spelled and known(taken) else ""
+    return f"the log gives {column!r} in {given}, {role} is taken as {taken}{hint}"
+
+
+def _alike(given: str, taken: str) -> bool:
+    """Whether two units are the same, however they are spelled; what nobody knows is alike to nothing."""
+    if known(given) and known(taken):
+        return same(given, taken)
+    read = unit_of(given)
+    return read is not None and read == unit_of(taken)
 
 
 def _absence(table: LogTable, role: str, name: str, taken: set[str]) -> str:
@@ -229,11 +234,15 @@ def _with_own_names(found: list[tuple[str, Experiment]]) -> list[Experiment]:
 def in_session_order(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """Order experiments on the session's clock.
 
-    By time stamps where they do not overlap; otherwise (each starts at 0, say) as given, one after the other,
-    as if no time had passed between them. One that continues another keeps its distance from it.
+    By time stamps where these do not overlap, and no clock falls back within a run. Otherwise (each starts at
+    0, say) as given, one after the other, as if no time had passed between them. One that continues
+    another keeps its distance from it.
     """
     by_time = sorted(experiments, key=lambda e: e.start)
-    if all(earlier.start + earlier.time[-1] < later.start for earlier, later in pairwise(by_time)):
+    fallen = any(later.anew and later.start < earlier.start for earlier, later in pairwise(experiments))
+    if not fallen and all(
+        earlier.start + earlier.time[-1] < later.start for earlier, later in pairwise(by_time)
+    ):
         return tuple(by_time)
     placed, now, before = [], 0.0, None
     for experiment in experiments:

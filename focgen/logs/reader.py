@@ -1,8 +1,8 @@
 """The process that reads one log: ``python -m focgen.logs.reader MODULE PATH``.
 
 Answers on stdout: a line of JSON, ``{"columns": [[name, texts or null, count], …], "units": …, "aliases": …,
-"runs": …, "clock": …}`` or ``{"fault": [kind, …]}``, and behind it the columns of numbers and the clock as
-float64, one after the other.
+"runs": …, "differing": …, "clock": …}`` or ``{"fault": [kind, …]}``, and behind it the columns of numbers
+and the clock as float64, one after the other.
 """
 
 from __future__ import annotations
@@ -86,7 +86,8 @@ def _columns(table: LogTable) -> tuple[dict[str, Any], list[Array]]:
     if table.clock is not None:
         numbers.append(np.ascontiguousarray(table.clock, dtype=np.float64))
     known = {"units": dict(table.units), "aliases": dict(table.aliases), "runs": table.runs}
-    return {"columns": head, **known, "clock": table.clock is not None}, numbers
+    clocks = {"differing": table.differing, "clock": table.clock is not None}
+    return {"columns": head, **known, **clocks}, numbers
 
 
 def _cell(cell: object) -> str:

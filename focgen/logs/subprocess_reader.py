@@ -66,7 +66,7 @@ def _table(path: Path, head: dict[str, Any], body: bytes) -> LogTable:
         columns[name] = numbers[at : at + count].copy() if texts is None else texts
         at += count if texts is None else 0
     clock = numbers[at:].copy() if head["clock"] else None
-    known = {key: head[key] for key in ("units", "aliases", "runs")}
+    known = {key: head[key] for key in ("units", "aliases", "runs", "differing")}
     return LogTable(str(path), columns, clock=clock, **known)
 
 

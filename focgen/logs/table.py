@@ -16,7 +16,7 @@ from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs import stamps
 from focgen.logs.cells import Levels, parsed
-from focgen.logs.dialect import is_stamp
+from focgen.logs.dialect import grouped, is_stamp
 from focgen.textfile import check_regular
 
 # The reader of each kind of file: a module of this room with ``read(path) -> LogTable``.
@@ -36,6 +36,7 @@ LARGEST = 1e30
 """The size of a reading: powers and sums of larger ones have no number."""
 Column = Sequence[str] | Array
 """Texts as they stand in a file, or numbers; (m,)."""
+_UNGROUPED = "write numbers without a mark between thousands, and a decimal one as 1.2"
 _LOOK = 100  # cells: by then a column of dates shows that it is one
 
 
@@ -46,7 +47,9 @@ class LogTable:
     ``line`` turns a row's index into the words that find it in the file ("line 17"). ``decimal``: the decimal
     mark of texts. ``units`` as the file gives them, by column. ``aliases``: further names of columns.
     ``clock`` (m,): the time in s that a file gives without a column for it. ``runs`` (m,): the name of the
-    run of each row, where the file has them apart. ``notes``: how the file was read.
+    run of each row, where the file has them apart. ``notes``: how the file was read. ``differing``: its
+    columns have clocks of their own that differ, so there is none. ``grouped``: columns whose points may
+    stand between thousands.
     """
 
     path: str
@@ -58,6 +61,8 @@ class LogTable:
     clock: Array | None = None
     runs: Sequence[str] | None = None
     notes: tuple[str, ...] = ()
+    differing: bool = False
+    grouped: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -84,6 +89,8 @@ class LogTable:
 
     def missing(self, role: str, name: str, taken: Collection[str] = ()) -> LogError:
         """The error for a column that is needed and not there; those ``taken`` have another role."""
+        if role == "time" and self.differing:
+            return self.without_clock()
         near = self.closest(name, taken)
         there = ", ".join(self.columns)
         hint = (
@@ -95,9 +102,16 @@ class LogTable:
             self.path, f"has no column {name!r} ({role}); there are: {there}".replace(";", ","), hint
         )
 
+    def without_clock(self) -> LogError:
+        """The error for a log whose rows have no time."""
+        if self.differing:
+            what = "gives its channels clocks that differ, so a row is not of one time"
+            return LogError(self.path, what, "log all channels by one clock, or the time of each row")
+        return LogError(self.path, "has no column that increases with time", "log the time of each sample")
+
     def texts(self, name: str) -> list[str]:
-        """A column as text, numbers in their shortest form."""
-        return [cell if isinstance(cell, str) else f"{cell:g}" for cell in _plain(self.column(name))]
+        """A column as text: numbers in the shortest form that tells them apart, "" where one is missing."""
+        return [cell if isinstance(cell, str) else _shortest(cell) for cell in _plain(self.column(name))]
 
     def levels(self, name: str) -> Levels:
         """A column of names, each different one once."""
@@ -114,14 +128,22 @@ class LogTable:
                 return stamps.seconds(column)
             except ValueError as reason:
                 what = f"has a time that cannot be read ({reason})"
-                raise LogError(f"{self.path} [{name}]", what, "write it as 2026-01-31T12:00:00.000") from None
-        return self.numbers(name)
+                remedy = "write it as 2026-01-31T12:00:00.000, or in seconds"
+                raise LogError(f"{self.path} [{name}]", what, remedy) from None
+        values = self.numbers(name)
+        if stamps.is_packed(values):
+            what = "counts to 59 and goes on at 100: it may be a time of day as hhmmss"
+            raise LogError(f"{self.path} [{name}]", what, "write it as 12:00:59.98, or in seconds")
+        return values
 
     def numbers(self, name: str) -> Array:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no
         number.
         """
         column = self.column(name)
+        if self.aliases.get(name, name) in self.grouped:
+            what = "has whole numbers beside ones like 1.200, whose point may stand between thousands"
+            raise LogError(f"{self.path} [{name}]", what, _UNGROUPED)
         try:
             plain = isinstance(column, np.ndarray) and column.dtype.kind in "fiu"
             values = column if plain else _values(column, self.decimal)
@@ -138,6 +160,11 @@ class LogTable:
     def _not_a_number(self, name: str) -> LogError:
         cells = enumerate(_plain(self.column(name)))
         row, cell = next((i, c) for i, c in cells if not _is_number(c, self.decimal))
+        mark = next((mark for mark in ",." if grouped(str(cell), mark)), None)
+        if mark is not None:
+            whole = str(cell).replace(mark, "")
+            what = f"holds {cell!r} in {self.line(row)}, which may be {whole} or have a decimal {mark!r}"
+            return LogError(f"{self.path} [{name}]", what, _UNGROUPED)
         remedy = (
             "write decimals with a point" if "," in str(cell) else "leave the cell empty or give a number"
         )
@@ -188,6 +215,13 @@ def stem(path: str | Path) -> str:
 
 def _plain(column: Column) -> list[Any]:
     return column.tolist() if isinstance(column, np.ndarray) else list(column)
+
+
+def _shortest(number: float) -> str:
+    if number != number:
+        return ""
+    short = f"{number:g}"
+    return short if float(short) == number else f"{int(number)}" if number == int(number) else repr(number)
 
 
 def _values(column: Column, decimal: str) -> Array | list[float]:

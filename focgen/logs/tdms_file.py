@@ -22,12 +22,14 @@ from focgen.logs.table import LARGEST, LogTable
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """``channels`` (m,) by name, their ``units``, and the time in s that their waveforms have, or None."""
+    """``channels`` (m,) by name, their ``units``, and the time in s that their waveforms have, or None;
+    ``differing``: it is another one of each."""
 
     name: str
     channels: Mapping[str, Array]
     units: Mapping[str, str]
     clock: Array | None
+    differing: bool
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
@@ -64,9 +66,15 @@ def _group(group: Any) -> _Group:
     channels = {name: values for name, (_, values) in found.items() if len(values)}
     units = {name: str(c.properties.get("unit_string", "")) for name, (c, _) in found.items()}
     clocks = [_clock(c.properties, len(values)) for c, values in found.values() if len(values)]
+    clock = _common(clocks)
+    differing = clock is None and any(c is not None for c in clocks)
+    return _Group(group.name, channels, {n: u for n, u in units.items() if u}, clock, differing)
+
+
+def _common(clocks: Sequence[Array | None]) -> Array | None:
+    """The time (m,) of all that have one; None where they differ, or none has one."""
     known = [clock for clock in clocks if clock is not None]
-    same = known and all(np.array_equal(clock, known[0]) for clock in known)
-    return _Group(group.name, channels, {n: u for n, u in units.items() if u}, known[0] if same else None)
+    return known[0] if known and all(np.array_equal(clock, known[0]) for clock in known) else None
 
 
 def _clock(properties: Mapping[str, Any], count: int) -> Array | None:
@@ -94,6 +102,7 @@ def _one_after_the_other(path: Path, groups: Sequence[_Group]) -> LogTable:
         units=groups[0].units,
         clock=np.concatenate(clocks) if len(clocks) == len(groups) else None,
         runs=[g.name for g in groups for _ in range(len(g))],
+        differing=any(g.differing for g in groups),
     )
 
 
@@ -111,5 +120,7 @@ def _side_by_side(path: Path, groups: Sequence[_Group]) -> LogTable:
             units |= {name: g.units[channel]} if channel in g.units else {}
             aliases |= {whole: name} if name != whole else {}
     _check_lengths(path, columns)
-    clock = next((g.clock for g in groups if g.clock is not None), None)
-    return LogTable(str(path), columns, units=units, aliases=aliases, clock=clock)
+    clocks = [g.clock for g in groups if g.clock is not None]
+    clock = _common(clocks)
+    differing = any(g.differing for g in groups) or (bool(clocks) and clock is None)
+    return LogTable(str(path), columns, units=units, aliases=aliases, clock=clock, differing=differing)

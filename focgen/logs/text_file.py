@@ -12,11 +12,10 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 
-from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs.cells import Gathered, Lines
 from focgen.logs.dialect import SAMPLE, Comments, Dialect, is_number, lines_of, rows_of, sniffed
@@ -48,16 +47,18 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
     try:
         sample = "".join(_first(lines()))
         dialect = sniffed(sample)
-        if not any(rows_of(lines_of(sample), dialect.delimiter)):
+        if not any(rows_of(lines_of(sample), dialect.delimiter, whole=False)):
             raise _without_rows(path, sample)
         comments = Comments(dialect.delimiter)
         rows = rows_of(lines(), dialect.delimiter, comments)
         ahead = list(islice(rows, dialect.data))
         header = _header(path, ahead, dialect)
         comments.width = len(header)
-        numbers, cells, header = _body(path, rows, ahead, dialect, header)
+        numbers, gathered, header = _body(path, rows, ahead, dialect, header)
     except csv.Error as reason:
         raise LogError(str(path), f"is not CSV ({reason})", "save it as comma-separated text") from None
+    cells = gathered.columns()
+    doubtful = {name for name, points in zip(header, gathered.pointed) if points.doubtful}
     units, aliases = _without_units(header, _units(ahead, dialect, header))
     return LogTable(
         str(path),
@@ -66,6 +67,7 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
         decimal=dialect.decimal,
         units=units,
         aliases=aliases,
+        grouped=frozenset(doubtful if dialect.delimiter != "," else ()),
         notes=(*_taken(ahead, dialect, guessed), *_left_out(comments)),
     )
 
@@ -172,8 +174,8 @@ def _header(path: Path, rows: list[list[str]], dialect: Dialect) -> list[str]:
 
 def _body(
     path: Path, rows: Iterable[list[str]], ahead: list[list[str]], dialect: Dialect, names: list[str]
-) -> tuple[Lines, list[Sequence[str] | Array], list[str]]:
-    """The lines of the readings, their columns, and the names of these; a header that is repeated is none.
+) -> tuple[Lines, Gathered, list[str]]:
+    """The lines of the readings, their columns, and the names of those to keep; a repeated header is none.
 
     Columns at the end without a name and a reading are delimiters at the end of lines. Raises LogError where
     a row is incomplete, or two columns have one name.
@@ -182,6 +184,7 @@ def _body(
     width = len(names)
     named = max((i for i, name in enumerate(names, start=1) if name), default=0)
     gathered, lines, short, filled = Gathered(width, dialect.decimal), Lines(), None, False
+    counted = named == width
     for i, row in enumerate(rows, start=dialect.data):
         if not row or row in told:
             continue
@@ -191,17 +194,21 @@ def _body(
                 raise _incomplete(path, i, cells, width)
             short = i if cells < width and short is None else short
             row = (row + [""] * width)[:width]
+        counted = counted and cells == width + 1 and row[0] in (str(len(lines)), str(len(lines) + 1))
         filled = filled or (named < width and any(row[named:]))
         gathered.add(row)
         lines.add(i)
     if filled and short is not None:
         raise _incomplete(path, short, named, width)
+    if counted and len(lines):
+        what = "counts its rows in a first cell that may have no name: each has a cell more than the header"
+        raise LogError(str(path), what, "name every column, or end the header as the rows end")
     kept = width if filled else named
     found = [name or f"column {number}" for number, name in enumerate(names[:kept], start=1)]
     doubled = next((name for name, count in Counter(found).items() if count > 1), None)
     if doubled is not None:
         raise LogError(str(path), f"has the column {doubled!r} twice", "give each column a name of its own")
-    return lines, gathered.columns()[:kept], found
+    return lines, gathered, found
 
 
 def _incomplete(path: Path, row: int, cells: int, width: int) -> LogError:

@@ -16,6 +16,8 @@ SIZES = {  # what one of each unit is, in the first of its kind
 """The kinds of unit that tell a role, and that are taken for one another."""
 _OTHERS = frozenset("mm cm m um N mN kN Nm s ms Hz rpm K C pct".split())  # these tell no role
 _SPELLED = {"permm": "1/mm", "percm": "1/cm", "perm": "1/m", "1pm": "1/m", "1pmm": "1/mm", "hpa": "mbar"}
+_TIMES = frozenset("ns us µs μs ms msec s sec secs seconds min mins minutes h hr hrs hours day days".split())
+_ALONE = frozenset("s h min day".split())  # names of other things as well
 _ANY_CASE = ("bar", "kPa", "mbar", "psi", "rad", "deg", "1/mm", "1/cm", "1/m")  # a name in v is no voltage
 
 
@@ -33,6 +35,21 @@ def unit_of(text: str) -> tuple[str, str] | None:
             if unit == last or (unit in _ANY_CASE and unit.lower() == last.lower()):
                 return kind, unit
     return None
+
+
+def time_unit_named(column: str) -> str | None:
+    """The unit that a column of time has in its name, None without; what stands in brackets, whatever it is.
+
+    >>> time_unit_named("t_us"), time_unit_named("Zeit [h]"), time_unit_named("TimeMs")
+    ('us', 'h', 'ms')
+    """
+    if bracketed := re.search(r"[\[(]([^\[\]()]+)[\])]\s*$", column):
+        return bracketed[1].strip()
+    words = re.split(r"[\s_.\-]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column).strip())
+    last = words[-1].lower()
+    if last in _TIMES:
+        return last if len(words) > 1 or last not in _ALONE else None
+    return "ms" if last.endswith("ms") else None
 
 
 def unit_named(column: str | None) -> str:

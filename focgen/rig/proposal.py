@@ -15,9 +15,11 @@ from focgen.arguments import checked
 from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs import clock
-from focgen.logs.columns import SIGNALS, Column, Guess, columns_of, guessed, run_of, time_of
+from focgen.logs.columns import SIGNALS, Column, Guess, columns_of, guessed, is_dated, run_of, time_of
 from focgen.logs.read import Logs, each_of, tables_of
+from focgen.logs.scales import unit_of_time
 from focgen.logs.table import LogTable, stem
+from focgen.logs.units import time_unit_named
 from focgen.output import check_apart, write_file
 from focgen.rig.files import read_rig
 from focgen.rig.rig import Rig
@@ -32,6 +34,7 @@ _MEANING = {
     "output": "what the controller reads",
     "reference": "in closed-loop logs",
 }
+_USUAL = 5e-4, 20.0  # s between samples: of other clocks without a unit it is said that seconds are a guess
 _NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 _MILLI = 0.9, 1e4  # s between samples: a clock this slow, with whole numbers, counts milliseconds
 _NOISE = 0.02  # of the span: so far below 0 a signal that starts there strays
@@ -108,20 +111,23 @@ def _check(table: LogTable, guesses: Mapping[str, Guess]) -> None:
 def _time(table: LogTable, run: str | None) -> _Time:
     name = time_of(table)
     if name is None and table.clock is None:
-        raise LogError(table.path, "has no column that increases with time", "log the time of each sample")
+        raise table.without_clock()
     stamps: Any = table.clock if name is None else table.seconds(name)
     step, drift = _step(stamps), 0.5 / len(stamps)
     if name is None:
         return _Time("time", "s", _rounded(step, drift))
-    given = table.unit(name)
-    if given in ("ms", "us", "µs", "min"):
-        scale = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}[given]
-        return _Time(name, given, _rounded(scale * step, drift))
-    named = name.lower().endswith("ms")
-    if named or (given is None and _MILLI[0] <= step <= _MILLI[1] and step == int(step)):
-        doubt = f"time: {name!r} is taken as milliseconds, {step:g} between samples"
-        return _Time(name, "ms", _rounded(1e-3 * step, drift), () if named else (doubt,))
-    return _Time(name, "s", _rounded(step, drift))
+    given = "s" if is_dated(table, name) else table.unit(name) or time_unit_named(name)
+    told = unit_of_time(given or "")
+    if told is not None:
+        unit, seconds = told
+        return _Time(name, unit if seconds != 1.0 else "s", _rounded(seconds * step, drift))
+    doubt = f"time: {name!r} has {'no unit' if given is None else f'the unit {given!r}'}, and is taken as "
+    if given is None and _MILLI[0] <= step <= _MILLI[1] and step == int(step):
+        said = f"{doubt}milliseconds, {step:g} between samples"
+        return _Time(name, "ms", _rounded(1e-3 * step, drift), (said,))
+    usual = given is None and _USUAL[0] <= step <= _USUAL[1]
+    doubts = () if usual else (f"{doubt}seconds, {step:.3g} between samples",)
+    return _Time(name, "s", _rounded(step, drift), doubts)
 
 
 def _step(stamps: Array) -> float:
@@ -208,7 +214,7 @@ def _text(
     lines = [f"name = {_quoted(label)}", _line(f"sample_time = {time.step!r}", "s, as logged"), ""]
     lines += ["[signals]"] + ([_line(f"run = {_quoted(run)}", _MEANING["run"])] if run else [])
     of_time = _quoted(time.column)
-    converted = f'{{ column = {of_time}, unit = "{time.unit}" }}'
+    converted = f"{{ column = {of_time}, unit = {_quoted(time.unit)} }}"
     lines.append(_line(f"time = {of_time if time.unit == 's' else converted}", "s"))
     for role, column in roles.items():
         unsure = "" if guesses[role].sure else " (a guess)"

@@ -5,6 +5,7 @@ Red when a column gets the wrong role without a doubt being said.
 
 import io
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -87,6 +88,13 @@ def test_runs_that_have_a_column():
         (1e3 * TIME, "t_ms", "ms", STEP),
         (np.round(1e3 * TIME), "clock", "ms", STEP),
         (np.round(np.arange(400) / 256, 4), "t_s", None, 1 / 256),
+        (TIME / 3600.0, "Time [h]", "h", STEP),
+        (TIME / 60.0, "t_min", "min", STEP),
+        (TIME / 60.0, "elapsed (Min)", "min", STEP),
+        (1e6 * TIME, "t_us", "us", STEP),
+        (1e9 * TIME, "time ns", "ns", STEP),
+        (1e3 * TIME, "msec", "msec", STEP),
+        (TIME / 86400.0, "Zeit_days", "days", STEP),
         (TIME + 1e-4 * np.random.default_rng(1).uniform(-1, 1, 400), "t", None, STEP),
     ],
 )
@@ -94,6 +102,42 @@ def test_the_clock(stamps, name, unit, step):
     found = focgen.init({name: stamps, "u_V": HELD, "y_mm": ANSWER}).rig
     assert found.sample_time == pytest.approx(step, rel=1e-12)
     assert (found.signals.scales["time"].unit if found.signals.scales else None) == unit
+
+
+@pytest.mark.parametrize(
+    "name, stamps, said",
+    [
+        ("Time", 45_000.0 + TIME / 86400.0, "'Time' has no unit, and is taken as seconds, 2.31e-07 between"),
+        ("Time [samples]", TIME / STEP, "has the unit 'samples', and is taken as seconds, 1 between"),
+        ("t", 1e3 * TIME, "'t' has no unit, and is taken as milliseconds, 20 between"),
+        ("t", 1e7 * TIME, "'t' has no unit, and is taken as seconds, 2e[+]05 between"),
+    ],
+)
+def test_a_clock_whose_unit_is_a_guess_is_said_to_be_one(name, stamps, said):
+    """Days of a spreadsheet, ticks and counts: a factor of time that identification could never see."""
+    doubts = focgen.init({name: stamps, "u_V": HELD, "y_mm": ANSWER}).doubts
+    assert re.search(said, doubts[0])
+    assert "taken as" not in focgen.init({"t": TIME, "u_V": HELD, "y_mm": ANSWER}).doubts[0]
+
+
+def test_dates_and_times_of_day_are_no_milliseconds(tmp_path):
+    """At one sample a second whole numbers look like a clock in milliseconds."""
+    since, seconds = np.datetime64("2026-11-24T12:00:00"), np.arange(400)
+    clocks = {
+        "dates": [str(since + s) for s in seconds],
+        "times": [f"12:{s // 60:02d}:{s % 60:02d}" for s in seconds],
+        "instants": since + seconds.astype("timedelta64[s]"),
+        "spans": seconds.astype("timedelta64[s]"),
+    }
+    for clock in clocks.values():
+        found = focgen.init({"when": clock, "u_V": HELD, "y_mm": ANSWER})
+        assert found.rig.sample_time == 1.0 and "taken as" not in found.text
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    table = pandas.DataFrame({"when": clocks["instants"], "u_V": HELD, "y_mm": ANSWER})
+    table.to_parquet(tmp_path / "log.parquet")
+    found = focgen.init(tmp_path / "log.parquet")
+    assert found.rig.sample_time == 1.0 and "taken as" not in found.text
 
 
 def test_ranges_hold_what_was_seen_and_begin_at_0_where_signals_do():
