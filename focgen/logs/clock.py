@@ -16,6 +16,7 @@ SHORT = 5  # samples: a longer hole is never bridged. On a response whose fastes
 FEWEST = 8  # samples: less shows neither a rate nor a response
 _JITTER = 0.1  # of a sample: time stamps this close to a uniform grid are rounding, not jitter
 _COARSE = 0.2  # of a sample: a resolution of the stamps that hides a uniform clock
+_TOLD = 0.005  # relative: so well do rounded stamps have to tell the time between samples
 _FEW = 0.1  # of the samples are lost: more are taken for a clock that ticks otherwise, if there is one
 _TICKING = 0.75  # of the steps within half of their median: holes are told from an irregular clock
 _IRREGULAR = 0.95  # quantile of the steps that stands for the pace of an irregular clock
@@ -69,21 +70,40 @@ def counted(time: Array) -> Array | None:
     """The stamps (m,) of the uniform clock behind rounded ones, or None where it is not evident.
 
     Stamps rounded to 10 ms repeat when samples are 5 ms apart, and alternate between steps of 10 and 20 ms
-    when those are 15 ms apart. The clock is evident where no stamp is off it by more than its resolution, and
-    where the stamps are not those of a clock with a few samples lost.
+    when those are 15 ms apart. The clock is evident where no stamp is off it by more than its resolution,
+    where the stamps are not those of a clock with a few samples lost, and where they tell its step well.
     """
     steps = np.diff(time)
     if steps.min() < 0 or not steps.max() > 0 or (steps.min() > 0 and _few_lost(time)):
         return None
     rows = np.arange(len(time))
-    step, begin = _line(rows, time)
+    resolution = float(steps[steps > 1e-6 * steps.max()].min())
+    step, begin, error = _clock_of(rows, time, steps, resolution)
+    if not error <= _TOLD:
+        return None
     off = time - (begin + step * rows)
-    resolution = float(steps[steps > 1e-6 * step].min())
     whole = np.abs(steps / resolution - np.round(steps / resolution)).max() < 1e-3
     if not whole or resolution < _COARSE * step or np.ptp(off) > 1.01 * resolution:
         return None
     made: Array | None = time[0] + step * rows
     return made
+
+
+def _clock_of(rows: Ints, time: Array, steps: Array, resolution: float) -> tuple[float, float, float]:
+    """Step and begin (s) of the clock that is nearest to rounded stamps, and three standard deviations of the
+    step over it.
+
+    Of samples closer than the resolution the rows at which the stamp changes tell of the clock, each to a
+    sample; else every row does, to the resolution. Either error is uniform, of a deviation of 1/√12.
+    """
+    usual = float(time[-1] - time[0]) / rows[-1]
+    at, stamps, width = rows.astype(float), time, min(resolution, usual)
+    if resolution > usual:
+        at, stamps = np.flatnonzero(steps > 0.0) + 0.5, time[1:][steps > 0.0] - 0.5 * resolution
+    if len(at) < 2:
+        return usual, float(time[0]), np.inf
+    step, begin = _line(at, stamps)
+    return step, begin, 3.0 * width / (np.sqrt(12.0 * len(at)) * float(np.std(at)) * step)
 
 
 def _few_lost(time: Array) -> bool:
@@ -101,7 +121,7 @@ def uniform_step(time: Array) -> float | None:
     return step if np.abs(off, out=off).max() <= _JITTER * step else None
 
 
-def _line(x: Ints, y: Array) -> tuple[float, float]:
+def _line(x: Array | Ints, y: Array) -> tuple[float, float]:
     """Slope and value at 0 of the line that is nearest to ``y`` (m,) over ``x`` (m,)."""
     middle, mean = float(np.mean(x)), float(np.mean(y))
     off = x - middle

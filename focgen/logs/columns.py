@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from focgen.arrays import Array
 from focgen.errors import LogError
-from focgen.logs.table import LogTable
+from focgen.logs.table import LogTable, stem
 from focgen.logs.units import unit_named, unit_of
 
 SIGNALS = ("command", "pressure", "curvature", "output", "reference")
@@ -73,20 +73,29 @@ class Column:
         return words[:-1] if len(words) > 1 and self.unit else words
 
 
-def columns_of(tables: Sequence[LogTable]) -> tuple[Column, ...]:
-    """The columns of numbers that all logs have. Raises LogError where there are none."""
-    names = [name for name in tables[0].columns if all(name in table for table in tables)]
-    found = []
-    for name in names:
+def columns_of(tables: Sequence[LogTable]) -> tuple[tuple[Column, ...], dict[str, str]]:
+    """The columns of numbers that all logs have; and of each other one why it is left out.
+
+    Raises LogError where there are none.
+    """
+    found, left = [], {}
+    for name in dict.fromkeys(name for table in tables for name in table.columns):
+        lacking = next((table.path for table in tables if name not in table), None)
+        if lacking is not None:
+            left[name] = f"{stem(lacking)} has no such column"
+            continue
         try:
             values = np.concatenate([table.numbers(name) for table in tables])
-        except LogError:
-            continue  # words, or dates
-        if not np.isnan(values).all():
+        except LogError as reason:
+            left[name] = reason.what  # words, or dates
+            continue
+        if np.isnan(values).all():
+            left[name] = "has no reading"
+        else:
             found.append(Column(name, tables[0].unit(name) or unit_named(name), values))
     if not found:
         raise LogError(tables[0].path, "has no column of numbers", "give a log with a header")
-    return tuple(found)
+    return tuple(found), left
 
 
 def time_of(table: LogTable) -> str | None:

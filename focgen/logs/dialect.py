@@ -80,7 +80,7 @@ def rows_of(
     if delimiter == " ":
         for line in plain:
             plain.row.clear()
-            yield line.split()
+            yield _unquoted(line) if '"' in line else line.split()
         return
     spaced = delimiter != "\t"
     for row in csv.reader(plain, delimiter=delimiter, skipinitialspace=spaced):
@@ -89,6 +89,12 @@ def rows_of(
         plain.row.clear()
         cells = [cell.strip() for cell in row]
         yield cells if any(cells) else []
+
+
+def _unquoted(line: str) -> list[str]:
+    """The cells of a line between blanks, some of them in quotes."""
+    spaced = " ".join(line.split())
+    return next(csv.reader([spaced], delimiter=" ", skipinitialspace=True), [])
 
 
 class _Plain:
@@ -169,8 +175,14 @@ def _readable(text: str, delimiter: str) -> int:
 def _all_plain(rows: Sequence[Sequence[str]]) -> bool:
     cells = [cell for row in rows for cell in row]
     return sum(is_number(cell, ".") for cell in cells) >= 0.5 * len(cells) and not any(
-        mark in cell for cell in cells for mark in ";\t|"
+        any(mark in cell for mark in ";\t|") or _are_numbers(cell) for cell in cells
     )
+
+
+def _are_numbers(cell: str) -> bool:
+    """Whether it holds several, with blanks between: "00 0" of "0,00 0,5"."""
+    parts = cell.split() if " " in cell else ()
+    return len(parts) > 1 and all(is_number(part) for part in parts)
 
 
 def _decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:

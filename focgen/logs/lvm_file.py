@@ -15,7 +15,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs.dialect import lines_of
-from focgen.logs.table import LARGEST, LogTable
+from focgen.logs.table import LARGEST, LogTable, check_units
 from focgen.logs.text_file import decoded, table_of
 from focgen.textfile import read_log_bytes
 
@@ -98,7 +98,8 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
         clock = np.concatenate([_clock(path, s) for s in segments])
         columns = {name: column for name, column in columns.items() if name != _TIME}
     runs = [str(k) for k, s in enumerate(segments, start=1) for _ in s.lines] if len(segments) > 1 else None
-    units = dict(zip(first[1:], segments[0].settings.get("Y_Unit_Label", ())))
+    units, *others = (dict(zip(first[1:], s.settings.get("Y_Unit_Label", ()))) for s in segments)
+    check_units(path, [units, *others])
     return LogTable(
         str(path),
         columns,

@@ -27,14 +27,15 @@ def keep(values: Mapping[str, Array], time: Array) -> Kept:
     """What is kept of signals (m,) by role, some with readings missing (NaN).
 
     Short stretches are kept, to be bridged. Rows of a long one are cut out; or its role is, where another can
-    do without it and more readings are left so. A role with no reading at all is left out without a word. No
-    row is kept without an output and an input.
+    do without it and more readings are left so. No row is kept without an output and an input.
     """
     gone = {role: long_stretches(y) for role, y in values.items()}
     roles = [role for role in values if not gone[role].all()]
     if "output" not in roles or not set(_INPUTS) & set(roles):
         return Kept(tuple(roles), np.zeros(len(time), bool), ())
-    rows, notes = np.ones(len(time), bool), []
+    empty = [role for role in values if role not in roles]
+    notes: list[str] = [f"{role} has no reading at all, taken as not logged" for role in empty]
+    rows = np.ones(len(time), bool)
     for role in sorted((r for r in roles if gone[r].any()), key=lambda r: _dispensable(r, roles)):
         place = f"at {time[np.argmax(gone[role])]:g} s"
         left = rows & ~gone[role]

@@ -16,6 +16,7 @@ from focgen.logs.experiment import Experiment
 from focgen.logs.mending import mended
 from focgen.logs.notes import Note
 
+_TWICE = 0.9  # of the stamps that repeat: fewer with the same readings are rounded ones of a rig at rest
 _ANEW = "the clock starts anew, what follows is an experiment of its own"
 _SHORT = f"parts of fewer than {FEWEST} samples left out"
 Window = tuple[float | None, float | None]
@@ -91,7 +92,8 @@ def _long_enough(sittings: list[slice], run: Raw) -> tuple[list[slice], tuple[No
 def _counted(run: Raw) -> Raw:
     """The run on time stamps that increase: rows logged twice once, rounded stamps counted."""
     twice = _repeats(run)
-    if twice.any():
+    stopped = int(np.sum(np.diff(run.time) == 0.0))
+    if twice.any() and twice.sum() > _TWICE * stopped:
         note = Note(
             "rows logged twice, taken once", int(twice.sum()), f"in {run.line(int(np.argmax(twice)))}"
         )

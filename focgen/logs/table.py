@@ -173,6 +173,15 @@ class LogTable:
         )
 
 
+def check_units(path: Path, units: Sequence[Mapping[str, str]]) -> None:
+    """Raise LogError where the runs of a file give a column in different ``units`` (by column, one each)."""
+    for name in dict.fromkeys(name for of_run in units for name in of_run):
+        given = list(dict.fromkeys(of_run.get(name, "") for of_run in units))
+        if len(given) > 1:
+            what = f"gives {name!r} in {' and in '.join(unit or 'no unit' for unit in given)}, by the run"
+            raise LogError(str(path), what, "save all runs in one unit, or each as a file of its own")
+
+
 def read_table(path: str | Path) -> LogTable:
     """Read a log by its ending. Raises LogError where it is missing, empty or of an unknown kind."""
     name = Path(path).name.lower()

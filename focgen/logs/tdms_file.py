@@ -17,7 +17,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
 from focgen.logs.stamps import of_numpy
-from focgen.logs.table import LARGEST, LogTable
+from focgen.logs.table import LARGEST, LogTable, check_units
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +96,7 @@ def _check_lengths(path: Path, columns: Mapping[str, Array]) -> None:
 def _one_after_the_other(path: Path, groups: Sequence[_Group]) -> LogTable:
     columns = {name: np.concatenate([g.channels[name] for g in groups]) for name in groups[0].channels}
     clocks = [g.clock for g in groups if g.clock is not None]
+    check_units(path, [g.units for g in groups])
     return LogTable(
         str(path),
         columns,

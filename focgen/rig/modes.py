@@ -22,6 +22,7 @@ from focgen.rig.delay import delayed, shifted
 from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
+_LARGEST = 300.0  # of an exponent
 
 
 @dataclass(frozen=True)
@@ -50,20 +51,19 @@ def fractional_lag(T: float, alpha: float, h: float, duration: float) -> Modes:
     last = max(last, first + 2)
     tail = np.ceil((np.log(1e6) / alpha) / SPACING) + 10  # far beyond the samples: acts at once
     x = centre + (np.arange(first, max(last, 0) + tail) + 0.5) * SPACING
-    xi = np.exp(x)
     power = np.exp(alpha * (x - centre))  # T ξ^α
     density = power * np.sin(alpha * np.pi) / (np.pi * (1 + 2 * power * np.cos(alpha * np.pi) + power**2))
-    weights = SPACING * xi * density
     seen = x <= np.log(30.0 / h)
+    xi = np.exp(x[seen])  # of the others, at low orders, no number is large enough
+    weights = SPACING * xi * density[seen]
     distance = np.pi * (1 - alpha) / alpha
     share = 1.0 / (np.exp(np.minimum(2 * np.pi * distance / SPACING, 700.0)) + 1.0)
-    pole = np.exp(centre) * np.exp(1j * np.pi / alpha)
+    size = np.exp(np.clip(centre, -_LARGEST, _LARGEST))  # beyond, the pole has no share
+    pole = size * np.exp(1j * np.pi / alpha)
     residue = -2 * pole / alpha * share  # both of the pair: twice the real part of one
     if distance > np.pi / 2:  # its share is below 1e-5 there, and the mode would grow
-        pole, residue = -np.exp(centre) + 0j, 0j
-    return Modes(
-        xi[seen], weights[seen], complex(pole), complex(residue), float(np.sum(weights[~seen] / xi[~seen]))
-    )
+        pole, residue = -size + 0j, 0j
+    return Modes(xi, weights, complex(pole), complex(residue), float(np.sum(SPACING * density[~seen])))
 
 
 def respond(

@@ -85,12 +85,14 @@ def init(
     tables = tables_of(given)
     run = run_of(tables[0])
     time = _time(tables[0], run)
-    columns = [c for c in columns_of(tables) if c.name not in (time.column, run)]
+    every, left = columns_of(tables)
+    columns = [c for c in every if c.name not in (time.column, run)]
     guesses = _asked(guessed(columns), columns, ask)
     _check(tables[0], guesses)
     by_name = {c.name: c for c in columns}
     roles = {role: by_name[guess.column] for role, guess in guesses.items()}
-    doubts = (*time.doubts, *_doubts(guesses, roles, [c.name for c in columns]))
+    said = [f"left out: {name!r} {why}" for name, why in left.items() if name not in (time.column, run)]
+    doubts = (*time.doubts, *_doubts(guesses, roles, [c.name for c in columns]), *said)
     label = name or (stem(tables[0].path) if isinstance(given[0], str | Path) else "rig")
     files = [str(log) for log in given if isinstance(log, str | Path)]
     told = _next(files, roles, out)

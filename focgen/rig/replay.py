@@ -16,6 +16,7 @@ from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
 from focgen.logs.read import Logs, read_logs
+from focgen.logs.still import check_moving
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Run, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
@@ -88,8 +89,9 @@ def experiments(
     rig: Rig, logs: Logs, first: float | None = None, last: float | None = None
 ) -> tuple[Experiment, ...]:
     """The logs read, and cut to ``first`` … ``last`` s. Raises RigError for a rig that cannot be run on
-    them."""
+    them, LogError where a measured signal stands still throughout."""
     found = read_logs(logs, rig.signals, rig.sample_time, first, last)
+    check_moving(found)
     check_bounded(rig, longest(found))
     return found
 

@@ -3,13 +3,18 @@
 Red when a factor of 1000 or 2π, a shifted clock, a merged run or half of a file passes without a word.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from focgen.errors import LogError
 from focgen.logs import read_logs
+from focgen.logs.clock import counted
+from focgen.logs.experiment import Experiment
 from focgen.logs.frames import table_of
 from focgen.logs.scales import between
+from focgen.logs.still import check_moving
 from focgen.logs.table import read_table
 from focgen.rig.rig import Signals
 from tests.logs.test_dialects import COLUMNS, STEP, TIME, lvm
@@ -270,3 +275,78 @@ def test_quantities_keep_their_unit():
     pressure = pint.UnitRegistry().Quantity(np.arange(40.0), "kPa")
     (found,) = read_logs([{"t": 0.01 * np.arange(40), "p": pressure, "y": np.arange(40.0)}], signals, 0.01)
     assert any("in kPa, pressure is taken as bar" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("count, step, resolution", [(110, 1.0, 60.0), (2000, 0.02, 128.0), (75, 0.02, 1.0)])
+def test_stamps_too_coarse_to_tell_the_clock_are_refused(count, step, resolution):
+    """Of hours and minutes over two minutes any step fits; the time constants would follow it."""
+    time = resolution * np.floor((0.6 * resolution + step * np.arange(count)) / resolution)
+    assert counted(time) is None
+
+
+def test_a_clock_that_is_counted_is_right():
+    random, told = np.random.default_rng(0), 0
+    for _ in range(2000):
+        resolution, count = 10.0 ** random.uniform(-1.0, 2.5), int(random.integers(10, 2000))
+        exact = random.uniform(0.0, resolution) + np.arange(count)
+        found = counted(resolution * np.floor(exact / resolution)) if resolution < count else None
+        if found is not None:
+            told += 1
+            assert found[1] - found[0] == pytest.approx(1.0, abs=0.01)
+    assert told > 1000
+
+
+def test_a_rig_at_rest_behind_a_coarse_converter_logs_nothing_twice(tmp_path):
+    rest = [(k / 10, 0.0, 0.0) for k in range(20) for _ in range(5)]
+    moves = [(2.0 + k / 10, 1.0, 5 * k + j) for k in range(20) for j in range(5)]
+    path = text(tmp_path, [",".join(map(str, row)) for row in rest + moves])
+    (found,) = read_logs([path], PLAIN, 0.02)
+    assert len(found) == 200 and "time stamps are rounded, 0.02 s" in found.notes[0]
+    twice = [",".join(map(str, row)) for row in moves[::5] for _ in range(2)]
+    (found,) = read_logs([text(tmp_path, twice)], PLAIN, 0.1)
+    assert len(found) == 20 and "rows logged twice" in found.notes[0]
+
+
+def test_runs_in_different_units_are_refused(tmp_path):
+    head, last = lvm(".", "One", 2).rsplit("Y_Unit_Label", 1)
+    (tmp_path / "log.lvm").write_text(f"{head}Y_Unit_Label{last.replace('bar', 'kPa', 1)}")
+    with pytest.raises(LogError, match="gives 'p_bar' in bar and in kPa, by the run"):
+        read_table(tmp_path / "log.lvm")
+
+
+@pytest.mark.parametrize("mark", [" ", "   "])
+def test_blanks_between_decimal_commas_and_quoted_names(tmp_path, mark):
+    for width in (2, 3, 4):
+        names = [f"name {k}" for k in range(width)]
+        lines = [mark.join([f"{k + 0.5:.2f}".replace(".", ",")] * width) for k in range(40)]
+        header = mark.join(f'"{name}"' for name in names)
+        found = read_table(text(tmp_path, lines, header=header))
+        assert list(found.columns) == names and found.numbers("name 1")[39] == 39.5
+
+
+# ---------------------------------------------------------------------------------------- what stands still
+
+
+@pytest.mark.parametrize(
+    "still, said",
+    [
+        (("output",), "output is 0 throughout, while command, pressure move; check its plug and its column$"),
+        (("pressure",), "pressure is 0 throughout, while command, output move; .* leave pressure out"),
+        (("output", "pressure", "command"), "output is 0 throughout, while nothing moves"),
+    ],
+)
+def test_a_measured_signal_that_stands_still_is_no_dead_zone(still, said):
+    signals = {
+        role: np.zeros(40) if role in still else np.arange(40.0) for role in ("command", "pressure", "output")
+    }
+    log = Experiment("log", 0.01, signals)
+    with pytest.raises(LogError, match=said):
+        check_moving([log])
+    check_moving([log, replace(log, signals={role: np.arange(40.0) for role in signals})])
+
+
+def test_a_column_without_a_reading_is_said_to_be_left_out(tmp_path):
+    lines = [f"{0.01 * k:.2f},{k},{k}," for k in range(40)]
+    roles = Signals("t", "y", "u", "p")
+    (found,) = read_logs([text(tmp_path, lines, header="t,u,y,p")], roles, 0.01)
+    assert "pressure has no reading at all, taken as not logged" in found.notes and "pressure" not in found

@@ -140,6 +140,18 @@ def test_dates_and_times_of_day_are_no_milliseconds(tmp_path):
     assert found.rig.sample_time == 1.0 and "taken as" not in found.text
 
 
+def test_columns_that_are_left_out_are_named():
+    """One word among numbers takes a column away; another one would become the output."""
+    odd = ["OL" if k == 7 else float(y) for k, y in enumerate(ANSWER)]
+    log = {"t": TIME, "u_V": HELD, "p_bar": PRESSURE, "angle": odd, "empty": np.full(400, np.nan)}
+    found = focgen.init(log)
+    assert "left out: 'angle' holds 'OL' in row 7, which is no number" in found.doubts
+    assert "left out: 'empty' has no reading" in found.doubts
+    log = log | {"angle": ANSWER}
+    two = focgen.init([log, {key: column for key, column in log.items() if key != "p_bar"}])
+    assert "left out: 'p_bar' log 2 has no such column" in two.doubts
+
+
 def test_ranges_hold_what_was_seen_and_begin_at_0_where_signals_do():
     found = proposed(("t_s", "u_V", "p_bar", "kappa_per_mm")).rig.ranges
     assert found.command == (0.0, 4.0) and found.pressure == (0.0, 0.25)
