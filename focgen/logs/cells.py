@@ -112,6 +112,11 @@ class Points:
         """Whether numbers like "1.200" stand beside whole ones like "999", and none like "0.5"."""
         return self._whole and self._grouped and not self._decimal
 
+    @property
+    def decimal(self) -> bool:
+        """Whether a point is a decimal one for sure."""
+        return self._decimal
+
 
 class _Growing:
     """One column: levels while its texts are few, then numbers, and texts where it holds no numbers."""

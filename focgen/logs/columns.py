@@ -11,8 +11,10 @@ from scipy.optimize import linear_sum_assignment
 
 from focgen.arrays import Array
 from focgen.errors import LogError
+from focgen.logs.scales import known as measures
+from focgen.logs.scales import unit_of_time
 from focgen.logs.table import LogTable, stem
-from focgen.logs.units import unit_named, unit_of
+from focgen.logs.units import time_unit_named, unit_named, unit_of
 
 SIGNALS = ("command", "pressure", "curvature", "output", "reference")
 _TIME = frozenset("t time zeit timestamp stamp clock sec seconds secs ms tiempo temps x".split())
@@ -99,13 +101,23 @@ def columns_of(tables: Sequence[LogTable]) -> tuple[tuple[Column, ...], dict[str
 
 
 def time_of(table: LogTable) -> str | None:
-    """The column of time: one that increases but for new beginnings, best by its name; None where the log
-    has its own clock or no time at all."""
-    rising = [name for name in table.columns if _rises(table, name)]
-    named = [name for name in rising if set(Column(name, "s", np.empty(0)).words) & _TIME]
+    """The column of time: one that increases but for new beginnings, best by its unit and its name; None
+    where the log has its own clock or no time at all. What has another unit is none."""
+    units = {name: table.unit(name) or time_unit_named(name) for name in table.columns}
+    of_time = {name: unit is None or unit_of_time(unit) is not None for name, unit in units.items()}
+    known = [name for name in table.columns if of_time[name] or not measures(units[name] or "")]
+    rising = [name for name in known if _rises(table, name)]
+    told = [name for name in rising if units[name] is not None and of_time[name]]
+    named = [name for name in rising if is_time_named(name)]
     dated = [name for name in rising if not isinstance(table.column(name), np.ndarray)]
-    best = named or [n for n in dated if is_dated(table, n)] or rising
+    both = [name for name in named if name in told]
+    best = both or told or named or [n for n in dated if is_dated(table, n)] or rising
     return best[0] if best else None
+
+
+def is_time_named(name: str) -> bool:
+    """Whether a column's name says that it is time."""
+    return bool(set(Column(name, "s", np.empty(0)).words) & _TIME)
 
 
 def is_dated(table: LogTable, name: str) -> bool:

@@ -86,9 +86,19 @@ def rows_of(
     for row in csv.reader(plain, delimiter=delimiter, skipinitialspace=spaced):
         if whole and len(plain.row) > 1:
             list(csv.reader(plain.row, delimiter=delimiter, skipinitialspace=spaced, strict=True))
+            _check_cell(plain.row[1:], delimiter, len(row))
         plain.row.clear()
         cells = [cell.strip() for cell in row]
         yield cells if any(cells) else []
+
+
+def _check_cell(lines: Sequence[str], delimiter: str, width: int) -> None:
+    """Raise csv.Error where the further lines of a quoted cell look like rows: two lone quotes, as marks of
+    "the same as above", take what stands between them for a cell."""
+    for line in lines:
+        first, *others = line.split(delimiter)
+        if others and len(others) + 1 >= width and is_number(first.strip()):
+            raise csv.Error("a quoted cell holds a whole row")
 
 
 def _unquoted(line: str) -> list[str]:

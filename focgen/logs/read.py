@@ -13,6 +13,7 @@ import numpy as np
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
 from focgen.logs.cells import Levels
+from focgen.logs.dialect import MISSING
 from focgen.logs.experiment import Experiment
 from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
@@ -23,6 +24,8 @@ from focgen.logs.units import unit_of
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
+_DATED = 1e8  # s: a clock this far on counts from 1970, no other one does
+_MOVED = "placed by its time stamps, not in the order given"
 _GIVE = "give a path, a frame, a dictionary of arrays, or a list of these"
 
 Limits = Mapping[str, tuple[float, float]]
@@ -197,7 +200,7 @@ def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, slice | Ints]
         return
     codes, firsts = np.unique(labels.codes, return_index=True)
     for code, first in sorted(zip(codes.tolist(), firsts.tolist()), key=lambda pair: pair[1]):
-        if not labels.texts[code]:
+        if labels.texts[code].lower() in MISSING:
             raise LogError(f"{table.path} [{run}]", f"is empty in {table.line(first)}", "name the run")
         yield labels.texts[code], np.flatnonzero(labels.codes == code)
 
@@ -234,16 +237,16 @@ def _with_own_names(found: list[tuple[str, Experiment]]) -> list[Experiment]:
 def in_session_order(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """Order experiments on the session's clock.
 
-    By time stamps where these do not overlap, and no clock falls back within a run. Otherwise (each starts at
-    0, say) as given, one after the other, as if no time had passed between them. One that continues
-    another keeps its distance from it.
+    By time stamps where these do not overlap, are of one clock, and do not fall back within a run. Otherwise
+    (each starts at 0, say) as given, one after the other, as if no time had passed between them. One that
+    continues another keeps its distance from it.
     """
     by_time = sorted(experiments, key=lambda e: e.start)
     fallen = any(later.anew and later.start < earlier.start for earlier, later in pairwise(experiments))
-    if not fallen and all(
-        earlier.start + earlier.time[-1] < later.start for earlier, later in pairwise(by_time)
-    ):
-        return tuple(by_time)
+    one = by_time[0].start > _DATED or by_time[-1].start < _DATED
+    if one and not fallen and all(a.start + a.time[-1] < b.start for a, b in pairwise(by_time)):
+        moved = {id(e) for e, given in zip(by_time, experiments) if e is not given}
+        return tuple(replace(e, notes=(*e.notes, _MOVED)) if id(e) in moved else e for e in by_time)
     placed, now, before = [], 0.0, None
     for experiment in experiments:
         if before is not None and experiment.continues and experiment.start > before.start:

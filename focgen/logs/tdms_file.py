@@ -16,6 +16,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
+from focgen.logs.columns import is_time_named
 from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LARGEST, LogTable, check_units
 
@@ -107,6 +108,15 @@ def _one_after_the_other(path: Path, groups: Sequence[_Group]) -> LogTable:
     )
 
 
+def _check_one_time(path: Path, groups: Sequence[_Group]) -> None:
+    """Raise LogError where groups have channels of time that differ: a row is not of one time then."""
+    named = [values for g in groups for name, values in g.channels.items() if is_time_named(name)]
+    times = [values for values in named if values.dtype.kind in "fiu" and np.all(np.diff(values) >= 0)]
+    if any(not np.array_equal(values, times[0]) for values in times[1:]):
+        what = "has groups with channels of time that differ, so a row is not of one time"
+        raise LogError(str(path), what, "log all channels by one clock, or each group as a file of its own")
+
+
 def _side_by_side(path: Path, groups: Sequence[_Group]) -> LogTable:
     """Channels by their own name where that is told from all others, and by "group/channel" always."""
     names = [name for g in groups for name in g.channels]
@@ -124,4 +134,5 @@ def _side_by_side(path: Path, groups: Sequence[_Group]) -> LogTable:
     clocks = [g.clock for g in groups if g.clock is not None]
     clock = _common(clocks)
     differing = any(g.differing for g in groups) or (bool(clocks) and clock is None)
+    _check_one_time(path, groups)
     return LogTable(str(path), columns, units=units, aliases=aliases, clock=clock, differing=differing)

@@ -58,7 +58,8 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
     except csv.Error as reason:
         raise LogError(str(path), f"is not CSV ({reason})", "save it as comma-separated text") from None
     cells = gathered.columns()
-    doubtful = {name for name, points in zip(header, gathered.pointed) if points.doubtful}
+    told = dialect.delimiter == "," or any(points.decimal for points in gathered.pointed)
+    doubtful = {name for name, points in zip(header, gathered.pointed) if points.doubtful and not told}
     units, aliases = _without_units(header, _units(ahead, dialect, header))
     return LogTable(
         str(path),
@@ -67,7 +68,7 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
         decimal=dialect.decimal,
         units=units,
         aliases=aliases,
-        grouped=frozenset(doubtful if dialect.delimiter != "," else ()),
+        grouped=frozenset(doubtful),
         notes=(*_taken(ahead, dialect, guessed), *_left_out(comments)),
     )
 

@@ -88,7 +88,7 @@ def init(
     every, left = columns_of(tables)
     columns = [c for c in every if c.name not in (time.column, run)]
     guesses = _asked(guessed(columns), columns, ask)
-    _check(tables[0], guesses)
+    _check(tables[0], guesses, left)
     by_name = {c.name: c for c in columns}
     roles = {role: by_name[guess.column] for role, guess in guesses.items()}
     said = [f"left out: {name!r} {why}" for name, why in left.items() if name not in (time.column, run)]
@@ -103,11 +103,12 @@ def init(
     return Proposal(rig, text, doubts, told)
 
 
-def _check(table: LogTable, guesses: Mapping[str, Guess]) -> None:
+def _check(table: LogTable, guesses: Mapping[str, Guess], left: Mapping[str, str]) -> None:
     if "output" not in guesses or not {"command", "pressure"} & set(guesses):
         there = ", ".join(table.columns).replace(";", ",")
         what = f"has no two columns that move, for an input and an output; there are: {there}"
-        raise LogError(table.path, what, "log what drives the rig and what it answers")
+        told = "".join(f" ({name!r} {why})" for name, why in left.items())
+        raise LogError(table.path, what + told, "log what drives the rig and what it answers")
 
 
 def _time(table: LogTable, run: str | None) -> _Time:

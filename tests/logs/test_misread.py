@@ -75,11 +75,12 @@ def test_a_mark_between_thousands_behind_a_long_beginning_is_seen(tmp_path, monk
         (["1.125", "2.250"], "t;p;y", 1.125),
         (["0.5", "1", "1.125"], "t;p;y", 1.125),
         (["1", "1.125"], "t,p,y", 1.125),
+        (["1", "1.125", "2"], "t;p;y;0.5", 1.125),
     ],
 )
 def test_decimals_that_cannot_be_thousands_are_read(tmp_path, cells, header, value):
     mark = header[1]
-    lines = [mark.join([str(k), cells[k % len(cells)], str(k)]) for k in range(40)]
+    lines = [mark.join([str(k), cells[k % len(cells)], str(k), *header.split(mark)[3:]]) for k in range(40)]
     assert value in read_table(text(tmp_path, lines, header=header)).numbers("p")
 
 
@@ -100,6 +101,9 @@ def test_a_quote_that_does_not_close_is_refused(tmp_path, places):
     for k in places:
         lines[k] += '"1/4 fitting'
     with pytest.raises(LogError, match="is not CSV"):
+        read_table(text(tmp_path, lines, header="t,p,y,note"))
+    lines[10:21] = [f'{ROWS[k]},"' for k in range(10, 21)]
+    with pytest.raises(LogError, match="a quoted cell holds a whole row"):
         read_table(text(tmp_path, lines, header="t,p,y,note"))
     lines[10:21] = [f'{ROWS[k]},"1/4" fitting' for k in range(10, 21)]
     assert len(read_table(text(tmp_path, lines, header="t,p,y,note"))) == 40
@@ -153,6 +157,42 @@ def test_waveforms_of_tdms_with_clocks_of_their_own_are_refused(tmp_path, field,
             continue
         with pytest.raises(LogError, match="clocks that differ"):
             read_logs([tmp_path / "log.tdms"], roles, STEP)
+
+
+def test_groups_of_tdms_with_channels_of_time_that_differ_are_refused(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    for late, name in ((0.0, "t"), (0.5, "t"), (0.5, "x")):
+        with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+            time = TIME if name == "t" else np.sin(TIME)
+            groups = {"a": {name: time, "p": TIME}, "b": {name: time + late, "y": TIME}}
+            writer.write_segment(
+                [
+                    nptdms.ChannelObject(g, c, values)
+                    for g, columns in groups.items()
+                    for c, values in columns.items()
+                ]
+            )
+        if (late, name) == (0.5, "t"):
+            with pytest.raises(LogError, match="channels of time that differ"):
+                read_table(tmp_path / "log.tdms")
+        else:
+            assert "p" in read_table(tmp_path / "log.tdms")
+
+
+def test_logs_that_are_placed_by_their_stamps_are_said_to_be(tmp_path):
+    """Monday afternoon and Tuesday morning, by the time of day: nobody can know, but it is said."""
+    late = text(tmp_path, [f"15:00:{k:02d},{k},{k}" for k in range(40)], "mon.csv")
+    early = text(tmp_path, [f"09:00:{k:02d},{k},{k}" for k in range(40)], "tue.csv")
+    found = read_logs([late, early], PLAIN, 1.0)
+    assert [e.name for e in found] == ["tue", "mon"] and "not in the order given" in found[0].notes[0]
+    assert not any(e.notes for e in read_logs([early, late], PLAIN, 1.0))
+
+
+def test_a_clock_from_0_and_one_from_1970_are_not_one(tmp_path):
+    dated = text(tmp_path, [f"{1.7e9 + k},{k},{k}" for k in range(40)], "a.csv")
+    plain = text(tmp_path, [f"{k},{k},{k}" for k in range(40)], "b.csv")
+    found = read_logs([dated, plain], PLAIN, 1.0)
+    assert [e.name for e in found] == ["a", "b"] and found[1].start - found[0].start == 40.0
 
 
 def test_two_numbers_of_a_time_of_day_are_refused(tmp_path):
@@ -237,9 +277,10 @@ def test_runs_with_long_numbers_are_told_apart(tmp_path, kind):
     log = tmp_path / "log.parquet" if kind == "parquet" else table
     found = read_logs([log], SIGNALS, 0.01)
     assert [e.name.rpartition("/")[2] for e in found] == ["20260131", "20260132"]
-    table["run"] = np.repeat([1.0, np.nan], 40)
-    with pytest.raises(LogError, match="is empty in row 40"):
-        read_logs([table], SIGNALS, 0.01)
+    for missing in ([1.0, np.nan], ["a", "NA"], ["a", "NaN"], ["a", None]):
+        table["run"] = np.repeat(np.array(missing, dtype=object), 40)
+        with pytest.raises(LogError, match="is empty in row 40"):
+            read_logs([table], SIGNALS, 0.01)
 
 
 def test_what_a_mask_hides_is_missing():

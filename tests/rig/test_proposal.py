@@ -140,6 +140,21 @@ def test_dates_and_times_of_day_are_no_milliseconds(tmp_path):
     assert found.rig.sample_time == 1.0 and "taken as" not in found.text
 
 
+def test_time_has_a_unit_of_time():
+    """A counter of samples rises as well, and so does a position that creeps."""
+    log = {"Sample": np.arange(400), "x (mm)": 1.0 + TIME, "Elapsed (s)": TIME, "u_V": HELD, "y_mm": ANSWER}
+    assert focgen.init(log).rig.signals.time == "Elapsed (s)"
+    del log["Elapsed (s)"], log["Sample"]
+    with pytest.raises(LogError, match="no column that increases with time"):
+        focgen.init(log)
+
+
+def test_the_reason_of_a_column_that_is_left_out_is_in_the_error():
+    odd = ["OL" if k == 7 else float(y) for k, y in enumerate(ANSWER)]
+    with pytest.raises(LogError, match=r"no two columns that move.*\('y' holds 'OL' in row 7"):
+        focgen.init({"t": TIME, "u_V": HELD, "y": odd})
+
+
 def test_columns_that_are_left_out_are_named():
     """One word among numbers takes a column away; another one would become the output."""
     odd = ["OL" if k == 7 else float(y) for k, y in enumerate(ANSWER)]
