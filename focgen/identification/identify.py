@@ -11,7 +11,7 @@ import numpy as np
 
 from focgen.arguments import checked
 from focgen.custody import identified_from
-from focgen.errors import FitError, check_choice
+from focgen.errors import FitError, LogError, check_choice
 from focgen.identification.caveats import warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
@@ -28,7 +28,8 @@ from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, check_determined, is_compromise, with_stages
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
-from focgen.logs.read import Logs, each_of, read_logs
+from focgen.logs.rates import at_one_rate
+from focgen.logs.read import Logs, digest_of, each_of, read_logs
 from focgen.output import check_apart, write_file
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.engine import STAGES
@@ -86,6 +87,7 @@ def identify(
     nominal = rig_of(rig)
     experiments = _read(given, nominal, from_, to)
     others = _read(shown, nominal, None, None) if shown else ()
+    _check_unseen(experiments, others)
     check_bounded(replace(nominal, actuator=None), longest(experiments))
     found = {stage: identify_stage(experiments, stage) for stage in stages if stage != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
@@ -112,7 +114,16 @@ def identify(
 
 def _read(logs: Logs, rig: Rig, first: float | None, last: float | None) -> tuple[Experiment, ...]:
     limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
-    return read_logs(logs, rig.signals, rig.sample_time, first, last, limits)
+    return at_one_rate(read_logs(logs, rig.signals, rig.sample_time, first, last, limits))
+
+
+def _check_unseen(fitted: Sequence[Experiment], shown: Sequence[Experiment]) -> None:
+    """Raise LogError where a log to show holds the samples of one that is fitted, under whatever name."""
+    known = {digest_of(log): log.name for log in fitted}
+    for log in shown:
+        if digest_of(log) in known:
+            what = f"holds the samples of {known[digest_of(log)]}, which is fitted"
+            raise LogError(f"--unseen {log.name}", what, "give a log that is not among those fitted")
 
 
 def _with_stages(rig: Rig, found: dict[str, StageFit]) -> Rig:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -84,7 +85,7 @@ def read_logs(
         raise LogError("logs", "none is given", "name at least one log")
     found = [part for table in tables for part in _experiments(table, signals, sample_time, (first, last))]
     _check_limits(found, dict(limits or {}), signals.columns())
-    return in_session_order(_with_own_names(found))
+    return _with_twins(in_session_order(_with_own_names(found)))
 
 
 def each_of(logs: Logs) -> list[Log]:
@@ -232,6 +233,26 @@ def _with_own_names(found: list[tuple[str, Experiment]]) -> list[Experiment]:
         if len({experiment.name for experiment in named}) == len(named):
             return named
     raise LogError("logs", "the same file is given twice", "name each log once")
+
+
+def _with_twins(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """Each with a note where an earlier one holds the same samples, as a copy under another name does: noise
+    never comes twice, so that it would count twice."""
+    first: dict[bytes, str] = {}
+    made = []
+    for log in logs:
+        name = first.setdefault(digest_of(log), log.name)
+        note = () if name == log.name else (f"holds the same samples as {name}, and counts twice",)
+        made.append(replace(log, notes=(*log.notes, *note)) if note else log)
+    return tuple(made)
+
+
+def digest_of(log: Experiment) -> bytes:
+    """Of the samples by role, wherever they stand on the session's clock."""
+    found = hashlib.sha256()
+    for role in sorted(log.signals):
+        found.update(role.encode() + np.ascontiguousarray(log[role], float).tobytes())
+    return found.digest()
 
 
 def in_session_order(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:

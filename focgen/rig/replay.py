@@ -15,6 +15,7 @@ from focgen.jsontext import UNWRITTEN
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
+from focgen.logs.rates import at_one_rate
 from focgen.logs.read import Logs, read_logs
 from focgen.logs.still import check_moving
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
@@ -88,9 +89,9 @@ def _with_past(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
 def experiments(
     rig: Rig, logs: Logs, first: float | None = None, last: float | None = None
 ) -> tuple[Experiment, ...]:
-    """The logs read, and cut to ``first`` … ``last`` s. Raises RigError for a rig that cannot be run on
-    them, LogError where a measured signal stands still throughout."""
-    found = read_logs(logs, rig.signals, rig.sample_time, first, last)
+    """The logs read, cut to ``first`` … ``last`` s, and at one rate. Raises RigError for a rig that cannot
+    be run on them, LogError where a measured signal stands still throughout."""
+    found = at_one_rate(read_logs(logs, rig.signals, rig.sample_time, first, last))
     check_moving(found)
     check_bounded(rig, longest(found))
     return found

@@ -32,6 +32,7 @@ from focgen.logs.notes import notes_of
 from focgen.rig.replay import goodness
 from focgen.rig.rig import Rig
 
+_WORSE = 1.05  # of the mean square without any effect: with more they do not belong together
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
 
@@ -50,6 +51,10 @@ def conclude(
     if summary.in_vain and not granted and (vain := _in_vain(summary)):
         unknown += vain
         summary = _summary(rig, logs, rigs, explanations, unknown)
+    at_odds = [] if granted else _at_odds(summary)
+    if at_odds:
+        unknown += at_odds
+        summary = _summary(rig, logs, rigs, explanations, unknown)
     made, squares, floor, total = summary.made, summary.squares, summary.floor, summary.total
     found = _ordered([_found(e, c, summary.rigs, logs, squares, floor, total) for e, c in summary.causes])
     found += _departures(controller)
@@ -66,7 +71,7 @@ def conclude(
         augmented_rig="augmented.toml",
         next_experiment=None,
         unexplained=_description(unknown),
-        notes=(*notes_of(logs), *_cautions(rig, summary, unknown)),
+        notes=(*notes_of(logs), *_cautions(rig, summary, unknown), *_gauges(at_odds)),
         fits=_plain_fits(explanations),
     )
     return summary.rigs, diagnosis, Evidence(made, tuple(explanations))
@@ -156,6 +161,32 @@ def _in_vain(summary: _Summary) -> list[Explanation]:
     see its gap whole, but forgets it at its pace: there the promise tells, which is of the path."""
     explained = dict.fromkeys(e for e, _ in summary.causes)
     return [e for e in explained if e.segment.pace or cross_validated_share(e) < NUMBERS.vain]
+
+
+def _at_odds(summary: _Summary) -> list[Explanation]:
+    """The segments with effects, where what was found leaves the output further off than no effect.
+
+    Then a signal logged in between fits neither what is ahead of it nor what is behind, as of a gauge that is
+    at fault: either segments make up for one another, or without any effect there is no gap at all. Where
+    errors add up, one may stand for another."""
+    explained = list(dict.fromkeys(e for e, _ in summary.causes))
+    if not explained or any(is_rounded(e) or e.segment.pace or paths(e) for e in explained):
+        return []
+    found, *others = (float(np.mean(summary.squares[k])) for k in ("explained", "as given", "refitted"))
+    without = min(others)
+    odd = len(explained) > 1 or summary.floor > NUMBERS.above**2 * without
+    return explained if odd and found > _WORSE * without else []
+
+
+def _gauges(at_odds: Sequence[Explanation]) -> Iterator[str]:
+    """What to look at where a signal in between fits neither side."""
+    between = dict.fromkeys(r for e in at_odds for r in (e.segment.entry, e.segment.exit))
+    gauges = [role for role in between if role not in ("command", "output")]
+    if gauges:
+        yield (
+            f"with the effects that {' and '.join(gauges)} as logged would ask for, the output is further "
+            "off than without any: check that gauge, its range and its column"
+        )
 
 
 def _no_closer(rigs: compose.Rigs, logs: Sequence[Experiment], last: Explanation) -> list[Explanation]:

@@ -22,6 +22,7 @@ from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, innovation
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import left_out
 from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.problem import Problem
 from focgen.diagnosis.problem.segments import Segment
 from focgen.rig.effects import Form
 
@@ -64,9 +65,9 @@ def is_timed(form: Form) -> bool:
 @lru_cache(maxsize=16)
 def changed_at_once(e: Explanation) -> Changed | None:
     """How likely the rig became another at up to three moments instead of what was found; None where that is
-    something that does not move with the session's clock."""
+    something that does not move with the session's clock, and leaves nothing that inputs predict."""
     timed = [c for c in e.best.problem.candidates if is_timed(c.form)]
-    if e.causes and not timed:
+    if e.causes and not timed and e.predictability.share < NUMBERS.left:
         return None
     bases = [_Pieces.of(e.nominal, e)]
     if 0 < len(timed) < len(e.best.problem.candidates):
@@ -85,8 +86,8 @@ def another(e: Explanation) -> Changed | None:
 class _Pieces:
     """A fit whose parameters may be others in every piece of the session. By cell's end: ``normal``
     (cells + 1, k, k), ``slope`` (cells + 1, k) and ``square`` (cells + 1,), sums up to there of what its
-    innovations and their derivatives make; ``ridge`` (k,): what is known beforehand; ``ends`` (cells + 1,)
-    the cells' in samples."""
+    innovations and their derivatives make; ``ridge`` (k,): what is known of the nuisances beforehand;
+    ``ends`` (cells + 1,) the cells' in samples."""
 
     of_fit: Fit
     free: np.ndarray
@@ -105,7 +106,7 @@ class _Pieces:
         ends = np.linspace(0, len(now), min(_CELLS, len(now) // 10) + 1).astype(int)
         cells = [(rows[:, a:b], now[a:b]) for a, b in pairwise(ends)]
         normal = _summed([r @ r.T for r, _ in cells])
-        ridge = problem.known[1][free] * float(now @ now) / len(now)
+        ridge = _known(problem)[free] * float(now @ now) / len(now)
         ridge = ridge + 1e-9 * np.trace(normal[-1])
         slope, square = _summed([r @ x for r, x in cells]), _summed([np.array(x @ x) for _, x in cells])
         return cls(fit, free, ends, normal, slope, square, ridge)
@@ -133,6 +134,14 @@ class _Pieces:
             least, places = np.min(ways, axis=0), [(*places[i], int(i)) for i in last]
             found.append((float(least[-1]), places[-1]))
         return found
+
+
+def _known(problem: Problem) -> np.ndarray:
+    """The inverse variances (k,) of what is known of the parameters: nothing of those of the rig, for what
+    was known holds no more behind a moment."""
+    known = problem.known[1].copy()
+    known[: len(problem.nominal_start)] = 0.0
+    return known
 
 
 def _summed(parts: list[np.ndarray]) -> np.ndarray:

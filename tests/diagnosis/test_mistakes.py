@@ -1,0 +1,123 @@
+"""Mistakes that every lab makes, on a rig that is healthy: none of them is an effect of the rig.
+
+Red when a gauge that saturates, an amplifier that is switched, a column that was exported twice or a log at
+another rate is named as one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.errors import LogError
+from focgen.identification.identify import identify
+from focgen.logs.experiment import Experiment
+from focgen.logs.rates import at_one_rate
+from focgen.rig.replay import replay
+from tests.diagnosis_rig import RIG, H, session
+
+
+def altered(logs, change):
+    """The logs with ``change`` of each one's number and signals."""
+    return [replace(log, signals=change(k, dict(log.signals))) for k, log in enumerate(logs)]
+
+
+def saturated(_, signals):
+    """The gauge of pressure ends in the middle of what it is to show."""
+    return signals | {"pressure": np.minimum(signals["pressure"], 0.6 * signals["pressure"].max())}
+
+
+def twice(_, signals):
+    """The camera's column holds the output's."""
+    return signals | {"curvature": signals["output"].copy()}
+
+
+@pytest.mark.parametrize(
+    "change, seed",
+    [(saturated, 2), *(pytest.param(*case, marks=pytest.mark.long) for case in ((saturated, 1), (twice, 1)))],
+)
+def test_a_gauge_at_fault_is_no_effect_before_it_and_behind_it(change, seed):
+    found = diagnose(RIG, altered(session(seed), change), pictures=False)
+    named = [c.candidates[0].effect for c in found.causes]
+    assert found.verdict in ("unknown", "none", "parameters") and not named, named
+    if found.verdict == "unknown" and change is saturated:
+        assert any("pressure" in line for line in (*found.notes, *found.unexplained))
+
+
+@pytest.mark.parametrize("factor", [2.0, pytest.param(0.6, marks=pytest.mark.long)])
+def test_an_amplifier_that_is_switched_between_experiments_is_no_curve(factor):
+    logs = session(3)
+    late = len(logs) // 2
+
+    def switched(k, signals):
+        return signals | {"output": signals["output"] * (factor if k >= late else 1.0)}
+
+    found = diagnose(RIG, altered(logs, switched), pictures=False)
+    assert found.verdict == "unknown"
+    moments = found.unexplained["curvature to output"]["moments"]
+    first = logs[late].start
+    assert any(abs(moment["at"] - first) < 0.1 * (logs[-1].start + len(logs[-1]) * H) for moment in moments)
+
+
+def faster(log, times, rng):
+    """The same experiment recorded so many times as often, the command held."""
+    count = (len(log) - 1) * times + 1
+    clock = np.arange(count) / times
+    noise = {"pressure": 2e-4, "curvature": 1e-5, "output": 1e-5}
+    signals = {
+        role: y[clock.astype(int)]
+        if role == "command"
+        else np.interp(clock, np.arange(len(y)), y) + rng.normal(0.0, 0.1 * noise[role], count)
+        for role, y in log.signals.items()
+    }
+    return Experiment(log.name, log.sample_time / times, signals, log.start)
+
+
+def test_logs_of_several_rates_are_brought_to_the_slowest():
+    logs, rng = session(4), np.random.default_rng(4)
+    mixed = [faster(log, 4, rng) if k == 1 else log for k, log in enumerate(logs)]
+    alike = at_one_rate(mixed)
+    assert {log.sample_time for log in alike} == {H} and alike[0] is mixed[0]
+    assert len(alike[1]) == len(logs[1]) and "as the slowest log" in alike[1].notes[-1]
+    assert np.allclose(alike[1]["command"], logs[1]["command"])
+    given, other = replay(RIG, logs), replay(RIG, mixed)
+    for name, result in given.logs.items():
+        assert other.logs[name].gof == pytest.approx(result.gof, abs=0.01)
+    assert diagnose(RIG, mixed, pictures=False).verdict in ("none", "parameters")
+
+
+def test_a_command_between_slower_samples_is_its_mean():
+    fast = Experiment("a", 0.01, {"command": np.arange(10.0), "output": np.arange(10.0)})
+    slow = Experiment("b", 0.025, {"command": np.zeros(4), "output": np.ones(4)})
+    made, _ = at_one_rate([fast, slow])
+    assert np.allclose(made["output"], [0.0, 2.5, 5.0, 7.5]) and made.sample_time == 0.025
+    area = [0 + 1 + 0.5 * 2, 0.5 * 2 + 3 + 4, 5 + 6 + 0.5 * 7, 0.5 * 7 + 8 + 9]
+    assert np.allclose(made["command"], np.array(area) / 2.5)
+
+
+def written(folder, name, log):
+    """A log as a file of the rig's columns."""
+    rows = np.column_stack(
+        [log.start + log.time, *(log[r] for r in ("command", "pressure", "curvature", "output"))]
+    )
+    np.savetxt(folder / name, rows, delimiter=",", header="t_s,u,p,k,y", comments="", fmt="%.9g")
+    return folder / name
+
+
+def test_one_experiment_under_two_names_is_said_to_be(tmp_path):
+    logs = session(5)
+    files = [written(tmp_path, "a.csv", logs[0]), written(tmp_path, "b.csv", logs[0])]
+    assert any("holds the same samples as a" in note for note in replay(RIG, files).notes)
+    other = [files[0], written(tmp_path, "c.csv", logs[1])]
+    assert not any("same samples" in note for note in replay(RIG, other).notes)
+
+
+def test_a_log_that_is_fitted_is_not_shown_as_unseen(tmp_path):
+    logs = session(6)
+    files = [written(tmp_path, f"{k}.csv", log) for k, log in enumerate(logs)]
+    copy = written(tmp_path, "copy.csv", logs[0])
+    with pytest.raises(LogError, match="holds the samples of 0, which is fitted"):
+        identify(RIG, files, unseen=[copy])
