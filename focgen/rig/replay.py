@@ -18,8 +18,9 @@ from focgen.logs.notes import notes_of
 from focgen.logs.rates import at_one_rate
 from focgen.logs.read import Logs, read_logs
 from focgen.logs.still import check_moving
+from focgen.logs.table import LARGEST
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
-from focgen.rig.effects import Run, library
+from focgen.rig.effects import Parameter, Run, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import begun
 from focgen.rig.plausibility import doubts
@@ -144,7 +145,7 @@ def placed_in(rig: Rig) -> tuple[Placed, ...]:
 
 
 def _placed(rig: Rig, table: Mapping[str, Any]) -> Placed:
-    effect = library().get(table["name"])
+    effect = library().get(table["name"]) if isinstance(table["name"], str) else None
     if effect is None:
         raise RigError(
             f"{rig.name} [[effects]]",
@@ -171,14 +172,39 @@ def _placed(rig: Rig, table: Mapping[str, Any]) -> Placed:
     if stage not in STAGES or strange:
         what = f"has the stage {stage!r}" if stage not in STAGES else f"has the unknown key {min(strange)!r}"
         raise RigError(f"{rig.name} [[effects]] {effect.name}", what, f"stages are {', '.join(STAGES)}")
-    values = tuple(float(table[p.name]) for p in form.parameters)
-    carried = {k: float(v) for k, v in table.get("carried", {}).items()}
-    return Placed(effect.name, form, stage, values, carried)
+    where = f"{rig.name} [[effects]] {effect.name}"
+    values = tuple(_value(where, p, table[p.name]) for p in form.parameters)
+    carried = table.get("carried", {})
+    if not isinstance(carried, Mapping):
+        raise RigError(where, f"has {carried!r} for carried", "write it as a table of numbers")
+    numbers = {k: _finite(f"{where} carried.{k}", v) for k, v in carried.items()}
+    return Placed(effect.name, form, stage, values, numbers)
+
+
+def _value(where: str, parameter: Parameter, value: object) -> float:
+    """A parameter's value. Raises RigError for what no fit could have found: what is no number, or has the
+    other sign."""
+    number = _finite(f"{where} {parameter.name}", value)
+    if (
+        parameter.lower < 0.0
+        or number > 0.0
+        or (number == 0.0 and (not parameter.time or parameter.zero == 0.0))
+    ):
+        return number
+    raise RigError(f"{where} {parameter.name}", f"is {number:g}", "give a positive number")
+
+
+def _finite(where: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+        raise RigError(where, f"is {value!r}", "give a number")
+    return float(value)
 
 
 def session_end(rig: Rig) -> float:
-    """Where the session that the rig's effects were found in ended, s on its clock."""
-    return max((float(table.get("clock", 0.0)) for table in rig.effects), default=0.0)
+    """Where the session that the rig's effects were found in ended, s on its clock. Raises RigError for a
+    clock that is no number."""
+    clocks = (_finite(f"{rig.name} [[effects]] clock", e.get("clock", 0.0)) for e in rig.effects)
+    return max(clocks, default=0.0)
 
 
 def effect_tables(

@@ -240,3 +240,23 @@ def test_counts_of_the_log_are_not_the_controllers():
     for digits in (0.1, 0.02, 0.05, 0.025, 1.0):
         assert count_of([digits * np.round(smooth / digits)]) is None
     assert count_of([np.zeros(100)]) is None
+
+
+@pytest.mark.parametrize("change, large", [({"gain": 80.0}, False), ({"integrator": False}, True)])
+def test_another_controller_than_the_files_is_said_to_be_one(change, large):
+    """No memory, arithmetic or limit of the file's controller makes these commands."""
+    found = check_controller(CONTROLLER, [log_of(*command(replace(CONTROLLER, **change)))])
+    assert found.unexplained and not found.causes and found.large == large
+    assert not check_controller(CONTROLLER, [log_of(*command())]).unexplained
+
+
+def test_a_command_that_is_a_sample_late_is_unexplained():
+    u, ref, meas = command()
+    found = check_controller(CONTROLLER, [log_of(np.r_[u[0], u[:-1]], ref, meas)])
+    assert found.unexplained and not found.causes
+
+
+def test_a_known_departure_is_not_unexplained():
+    ref, meas = inputs()
+    u = ideal(CONTROLLER, Scenario(ref[None], meas[None]), 50).u[0]
+    assert not check_controller(CONTROLLER, [log_of(u, ref, meas)]).unexplained

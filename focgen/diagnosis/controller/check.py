@@ -34,6 +34,7 @@ _NEARLY = 0.9  # of it: nothing is left for another
 _ROUNDED = 1.5  # counts: a departure that only the output's rounding makes stays within
 _TIED = 1.5  # times what the best cause leaves unexplained: who leaves less may be the cause as well
 _RESOLVED = 5e-5  # of the command's range: departures below are the log's resolution
+_LARGE = 0.01  # of it: so much that the loop is not the one of the file
 _BIT = 1.0  # bits: words of about the stated length are those
 _STEADY = 0.2  # what a departure that stays counts beside one from sample to sample
 _STAYS = 5  # samples at one end of what the command runs over: there may be a limit
@@ -53,11 +54,15 @@ class Departure:
 @dataclass(frozen=True)
 class ControllerCheck:
     """``departure``: root-mean-square of logged less ideal command, per sample, in its unit; ``causes``: for
-    each, those that may be it, the likeliest first."""
+    each, those that may be it, the likeliest first. ``unexplained``: that it is more than the log resolves,
+    and none of them explains half of it; then ``large`` says whether it is a hundredth of the command's
+    range."""
 
     departure: float
     resolved: bool
     causes: tuple[tuple[Departure, ...], ...]
+    unexplained: bool = False
+    large: bool = False
 
 
 _Suspect = tuple[Departure, list[np.ndarray]]
@@ -82,8 +87,10 @@ def check_controller(controller: Controller, logs: Sequence[Experiment]) -> Cont
     found = _explained(replay) if resolved else []
     counted = _counted(replay, found)
     tied = (counted,) if counted is not None else _tied(found)
+    unexplained = bool(resolved) and not (stamps or tied)
     tied = tuple(d for d in tied if not _stated(controller, d))
-    return ControllerCheck(departure, bool(resolved), (*stamps, tied) if tied else stamps)
+    large = unexplained and departure > _LARGE * replay.span
+    return ControllerCheck(departure, bool(resolved), (*stamps, tied) if tied else stamps, unexplained, large)
 
 
 def _stated(controller: Controller, departure: Departure) -> bool:

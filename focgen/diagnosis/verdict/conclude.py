@@ -59,6 +59,8 @@ def conclude(
     found = _ordered([_found(e, c, summary.rigs, logs, squares, floor, total) for e, c in summary.causes])
     found += _departures(controller)
     word = _word(found, unknown, [e for e in explanations if e.kept_by(rig, summary.rigs.refitted)])
+    if controller is not None and controller.large and not found:
+        word = "unknown"
     shares = stage_shares(found, unknown, explanations)
     diagnosis = Diagnosis(
         verdict=word,
@@ -70,8 +72,8 @@ def conclude(
         refitted_rig="refitted.toml",
         augmented_rig="augmented.toml",
         next_experiment=None,
-        unexplained=_description(unknown),
-        notes=(*notes_of(logs), *_cautions(rig, summary, unknown), *_gauges(at_odds)),
+        unexplained=_description(unknown) | _departing(controller),
+        notes=(*notes_of(logs), *_cautions(rig, summary, unknown), *_gauges(at_odds), *_another(controller)),
         fits=_plain_fits(explanations),
     )
     return summary.rigs, diagnosis, Evidence(made, tuple(explanations))
@@ -217,6 +219,24 @@ def _departed(tied: Sequence[Departure]) -> Found:
     interval = (max(share - 0.1, 0.0), min(share + 0.1, 1.0))
     sure = [NUMBERS.held * 2.0**-k / sum(2.0**-i for i in range(len(tied))) for k in range(len(tied))]
     return Found("controller", tuple(_suspected(d, p) for d, p in zip(tied, sure)), share, interval)
+
+
+def _another(controller: ControllerCheck | None) -> Iterator[str]:
+    """What to look at where the command is not the file's, and nothing known makes it so."""
+    if controller is not None and controller.unexplained:
+        by = f"{controller.departure:.3g} (root mean square)"
+        yield (
+            f"the command departs from the controller's file by {by}, and no memory, arithmetic or limit "
+            "explains it: check that this file is the one that ran, with these gains, and that no column is "
+            "a sample late"
+        )
+
+
+def _departing(controller: ControllerCheck | None) -> dict[str, object]:
+    """The same as an entry of what is unexplained, where it is much."""
+    if controller is None or not controller.large:
+        return {}
+    return {"reference to command": {"depends_on": ["nothing"], "departure": controller.departure}}
 
 
 def _suspected(d: Departure, confidence: float) -> Candidate:
