@@ -26,10 +26,11 @@ from focgen.errors import FocgenError
 from focgen.logs.read import read_logs
 from focgen.logs.table import read_table
 from focgen.plan.build import build_plan
-from focgen.report import paths
+from focgen.report.pages.chain import verification_section
 from focgen.report.pages.files import read_diagnosis
 from focgen.report.texts import data as within_script
 from focgen.report.texts import drawn
+from focgen.report.verified import read_verified
 from focgen.rig.files import read_rig, rig_table, rig_text
 from focgen.rig.proposal import init
 from focgen.studies.kept import read_study
@@ -197,7 +198,7 @@ def _study(data: bytes, place: Path) -> None:
 
 
 def _verified(data: bytes, place: Path) -> None:
-    paths.verification_section(paths._verified(seeds.path_of(place, "verified.json", data)))
+    verification_section(read_verified(seeds.path_of(place, "verified.json", data)))
 
 
 def _costs(data: bytes, place: Path) -> None:
