@@ -28,8 +28,10 @@ _LEFT = "the folder has been edited, so nothing of it was compiled (--edited doe
 @dataclass(frozen=True, repr=False)
 class Verification(Shown):
     """``targets`` by name; ``differences`` between the folder and what its controller.toml gives; ``notes``
-    on files that nothing is compiled from; ``files``: the SHA-256 of what was compared, by name; ``agrees``:
-    what ran does; ``holds``: it does, and nothing was edited.
+    on files that nothing is compiled from. ``agrees``: what ran does; ``holds``: it does, and nothing was
+    edited.
+
+    ``files`` is the SHA-256 of what was compared, by name.
     """
 
     name: str
