@@ -101,6 +101,7 @@ def _move(scratch: Path, target: Path, inputs: tuple[Any, ...], old: Old) -> Non
         with journal.alone(target):
             _check_places(made, target, files, inputs)
             going = tuple(old())
+            _check_within(target, [*(target / name for name in files), *going])
             for path in (*(target / name for name in files), *going):
                 _check_size(path)
             journal.put(scratch, target, files, going)
@@ -119,6 +120,17 @@ def _check_places(made: Path, target: Path, files: list[Path], inputs: tuple[Any
         for parent in list(name.parents)[:-1]:
             if (target / parent).exists() and not (target / parent).is_dir():
                 raise InputError(str(target / parent), "is a file where a folder belongs", "move it away")
+
+
+def _check_within(target: Path, places: Iterable[Path]) -> None:
+    """Raise InputError where a link among a folder's own subfolders leads out of it: no file is written or
+    removed elsewhere, and none is left out without a word."""
+    for parent in dict.fromkeys(path.parent for path in places):
+        if not parent.resolve().is_relative_to(target.resolve()):
+            what = f"leads out of {target}, where its files would be missing"
+            raise InputError(
+                str(parent), what, "put a folder in the place of the link, or choose another --out"
+            )
 
 
 def _check_size(path: Path) -> None:
