@@ -141,6 +141,22 @@ def _check_size(path: Path) -> None:
         raise InputError(str(path), what, "move it away")
 
 
+def check_writable(path: Path, folder: bool = False) -> None:
+    """Raise InputError, before work begins, where a file, or files of a ``folder``, could not be written."""
+    place = path if folder else path.parent
+    nearest = next(one for one in (place, *place.absolute().parents) if one.exists())
+    if not folder:
+        _check_no_device(path)
+    if not nearest.is_dir() or (path.is_dir() and not folder):
+        what = "is a folder where a file belongs" if nearest.is_dir() else "is a file where a folder belongs"
+        raise InputError(str(path if nearest.is_dir() else nearest), what, "name another place")
+    try:
+        with scratch_file(nearest):
+            pass
+    except OSError as reason:
+        raise InputError(str(path), f"cannot be written ({reason.strerror})", "name another place") from None
+
+
 def _check_no_device(path: Path) -> None:
     """Raise InputError where a pipe, a socket or a device stands at a place, or a link to what a process has
     open: a file would replace it, and ``/dev/null`` or ``/dev/stdout`` were no more."""

@@ -27,7 +27,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> Outcome:
-    check_report(args.report, ())
+    check_report(args.report, (), args.out if is_page(args.report) else None)
     made = demo(args.out)
     folder = made.folder / "pictures"
     if is_page(args.report):

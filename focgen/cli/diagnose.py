@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from focgen.cli.outcome import Outcome
-from focgen.cli.shown import add_report, check_report, drawn, write_report
+from focgen.cli.shown import add_report, check_report, drawn, is_page, write_report
 from focgen.control.units import units_of_rig
 from focgen.diagnosis.diagnose import diagnose
 from focgen.errors import FocgenError
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> Outcome:
     if args.out is None:
         raise FocgenError("diagnose", "--out is missing", "name the folder for the diagnosis")
     given = [path for path in (args.rig, *args.logs, args.controller) if path]
-    check_report(args.report, given)
+    check_report(args.report, given, args.out if is_page(args.report) else None)
     with led_by("diagnose: the signals from "):
         found = diagnose(
             args.rig, args.logs, args.out, args.controller, args.first, args.last, args.bootstrap

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from focgen.cli.outcome import Outcome
-from focgen.cli.shown import add_report, check_report, drawn, write_report
+from focgen.cli.shown import add_report, check_report, drawn, is_page, write_report
 from focgen.output import write_files
 from focgen.report.pages.trials import trials_page
 from focgen.report.trials import pictures
@@ -99,7 +99,7 @@ def _run(args: argparse.Namespace) -> Outcome:
 
 
 def _score(args: argparse.Namespace) -> Outcome:
-    check_report(args.report, ())
+    check_report(args.report, (), args.out if is_page(args.report) else None)
     summary = trial(
         "score",
         *args.folder,
