@@ -24,10 +24,9 @@ from focgen.plan.plan import ErrorBound, Plan
 from focgen.scratch import temporary_folder
 from focgen.textfile import LARGEST_CODE, LARGEST_SETTING, holds, read_regular
 from focgen.verification.recorded import AGAIN, Recorded, read_recorded
+from focgen.verification.remembered import REMEMBERED, remembered
 
 _EXAMPLES = ("example/", "examples/", "extras/")
-REMEMBERED = "cost.json"
-"""The file beside a controller's C that remembers what it cost; no part of what was generated."""
 _MOST = 8  # strangers that are named
 
 
@@ -148,7 +147,7 @@ def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Ite
     known = {
         *files,
         *folders,
-        REMEMBERED,
+        *([] if remembered(path / REMEMBERED) is None else [REMEMBERED]),
         *(name for own in beside_it.values() for name in own),
         *(_archive(controller) if any(map(_of_fmu, files)) else ()),
     }

@@ -34,9 +34,10 @@ from focgen.report.verified import read_verified
 from focgen.rig.files import read_rig, rig_table, rig_text
 from focgen.rig.proposal import init
 from focgen.studies.kept import read_study
+from focgen.targets.cost import Cost, cost_of
 from focgen.trials import facts
-from focgen.verification.costs import _stored
 from focgen.verification.recorded import read_recorded
+from focgen.verification.remembered import remembered
 from tests.fuzz import seeds
 
 
@@ -202,7 +203,11 @@ def _verified(data: bytes, place: Path) -> None:
 
 
 def _costs(data: bytes, place: Path) -> None:
-    check(isinstance(_stored(seeds.path_of(place, "cost.json", data)), dict), "costs that are none")
+    found = remembered(seeds.path_of(place, "cost.json", data)) or {}
+    entries = [
+        one for part in found.values() for one in (*part["targets"].values(), *part["previous"].values())
+    ]
+    check(all(isinstance(cost_of(one), Cost) for one in entries), "costs that are none")
 
 
 # ------------------------------------------------------------------------------------------- texts
