@@ -61,7 +61,8 @@ def write_with_report(
     out: str, text: str, path: str | None, what: str | Mapping[str, bytes] | None, inputs: Sequence[Any]
 ) -> str:
     """Write the file ``out`` and what :func:`drawn` gave, both or neither but for a page, which may be
-    without it; say where the latter is."""
+    without it; say where the latter is. Raises InputError where one would be lost to the other, or to an
+    input."""
     check_writable(Path(out))
     if path is None or isinstance(what, str) or not what:
         told = write_report(path, what, inputs)
