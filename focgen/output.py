@@ -20,6 +20,18 @@ Old = Callable[[], Iterable[Path]]
 """What goes from a folder as a result takes its place there."""
 
 
+def former(folder: str | Path, told: str, names: Iterable[str], files: Iterable[str]) -> Old:
+    """What goes of an earlier result of the same kind, which the file ``told`` tells of: those of its
+    ``names`` that are not among the new ``files``. They would look like parts of the new one."""
+    place, new = Path(folder), set(files)
+
+    def old() -> Iterator[Path]:
+        if (place / told).is_file():
+            yield from (place / name for name in names if name not in new and (place / name).is_file())
+
+    return old
+
+
 def check_apart(outputs: Iterable[str | Path], inputs: Iterable[Any]) -> None:
     """Raise InputError where an output is the same file as one of the inputs, whatever name or link leads
     there.

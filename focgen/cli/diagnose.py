@@ -9,6 +9,7 @@ from focgen.cli.outcome import Outcome
 from focgen.cli.shown import add_report, check_report, drawn, is_page, write_report
 from focgen.control.units import units_of_rig
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.write import PICTURES
 from focgen.errors import FocgenError
 from focgen.progress import led_by
 from focgen.report.diagnosis_summary import diagnosis_text
@@ -81,4 +82,4 @@ def run(args: argparse.Namespace) -> Outcome:
 
 def _pictures(folder: Path) -> dict[str, bytes]:
     """Those that the diagnosis has written."""
-    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.png"))}
+    return {name: (folder / name).read_bytes() for name in PICTURES if (folder / name).is_file()}
