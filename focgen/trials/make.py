@@ -26,6 +26,7 @@ import focgen
 from focgen.arrays import Array
 from focgen.control.files import controller_text
 from focgen.errors import InputError
+from focgen.journal import alone
 from focgen.jsontext import read_json
 from focgen.output import write_file, write_files
 from focgen.progress import track
@@ -136,18 +137,29 @@ def _facts(drawn: Drawing) -> dict[str, Any]:
 
 
 def _begin(folder: Path, facts: dict[str, Any]) -> None:
-    """Write down what is made, ahead of the first case: so nothing of another trial gets among the cases."""
-    begun = folder / _BEGUN
+    """Write down what is made, ahead of the first case: so nothing of another trial gets among the cases, of
+    one that is being made at this moment neither. Raises InputError where there is some."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with alone(folder):
+            _check_begun(folder, facts)
+            write_file(folder / _BEGUN, json.dumps(facts, indent=1) + "\n")
+    except OSError as reason:
+        raise InputError(
+            str(folder), f"cannot be written ({reason.strerror})", "choose another folder"
+        ) from None
+
+
+def _check_begun(folder: Path, facts: dict[str, Any]) -> None:
+    """Raise InputError where a folder holds cases, and not the first ones of this very trial."""
+    begun, remedy = folder / _BEGUN, "choose another folder, or remove that one"
     holds = [name for name in ("cases", "sealed", "runs") if (folder / name).exists()]
-    if begun.is_file():
-        remedy = "choose another folder, or remove that one"
-        if read_json(begun, remedy) != facts:
-            what = f"holds part of another trial, which {_BEGUN} tells of"
-            raise InputError(str(folder), what, f"{remedy}; the same arguments as then finish it")
-    elif holds:
+    if begun.is_file() and read_json(begun, remedy) != facts:
+        what = f"holds part of another trial, which {_BEGUN} tells of"
+        raise InputError(str(folder), what, f"{remedy}; the same arguments as then finish it")
+    if holds and not begun.is_file():
         what = f"holds {holds[0]}, and no {_BEGUN} says of which trial"
         raise InputError(str(folder), what, "choose another folder, or move it away")
-    write_file(begun, json.dumps(facts, indent=1) + "\n")
 
 
 def _made(assignment: Assignment, signals: str, suite: str, rng: np.random.Generator) -> Case:

@@ -8,6 +8,7 @@ import json
 import pytest
 
 import focgen
+from focgen import scratch
 from focgen.errors import InputError
 from focgen.trials import make as making
 
@@ -67,3 +68,20 @@ def test_one_of_another_version_is_another(interrupted):
     (interrupted / "begun.json").write_text(json.dumps(told | {"focgen": "0.0.0"}))
     with pytest.raises(InputError, match="holds part of another trial"):
         make(interrupted)
+
+
+def test_two_that_are_made_at_once_do_not_mix(tmp_path, monkeypatch):
+    """The one that begins second is refused, although the first has written no case."""
+    write, seen = making.write_file, []
+
+    def meanwhile(path, text):
+        if not seen:
+            seen.append(path)
+            with pytest.raises(InputError, match="another process"):
+                make(tmp_path / "t", seed=12)
+        write(path, text)
+
+    monkeypatch.setattr(scratch, "PATIENCE", 0.1)
+    monkeypatch.setattr(making, "write_file", meanwhile)
+    made = make(tmp_path / "t")
+    assert json.loads((tmp_path / "t" / "trial.json").read_text())["commitments"] == made.commitments
