@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from focgen.cli.outcome import Outcome
 from focgen.cli.shown import add_report, check_report, drawn, write_with_report
 from focgen.control.controller import ARITHMETICS
-from focgen.control.files import controller_text
+from focgen.control.files import check_replaces_controller, controller_text
 from focgen.loop.design import design
 from focgen.output import check_apart
 from focgen.report.control import design_pictures
@@ -63,6 +63,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> Outcome:
     check_apart([args.out], [args.rig])
+    check_replaces_controller(args.out)
     check_report(args.report, [args.rig], args.out)
     specified = (args.settling, args.overshoot, args.arithmetic, args.length)
     result = design(args.rig, None, *specified, delay=args.delay, setpoints=args.setpoints)

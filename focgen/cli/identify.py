@@ -13,7 +13,7 @@ from focgen.output import check_apart
 from focgen.report.identification import identification_pictures
 from focgen.report.identification_summary import identification_payload, identification_text
 from focgen.report.pages.identification import identification_page
-from focgen.rig.files import rig_text
+from focgen.rig.files import check_replaces_rig, rig_text
 
 HELP = "fit K(p)/(T s^alpha + 1) to logs of a rig, and integer-order models beside it"
 EXAMPLE = """example:
@@ -86,6 +86,7 @@ def _options(args: Namespace) -> dict[str, Any]:
 def run(args: Namespace) -> Outcome:
     given = (*args.logs, args.rig, *args.unseen)
     check_apart([args.out], given)
+    check_replaces_rig(args.out)
     check_report(args.report, given, args.out)
     found = identify(
         args.rig,

@@ -73,7 +73,7 @@ from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.terms import read_transfer, terms_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
-from focgen.tomlfile import Table
+from focgen.tomlfile import Table, check_replaced
 
 ControllerLike = Controller | str | Path | Mapping[str, Any]
 """A controller, the path of its controller.toml, or a dictionary of the same shape."""
@@ -295,6 +295,11 @@ def source_table(source: Source) -> dict[str, Any]:
 
 
 @checked
+def check_replaces_controller(path: str | Path) -> None:
+    """Raise InputError where a controller would take the place of something else."""
+    check_replaced(path, "controller", ("sample_time", "transfer"))
+
+
 def write_controller(controller: Controller, path: str | Path) -> None:
     """Write a controller so that :func:`read_controller` gives an equal one.
 

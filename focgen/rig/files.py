@@ -28,7 +28,7 @@ from focgen.rig.rig import (
     Signals,
     Uncertainty,
 )
-from focgen.tomlfile import MOST_ORDER, Table
+from focgen.tomlfile import MOST_ORDER, Table, check_replaced
 
 _STAGES = ("regulator", "actuator", "sensor")
 _ROLES = ("time", "output", "command", "pressure", "curvature", "reference")
@@ -249,6 +249,15 @@ def _effects(top: Table) -> tuple[Mapping[str, Any], ...]:
 
 
 @checked
+def check_replaces_rig(path: str | Path, proposed: bool = False) -> None:
+    """Raise InputError where a rig would take the place of something else; ``proposed``: of a rig that has a
+    model, which a proposal has not."""
+    models = ("regulator", "actuator", "sensor", "effects") if proposed else ()
+    check_replaced(
+        path, "rig without a model" if proposed else "rig", ("sample_time", "signals"), ("transfer", *models)
+    )
+
+
 def write_rig(rig: Rig, path: str | Path) -> None:
     """Write a rig so that :func:`read_rig` gives an equal one.
 
