@@ -294,12 +294,12 @@ def source_table(source: Source) -> dict[str, Any]:
     return {"file": source.file, "sha256": source.sha256, **({"options": given} if given else {})}
 
 
-@checked
 def check_replaces_controller(path: str | Path) -> None:
     """Raise InputError where a controller would take the place of something else."""
     check_replaced(path, "controller", ("sample_time", "transfer"))
 
 
+@checked
 def write_controller(controller: Controller, path: str | Path) -> None:
     """Write a controller so that :func:`read_controller` gives an equal one.
 

@@ -248,7 +248,6 @@ def _effects(top: Table) -> tuple[Mapping[str, Any], ...]:
     return tuple(effects)
 
 
-@checked
 def check_replaces_rig(path: str | Path, proposed: bool = False) -> None:
     """Raise InputError where a rig would take the place of something else; ``proposed``: of a rig that has a
     model, which a proposal has not."""
@@ -258,6 +257,7 @@ def check_replaces_rig(path: str | Path, proposed: bool = False) -> None:
     )
 
 
+@checked
 def write_rig(rig: Rig, path: str | Path) -> None:
     """Write a rig so that :func:`read_rig` gives an equal one.
 

@@ -10,10 +10,11 @@ import pytest
 
 from focgen.cli import shown
 from focgen.cli.main import main
+from focgen.control.files import write_controller
 from focgen.errors import InputError
 from focgen.output import check_writable
 from focgen.rig.files import write_rig
-from tests.conftest import paper_rig
+from tests.conftest import paper_controller, paper_rig
 
 
 @pytest.fixture
@@ -62,13 +63,15 @@ def test_a_report_that_cannot_be_written_is_told_before_anything_is(place, comma
     (place / "file").write_text("mine")
     (place / "folder.html").mkdir()
     os.mkfifo(place / "pipe.html")
-    (place / "earlier").write_text("mine")
-    before = sorted(place.iterdir())
+    write_controller(paper_controller(), "earlier") if command == "design" else write_rig(
+        paper_rig(), "earlier"
+    )
+    before, mine = sorted(place.iterdir()), (place / "earlier").read_text()
     asked = {**COMMANDS, **FOLDERS}[command]
     assert main([*asked, "--out", "earlier", "--report", report]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and report.partition("/")[0] in said
-    assert sorted(place.iterdir()) == before and (place / "earlier").read_text() == "mine"
+    assert sorted(place.iterdir()) == before and (place / "earlier").read_text() == mine
 
 
 @pytest.mark.parametrize("path", ["/proc/x.html", "/proc/none/x.html"])
