@@ -22,7 +22,7 @@ $(VENV)/ready-test: $(VENV)/ready
 	@touch $@
 
 demo: $(VENV)/ready            ## the whole chain on the example logs, into build/demo/
-	$(RUN) -m focgen demo --out build/demo
+	$(RUN) -m focgen demo --out build/demo --force
 
 # Several processes share the cores: one that spreads its sums over all of them waits for the others.
 test test-long: export OMP_NUM_THREADS = 1

@@ -13,8 +13,10 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
+from focgen.custody import sha256_of
 from focgen.progress import say
-from focgen.scratch import new_temporary, remove_temporary, scratch_folder
+from focgen.scratch import new_temporary, remove_temporary, scratch_folder, synced
+from focgen.textfile import holds
 
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
@@ -32,25 +34,44 @@ def cache_folder() -> Path:
 
 
 def kept(name: str, build: Callable[[Path], None]) -> Path:
-    """The file ``name`` of the cache; ``build(path)`` writes it where it is absent or could be another's.
+    """The file ``name`` of the cache; ``build(path)`` writes it where it is absent, could be another's, or is
+    not as it was built: what a full disk or a fall of power has cut would end the process that loads it.
 
     Raises what ``build`` raises; then nothing is left behind.
     """
     target = cache_folder() / name
-    if _is_own(target, stat.S_ISREG):
+    digest = target.with_name(f"{name}.sha256")
+    if _is_own(target, stat.S_ISREG) and _is_own(digest, stat.S_ISREG) and holds(digest, _digest(target)):
         return target
     with scratch_folder(target.parent) as scratch:
         part = scratch / name
         build(part)
         os.chmod(part, 0o700)
-        os.replace(part, target)
+        (scratch / digest.name).write_bytes(_digest(part))
+        os.chmod(scratch / digest.name, 0o600)
+        for made in (target, digest):
+            synced(scratch / made.name)
+            os.replace(scratch / made.name, made)
     return target
 
 
+def _digest(path: Path) -> bytes:
+    """As it stands beside a file, for ``sha256sum -c``."""
+    return f"{sha256_of(path)}  {path.name}\n".encode()
+
+
 def _wanted() -> Path:
-    """Where the user's caches are. A relative $XDG_CACHE_HOME is void, as its specification has it."""
+    """Where the user's caches are. A relative $XDG_CACHE_HOME is void, as its specification has it, and a
+    relative $HOME is none: whatever folder one stands in could hold what is loaded.
+
+    Raises RuntimeError where there is no home.
+    """
     base = Path(os.environ.get("XDG_CACHE_HOME") or "")
-    return (base if base.is_absolute() else Path.home() / ".cache") / "focgen"
+    if not base.is_absolute():
+        base = Path.home() / ".cache"
+    if not base.is_absolute():
+        raise RuntimeError("the home is relative")
+    return base / "focgen"
 
 
 @functools.cache

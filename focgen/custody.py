@@ -19,7 +19,7 @@ from focgen.textfile import LARGEST_SETTING, check_regular, read_regular
 from focgen.tomlfile import parsed
 
 TABLE = "identified_from"
-_MOST = 64  # files of one link that are followed
+_MOST = 1000  # files of one link that are followed
 _LARGEST = 4 << 30  # bytes of them all: a log as large takes more memory to read than there is for it
 _PART = 1 << 20  # bytes that are read at a time
 
@@ -71,34 +71,52 @@ def _beside(path: Path, base: Path) -> str:
 
 def followed(controller: Path, near: Path) -> Iterator[str]:
     """Yield what does not fit, from a controller.toml back to the logs, as far as the files are there; names
-    are looked up beside the folder ``near`` and in the one above."""
+    are looked up beside the folder ``near`` and in the two above, since ``generate`` has often put several
+    folders into one."""
     source = _table(controller).get("designed_from")
     if not isinstance(source, dict):
         return
-    rig = _found(source.get("file"), (near, near.parent))
-    if rig is None:
+    rigs = _found(source.get("file"), (near, *_above(near)))
+    if not rigs:
         return
-    if sha256_within(rig, LARGEST_SETTING) != source.get("sha256"):
-        yield f"{rig}: is not the rig that the controller was designed from"
+    wanted = source.get("sha256")
+    rig = next((path for path in rigs if sha256_within(path, LARGEST_SETTING) == wanted), None)
+    if rig is None:
+        yield f"{rigs[0]}: is not the rig that the controller was designed from"
         return
     made = _table(rig).get(TABLE)
     files = made.get("files") if isinstance(made, dict) else None
+    yield from _inputs(rig, files if isinstance(files, list) else [])
+
+
+def _above(folder: Path) -> tuple[Path, ...]:
+    """The two folders above one, of whatever name: ``.`` has some, too."""
+    return tuple(
+        (folder if folder.is_absolute() and ".." not in folder.parts else folder.resolve()).parents[:2]
+    )
+
+
+def _inputs(rig: Path, files: list[Any]) -> Iterator[str]:
+    """Yield which of the files that a rig was identified from are others, or were not looked at."""
     left = _LARGEST
-    for entry in files[:_MOST] if isinstance(files, list) else ():
-        path = _found(entry.get("file"), (rig.parent,)) if isinstance(entry, dict) else None
-        if path is None:
-            continue
-        if sha256_within(path, left) != entry.get("sha256"):
-            yield f"{path}: is not what {rig.name} was identified from"
-        left = max(0, left - path.stat().st_size)
+    for entry in files[:_MOST]:
+        for path in _found(entry.get("file"), (rig.parent,)) if isinstance(entry, dict) else ():
+            size = path.stat().st_size
+            if size > left:
+                yield f"{path}: was not looked at, since it and those ahead of it are too large"
+            elif sha256_within(path, size) != entry.get("sha256"):
+                yield f"{path}: is not what {rig.name} was identified from"
+            left -= min(left, size)
+    if len(files) > _MOST:
+        yield f"{rig}: names {len(files)} files, of which only the first {_MOST} were looked at"
 
 
-def _found(name: Any, places: Iterable[Path]) -> Path | None:
-    """The first regular file of a relative name."""
+def _found(name: Any, places: Iterable[Path]) -> list[Path]:
+    """The regular files of a relative name that may be read."""
     if not isinstance(name, str) or "\0" in name or os.path.isabs(name):
-        return None
+        return []
     found = (place / name for place in places)
-    return next((path for path in found if path.is_file() and os.access(path, os.R_OK)), None)
+    return [path for path in found if path.is_file() and os.access(path, os.R_OK)]
 
 
 def _table(path: Path) -> dict[str, Any]:

@@ -4,19 +4,25 @@ report.
 
 from __future__ import annotations
 
+import json
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import focgen
 from focgen.arguments import checked
 from focgen.codegen.generate import Generated, generate
 from focgen.control.controller import ARITHMETICS
+from focgen.custody import sha256_of, sha256_within
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.drawn import FILE as SIGNALS
 from focgen.diagnosis.drawn import read_drawn
 from focgen.diagnosis.model import Diagnosis
+from focgen.errors import InputError
 from focgen.identification.identification import Identification
 from focgen.identification.identify import identify
+from focgen.jsontext import ANY, fits, read_json
 from focgen.loop.design import Design, design
 from focgen.loop.simulate import Simulation, simulate
 from focgen.output import new_folder
@@ -27,10 +33,16 @@ from focgen.report.identification import identification_pictures
 from focgen.resources import shipped
 from focgen.studies.results import Study
 from focgen.studies.study import study
+from focgen.textfile import LARGEST_JSON
 from focgen.trials.make import make
 from focgen.trials.sealing import unseal
 from focgen.verification.verify import Verification, verify
 
+_GIVEN = ("rig.toml", "logs/steps.csv", "logs/sines.csv")
+_RECORD = "demo.json"
+"""What the demo has written, by name and SHA-256: so the next one replaces nothing else."""
+_MADE = (_RECORD, "identified.toml", "controller.toml", "report.html")
+_NAMED = 3
 _LOADED = 40.0  # s: the steps up to their release, as in the paper
 _LENGTHS, _TOLERANCES = (50, 200, 1000), (0.1, 0.03, 1e-3, 1e-5)
 _SEED = 5  # of the sealed case
@@ -66,15 +78,19 @@ class Demo:
 
 
 @checked
-def demo(out: str | Path) -> Demo:
+def demo(out: str | Path, force: bool = False) -> Demo:
     """Identify, design, simulate, generate in four arithmetics, verify, and diagnose, into the folder
-    ``out``.
+    ``out``; ``force`` replaces files also where no earlier demo has written them as they are.
 
-    Raises InputError where ``out`` cannot be written, MissingExtra where matplotlib is not installed.
+    Raises InputError where ``out`` cannot be written, or where a file would be lost there that somebody has
+    put or edited. MissingExtra: matplotlib is not installed.
     """
-    examples = shipped("examples")
-    with new_folder(out, examples.rglob("*")) as scratch:
-        for name in ("rig.toml", "logs/steps.csv", "logs/sines.csv"):
+    examples, target = shipped("examples"), Path(out)
+    if not force:  # before anything takes time
+        given = {name: sha256_of(examples / name) for name in _GIVEN}
+        _check_unedited(target, {**dict.fromkeys((*_MADE, *_recorded(target)), None), **given})
+    with new_folder(out, examples.rglob("*"), lambda: () if force else _going(scratch, target)) as scratch:
+        for name in _GIVEN:
             (scratch / name).parent.mkdir(exist_ok=True)
             shutil.copyfile(examples / name, scratch / name)
         made = _chain(scratch)
@@ -93,7 +109,46 @@ def demo(out: str | Path) -> Demo:
             read_drawn(scratch / "diagnosis/found" / SIGNALS),
         )
         (scratch / "report.html").write_text(page.best(), encoding="utf-8")
+        record = {"focgen": focgen.__version__, "files": _digests(scratch)}
+        (scratch / _RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     return replace(made, folder=Path(out), report=Path(out) / "report.html")
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    """Name → SHA-256 of all files of a folder."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): sha256_of(path) for path in files}
+
+
+def _recorded(folder: Path) -> dict[str, str]:
+    """The same of what an earlier demo has written there; nothing where there was none."""
+    try:
+        found = read_json(folder / _RECORD, "")
+    except InputError:
+        return {}
+    return dict(found["files"]) if fits(found, {"focgen": str, "files": {ANY: str}}) else {}
+
+
+def _going(made: Path, target: Path) -> tuple[Path, ...]:
+    """Nothing goes; asked as the files are about to take their places, it looks at them once more."""
+    _check_unedited(target, _digests(made))
+    return ()
+
+
+def _check_unedited(folder: Path, new: Mapping[str, str | None]) -> None:
+    """Raise InputError, naming them, where files of these names and new digests would take the place of what
+    no demo has written. A record that is none is somebody's as well."""
+    recorded = _recorded(folder)
+    places = [(name, folder / name) for name in new if name != _RECORD or not recorded]
+    lost = [
+        name
+        for name, place in places
+        if place.is_file() and sha256_within(place, LARGEST_JSON) not in (recorded.get(name), new[name])
+    ]
+    if lost:
+        more = f" and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
+        what = f"{', '.join(lost[:_NAMED])}{more} would be replaced, and no demo has written that"
+        raise InputError(str(folder), what, "choose another --out, or give --force to lose what stands there")
 
 
 def _chain(folder: Path) -> Demo:

@@ -6,8 +6,10 @@ says what stood at each place when the moving began. The renaming that gives it 
 which the new result counts. A place where something else stands by now, somebody's work of meanwhile, is left
 alone.
 
-A plan counts only in the folder that it was written in, by its number on the disk, and where that is the
-user's alone: a folder that came out of an archive moves nothing.
+A plan counts only in the folder that it was written in, and where that is the user's alone: a folder that
+came out of an archive moves nothing. The folder is known by its number on the disk. After a restart the disk
+may have another one; then a file in it is known by its own number and by when it was made, which no archive
+can set: to the nanosecond, or to the second where the disk keeps no more.
 
 Where a place cannot be written to, the files that have been moved by then go back: what stood there is kept
 in ``before`` until all have their places, and the plan is exchanged for the way back.
@@ -35,8 +37,11 @@ _PLAN, _BACK = "plan.json", "back.json"
 _LAST = "manifest.json"  # what tells of the others
 _WHOLE = re.compile(r"\.focgen-[0-9a-f]{16}\.whole")
 _DIGEST = (re.compile(r"[0-9a-f]{64}"), None)
+_MARK = "mark"  # what a folder is known by
+_SECOND = 1_000_000_000  # ns
 _SHAPE = {
     "folder": [int],
+    "mark?": [int],
     "source?": re.compile(f"{FILES}|{_BEFORE}"),
     "files": dict,
     "old": dict,
@@ -101,7 +106,8 @@ def _new_folders(folder: Path) -> list[Path]:
 
 def _way_back(scratch: Path, target: Path, plan: dict[str, Any]) -> dict[str, Any]:
     """The plan that undoes ``plan``; what stands in the places is kept for it."""
-    stood = {name: digest for name, digest in {**plan["files"], **plan["old"]}.items() if digest is not None}
+    there = {**plan["files"], **plan["old"]}
+    stood = [name for name in there if there[name] is not None or (target / name).is_symlink()]
     for name in stood:
         kept = scratch / _BEFORE / name
         kept.parent.mkdir(parents=True, exist_ok=True)
@@ -113,7 +119,11 @@ def _way_back(scratch: Path, target: Path, plan: dict[str, Any]) -> dict[str, An
 
 
 def _kept(path: Path, place: Path) -> None:
-    """One more name of a file, or a copy where the file system has one name a file."""
+    """One more name of a file, or a copy where the file system has one name a file; of a link the same link,
+    which leads nowhere from here."""
+    if path.is_symlink():
+        place.symlink_to(os.readlink(path))
+        return
     try:
         os.link(path, place)
     except OSError:
@@ -147,11 +157,27 @@ def _committed(scratch: Path, plan: dict[str, Any]) -> Path:
 
 
 def _write_plan(folder: Path, plan: dict[str, Any], name: str = _PLAN) -> None:
-    number = os.stat(folder)
-    text = json.dumps({"folder": [number.st_dev, number.st_ino], **plan})
+    if not (folder / _MARK).exists():  # touched again, it would be another
+        (folder / _MARK).touch()
+    text = json.dumps({"folder": _number(folder), "mark": _made(folder), **plan})
     (folder / name).write_text(text, encoding="utf-8")
     synced(folder / name)
     synced(folder)
+
+
+def _number(folder: Path) -> list[int]:
+    """Which folder it is, for as long as the disk is not mounted anew."""
+    found = os.stat(folder)
+    return [found.st_dev, found.st_ino]
+
+
+def _made(folder: Path) -> list[int]:
+    """Which folder it is by its mark: number, and when it was made (ns); nothing where it has none."""
+    try:
+        found = os.lstat(folder / _MARK)
+    except OSError:
+        return []
+    return [found.st_ino, found.st_ctime_ns]
 
 
 def _left(folder: Path) -> Iterator[Path]:
@@ -196,9 +222,19 @@ def _inside(name: str) -> bool:
 
 def _counting(whole: Path) -> dict[str, Any] | None:
     """A plan that was written here, by this user; None of any other."""
-    plan, found = _plan(whole), os.stat(whole)
-    here = plan is not None and plan["folder"] == [found.st_dev, found.st_ino] and own(whole)
+    plan = _plan(whole)
+    if plan is None or not own(whole):
+        return None
+    here = plan["folder"] == _number(whole) or _same(plan.get("mark", []), _made(whole))
     return plan if here else None
+
+
+def _same(mark: list[int], found: list[int]) -> bool:
+    """Whether a mark is the one that was made, for all that the disk has kept of it."""
+    if len(mark) != 2 or len(found) != 2:
+        return False
+    (number, when), (found_number, kept) = mark, found
+    return number == found_number and kept in (when, when - when % _SECOND)
 
 
 def _carry_out(whole: Path, plan: dict[str, Any], target: Path) -> None:
@@ -217,13 +253,15 @@ def _carry_out(whole: Path, plan: dict[str, Any], target: Path) -> None:
 
 def _move(source: Path, place: Path, stood: str | None, target: Path) -> None:
     """To its place, unless it has been moved or something else stands there by now."""
-    if not source.is_file() or not _within(place, target):
+    link = source.is_symlink()  # one that stood here and goes back
+    if not (link or source.is_file()) or not _within(place, target):
         return
     found, ours = _digest(place), _digest(source)
     if found not in (stood, ours):
         return
     place.parent.mkdir(parents=True, exist_ok=True)
-    as_before(source, place)
+    if not link:
+        as_before(source, place)
     try:
         os.replace(source, place)
     except OSError:

@@ -20,6 +20,18 @@ Old = Callable[[], Iterable[Path]]
 """What goes from a folder as a result takes its place there."""
 
 
+def former(folder: str | Path, told: str, names: Iterable[str], files: Iterable[str]) -> Old:
+    """What goes of an earlier result of the same kind, which the file ``told`` tells of: those of its
+    ``names`` that are not among the new ``files``. They would look like parts of the new one."""
+    place, new = Path(folder), set(files)
+
+    def old() -> Iterator[Path]:
+        if (place / told).is_file():
+            yield from (place / name for name in names if name not in new and (place / name).is_file())
+
+    return old
+
+
 def check_apart(outputs: Iterable[str | Path], inputs: Iterable[Any]) -> None:
     """Raise InputError where an output is the same file as one of the inputs, whatever name or link leads
     there.
@@ -101,6 +113,7 @@ def _move(scratch: Path, target: Path, inputs: tuple[Any, ...], old: Old) -> Non
         with journal.alone(target):
             _check_places(made, target, files, inputs)
             going = tuple(old())
+            _check_within(target, [*(target / name for name in files), *going])
             for path in (*(target / name for name in files), *going):
                 _check_size(path)
             journal.put(scratch, target, files, going)
@@ -121,12 +134,39 @@ def _check_places(made: Path, target: Path, files: list[Path], inputs: tuple[Any
                 raise InputError(str(target / parent), "is a file where a folder belongs", "move it away")
 
 
+def _check_within(target: Path, places: Iterable[Path]) -> None:
+    """Raise InputError where a link among a folder's own subfolders leads out of it: no file is written or
+    removed elsewhere, and none is left out without a word."""
+    for parent in dict.fromkeys(path.parent for path in places):
+        if not parent.resolve().is_relative_to(target.resolve()):
+            what = f"leads out of {target}, where its files would be missing"
+            raise InputError(
+                str(parent), what, "put a folder in the place of the link, or choose another --out"
+            )
+
+
 def _check_size(path: Path) -> None:
     """Raise InputError where what stands at a place is larger than any result: it would be read for hours,
     to know it again after a kill."""
     if path.is_file() and path.stat().st_size > LARGEST_JSON:
         what = f"has more than {LARGEST_JSON >> 20} MiB, which no result has"
         raise InputError(str(path), what, "move it away")
+
+
+def check_writable(path: Path, folder: bool = False) -> None:
+    """Raise InputError, before work begins, where a file, or files of a ``folder``, could not be written."""
+    place = path if folder else path.parent
+    nearest = next(one for one in (place, *place.absolute().parents) if one.exists())
+    if not folder:
+        _check_no_device(path)
+    if not nearest.is_dir() or (path.is_dir() and not folder):
+        what = "is a folder where a file belongs" if nearest.is_dir() else "is a file where a folder belongs"
+        raise InputError(str(path if nearest.is_dir() else nearest), what, "name another place")
+    try:
+        with scratch_file(nearest):
+            pass
+    except OSError as reason:
+        raise InputError(str(path), f"cannot be written ({reason.strerror})", "name another place") from None
 
 
 def _check_no_device(path: Path) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping, Sized
+from collections.abc import Iterable, Mapping, Sized
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, overload
 
@@ -34,6 +35,21 @@ def parsed(text: str) -> dict[str, Any]:
     if _DEEP.search(text):
         raise RecursionError
     return tomllib.loads(text)
+
+
+def check_replaced(path: str | Path, what: str, has: Iterable[str], lacks: Iterable[str] = ()) -> None:
+    """Raise InputError, before work begins, where a result would take the place of a file that is no
+    ``what``: a table with all the keys that it ``has`` and none that it ``lacks``. An empty file is nobody's.
+    """
+    place, found = Path(path), {}
+    if not place.is_file() or not place.stat().st_size:
+        return
+    with suppress(OSError, ValueError, RecursionError, InputError):  # no TOML: none of ours
+        found = parsed(read_regular(place, LARGEST_SETTING).decode("utf-8"))
+    if not found.keys() >= set(has) or found.keys() & set(lacks):
+        raise InputError(
+            str(path), f"is no {what}, and would be replaced by one", "name another --out, or move it away"
+        )
 
 
 class Table:

@@ -12,7 +12,8 @@ from focgen.report.page import TableOf, text_table
 from focgen.targets.calls import CallCost
 from focgen.targets.cost import COUNTED, Cost, PerStep
 from focgen.targets.selection import entry_of
-from focgen.verification.costs import COMPILERS, ControllerCost, cost
+from focgen.verification.costs import ControllerCost, cost
+from focgen.verification.remembered import COMPILERS
 
 HELP = "what one step of generated C costs on microcontrollers: instructions, cycles, flash, RAM, stack"
 EXAMPLE = """example:

@@ -23,12 +23,15 @@ EXAMPLE = """example:
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="the folder to write")
+    parser.add_argument(
+        "--force", action="store_true", help="replace files also where no earlier demo has written them"
+    )
     add_report(parser)
 
 
 def run(args: Namespace) -> Outcome:
-    check_report(args.report, ())
-    made = demo(args.out)
+    check_report(args.report, (), args.out if is_page(args.report) else None)
+    made = demo(args.out, args.force)
     folder = made.folder / "pictures"
     if is_page(args.report):
         told = write_report(args.report, made.report.read_text(encoding="utf-8"), ())

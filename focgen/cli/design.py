@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
 from focgen.cli.outcome import Outcome
-from focgen.cli.shown import add_report, check_report, drawn, write_report
+from focgen.cli.shown import add_report, check_report, drawn, write_with_report
 from focgen.control.controller import ARITHMETICS
-from focgen.control.files import controller_text
+from focgen.control.files import check_replaces_controller, controller_text
 from focgen.loop.design import design
-from focgen.output import check_apart, write_file
+from focgen.output import check_apart
 from focgen.report.control import design_pictures
 from focgen.report.control_summary import design_payload, design_text
 from focgen.report.pages.control import design_page
@@ -64,16 +63,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> Outcome:
     check_apart([args.out], [args.rig])
-    check_report(args.report, [args.rig])
+    check_replaces_controller(args.out)
+    check_report(args.report, [args.rig], args.out)
     specified = (args.settling, args.overshoot, args.arithmetic, args.length)
     result = design(args.rig, None, *specified, delay=args.delay, setpoints=args.setpoints)
     rig = read_rig(args.rig)
     shown = drawn(args.report, lambda: design_page(result, rig), lambda: design_pictures(result, rig))
-    if isinstance(shown, dict):
-        check_apart((Path(args.report) / name for name in shown), [args.rig])
-    write_file(args.out, controller_text(result.controller), [args.rig])
-    text = f"{design_text(result)}\n\nwrote {args.out}\n"
-    text += write_report(args.report, shown, [args.rig])
+    told = write_with_report(args.out, controller_text(result.controller), args.report, shown, [args.rig])
+    text = f"{design_text(result)}\n\nwrote {args.out}\n{told}"
     text += f"next: focgen simulate {args.rig} {args.out}\n"
     text += f"      focgen generate {args.out} --out DIR --arithmetic {args.arithmetic}"
     return Outcome(design_payload(result) | {"controller": args.out}, text, result.holds)

@@ -6,9 +6,10 @@ import argparse
 from pathlib import Path
 
 from focgen.cli.outcome import Outcome
-from focgen.cli.shown import add_report, check_report, drawn, write_report
+from focgen.cli.shown import add_report, check_report, drawn, is_page, write_report
 from focgen.control.units import units_of_rig
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.write import PICTURES
 from focgen.errors import FocgenError
 from focgen.progress import led_by
 from focgen.report.diagnosis_summary import diagnosis_text
@@ -68,7 +69,7 @@ def run(args: argparse.Namespace) -> Outcome:
     if args.out is None:
         raise FocgenError("diagnose", "--out is missing", "name the folder for the diagnosis")
     given = [path for path in (args.rig, *args.logs, args.controller) if path]
-    check_report(args.report, given)
+    check_report(args.report, given, args.out if is_page(args.report) else None)
     with led_by("diagnose: the signals from "):
         found = diagnose(
             args.rig, args.logs, args.out, args.controller, args.first, args.last, args.bootstrap
@@ -81,4 +82,4 @@ def run(args: argparse.Namespace) -> Outcome:
 
 def _pictures(folder: Path) -> dict[str, bytes]:
     """Those that the diagnosis has written."""
-    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.png"))}
+    return {name: (folder / name).read_bytes() for name in PICTURES if (folder / name).is_file()}

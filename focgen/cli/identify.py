@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from typing import Any
 
 from focgen.cli.outcome import Outcome
-from focgen.cli.shown import add_report, check_report, drawn, write_report
+from focgen.cli.shown import add_report, check_report, drawn, write_with_report
 from focgen.custody import identified_from
 from focgen.identification.identify import identify
-from focgen.output import check_apart, new_folder, write_file
+from focgen.output import check_apart
 from focgen.report.identification import identification_pictures
 from focgen.report.identification_summary import identification_payload, identification_text
 from focgen.report.pages.identification import identification_page
-from focgen.rig.files import rig_text
+from focgen.rig.files import check_replaces_rig, rig_text
 
 HELP = "fit K(p)/(T s^alpha + 1) to logs of a rig, and integer-order models beside it"
 EXAMPLE = """example:
@@ -87,7 +86,8 @@ def _options(args: Namespace) -> dict[str, Any]:
 def run(args: Namespace) -> Outcome:
     given = (*args.logs, args.rig, *args.unseen)
     check_apart([args.out], given)
-    check_report(args.report, given)
+    check_replaces_rig(args.out)
+    check_report(args.report, given, args.out)
     found = identify(
         args.rig,
         args.logs,
@@ -103,15 +103,6 @@ def run(args: Namespace) -> Outcome:
     written = rig_text(found.rig) + identified_from(given, args.out, _options(args))
     text = f"{identification_text(found)}\n\nwrote {args.out}\n"
     shown = drawn(args.report, lambda: identification_page(found), lambda: identification_pictures(found))
-    if isinstance(shown, dict):
-        check_apart((Path(args.report) / name for name in shown), given)
-        with new_folder(args.report, given) as folder:  # pictures and rig, or neither
-            for name, picture in shown.items():
-                (folder / name).write_bytes(picture)
-            write_file(args.out, written, given)
-        text += f"pictures in {args.report}\n"
-    else:
-        text += write_report(args.report, shown, given)  # ahead of the rig: a page may be without it
-        write_file(args.out, written, given)
+    text += write_with_report(args.out, written, args.report, shown, given)
     text += _next(found.rig.actuator is not None, args)
     return Outcome(identification_payload(found) | {"new_rig": args.out}, text)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from focgen.output import check_apart, write_file, write_files
+from focgen.errors import InputError
+from focgen.output import check_apart, check_writable, new_folder, write_file, write_files
 from focgen.report.interactive import library
 from focgen.report.page import Page
 
@@ -23,12 +24,17 @@ def is_page(path: str | None) -> bool:
     return path is not None and Path(path).suffix.lower() in (".html", ".htm")
 
 
-def check_report(path: str | None, inputs: Iterable[Any]) -> None:
+def check_report(path: str | None, inputs: Iterable[Any], out: str | None = None) -> None:
     """Raise before work begins that cannot be shown: MissingExtra without the library that draws on pages,
-    InputError where the page would replace an input."""
-    if path is not None and is_page(path):
+    InputError where the page would replace an input or ``out``, or cannot be written."""
+    if path is None:
+        return
+    if out is not None and Path(path).resolve() == Path(out).resolve():
+        raise InputError(path, "is --out as well, and one would be lost", "give --report another name")
+    if is_page(path):
         library()
         check_apart([path], inputs)
+    check_writable(Path(path), folder=not is_page(path))
 
 
 def drawn(
@@ -48,4 +54,25 @@ def write_report(path: str | None, what: str | Mapping[str, bytes] | None, input
         write_file(path, what, inputs)
         return f"page in {path}\n"
     write_files(path, what, inputs)
+    return f"pictures in {path}\n"
+
+
+def write_with_report(
+    out: str, text: str, path: str | None, what: str | Mapping[str, bytes] | None, inputs: Sequence[Any]
+) -> str:
+    """Write the file ``out`` and what :func:`drawn` gave, both or neither but for a page, which may be
+    without it; say where the latter is. Raises InputError where one would be lost to the other, or to an
+    input."""
+    check_writable(Path(out))
+    if path is None or isinstance(what, str) or not what:
+        told = write_report(path, what, inputs)
+        write_file(out, text, inputs)
+        return told
+    check_apart((Path(path) / name for name in what), inputs)
+    if Path(out).resolve() in {(Path(path) / name).resolve() for name in what}:
+        raise InputError(out, "is a picture's name as well, and one would be lost", "give it another name")
+    with new_folder(path, inputs) as folder:
+        for name, picture in what.items():
+            (folder / name).write_bytes(picture)
+        write_file(out, text, inputs)
     return f"pictures in {path}\n"

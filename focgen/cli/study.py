@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from focgen.cli.outcome import Outcome
-from focgen.cli.shown import add_report, check_report, drawn, write_report
+from focgen.cli.shown import add_report, check_report, drawn, is_page, write_report
 from focgen.control.controller import ARITHMETICS, MEMORIES
 from focgen.report.pages.study import study_page
 from focgen.report.study import study_pictures
@@ -86,7 +86,7 @@ def _add_variants(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Outcome:
     """Study, and say what came out."""
     given = [path for path in (args.controller, args.rig) if path]
-    check_report(args.report, given)
+    check_report(args.report, given, args.out if is_page(args.report) else None)
     found = study(
         args.subject,
         args.controller,

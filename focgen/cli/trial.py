@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from focgen.cli.outcome import Outcome
-from focgen.cli.shown import add_report, check_report, drawn, write_report
-from focgen.output import write_files
+from focgen.cli.shown import add_report, check_report, drawn, is_page, write_report
+from focgen.output import former, write_files
 from focgen.report.pages.trials import trials_page
 from focgen.report.trials import pictures
 from focgen.trials.patterns import SUITES
@@ -16,6 +17,7 @@ from focgen.trials.plan import KINDS
 from focgen.trials.tables import full_text, markdown
 from focgen.trials.trial import ACTIONS, trial
 
+_DRAWN = re.compile(r"reliability\.png|confusion_[ABC]_[a-z]+\.png")
 HELP = "sealed cases: make them, diagnose them blind, unseal and score"
 
 EXAMPLE = """examples:
@@ -99,7 +101,7 @@ def _run(args: argparse.Namespace) -> Outcome:
 
 
 def _score(args: argparse.Namespace) -> Outcome:
-    check_report(args.report, ())
+    check_report(args.report, (), args.out if is_page(args.report) else None)
     summary = trial(
         "score",
         *args.folder,
@@ -112,7 +114,8 @@ def _score(args: argparse.Namespace) -> Outcome:
     text = full_text(summary.sets)
     if args.out:
         files: dict[str, str | bytes] = {"scores.md": markdown(summary.sets), **pictures(summary.sets)}
-        write_files(args.out, files, _inputs(args.folder))
+        drawn_before = [path.name for path in Path(args.out).glob("*.png") if _DRAWN.fullmatch(path.name)]
+        write_files(args.out, files, _inputs(args.folder), former(args.out, "scores.md", drawn_before, files))
         text += f"\ntable and pictures in {args.out}"
     shown = drawn(args.report, lambda: trials_page(summary.sets), lambda: pictures(summary.sets))
     text += "\n" + write_report(args.report, shown, _inputs(args.folder))

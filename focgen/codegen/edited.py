@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from focgen.codegen.manifest import read_manifest, sha256
+from focgen.codegen.manifest import is_generated, read_manifest, sha256
 from focgen.codegen.neighbours import MANIFEST
+from focgen.codegen.packages.archive import DIGEST, is_digest, is_recorded
 from focgen.custody import sha256_within
 from focgen.errors import InputError
 from focgen.textfile import LARGEST_CODE
@@ -19,7 +20,7 @@ def check_unedited(folder: Path, files: Mapping[str, str | bytes], old: Iterable
     """Raise InputError, naming them, where new ``files`` or the removal of ``old`` ones would lose work.
 
     Lost would be a file whose bytes are neither those that the folder's manifest recorded when it was written
-    nor those that take its place. The manifest itself is always ``generate``'s own.
+    nor those that take its place. A manifest is ``generate``'s own where it says so.
     """
     written = _written(folder)
     bytes_of = {name: text.encode("utf-8") if isinstance(text, str) else text for name, text in files.items()}
@@ -38,10 +39,20 @@ def _not_as(count: int) -> str:
 
 
 def _lost(path: Path, new: bytes | None, written: Any) -> bool:
-    if path.name.endswith(MANIFEST) or ".fmu" in path.suffixes or not path.is_file():
-        return False  # an archive is built by a compiler, which promises no bytes
+    if not path.is_file() or _own(path):
+        return False
     found = sha256_within(path, LARGEST_CODE)
     return found is None or found not in (written, None if new is None else sha256(new))
+
+
+def _own(path: Path) -> bool:
+    """Whether a file that no manifest records is ``generate``'s all the same: a manifest, by what made it; an
+    archive, which a compiler builds, by the digest beside it; such a digest, by its form."""
+    if path.name.endswith(MANIFEST):
+        return is_generated(read_manifest(path.parent, path.name))
+    if path.suffix == ".fmu":
+        return is_recorded(path)
+    return path.name.endswith(f".fmu{DIGEST}") and is_digest(path)
 
 
 def _written(folder: Path) -> dict[str, Any]:

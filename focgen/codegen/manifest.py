@@ -43,6 +43,14 @@ def read_manifest(folder: Path, file: str = "manifest.json") -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
+def is_generated(manifest: dict[str, Any]) -> bool:
+    """Whether it says that focgen made it, of whatever version: many tools have a manifest.json."""
+    made_by = manifest.get("generator")
+    return (
+        isinstance(made_by, str) and made_by.startswith("focgen ") and isinstance(manifest.get("files"), dict)
+    )
+
+
 def sha256(data: str | bytes) -> str:
     """SHA-256 of text (UTF-8) or bytes, as hexadecimal text."""
     return hashlib.sha256(data.encode("utf-8") if isinstance(data, str) else data).hexdigest()

@@ -73,7 +73,7 @@ from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.terms import read_transfer, terms_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
-from focgen.tomlfile import Table
+from focgen.tomlfile import Table, check_replaced
 
 ControllerLike = Controller | str | Path | Mapping[str, Any]
 """A controller, the path of its controller.toml, or a dictionary of the same shape."""
@@ -292,6 +292,11 @@ def source_table(source: Source) -> dict[str, Any]:
     """As the file has it; without options where none are known."""
     given = {name: list(value) if isinstance(value, tuple) else value for name, value in source.options}
     return {"file": source.file, "sha256": source.sha256, **({"options": given} if given else {})}
+
+
+def check_replaces_controller(path: str | Path) -> None:
+    """Raise InputError where a controller would take the place of something else."""
+    check_replaced(path, "controller", ("sample_time", "transfer"))
 
 
 @checked

@@ -14,9 +14,12 @@ from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.proposals.menu import Choice
 from focgen.diagnosis.proposals.next_experiment import NEXT
 from focgen.jsontext import to_json
-from focgen.output import write_files
+from focgen.output import former, write_files
 from focgen.rig.files import rig_table
 from focgen.shown import files_of
+
+PICTURES = ("ladder.png", "residual.png", "loops.png", "waterfall.png", "candidates.png")
+"""All that may be drawn of a diagnosis."""
 
 
 def write(
@@ -40,7 +43,8 @@ def write(
     }
     if proposed is not None:
         files[NEXT] = _next(proposed)
-    write_files(out, files | (files_of(diagnosis) if pictures else {}), inputs)
+    files |= files_of(diagnosis) if pictures else {}
+    write_files(out, files, inputs, former(out, "diagnosis.json", (NEXT, *PICTURES), files))
 
 
 def _next(choice: Choice) -> str:

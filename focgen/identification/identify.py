@@ -33,7 +33,7 @@ from focgen.logs.read import Logs, digest_of, each_of, read_logs
 from focgen.output import check_apart, write_file
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.engine import STAGES
-from focgen.rig.files import rig_text
+from focgen.rig.files import check_replaces_rig, rig_text
 from focgen.rig.plausibility import doubts
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Actuator, Rig
@@ -79,6 +79,7 @@ def identify(
     inputs = (*given, rig, *shown)
     if out is not None:
         check_apart([out], inputs)
+        check_replaces_rig(out)
     check_degree(gain_degree)
     if not stages:
         raise FitError("--stages", "names no stage", f"give one or more of {', '.join(STAGES)}")

@@ -13,7 +13,7 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.control.controller import ARITHMETICS, Controller, Source
 from focgen.control.equilibrium import Equilibrium
-from focgen.control.files import controller_text
+from focgen.control.files import check_replaces_controller, controller_text
 from focgen.control.inversion import Inversion
 from focgen.control.measures import StepMeasures
 from focgen.control.schedule import TOLERANCE, Table, gain_table
@@ -138,7 +138,7 @@ def design(
 
     Raises DesignError where the rig cannot be inverted or the specification is not feasible (naming what is),
     and PlanError where the controller does not fit the arithmetic. RigError: the file cannot be used.
-    InputError: ``out`` is the rig's file.
+    InputError: ``out`` is the rig's file, or something else than a controller.
 
     A rig that carries effects is designed for without them; the margins then hold those that are linear, and
     the steps that the specification is judged by hold all of them.
@@ -146,6 +146,7 @@ def design(
     _check_wishes(settling, overshoot, arithmetic, length, delay, tolerance)
     if out is not None:
         check_apart([out], [rig])
+        check_replaces_controller(out)
     given: dict[str, Any] = {
         "settling": settling,
         "overshoot": overshoot,

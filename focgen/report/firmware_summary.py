@@ -20,6 +20,7 @@ def verification_payload(found: Verification) -> dict[str, Any]:
         "targets": {name: entry_of(result) for name, result in found.targets.items()},
         "differences": list(found.differences),
         "notes": list(found.notes),
+        "files": dict(found.files),
         "holds": found.holds,
     }
 

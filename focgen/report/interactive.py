@@ -6,7 +6,9 @@ for) is never asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from focgen.errors import MissingExtra
+from focgen.errors import InputError, MissingExtra
 from focgen.logs.thinning import thinned
 from focgen.report.figures import MOST, Area, Axis, Bars, Figure, Line, Mark, Panel, Rule
 from focgen.report.style import COLOURS
@@ -28,11 +30,33 @@ _SPARE = 0.06  # of the range, beyond what is drawn
 
 
 def _bokeh() -> ModuleType:
+    """The library, which looks at its settings as it is loaded. Raises MissingExtra where it is not
+    installed, InputError where the user's own settings stop it."""
     try:
-        import bokeh
+        with _unset():
+            import bokeh
+            import bokeh.document
+            import bokeh.layouts
+            import bokeh.plotting
     except ImportError:
         raise MissingExtra.of("bokeh", "report", "an HTML report") from None
+    except (ValueError, RuntimeError) as reason:
+        remedy = "correct or move away ~/.bokeh/bokeh.yaml"
+        raise InputError("bokeh", f"cannot be loaded ({reason})", remedy) from None
     return bokeh
+
+
+@contextmanager
+def _unset() -> Iterator[None]:
+    """Without Bokeh's own settings: a page is the same in every environment, and one that Bokeh does not
+    understand stops none."""
+    before = {name: value for name, value in os.environ.items() if name.startswith("BOKEH_")}
+    for name in before:
+        del os.environ[name]
+    try:
+        yield
+    finally:
+        os.environ.update(before)
 
 
 def library() -> str:
@@ -50,10 +74,11 @@ def document(figure: Figure, most: int = MOST, name: str = "figure") -> dict[str
     from bokeh.document import Document
     from bokeh.layouts import column
 
-    plots = _plots(figure, most)
-    made = Document()
-    made.add_root(column(*plots, sizing_mode="stretch_width", spacing=4))
-    found: dict[str, Any] = _numbered(made.to_json(deferred=False), name)
+    with _unset():
+        plots = _plots(figure, most)
+        made = Document()
+        made.add_root(column(*plots, sizing_mode="stretch_width", spacing=4))
+        found: dict[str, Any] = _numbered(made.to_json(deferred=False), name)
     return found
 
 

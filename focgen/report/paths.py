@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -12,6 +12,7 @@ from focgen.arguments import checked
 from focgen.codegen.generate import Generated
 from focgen.control.controller import Controller
 from focgen.control.files import read_controller
+from focgen.custody import sha256_of
 from focgen.diagnosis.drawn import FILE as SIGNALS
 from focgen.diagnosis.drawn import read_drawn
 from focgen.errors import InputError
@@ -35,6 +36,7 @@ from focgen.report.pages.control import simulation_sections
 from focgen.report.pages.diagnosis import diagnosis_page
 from focgen.report.pages.files import read_diagnosis
 from focgen.report.pages.study import study_page
+from focgen.report.verified import folder_of, read_verified
 from focgen.rig.files import read_rig
 from focgen.rig.proposal import Proposal
 from focgen.rig.replay import experiments, replay
@@ -58,16 +60,6 @@ _MANIFEST = {
     "error_bound": {"quantisation": {"operator": float}},
     "sizes": {"state_bytes": int, "table_bytes": int},
 }
-_ERROR = ({"operator": float}, None)
-_RAN = {"samples": int, "mismatches": int, "max_error": _ERROR, "error_bound": _ERROR}
-_VERIFIED = {
-    "name": str,
-    "arithmetic": str,
-    "targets": dict,
-    "differences": [str],
-    "notes": [str],
-    "holds": bool,
-}
 
 
 @dataclass
@@ -76,9 +68,10 @@ class _Chain:
 
     rig: Rig | None = None
     controller: Controller | None = None
+    source: Path | None = None  # of the controller, where it is a file
     logs: list[Path] = field(default_factory=list)
-    folders: list[Section] = field(default_factory=list)
-    verified: list[Section] = field(default_factory=list)
+    folders: dict[Path, dict[str, Any]] = field(default_factory=dict)  # their manifests
+    verified: dict[Path, dict[str, Any]] = field(default_factory=dict)
     found: list[Page] = field(default_factory=list)  # studies and diagnoses: pages by themselves
 
 
@@ -153,7 +146,7 @@ def _take(path: Path, chain: _Chain) -> None:
     elif path.name in ("diagnosis.json", "study.json", "manifest.json", SIGNALS, CURVES):
         _take_folder(path.parent, chain)
     elif path.suffix == ".json":
-        chain.verified.append(verification_section(_verified(path)))
+        chain.verified[path] = read_verified(path)
     elif path.suffix == ".toml":
         _take_toml(path, chain)
     elif path.suffix in (".html", ".htm", ".png", ".c", ".h", ".md"):
@@ -169,7 +162,7 @@ def _take_folder(folder: Path, chain: _Chain) -> None:
     elif (folder / "study.json").is_file():
         chain.found.append(study_page(read_study(folder)))
     elif (folder / "manifest.json").is_file():
-        chain.folders.append(firmware_section(_manifest(folder / "manifest.json")))
+        chain.folders[folder] = _manifest(folder / "manifest.json")
     else:
         raise InputError(str(folder), "holds no diagnosis.json, study.json or manifest.json", _TAKEN)
 
@@ -180,6 +173,7 @@ def _take_toml(path: Path, chain: _Chain) -> None:
         controller = "transfer" in parsed(read_regular(path, LARGEST_SETTING).decode("utf-8"))
     except (OSError, ValueError, RecursionError, InputError):
         controller = False  # the reader of rigs says what is wrong
+    chain.source = path if controller else chain.source
     _take_object(read_controller(path) if controller else read_rig(path), str(path), chain)
 
 
@@ -207,16 +201,6 @@ def _manifest(path: Path) -> dict[str, Any]:
     return value
 
 
-def _verified(path: Path) -> dict[str, Any]:
-    remedy = "name what `focgen verify DIR --json` printed"
-    value: dict[str, Any] = read_json(path, remedy)
-    if not fits(value, _VERIFIED) or not all(
-        fits(one, ({"skipped": str}, _RAN)) for one in value["targets"].values()
-    ):
-        raise InputError(str(path), "is no verification", remedy)
-    return value
-
-
 def _sections(chain: _Chain) -> list[Section]:
     """The chain in the order in which it is gone."""
     rig, sections = chain.rig, []
@@ -229,7 +213,15 @@ def _sections(chain: _Chain) -> list[Section]:
         sections.append(controller_section(chain.controller))
         if rig is not None and isinstance(rig.actuator, Actuator):
             sections += simulation_sections(simulate(rig, chain.controller))
-    return [*sections, *chain.folders, *chain.verified]
+    made_from = None if chain.source is None else sha256_of(chain.source)
+    folders = (firmware_section(manifest, made_from) for manifest in chain.folders.values())
+    return [*sections, *folders, *_verifications(chain)]
+
+
+def _verifications(chain: _Chain) -> Iterator[Section]:
+    """Yield what was verified; of a folder that the page shows, where it shows one."""
+    for path, found in chain.verified.items():
+        yield verification_section(found, folder_of(path, found, list(chain.folders)))
 
 
 def _title(chain: _Chain) -> str:

@@ -28,7 +28,7 @@ from focgen.rig.rig import (
     Signals,
     Uncertainty,
 )
-from focgen.tomlfile import MOST_ORDER, Table
+from focgen.tomlfile import MOST_ORDER, Table, check_replaced
 
 _STAGES = ("regulator", "actuator", "sensor")
 _ROLES = ("time", "output", "command", "pressure", "curvature", "reference")
@@ -246,6 +246,15 @@ def _effects(top: Table) -> tuple[Mapping[str, Any], ...]:
     if not isinstance(effects, list) or not all(isinstance(e, dict) and "name" in e for e in effects):
         raise top.fail("effects", "is not a list of tables with a 'name'", "write each effect as [[effects]]")
     return tuple(effects)
+
+
+def check_replaces_rig(path: str | Path, proposed: bool = False) -> None:
+    """Raise InputError where a rig would take the place of something else; ``proposed``: of a rig that has a
+    model, which a proposal has not."""
+    models = ("regulator", "actuator", "sensor", "effects") if proposed else ()
+    check_replaced(
+        path, "rig without a model" if proposed else "rig", ("sample_time", "signals"), ("transfer", *models)
+    )
 
 
 @checked

@@ -21,7 +21,7 @@ from focgen.logs.scales import unit_of_time
 from focgen.logs.table import LogTable, stem
 from focgen.logs.units import time_unit_named
 from focgen.output import check_apart, write_file
-from focgen.rig.files import read_rig
+from focgen.rig.files import check_replaces_rig, read_rig
 from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
@@ -75,13 +75,15 @@ def init(
 
     Roles go by the columns' names and units, and by their shape where those do not tell. ``ask(role, likely,
     columns)`` returns the column of a role that is unsure, "" for none. Raises LogError where the logs hold
-    no time, input or output, InputError where ``out`` is one of them.
+    no time, input or output, InputError where ``out`` is one of them, or
+    something else than a rig without a model.
     """
     given = each_of(logs)
     if not given:
         raise LogError("logs", "none is given", "name at least one log")
     if out is not None:
         check_apart([out], given)
+        check_replaces_rig(out, proposed=True)
     tables = tables_of(given)
     run = run_of(tables[0])
     time = _time(tables[0], run)

@@ -8,11 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from focgen.output import write_files
+from focgen.output import former, write_files
 from focgen.present import present
 from focgen.shown import files_of
 from focgen.studies.kept import FILE, curves_text
 from focgen.studies.results import Study
+
+_DRAWN = ("accuracy.png", "pareto.png", "frequency.png", "loops.png", "plant.png", "report.html")
 
 
 def write(study: Study, folder: Path, inputs: Iterable[Any] = ()) -> None:
@@ -23,7 +25,8 @@ def write(study: Study, folder: Path, inputs: Iterable[Any] = ()) -> None:
         "study.json": json.dumps(payload(study), indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         FILE: curves_text(study),
     }
-    write_files(folder, files | files_of(study), inputs)
+    files |= files_of(study)
+    write_files(folder, files, inputs, former(folder, "study.json", _DRAWN, files))
 
 
 def payload(study: Study) -> dict[str, Any]:

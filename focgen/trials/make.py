@@ -1,6 +1,7 @@
 """``focgen trial make``: a folder of sealed cases.
 
 DIR/trial.json                    what was made, and each case's commitment
+DIR/begun.json                    what is being made, until trial.json is there
 DIR/cases/0001/rig.toml           the nominal rig
 DIR/cases/0001/logs/*.csv         one session of the real one
 DIR/cases/0001/controller.toml    closed-loop suites only
@@ -16,6 +17,7 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tomlkit
@@ -24,6 +26,8 @@ import focgen
 from focgen.arrays import Array
 from focgen.control.files import controller_text
 from focgen.errors import InputError
+from focgen.journal import alone
+from focgen.jsontext import read_json
 from focgen.output import write_file, write_files
 from focgen.progress import track
 from focgen.rig.files import rig_table
@@ -48,6 +52,7 @@ DEFAULT_KINDS = {
 }
 
 
+_BEGUN = "begun.json"
 MOST_CASES = 1_000_000
 _POSITIVE = f"give positive numbers, at most {MOST_CASES} cases"
 
@@ -100,28 +105,61 @@ def make(
     kinds: tuple[str, ...] | None = None,
 ) -> Made:
     """Make sealed cases; the same arguments give the same bytes, those of the suite "engine" on one machine.
-    Raises InputError for arguments that make no sense, and where the physics engine is asked for but not
-    installed.
+    What a kill has interrupted, the same arguments finish.
+
+    Raises InputError for arguments that make no sense, for a folder that holds a trial or part of another
+    one, and where the physics engine is asked for but not installed.
     """
     folder = Path(folder)
     _check(folder, cases, seed, signals, suite)
     kinds = tuple(kinds or DEFAULT_KINDS[suite])
     drawn = Drawing(cases, seed, signals, suite, kinds)
+    total, facts = len(drawn.plan), _facts(drawn)
+    _begin(folder, {**facts, "cases": cases})
     commitments = {}
-    for index in track(range(1, len(drawn.plan) + 1), "trial make"):
+    for index in track(range(1, total + 1), "trial make"):
         case, salt = drawn.case(index)
         commitments[f"{index:04d}"] = _write(folder, f"{index:04d}", case, salt)
-    made = Made(str(folder), suite, signals, seed, cases, commitments)
-    facts = {
+    whole = json.dumps({**facts, "commitments": commitments}, indent=1) + "\n"
+    write_files(folder, {"trial.json": whole}, old=lambda: [folder / _BEGUN])
+    return Made(str(folder), suite, signals, seed, cases, commitments)
+
+
+def _facts(drawn: Drawing) -> dict[str, Any]:
+    """What a trial says of how it was drawn."""
+    return {
         "focgen": focgen.__version__,
-        "suite": suite,
-        "signals": signals,
-        "seed": seed,
-        "kinds": kinds,
-        "commitments": commitments,
+        "suite": drawn.suite,
+        "signals": drawn.signals,
+        "seed": drawn.seed,
+        "kinds": list(drawn.kinds),
     }
-    write_file(folder / "trial.json", json.dumps(facts, indent=1) + "\n")
-    return made
+
+
+def _begin(folder: Path, facts: dict[str, Any]) -> None:
+    """Write down what is made, ahead of the first case: so nothing of another trial gets among the cases, of
+    one that is being made at this moment neither. Raises InputError where there is some."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with alone(folder):
+            _check_begun(folder, facts)
+            write_file(folder / _BEGUN, json.dumps(facts, indent=1) + "\n")
+    except OSError as reason:
+        raise InputError(
+            str(folder), f"cannot be written ({reason.strerror})", "choose another folder"
+        ) from None
+
+
+def _check_begun(folder: Path, facts: dict[str, Any]) -> None:
+    """Raise InputError where a folder holds cases, and not the first ones of this very trial."""
+    begun, remedy = folder / _BEGUN, "choose another folder, or remove that one"
+    holds = [name for name in ("cases", "sealed", "runs") if (folder / name).exists()]
+    if begun.is_file() and read_json(begun, remedy) != facts:
+        what = f"holds part of another trial, which {_BEGUN} tells of"
+        raise InputError(str(folder), what, f"{remedy}; the same arguments as then finish it")
+    if holds and not begun.is_file():
+        what = f"holds {holds[0]}, and no {_BEGUN} says of which trial"
+        raise InputError(str(folder), what, "choose another folder, or move it away")
 
 
 def _made(assignment: Assignment, signals: str, suite: str, rng: np.random.Generator) -> Case:

@@ -8,13 +8,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from focgen.arguments import checked
 from focgen.codegen.kernels import TARGETS
 from focgen.errors import InputError, MissingExtra, check_choice
-from focgen.jsontext import read_json
 from focgen.output import write_file
+from focgen.progress import say
 from focgen.shown import Shown
 from focgen.targets.cores import core
 from focgen.targets.cost import Cost, cost_of, cost_on, cost_on_avr, with_runtimes
@@ -22,9 +21,9 @@ from focgen.targets.emulator import emulator_title
 from focgen.targets.selection import entry_of, selected
 from focgen.targets.toolchains import Toolchain, absent, toolchains
 from focgen.textfile import LARGEST_CODE, read_regular
-from focgen.verification.folder import REMEMBERED, GeneratedFolder, read_folder, sources
+from focgen.verification.folder import GeneratedFolder, read_folder, sources
+from focgen.verification.remembered import COMPILERS, REMEMBERED, is_own, remembered
 
-COMPILERS = ("zig", "gcc")
 _BY_FUNCTIONS = "cortex-m0plus"  # wide products, shifts and floating point are functions of the compiler's
 
 
@@ -131,28 +130,19 @@ def _chain(name: str, compiler: str) -> Toolchain | None:
 def _remember(read: GeneratedFolder, compiler: str, found: dict[str, Cost]) -> dict[str, Cost]:
     """Write the costs down in the folder; return those of the C that was there before, same compiler."""
     path, made_from = read.path / REMEMBERED, _hash(read)
-    stored = _stored(path)
+    stored = remembered(path) or {}
     mine = stored.get(compiler, {})
     same = mine.get("made_from") == made_from
     previous = mine.get("previous", {}) if same else mine.get("targets", {})
     counted = {name: entry_of(one) for name, one in found.items() if one.skipped is None}
     targets = {**(mine.get("targets", {}) if same else {}), **counted}
     stored[compiler] = {"made_from": made_from, "targets": targets, "previous": previous}
+    if not is_own(path):
+        say(f"{path} is no memory of costs, so it stays, and these are not remembered")
+        return {}
     with suppress(InputError):  # a folder that cannot be written remembers nothing
         write_file(path, json.dumps(stored, indent=2) + "\n")
     return {name: cost_of(entry) for name, entry in previous.items()}
-
-
-def _stored(path: Path) -> dict[str, Any]:
-    """What a folder remembers; nothing where that cannot be read."""
-    try:
-        stored: dict[str, Any] = read_json(path, "")
-        for part in stored.values():
-            for entry in (*part["targets"].values(), *part["previous"].values()):
-                cost_of(entry)
-        return stored
-    except (InputError, ValueError, TypeError, KeyError, AttributeError):
-        return {}
 
 
 def _hash(read: GeneratedFolder) -> str:

@@ -15,19 +15,18 @@ from focgen.codegen.manifest import sha256
 from focgen.codegen.neighbours import others
 from focgen.codegen.packages.archive import DIGEST, compare_archive
 from focgen.control.files import read_controller
-from focgen.custody import followed
+from focgen.custody import followed, sha256_within
 from focgen.errors import InputError
 from focgen.journal import finish
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.plan import ErrorBound, Plan
 from focgen.scratch import temporary_folder
-from focgen.textfile import LARGEST_SETTING, holds, read_regular
+from focgen.textfile import LARGEST_CODE, LARGEST_SETTING, holds, read_regular
 from focgen.verification.recorded import AGAIN, Recorded, read_recorded
+from focgen.verification.remembered import REMEMBERED, remembered
 
 _EXAMPLES = ("example/", "examples/", "extras/")
-REMEMBERED = "cost.json"
-"""The file beside a controller's C that remembers what it cost; no part of what was generated."""
 _MOST = 8  # strangers that are named
 
 
@@ -37,7 +36,8 @@ class GeneratedFolder:
     whether it has NAME_selftest.c; ``kernels``: how it computes its sums.
 
     ``files``: name and content of every file, rendered anew from controller.toml and the manifest's options.
-    ``differences``: what the folder has edited of them; ``notes``: what else is in it, or is not.
+    ``differences``: what the folder has edited of them; ``notes``: what else is in it, or is not;
+    ``digests``: SHA-256 of what stands there under the names that count, by name; "" of a file too large.
     """
 
     path: Path
@@ -48,6 +48,7 @@ class GeneratedFolder:
     kernels: Kernels = PORTABLE
     files: Mapping[str, str | bytes] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    digests: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_folder(path: str | Path) -> GeneratedFolder:
@@ -70,8 +71,18 @@ def read_folder(path: str | Path) -> GeneratedFolder:
     built = compare_archive(path / f"{plan.name}.fmu", plan.name, files, recorded.package.fmi)
     differences = (*_edited(path, files, recorded), *built.differences)
     notes = (*_notes(path, files, plan.name), *built.notes, *followed(path / "controller.toml", path))
-    kernels = recorded.kernels
-    return GeneratedFolder(path, plan, recorded.bound, differences, recorded.selftest, kernels, files, notes)
+    made = recorded.selftest, recorded.kernels, files
+    return GeneratedFolder(path, plan, recorded.bound, differences, *made, notes, _digests(path, plan, files))
+
+
+def _digests(path: Path, plan: Plan, files: Mapping[str, str | bytes]) -> dict[str, str]:
+    """Of what was compared: C, headers, manifest and controller.toml, and an FMU where there is one."""
+    names = [name for name in (*files, f"{plan.name}.fmu") if not beside(name) or name.endswith(".fmu")]
+    return {
+        name: sha256_within(path / name, LARGEST_CODE) or ""
+        for name in sorted(names)
+        if (path / name).is_file()
+    }
 
 
 def beside(name: str) -> bool:
@@ -136,7 +147,7 @@ def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Ite
     known = {
         *files,
         *folders,
-        REMEMBERED,
+        *([] if remembered(path / REMEMBERED) is None else [REMEMBERED]),
         *(name for own in beside_it.values() for name in own),
         *(_archive(controller) if any(map(_of_fmu, files)) else ()),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -28,8 +28,10 @@ _LEFT = "the folder has been edited, so nothing of it was compiled (--edited doe
 @dataclass(frozen=True, repr=False)
 class Verification(Shown):
     """``targets`` by name; ``differences`` between the folder and what its controller.toml gives; ``notes``
-    on files that nothing is compiled from; ``agrees``: what ran does; ``holds``: it does, and nothing was
+    on files that nothing is compiled from. ``agrees``: what ran does; ``holds``: it does, and nothing was
     edited.
+
+    ``files`` is the SHA-256 of what was compared, by name.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Verification(Shown):
     targets: dict[str, TargetResult]
     differences: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
+    files: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def agrees(self) -> bool:
@@ -84,7 +87,8 @@ def verify(
     else:
         with sources(read) as place:
             results = {name: _on(name, replace(read, path=place), samples, seed) for name in names}
-    return Verification(read.plan.name, read.plan.arithmetic, results, read.differences, read.notes)
+    told = read.differences, read.notes, read.digests
+    return Verification(read.plan.name, read.plan.arithmetic, results, *told)
 
 
 def _on(name: str, read: GeneratedFolder, samples: int | None, seed: int) -> TargetResult:

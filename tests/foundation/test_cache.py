@@ -109,8 +109,42 @@ def test_a_file_that_could_be_anothers_is_built_anew(anew, how):
         (folder / "program").write_bytes(b"foreign")
         (folder / "program").chmod(0o666 if how == "writable" else 0o600)
     found = cache.kept("program", lambda path: path.write_bytes(b"mine"))
-    assert found.read_bytes() == (b"foreign" if how == "folder's own" else b"mine")
-    assert foreign.read_bytes() == b"foreign"
+    assert found.read_bytes() == b"mine" and foreign.read_bytes() == b"foreign"
+
+
+@pytest.mark.parametrize("spoiled", ("program", "program.sha256"))
+@pytest.mark.parametrize("left", (b"", b"prog", b"another"))
+def test_what_is_not_as_it_was_built_is_built_anew(spoiled, left):
+    """A library that was cut ends the process that loads it, by SIGBUS, and would do so for ever."""
+    built = []
+
+    def build_it(path: Path) -> None:
+        built.append(path)
+        path.write_bytes(b"program")
+
+    found = cache.kept("program", build_it)
+    found.with_name(spoiled).write_bytes(left)
+    assert cache.kept("program", build_it).read_bytes() == b"program" and len(built) == 2
+    cache.kept("program", build_it)
+    assert len(built) == 2
+
+
+def test_what_is_kept_is_on_the_disk_before_it_has_its_place(monkeypatch):
+    seen, real = [], os.replace
+    monkeypatch.setattr(cache, "synced", lambda path: seen.append(path.name))
+    monkeypatch.setattr(os, "replace", lambda a, b: (seen.append("place"), real(a, b))[1])
+    cache.kept("program", lambda path: path.write_bytes(b"program"))
+    assert seen == ["program", "place", "program.sha256", "place"]
+
+
+@pytest.mark.parametrize("home", (".", "me"))
+def test_a_relative_home_is_none(anew, monkeypatch, home):
+    """In the folder one stands in, somebody else may have put what would be loaded."""
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", home)
+    monkeypatch.chdir(anew)
+    (anew / home / ".cache" / "focgen").mkdir(parents=True, mode=0o700)
+    assert ".cache" not in cache.cache_folder().parts
 
 
 def test_what_cannot_be_built_leaves_nothing():

@@ -320,7 +320,8 @@ def verified() -> list[bytes]:
         "targets": {"host": ran, "avr": {"skipped": "no compiler"}},
         "differences": ["lead.c: is not"],
         "notes": ["README.md: has been edited"],
-        "holds": True,
+        "files": {"manifest.json": "0" * 64},
+        "holds": False,
     }
     return [json.dumps(whole).encode()]
 

@@ -26,16 +26,18 @@ from focgen.errors import FocgenError
 from focgen.logs.read import read_logs
 from focgen.logs.table import read_table
 from focgen.plan.build import build_plan
-from focgen.report import paths
+from focgen.report.pages.chain import verification_section
 from focgen.report.pages.files import read_diagnosis
 from focgen.report.texts import data as within_script
 from focgen.report.texts import drawn
+from focgen.report.verified import read_verified
 from focgen.rig.files import read_rig, rig_table, rig_text
 from focgen.rig.proposal import init
 from focgen.studies.kept import read_study
+from focgen.targets.cost import Cost, cost_of
 from focgen.trials import facts
-from focgen.verification.costs import _stored
 from focgen.verification.recorded import read_recorded
+from focgen.verification.remembered import remembered
 from tests.fuzz import seeds
 
 
@@ -197,11 +199,15 @@ def _study(data: bytes, place: Path) -> None:
 
 
 def _verified(data: bytes, place: Path) -> None:
-    paths.verification_section(paths._verified(seeds.path_of(place, "verified.json", data)))
+    verification_section(read_verified(seeds.path_of(place, "verified.json", data)))
 
 
 def _costs(data: bytes, place: Path) -> None:
-    check(isinstance(_stored(seeds.path_of(place, "cost.json", data)), dict), "costs that are none")
+    found = remembered(seeds.path_of(place, "cost.json", data)) or {}
+    entries = [
+        one for part in found.values() for one in (*part["targets"].values(), *part["previous"].values())
+    ]
+    check(all(isinstance(cost_of(one), Cost) for one in entries), "costs that are none")
 
 
 # ------------------------------------------------------------------------------------------- texts

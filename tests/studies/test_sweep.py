@@ -3,6 +3,7 @@
 Red when another number of processes, or an interruption, changes a row.
 """
 
+import json
 import os
 import shutil
 import signal
@@ -100,6 +101,49 @@ def test_what_is_there_is_not_done_again(done, alone, tmp_path, counted):
     lost.write_text('{"half": ')
     focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
     assert [f"{job.key}.json" for job in counted] == [lost.name]
+    assert (tmp_path / "out" / "study.json").read_text() == alone
+
+
+def _other_number(kept):
+    kept["answer"]["row"]["error"] = 0.5
+
+
+def _other_kind(kept):
+    kept["answer"]["row"] = "none"
+
+
+def _no_key(kept):
+    del kept["answer"]["curves"]
+
+
+def _no_seal(kept):
+    del kept["sha256"]
+
+
+def _not_finite(kept):
+    kept["answer"]["row"]["error"] = float("nan")
+
+
+@pytest.mark.parametrize("edit", [_other_number, _other_kind, _no_key, _no_seal, _not_finite])
+def test_what_was_edited_is_done_again_and_said(done, alone, tmp_path, counted, capsys, edit):
+    shutil.copytree(done, tmp_path / "out")
+    rows = (p for p in sorted((tmp_path / "out" / "rows").iterdir()) if '"row"' in p.read_text())
+    edited = next(rows)
+    kept = json.loads(edited.read_text())
+    edit(kept)
+    edited.write_text(json.dumps(kept))
+    focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
+    assert [f"{job.key}.json" for job in counted] == [edited.name]
+    assert f"{edited} is not as it was kept" in capsys.readouterr().err
+    assert (tmp_path / "out" / "study.json").read_text() == alone
+
+
+def test_one_answer_does_not_stand_for_another(done, alone, tmp_path, counted):
+    shutil.copytree(done, tmp_path / "out")
+    one, other, *_ = sorted((tmp_path / "out" / "rows").iterdir())
+    shutil.copy(one, other)
+    focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
+    assert [f"{job.key}.json" for job in counted] == [other.name]
     assert (tmp_path / "out" / "study.json").read_text() == alone
 
 

@@ -24,8 +24,9 @@ from focgen.targets.library import TargetLibrary
 from focgen.targets.stack import Stack
 from focgen.targets.steps import step_costs
 from focgen.targets.toolchains import EXACT, toolchains
-from focgen.verification.costs import REMEMBERED, cost
+from focgen.verification.costs import cost
 from focgen.verification.folder import read_folder
+from focgen.verification.remembered import REMEMBERED
 from tests.c_code import cross_compiler, tool
 from tests.conftest import paper_controller
 from tests.targets.test_verify import ZIG, piece

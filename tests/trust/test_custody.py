@@ -75,6 +75,54 @@ def test_any_link_that_does_not_fit_is_named(chain, name, capsys):
     assert note in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("place", ("fw/q15", "fw/q31/../q15", "."))
+def test_a_folder_among_several_is_followed_too(chain, place, monkeypatch):
+    """Two below its controller, as the demo's are; or the one that one stands in."""
+    (chain / "fw").rename(chain / "q15")
+    (chain / "fw" / "q31").mkdir(parents=True)
+    (chain / "q15").rename(chain / "fw" / "q15")
+    monkeypatch.chdir(chain / "fw" / "q15" if place == "." else chain)
+    assert read_folder(place).notes == ()
+    for name in ("logs/steps.csv", "identified.toml"):
+        (chain / name).write_bytes((chain / name).read_bytes() + b"\n")
+        (note,) = read_folder(place).notes
+        assert f"{name}: is not " in note
+
+
+def test_a_rig_of_the_same_name_nearby_is_not_taken_for_it(chain):
+    (chain / "fw" / "identified.toml").write_text("another")
+    assert [note for note in read_folder(chain / "fw").notes if "is not the rig" in note] == []
+
+
+def _many(chain, monkeypatch, count):
+    """So many logs that the rig is said to be identified from, the last one another."""
+    entry = f'{{ file = "logs/steps.csv", sha256 = "{digest(chain / "logs" / "steps.csv")}" }}'
+    rig, own = chain / "identified.toml", chain / "fw" / "controller.toml"
+    last = '{ file = "rig.toml", sha256 = "another" }'
+    rig.write_text(
+        (EXAMPLES / "rig.toml").read_text()
+        + f"\n[identified_from]\nfiles = [{', '.join([*[entry] * (count - 1), last])}]\n"
+    )
+    before = tomllib.loads(own.read_text())["designed_from"]["sha256"]
+    own.write_text(own.read_text().replace(before, digest(rig)))
+    return [note for note in read_folder(chain / "fw").notes if not note.startswith("controller.toml")]
+
+
+def test_many_logs_are_followed(chain, monkeypatch):
+    (note,) = _many(chain, monkeypatch, 200)
+    assert note.endswith("rig.toml: is not what identified.toml was identified from")
+
+
+def test_what_is_too_much_to_look_at_is_said(chain, monkeypatch):
+    monkeypatch.setattr(custody, "_MOST", 4)
+    (note,) = _many(chain, monkeypatch, 5)
+    assert note.endswith("names 5 files, of which only the first 4 were looked at")
+    monkeypatch.setattr(custody, "_LARGEST", 10)
+    notes = read_folder(chain / "fw").notes
+    assert any("steps.csv: was not looked at" in note for note in notes)
+    assert not any("is not what" in note for note in notes)
+
+
 @pytest.mark.parametrize("name", ("logs/steps.csv", "rig.toml", "identified.toml"))
 def test_what_is_not_there_is_passed_over(chain, name):
     (chain / name).unlink()
@@ -113,6 +161,7 @@ def test_a_strangers_table_leads_to_nothing_without_end(chain, name, monkeypatch
     own = chain / "fw" / "controller.toml"
     own.write_text(own.read_text().replace('"identified.toml"', f'"{reach}"'))
     told = [note for note in read_folder(chain / "fw").notes if "is not the rig" in note]
+    asked = [path for path in asked if path.endswith(name)]
     assert len(told) == len(asked) <= 1  # who may not read a file is not told of it
 
 

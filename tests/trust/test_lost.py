@@ -195,6 +195,45 @@ def test_what_a_kill_interrupts_the_next_run_finishes(tmp_path, monkeypatch, at)
     assert content(tmp_path) == (AFTER if at else BEFORE), "and nothing is left"
 
 
+def _another_disk(monkeypatch) -> None:
+    """The same files; only their disk is counted otherwise, as after a restart or another mount."""
+    monkeypatch.setattr(journal, "_number", lambda folder: [-1, os.stat(folder).st_ino])
+
+
+@killable
+@pytest.mark.parametrize("kept", [1, 10**9], ids=["nanoseconds", "seconds"])
+@pytest.mark.parametrize("at", range(1, 6))
+def test_a_disk_that_comes_back_under_another_number_is_finished(tmp_path, monkeypatch, at, kept):
+    """What a small disk keeps of the time are its seconds."""
+    _interrupted(monkeypatch, tmp_path, at)
+    _another_disk(monkeypatch)
+    made = journal._made
+    monkeypatch.setattr(journal, "_made", lambda folder: [made(folder)[0], made(folder)[1] // kept * kept])
+    journal.finish(tmp_path)
+    assert visible(tmp_path) == AFTER
+
+
+@killable
+@pytest.mark.parametrize("how", ["copied", "made anew", "no mark"])
+def test_under_another_number_a_copy_moves_nothing(tmp_path, monkeypatch, how):
+    """The mark's number could be guessed; when it was made could not."""
+    _interrupted(monkeypatch, tmp_path, 1)
+    (whole,) = tmp_path.glob(".focgen-*.whole")
+    if how == "copied":
+        shutil.copytree(whole, tmp_path / ".focgen-0123456789abcdef.whole")
+        shutil.rmtree(whole)
+    elif how == "made anew":
+        (whole / "mark").touch()
+    else:
+        (whole / "mark").unlink()
+        plan = json.loads((whole / "plan.json").read_text())
+        (whole / "plan.json").write_text(json.dumps({**plan, "mark": []}))
+    _another_disk(monkeypatch)
+    before = visible(tmp_path)
+    journal.finish(tmp_path)
+    assert visible(tmp_path) == before
+
+
 @killable
 def test_what_was_edited_meanwhile_stays(tmp_path, monkeypatch):
     _interrupted(monkeypatch, tmp_path, 1)

@@ -40,6 +40,41 @@ def test_a_place_that_cannot_be_written_leaves_the_earlier_result(tmp_path, monk
     assert content(tmp_path) == BEFORE and not (tmp_path / "sub").exists()
 
 
+@pytest.mark.parametrize("links", (True, False))
+def test_links_go_back_as_they_stood(tmp_path, monkeypatch, links):
+    """Relative ones, one that leads nowhere today, and one to a file with rights of its own."""
+    folder, notes, real = (
+        tmp_path / "fw",
+        tmp_path / "notes",
+        {n: getattr(os, n) for n in ("replace", "link")},
+    )
+    for path in (folder, notes):
+        path.mkdir()
+    for name in ("a", "gone"):
+        (notes / name).write_text("mine")
+        os.chmod(notes / name, 0o640)
+    stood = {"a": "../notes/a", "b": "../notes/none", "gone": str(notes / "gone")}
+    for name, target in stood.items():
+        (folder / name).symlink_to(target)
+
+    def denying(name):
+        def step(*arguments, **options):
+            if str(folder / "d") in map(str, arguments) or (name == "link" and not links):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), *map(str, arguments[:1]))
+            return real[name](*arguments, **options)
+
+        return step
+
+    with monkeypatch.context() as patched:
+        for name in real:
+            patched.setattr(os, name, denying(name))
+        with pytest.raises(InputError, match="cannot be written"):
+            output.write_files(folder, {"a": "2", "b": "2", "d": "2"}, old=lambda: [folder / "gone"])
+    assert {path.name: os.readlink(path) for path in folder.iterdir()} == stood
+    assert content(notes) == {"a": b"mine", "gone": b"mine"}
+    assert {oct(path.stat().st_mode & 0o777) for path in notes.iterdir()} == {"0o640"}
+
+
 def test_a_umask_that_takes_reading_away_is_said(tmp_path, monkeypatch):
     """What was made was not found then, and nothing was written at exit status 0. Rights are asked as they
     stand, since root has all of them."""

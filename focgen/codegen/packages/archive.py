@@ -19,9 +19,10 @@ from pathlib import Path
 
 from focgen.compiler import compile_shared
 from focgen.custody import sha256_within
+from focgen.errors import InputError
 from focgen.present import present
 from focgen.scratch import temporary_folder
-from focgen.textfile import LARGEST_CODE, holds
+from focgen.textfile import LARGEST_CODE, holds, read_regular
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can tell
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
@@ -108,7 +109,7 @@ def compare_archive(path: Path, name: str, files: Mapping[str, str | bytes], fmi
     try:
         with zipfile.ZipFile(path) as archive:
             faults = tuple(_faults(archive, _members(name, files, fmi), name))
-        if not faults and not _recorded(path):
+        if not faults and not is_recorded(path):
             faults = (f"is not what was built, by {path.name}{DIGEST}",)
     except (zipfile.BadZipFile, zlib.error, OSError, ValueError, NotImplementedError, RuntimeError, EOFError):
         return Compared((f"{path.name}: is no zip that can be read",))
@@ -118,10 +119,19 @@ def compare_archive(path: Path, name: str, files: Mapping[str, str | bytes], fmi
     )
 
 
-def _recorded(path: Path) -> bool:
+def is_recorded(path: Path) -> bool:
     """Whether what stands beside an archive is its digest."""
     found = sha256_within(path, LARGEST_CODE)
     return holds(path.with_name(path.name + DIGEST), f"{found}  {path.name}\n".encode("ascii"))
+
+
+def is_digest(path: Path) -> bool:
+    """Whether a file holds what stands beside an archive, of whatever archive of that name."""
+    line = re.compile(rf"[0-9a-f]{{64}}  {re.escape(path.name.removesuffix(DIGEST))}\n".encode())
+    try:
+        return line.fullmatch(read_regular(path, LARGEST_CODE)) is not None
+    except (OSError, InputError):
+        return False
 
 
 def _faults(archive: zipfile.ZipFile, expected: Mapping[str, bytes], name: str) -> Iterator[str]:

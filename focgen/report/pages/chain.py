@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -172,8 +173,9 @@ def _schedule(controller: Controller) -> Figure:
 # --------------------------------------------------------------------------------------------- folder
 
 
-def firmware_section(manifest: Mapping[str, Any]) -> Section:
-    """What a manifest says of the generated C: its size, and what is proved of it."""
+def firmware_section(manifest: Mapping[str, Any], made_from: str | None = None) -> Section:
+    """What a manifest says of the generated C: its size, and what is proved of it; ``made_from``: the SHA-256
+    of the controller.toml on the same page."""
     bound, sizes = manifest["error_bound"]["quantisation"], manifest["sizes"]
     told = (
         (
@@ -182,6 +184,7 @@ def firmware_section(manifest: Mapping[str, Any]) -> Section:
             f"{sizes['table_bytes']} B. Against the same controller in float64 the signal ahead of the "
             f"integrator is off by {bound['operator']:.3g} at most, which is proved."
         ),
+        *warnings(_made_from_another(manifest, made_from)),
     )
     rows = tuple(
         (p["node"], number(p["worst"]), p["type"], number(p["margin_bits"]), p["how"])
@@ -193,6 +196,13 @@ def firmware_section(manifest: Mapping[str, Any]) -> Section:
     proved = [p for p in manifest["proofs"] if p["margin_bits"] is not None]
     figures = (_margins(proved, table),) if proved else ()
     return Section(f"C in {manifest['arithmetic']}", told, () if figures else (table,), figures=figures)
+
+
+def _made_from_another(manifest: Mapping[str, Any], digest: str | None) -> tuple[str, ...]:
+    inputs = manifest.get("inputs")
+    named = inputs.get("controller.toml") if isinstance(inputs, dict) else None
+    other = digest is not None and named != digest
+    return ("this C was generated from another controller.toml than the one above",) * other
 
 
 def _margins(proofs: Sequence[Mapping[str, Any]], table: TableOf) -> Figure:
@@ -217,16 +227,18 @@ def _margins(proofs: Sequence[Mapping[str, Any]], table: TableOf) -> Figure:
     )
 
 
-def verification_section(found: Mapping[str, Any]) -> Section:
-    """What ``focgen verify --json`` found on every target."""
+def verification_section(found: Mapping[str, Any], folder: Path | None = None) -> Section:
+    """What ``focgen verify --json`` found on every target; ``folder``: where what it speaks of stands."""
     ran = {name: one for name, one in found["targets"].items() if "skipped" not in one}
     rows = tuple(_compared(name, one) for name, one in found["targets"].items())
     verdict = "holds" if found["holds"] else "does NOT hold"
     skipped = [
         f"skipped on {name}: {one['skipped']}" for name, one in found["targets"].items() if "skipped" in one
     ]
+    which = f"{found['name']} ({found['arithmetic']}{f', in {folder}' if folder else ''})"
     told = (
-        f"The comparison of {found['name']} ({found['arithmetic']}) with the reference {verdict}.",
+        f"The comparison of {which} with the reference {verdict}.",
+        *_compared_files(found),
         *warnings(found["differences"]),
     )
     table = TableOf(
@@ -236,6 +248,14 @@ def verification_section(found: Mapping[str, Any]) -> Section:
     )
     figures = (_used(ran, table),) if ran else ()
     return Section("Verification", (*told, *notes([*skipped, *found["notes"]])), (table,), figures=figures)
+
+
+def _compared_files(found: Mapping[str, Any]) -> tuple[str, ...]:
+    """Which files it speaks of, so that whoever has a folder can see whether it is this one."""
+    digest = found.get("files", {}).get("manifest.json")
+    if not digest:
+        return ("It does not say which files it compared.",)
+    return (f"It speaks of the folder whose manifest.json has the SHA-256 {digest}.",)
 
 
 def _compared(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
