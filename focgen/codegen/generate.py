@@ -9,6 +9,7 @@ from typing import Any
 
 from focgen.arguments import checked
 from focgen.codegen.edited import check_unedited
+from focgen.codegen.fits import check_fits
 from focgen.codegen.folder import example_context, readme_context
 from focgen.codegen.header import header_context
 from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels, runtime_files
@@ -129,9 +130,10 @@ def folder_files(
     """Name and content of every file of a generated folder; the same plan gives the same bytes. Of a package
     all but what a compiler makes.
 
-    Raises PlanError for what C cannot express, InputError where the plan's name is no name in C.
+    Raises PlanError for what C cannot express or count, InputError where the plan's name is no name in C.
     """
     check_name(plan.name, plan.controller.name)
+    check_fits(plan)
     title, digest = plan.controller.name, sha256(controller_toml)
     runtime = {
         name: (shipped("c_runtime") / name).read_text(encoding="utf-8")

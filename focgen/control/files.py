@@ -79,6 +79,8 @@ ControllerLike = Controller | str | Path | Mapping[str, Any]
 """A controller, the path of its controller.toml, or a dictionary of the same shape."""
 _FACTORS = 1e-3, 1e3
 """What a factor on a gain can be."""
+MOST_POINTS = 4096
+"""Breakpoints of a schedule: a step looks for its own one by one."""
 
 
 def controller_from(given: ControllerLike) -> Controller:
@@ -143,6 +145,8 @@ def _gain(top: Table) -> float | GainSchedule:
         raise table.fail(
             "gains", f"has {len(gains)} values for {len(points)} breakpoints", "give one gain for each"
         )
+    if len(points) > MOST_POINTS:
+        raise table.fail("breakpoints", f"has {len(points)} values", f"give at most {MOST_POINTS}")
     if len(points) < 2 or any(b <= a for a, b in pairwise(points)):
         raise table.fail("breakpoints", f"is {list(points)}", "give at least two, rising strictly")
     return GainSchedule(points, gains)
