@@ -47,7 +47,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -68,12 +68,13 @@ from focgen.control.controller import (
     Tunable,
     Units,
 )
+from focgen.control.given import plain, table_of
 from focgen.errors import ControllerError
 from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.terms import read_transfer, terms_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
-from focgen.tomlfile import Table
+from focgen.tomlfile import Table, is_written
 
 ControllerLike = Controller | str | Path | Mapping[str, Any]
 """A controller, the path of its controller.toml, or a dictionary of the same shape."""
@@ -84,13 +85,22 @@ MOST_POINTS = 4096
 
 
 def controller_from(given: ControllerLike) -> Controller:
-    """The controller that an argument is. Raises ControllerError where it is none, or cannot be used."""
+    """The controller that an argument is, held to the same whichever way it comes. Raises ControllerError
+    where it is none, or cannot be used."""
     if isinstance(given, Controller):
-        return given
+        return _of_object(given)
     if not isinstance(given, (str, os.PathLike, Mapping)):
         remedy = "give a Controller, a controller.toml or a dictionary like it"
         raise ControllerError("controller", f"is {type(given).__name__}", remedy)
     return read_controller(given)
+
+
+def _of_object(given: Controller) -> Controller:
+    """An equal one, of Python's own numbers, where its file could be read."""
+    where = "controller"
+    made = controller_of(Table(table_of(given, where), where, ControllerError), where)
+    unused = Table({"horizon": plain(given.horizon)}, where, ControllerError)  # of "continuous", for "gl"
+    return replace(made, horizon=_whole(unused, "horizon", 1))
 
 
 @checked
@@ -276,6 +286,8 @@ def _source(table: Table | None) -> Source | None:
 def _options(table: Table | None) -> tuple[tuple[str, Option], ...]:
     """What the controller was designed with: told, and nothing of what it is."""
     names = () if table is None else tuple(table.values)
+    if table is not None and not all(isinstance(name, str) and is_written(name) for name in names):
+        raise table.fail(None, "has a name that is no text", "give names that can be written as UTF-8")
     return tuple((name, _option(table, name)) for name in names if table is not None)
 
 
@@ -302,9 +314,9 @@ def source_table(source: Source) -> dict[str, Any]:
 def write_controller(controller: Controller, path: str | Path) -> None:
     """Write a controller so that :func:`read_controller` gives an equal one.
 
-    Raises InputError where it cannot be written.
+    Raises ControllerError where it could not be read, InputError where it cannot be written.
     """
-    write_file(path, controller_text(controller))
+    write_file(path, controller_text(controller_from(controller)))
 
 
 def controller_text(controller: Controller) -> str:
