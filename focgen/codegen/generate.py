@@ -16,7 +16,7 @@ from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels, runtime_files
 from focgen.codegen.leftovers import leftovers
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.codegen.names import check_name
-from focgen.codegen.neighbours import kept, taken_back
+from focgen.codegen.neighbours import check_told_apart, kept, taken_back
 from focgen.codegen.packages.archive import archived
 from focgen.codegen.packages.context import Made
 from focgen.codegen.packages.package import PACKAGES, PLAIN, Package, check_package, packed
@@ -89,7 +89,7 @@ def generate(
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, BuildError where an FMU finds no C compiler. InputError: a name or an option that
     cannot be used, a folder that cannot be written, or one where a file would replace the controller's own by
-    other bytes, or what somebody has edited.
+    other bytes, or what somebody has edited. So is one with a controller whose name differs in capitals only.
     """
     wanted = check_package(for_, fmi)
     kernels = _kernels(target)
@@ -103,6 +103,7 @@ def generate(
     plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band, tunable)
     files = folder_files(plan, text, selftest, kernels, not no_float, wanted)
     files.update(archived(plan.name, files, wanted.fmi))
+    check_told_apart(Path(out), called)
     placed = {**kept(Path(out), called), **files}
     write_files(out, placed, [controller], lambda: _going(Path(out), called, placed, controller, force))
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
