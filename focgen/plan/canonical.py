@@ -17,8 +17,8 @@ What that means where orders are whole:
 of two samples.
 * 1/(T s + 1) is the backward Euler recursion v_k = (e_k + (T/h) v_{k−1}) / (1 + T/h),
   whatever L ≥ 1 is: the weights of a whole order end at the order, and the tables with them.
-* An order is the decimal number that is written: 1.6 less 0.6 is 1. One beside a whole number is not that
-  number: it has a past as long as any other.
+* An order is the decimal number that is written: 1.6 less 0.6 is 1. A double beside a whole number is not
+  that number: it has a past as long as any other.
 
 The integral of a term of negative order is clamped like that of an ordinary PID controller: to what takes the
 output, alone and at rest, from one of its limits to the other at the smallest gain that occurs. Ahead of an
@@ -144,7 +144,7 @@ def _split_remedy(controller: Controller) -> str:
 
 
 def _shifted(terms: Polynomial, by: float) -> Polynomial:
-    """Orders less ``by``, as decimal numbers: what is not whole there is not rounded to what is."""
+    """Orders less ``by``, as decimal numbers, each to the double that is nearest."""
     less = Fraction(repr(by))
     return polynomial((c, float(Fraction(repr(order)) - less)) for c, order in terms)
 

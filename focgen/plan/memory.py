@@ -154,7 +154,7 @@ def band_memories_of(
 def _fractional_orders(controller: Controller) -> list[float]:
     orders = sorted({t.order for t in _terms(realise(controller)) if not t.order.is_integer()})
     if orders and orders[-1] > _LARGEST_ORDER:
-        what = f"has the order {orders[-1]:.17g} over its lowest: exponential memory ends at 2"
+        what = f"has the order {orders[-1]!r} over its lowest: exponential memory ends at 2"
         remedy = _whole_remedy(orders[-1]) or "use memory short"
         raise PlanError(f"{controller.name} [transfer]", what, remedy)
     return orders
@@ -178,7 +178,7 @@ def _fitted(
     except ValueError as reason:
         other = "allow a larger tolerance, a shorter horizon, or choose another arithmetic"
         remedy = _whole_remedy(order) or other
-        what = f"order {order:.17g} has no exponential memory: {reason}"
+        what = f"order {order!r} has no exponential memory: {reason}"
         raise PlanError(controller.name, what, remedy) from None
 
 

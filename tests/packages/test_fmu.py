@@ -246,8 +246,10 @@ def test_texts_of_a_user_are_those_of_the_description(fmpy, tmp_path):
 @pytest.mark.parametrize("units", [("V", "V ", "bar"), ("1/mm", " ", "bar"), ("a\x01", "a\x02", "a?")])
 def test_units_that_look_alike_are_one(fmpy, tmp_path, fmi, units):
     """Two of one name are no valid description."""
+    from fmpy.validation import validate_fmu
+
     focgen.generate(seed_controller(9, units=Units(*units)), tmp_path, "q31", name="fin", for_="fmu", fmi=fmi)
-    assert not fmpy.validate_fmu(str(tmp_path / "fin.fmu"))
+    assert validate_fmu(str(tmp_path / "fin.fmu")) == []
     found = fmpy.read_model_description(str(tmp_path / "fin.fmu")).unitDefinitions
     names = [unit.name for unit in found]
     assert len(names) == len(set(names)) and all(names)
