@@ -49,6 +49,16 @@ def test_limits_ahead_of_which_little_happens_hold(tmp_path, arithmetic):
     assert found.holds
 
 
+PERCENT = ControllerRanges((0.0, 1.0), (0.0, 1.0), (20.3, 99.9))
+PI = simple(TransferFunction([(2.0, 0.0), (1.0, -0.9)]), length=100, ranges=PERCENT)
+
+
+@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31"])
+def test_so_do_those_of_a_controller_that_integrates_by_itself(tmp_path, arithmetic):
+    generate(PI, tmp_path, arithmetic)
+    assert verify(tmp_path, samples=4000).holds
+
+
 @pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31"])
 def test_so_do_limits_that_are_tuned(tmp_path, arithmetic):
     generate(replace(SMALL, tunable=BOX), tmp_path, arithmetic, tunable=True)
