@@ -48,7 +48,7 @@ def _check_scales(plan: Plan) -> None:
     forms = {**inputs_of(plan), "u": plan.output}
     for name, form in forms.items():
         if not form.floating and not (form.lsb >= _FINEST and _end(form) <= _LARGEST):
-            what = f"a count of {name} would be {form.lsb:.3g}, and the most that there are {_end(form):.3g}"
+            what = f"one count of {name} would be {form.lsb:.3g}, and as many as there are {_end(form):.3g}"
             remedy = "give [ranges] in units that are nearer to 1"
             raise PlanError(f"{plan.name} [ranges]", what, f"{remedy}, so that single precision holds both")
 
