@@ -6,6 +6,7 @@ among them. That folder may be a stranger's.
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import sys
 from collections.abc import Iterator, Mapping
@@ -27,6 +28,17 @@ def environment(**more: str) -> dict[str, str]:
     home = str(Path(focgen.__file__).resolve().parent.parent)
     paths = [path for path in sys.path if path]
     return {**os.environ, **_SAFE, "PYTHONPATH": os.pathsep.join(dict.fromkeys([home, *paths])), **more}
+
+
+def have_children() -> None:
+    """Let this process start others, also where it is a worker of :class:`multiprocessing.pool.Pool`.
+
+    Such a one is daemonic, which forbids just that, lest children be left behind. Ours end with the block
+    that uses them, or with its holder. The mark says nothing else of a process that runs.
+    """
+    this = multiprocessing.current_process()
+    if this.daemon:
+        this.daemon = False
 
 
 @contextmanager

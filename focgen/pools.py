@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any, NoReturn
 
-from focgen.children import workers
+from focgen.children import have_children, workers
 from focgen.present import present
 
 _GRACE = 5.0  # s that a process may take to leave in order
@@ -43,6 +43,7 @@ def pool(
     Where the block ends by an exception, an interrupt also, none of them goes on. An interrupt of the
     terminal is left to this process.
     """
+    have_children()
     watched, held = multiprocessing.Pipe(duplex=False)
     with workers(more), watched, held:
         made = _Pool(count, multiprocessing.get_context(start), _begin, (watched, held))

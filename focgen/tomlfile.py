@@ -108,8 +108,12 @@ class Table:
     def text(self, key: str, default: str | None = None) -> str | None:
         """A string, or ``default`` where absent."""
         value = self.raw(key, default)
-        if value is not None and not isinstance(value, str):
+        if key not in self:
+            return default
+        if not isinstance(value, str):
             raise self.fail(key, f"is {value!r}, not text", "put it in quotes")
+        if not is_written(value):
+            raise self.fail(key, f"is {value!r}, half a character", "give text that can be written as UTF-8")
         return value
 
     def flag(self, key: str, default: bool) -> bool:
@@ -188,6 +192,11 @@ class Table:
         if unknown:
             known = ", ".join(sorted(self._known))
             raise self.fail(None, f"has the unknown key {unknown[0]!r}", f"known here: {known}")
+
+
+def is_written(text: str) -> bool:
+    """Whether a text is one of UTF-8: Python's own may hold halves of characters, which no file can."""
+    return not any("\ud800" <= character <= "\udfff" for character in text)
 
 
 def _is_number(value: Any) -> bool:

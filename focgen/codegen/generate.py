@@ -9,13 +9,14 @@ from typing import Any
 
 from focgen.arguments import checked
 from focgen.codegen.edited import check_unedited
+from focgen.codegen.fits import check_fits
 from focgen.codegen.folder import example_context, readme_context
 from focgen.codegen.header import header_context
 from focgen.codegen.kernels import PORTABLE, TARGETS, Kernels, runtime_files
 from focgen.codegen.leftovers import leftovers
 from focgen.codegen.manifest import manifest_of, sha256
 from focgen.codegen.names import check_name
-from focgen.codegen.neighbours import kept, taken_back
+from focgen.codegen.neighbours import check_told_apart, kept, taken_back
 from focgen.codegen.packages.archive import archived
 from focgen.codegen.packages.context import Made
 from focgen.codegen.packages.package import PACKAGES, PLAIN, Package, check_package, packed
@@ -88,7 +89,7 @@ def generate(
     Raises ControllerError for a file that cannot be read, PlanError where the controller cannot be realised
     in this arithmetic, BuildError where an FMU finds no C compiler. InputError: a name or an option that
     cannot be used, a folder that cannot be written, or one where a file would replace the controller's own by
-    other bytes, or what somebody has edited.
+    other bytes, or what somebody has edited. So is one with a controller whose name differs in capitals only.
     """
     wanted = check_package(for_, fmi)
     kernels = _kernels(target)
@@ -102,6 +103,7 @@ def generate(
     plan = build_plan(made, arithmetic, length, called, memory, tolerance, horizon, operator, band, tunable)
     files = folder_files(plan, text, selftest, kernels, not no_float, wanted)
     files.update(archived(plan.name, files, wanted.fmi))
+    check_told_apart(Path(out), called)
     placed = {**kept(Path(out), called), **files}
     write_files(out, placed, [controller], lambda: _going(Path(out), called, placed, controller, force))
     return Generated(Path(out), tuple(files), plan, json.loads(files["manifest.json"]))
@@ -129,9 +131,10 @@ def folder_files(
     """Name and content of every file of a generated folder; the same plan gives the same bytes. Of a package
     all but what a compiler makes.
 
-    Raises PlanError for what C cannot express, InputError where the plan's name is no name in C.
+    Raises PlanError for what C cannot express or count, InputError where the plan's name is no name in C.
     """
     check_name(plan.name, plan.controller.name)
+    check_fits(plan)
     title, digest = plan.controller.name, sha256(controller_toml)
     runtime = {
         name: (shipped("c_runtime") / name).read_text(encoding="utf-8")

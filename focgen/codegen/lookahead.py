@@ -20,7 +20,8 @@ from focgen.plan.plan import Block, Count, Sum
 AHEAD = 4
 NEAR, NEAR_FLOATING = 16, 8  # lags summed in their own step; 8 at least, as the others are not known before
 SHORTEST = 8  # far lags below which looking ahead does not pay
-_LONGEST = 65_000  # the runs count weights in 16 bits
+_LONGEST = 65_000  # lags: a ring of whole groups is counted in 16 bits
+_WEIGHTS, _RUNS = 65_535, 255  # with the zeros that fill up blocks; what foc_run and the slices count
 _WIDEST = 31  # bits that a block may be shifted by
 _RUN = 4  # what a run costs beside its tiles, in tiles: calls, the ring's end, rounding
 
@@ -60,8 +61,8 @@ class LookAhead:
 
 
 def look_ahead(table: Sum) -> LookAhead | None:
-    """Lay a sum out; None where it is too short for that to pay, too long, or
-    shifted by more than the runtime's tiles can."""
+    """Lay a sum out; None where it is too short for that to pay, longer or in more parts than the runtime's
+    tiles are counted, or shifted by more than they can."""
     near_lags = NEAR_FLOATING if table.total.floating else NEAR
     if table.last - near_lags + 1 < SHORTEST or table.last > _LONGEST:
         return None
@@ -71,6 +72,8 @@ def look_ahead(table: Sum) -> LookAhead | None:
     if not far or any(block.align > _WIDEST for block in far):
         return None
     runs, slices = _shared([_whole(block) for block in far])
+    if max(run.weights for run in runs) > _WEIGHTS or len(runs) > _RUNS:
+        return None
     return LookAhead(
         far, tuple(map(_padded, far)), runs, slices, replace(table, blocks=near) if near else None
     )

@@ -36,6 +36,17 @@ def kept(folder: Path, name: str) -> dict[str, bytes]:
     }
 
 
+def check_told_apart(folder: Path, name: str) -> None:
+    """Raise InputError where a controller stands in ``folder`` whose name is ``name`` but for capitals.
+
+    Macros are in capitals, and some file systems make no difference either.
+    """
+    for other, _ in others(folder, name):
+        if other.lower() == name.lower():
+            what = f"holds the controller {other!r}, which shares its macros with {name!r}"
+            raise InputError(str(folder), what, "give --name one that differs in more than capitals")
+
+
 def taken_back(folder: Path, name: str) -> tuple[Path, ...]:
     """What stands beside for ``name``, which has its own place again."""
     beside = (folder / f"{name}.{file}" for file in _OWN)

@@ -41,7 +41,7 @@ def comment(text: str | UserText) -> str:
 
 def string(text: str | UserText) -> str:
     """Text between the quotes of a C string, on one line: what is not ASCII as the bytes of its UTF-8."""
-    return "".join(_ESCAPED.get(char, char) if char.isascii() else _octal(char) for char in _shown(text))
+    return "".join(_ESCAPED.get(char, char) if char.isascii() else _octal(char) for char in shown(text))
 
 
 def printf(text: str | UserText) -> str:
@@ -51,12 +51,12 @@ def printf(text: str | UserText) -> str:
 
 def markdown(text: str | UserText) -> str:
     """Text within a line or a cell of a table in Markdown, which shows it as it is."""
-    return _MARKUP.sub(r"\\\1", _shown(text))
+    return _MARKUP.sub(r"\\\1", shown(text))
 
 
 def xml(text: str | UserText) -> str:
     """Text between the quotes of an attribute in XML."""
-    return escape(_shown(text), {'"': "&quot;"})
+    return escape(shown(text), {'"': "&quot;"})
 
 
 def _of(text: str | UserText) -> str:
@@ -67,7 +67,7 @@ def _line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _shown(text: str | UserText) -> str:
+def shown(text: str | UserText) -> str:
     """One line without control characters: what cannot be seen, or turns the line about, becomes "?"."""
     return "".join(char if char.isprintable() else "?" for char in _line(_of(text)))
 

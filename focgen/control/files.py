@@ -47,7 +47,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -68,27 +68,39 @@ from focgen.control.controller import (
     Tunable,
     Units,
 )
+from focgen.control.given import plain, table_of
 from focgen.errors import ControllerError
 from focgen.fractional.continuous import OPERATORS
 from focgen.fractional.terms import read_transfer, terms_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.output import write_file
-from focgen.tomlfile import Table, check_replaced
+from focgen.tomlfile import Table, check_replaced, is_written
 
 ControllerLike = Controller | str | Path | Mapping[str, Any]
 """A controller, the path of its controller.toml, or a dictionary of the same shape."""
 _FACTORS = 1e-3, 1e3
 """What a factor on a gain can be."""
+MOST_POINTS = 4096
+"""Breakpoints of a schedule: a step looks for its own one by one."""
 
 
 def controller_from(given: ControllerLike) -> Controller:
-    """The controller that an argument is. Raises ControllerError where it is none, or cannot be used."""
+    """The controller that an argument is, held to the same whichever way it comes. Raises ControllerError
+    where it is none, or cannot be used."""
     if isinstance(given, Controller):
-        return given
+        return _of_object(given)
     if not isinstance(given, (str, os.PathLike, Mapping)):
         remedy = "give a Controller, a controller.toml or a dictionary like it"
         raise ControllerError("controller", f"is {type(given).__name__}", remedy)
     return read_controller(given)
+
+
+def _of_object(given: Controller) -> Controller:
+    """An equal one, of Python's own numbers, where its file could be read."""
+    where = "controller"
+    made = controller_of(Table(table_of(given, where), where, ControllerError), where)
+    unused = Table({"horizon": plain(given.horizon)}, where, ControllerError)  # of "continuous", for "gl"
+    return replace(made, horizon=_whole(unused, "horizon", 1))
 
 
 @checked
@@ -143,6 +155,8 @@ def _gain(top: Table) -> float | GainSchedule:
         raise table.fail(
             "gains", f"has {len(gains)} values for {len(points)} breakpoints", "give one gain for each"
         )
+    if len(points) > MOST_POINTS:
+        raise table.fail("breakpoints", f"has {len(points)} values", f"give at most {MOST_POINTS}")
     if len(points) < 2 or any(b <= a for a, b in pairwise(points)):
         raise table.fail("breakpoints", f"is {list(points)}", "give at least two, rising strictly")
     return GainSchedule(points, gains)
@@ -272,6 +286,8 @@ def _source(table: Table | None) -> Source | None:
 def _options(table: Table | None) -> tuple[tuple[str, Option], ...]:
     """What the controller was designed with: told, and nothing of what it is."""
     names = () if table is None else tuple(table.values)
+    if table is not None and not all(isinstance(name, str) and is_written(name) for name in names):
+        raise table.fail(None, "has a name that is no text", "give names that can be written as UTF-8")
     return tuple((name, _option(table, name)) for name in names if table is not None)
 
 
@@ -303,9 +319,9 @@ def check_replaces_controller(path: str | Path) -> None:
 def write_controller(controller: Controller, path: str | Path) -> None:
     """Write a controller so that :func:`read_controller` gives an equal one.
 
-    Raises InputError where it cannot be written.
+    Raises ControllerError where it could not be read, InputError where it cannot be written.
     """
-    write_file(path, controller_text(controller))
+    write_file(path, controller_text(controller_from(controller)))
 
 
 def controller_text(controller: Controller) -> str:

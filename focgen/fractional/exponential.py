@@ -29,7 +29,7 @@ from focgen.fractional.exponential_fit import Alternation, eased, ladder
 
 HORIZONS = (100, 10**8)  # samples
 TOLERANCES = (1e-8, 0.1)
-_CLOSEST_TO_INTEGER = 1e-7
+CLOSEST_TO_INTEGER = 1e-7
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def fit_states(order: float, horizon: int, states: int) -> ExponentialMemory:
 
 def checked_differences(order: float, horizon: int) -> int:
     """Return the number of whole differences of ``order``. Raises ValueError for what cannot be fitted."""
-    if not (-1.0 < order < 2.0 and abs(order - round(order)) >= _CLOSEST_TO_INTEGER):
+    if not (-1.0 < order < 2.0 and abs(order - round(order)) >= CLOSEST_TO_INTEGER):
         raise ValueError(f"the order {order} is not between -1 and 2, or within 1e-7 of a whole one")
     if not HORIZONS[0] <= horizon <= HORIZONS[1]:
         raise ValueError(f"the horizon {horizon} is not between {HORIZONS[0]} and {HORIZONS[1]} samples")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,15 @@ class Experiment:
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
         if self.rows is not None:
             object.__setattr__(self, "rows", MappingProxyType(dict(self.rows)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For copies and other processes: views of mappings become mappings."""
+        return {key: dict(x) if isinstance(x, MappingProxyType) else x for key, x in vars(self).items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for key, value in state.items():
+            object.__setattr__(self, key, value)
+        self.__post_init__()
 
     def __repr__(self) -> str:
         told = f"{len(self)} samples every {self.sample_time:g} s: {', '.join(self.signals)}"

@@ -17,7 +17,8 @@ What that means where orders are whole:
 of two samples.
 * 1/(T s + 1) is the backward Euler recursion v_k = (e_k + (T/h) v_{k−1}) / (1 + T/h),
   whatever L ≥ 1 is: the weights of a whole order end at the order, and the tables with them.
-* An order within 1e-9 of a whole number is that number.
+* An order is the decimal number that is written: 1.6 less 0.6 is 1. A double beside a whole number is not
+  that number: it has a past as long as any other.
 
 The integral of a term of negative order is clamped like that of an ordinary PID controller: to what takes the
 output, alone and at rest, from one of its limits to the other at the smallest gain that occurs. Ahead of an
@@ -28,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -39,7 +41,6 @@ from focgen.fractional.transfer import Polynomial, polynomial
 from focgen.fractional.weights import gl_weights, short_memory_bias
 from focgen.plan.mode_sums import Modes, Response
 
-_WHOLE = 1e-9
 _HIGHEST = 8.0  # of any order: beyond, h^−β leaves no digits
 
 
@@ -143,11 +144,9 @@ def _split_remedy(controller: Controller) -> str:
 
 
 def _shifted(terms: Polynomial, by: float) -> Polynomial:
-    return polynomial((c, _whole(order - by)) for c, order in terms)
-
-
-def _whole(order: float) -> float:
-    return float(round(order)) if abs(order - round(order)) < _WHOLE else order
+    """Orders less ``by``, as decimal numbers, each to the double that is nearest."""
+    less = Fraction(repr(by))
+    return polynomial((c, float(Fraction(repr(order)) - less)) for c, order in terms)
 
 
 def normaliser(controller: Controller, leads: Mapping[float, float]) -> float:

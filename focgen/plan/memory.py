@@ -25,7 +25,7 @@ from focgen.fractional.continuous import (
     fit_band,
 )
 from focgen.fractional.elementary import power, total
-from focgen.fractional.exponential import ExponentialMemory
+from focgen.fractional.exponential import CLOSEST_TO_INTEGER, ExponentialMemory
 from focgen.fractional.exponential_rounded import fit_rounded
 from focgen.fractional.transfer import Polynomial, Term
 from focgen.fractional.weights import gl_weights
@@ -145,7 +145,7 @@ def band_memories_of(
         try:
             found.append(fit_band(order, low, high, tolerance, ROUNDED[arithmetic]))
         except ValueError as reason:
-            remedy = "allow a larger tolerance, another band, or use the operator gl"
+            remedy = _whole_remedy(order) or "allow a larger tolerance, another band, or use the operator gl"
             what = f"order {order:g} has no memory that follows it: {reason}"
             raise PlanError(controller.name, what, remedy) from None
     return tuple(found)
@@ -154,9 +154,16 @@ def band_memories_of(
 def _fractional_orders(controller: Controller) -> list[float]:
     orders = sorted({t.order for t in _terms(realise(controller)) if not t.order.is_integer()})
     if orders and orders[-1] > _LARGEST_ORDER:
-        what = f"has the order {orders[-1]:g} over its lowest: exponential memory ends at 2"
-        raise PlanError(f"{controller.name} [transfer]", what, "use memory short")
+        what = f"has the order {orders[-1]!r} over its lowest: exponential memory ends at 2"
+        remedy = _whole_remedy(orders[-1]) or "use memory short"
+        raise PlanError(f"{controller.name} [transfer]", what, remedy)
     return orders
+
+
+def _whole_remedy(order: float) -> str:
+    """What helps an order that no sum of exponentials tells from a whole one; nothing for any other."""
+    whole = round(order)
+    return f"write {whole}, or use memory short" if abs(order - whole) < CLOSEST_TO_INTEGER else ""
 
 
 def _terms(form: Realisation) -> Polynomial:
@@ -169,8 +176,9 @@ def _fitted(
     try:
         return fit_rounded(order, horizon, tolerance, ROUNDED[arithmetic])
     except ValueError as reason:
-        remedy = "allow a larger tolerance, a shorter horizon, or choose another arithmetic"
-        what = f"order {order:g} has no exponential memory: {reason}"
+        other = "allow a larger tolerance, a shorter horizon, or choose another arithmetic"
+        remedy = _whole_remedy(order) or other
+        what = f"order {order!r} has no exponential memory: {reason}"
         raise PlanError(controller.name, what, remedy) from None
 
 

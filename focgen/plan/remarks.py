@@ -11,13 +11,27 @@ from focgen.plan.plan import Plan
 
 _SHARE = 0.01  # of what an integral can be off by in the end
 _SAID = 1e-3  # of the trapezoid's error from here on
+_BESIDE = 1e-9  # of a whole order, which it may well be meant to be
 
 
 def remarks(plan: Plan) -> list[str]:
     """What has to be said, most important first; nothing of most plans."""
+    found = [*_held(plan), *_beside_whole(plan)]
     if plan.inner is None:
-        return _held(plan)
-    return [*_held(plan), *_adding_up(plan), *_ramp(plan), *_trapezoid(plan)]
+        return found
+    return [*found, *_adding_up(plan), *_ramp(plan), *_trapezoid(plan)]
+
+
+def _beside_whole(plan: Plan) -> list[str]:
+    """Orders that need all of a memory for next to nothing."""
+    form = realise(plan.controller)
+    orders = dict.fromkeys(t.order for t in form.direct + form.rest + form.den)
+    near = [order for order in orders if 0.0 < abs(order - round(order)) < _BESIDE]
+    what = "is no whole number, so it takes all the memory that any power does; write it so that"
+    return [
+        f"{plan.name} [transfer]: the order {order!r} {what} {round(order)} is left, if that is meant"
+        for order in near
+    ]
 
 
 def _held(plan: Plan) -> list[str]:

@@ -122,7 +122,7 @@ def holding(
     """
     order = _good_first(invalid)
     ran = execute(plan, good_samples(plan, scenario, invalid))
-    low, high = _limits(plan, scenario)
+    low, high = limits_of(plan, scenario)
     u, d, flags = (np.zeros_like(part) for part in (ran.u, ran.d, ran.flags))
     for whole, part in ((u, ran.u), (d, ran.d), (flags, ran.flags)):
         np.put_along_axis(whole, order, present(part), axis=1)
@@ -133,8 +133,8 @@ def holding(
     return Trace(u, np.where(invalid, d.dtype.type(0), d), flags)
 
 
-def _limits(plan: Plan, scenario: Scenario) -> tuple[Numbers, Numbers]:
-    """The output's limits at every sample, shape (lanes, samples)."""
+def limits_of(plan: Plan, scenario: Scenario) -> tuple[Numbers, Numbers]:
+    """The output's limits at every sample of a raw scenario, raw, shape (lanes, samples)."""
     low, high = (np.full(scenario.ref.shape, end, scenario.ref.dtype.type) for end in _ends(plan))
     for lane, course in (courses(plan, scenario) if plan.tuning else {}).items():
         for sample, now in course[1:]:

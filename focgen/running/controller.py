@@ -174,7 +174,13 @@ class LoadedController:
         if not isinstance(given, Params):
             raise InputError(f"{self.name}: params", f"is {given!r}", "change what default() gives")
         box, count = self.plan.box, len(self.plan.box.nominal)
-        factors = tuple(self._one("gain", factor, box.factor) for factor in given.gain)
+        several: Any = given.gain
+        if not isinstance(several, (tuple, list)) and not (
+            isinstance(several, np.ndarray) and several.ndim == 1
+        ):
+            what = f"is of the type {type(several).__name__}"
+            raise InputError(f"{self.name}: gain", what, "give a tuple of a factor for each gain")
+        factors = tuple(self._one("gain", factor, box.factor) for factor in several)
         if len(factors) != count:
             what, remedy = f"has {len(factors)} factors for {count} gains", "give one for each gain"
             raise InputError(f"{self.name}: gain", what, remedy)

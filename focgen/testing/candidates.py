@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -161,15 +162,26 @@ def _lane(one: Steps, plan: Plan, scenario: Scenario, lane: int) -> tuple[list[f
         try:
             for event in events.get(k, ()):
                 _happen(one, event)
-            u.append(float(one.step(*given)))
+            u.append(float(_answer(one.step(*given), Real, "step", "a number")))
             if flagged:
                 now = getattr(one, "flags")  # noqa: B009 - which a candidate may have
-                flags.append(int(now() if callable(now) else now))
+                said = now() if callable(now) else now
+                flags.append(int(_answer(said, Integral, "flags", "a whole number")))
         except Exception as error:
             now = events.get(k, "no event")
             error.add_note(f"at sample {k} of run {lane}, with the inputs {given}, after {now}")
             raise
     return u, flags if flagged else None
+
+
+def _answer(value: Any, kind: type, of: str, wanted: str) -> Any:
+    """A candidate's answer, where it is a number: text of one, for instance, is none."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if not isinstance(value, kind) or isinstance(value, bool):
+        what = f"gives a value of the type {type(value).__name__} as its {of}"
+        raise InputError("the candidate", what, f"return {wanted}")
+    return value
 
 
 def _happen(one: Any, event: Reset | Track | Tune) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.arrays import Numbers
 from focgen.control.controller import Controller
-from focgen.control.files import read_controller
+from focgen.control.files import controller_from
 from focgen.errors import InputError, check_choice
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
@@ -120,9 +120,9 @@ def _plan(reference: str | Path | Controller | LoadedController) -> tuple[Plan, 
     if isinstance(reference, LoadedController):
         return reference.plan, reference.name
     if isinstance(reference, Controller):
-        return build_plan(reference), reference.name
+        return build_plan(controller_from(reference)), reference.name
     if Path(reference).is_file():
-        return build_plan(read_controller(reference)), str(reference)
+        return build_plan(controller_from(reference)), str(reference)
     read = read_folder(reference)
     changed = [d for d in read.differences if d.startswith(("controller.toml", "manifest.json"))]
     if changed:

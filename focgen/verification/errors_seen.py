@@ -9,7 +9,8 @@ import numpy as np
 from focgen.arrays import Numbers
 from focgen.plan.ideal import ideal
 from focgen.plan.plan import ErrorBound, Plan
-from focgen.plan.scenario import Scenario, Trace, physical_trace
+from focgen.plan.scenario import Scenario, Trace, physical_trace, to_raw
+from focgen.plan.usable import limits_of
 
 
 @dataclass(frozen=True)
@@ -37,18 +38,29 @@ class ErrorsSeen:
 def errors_seen(plan: Plan, physical: Scenario, trace: Trace, bound: ErrorBound) -> ErrorsSeen:
     """Compare a raw ``trace`` of the plan's controller with the same memory in float64 on the same inputs.
 
-    Without an integrator only the clamped output is seen, which errs no more than what is clamped.
+    Without an integrator only the clamped output is seen. It errs no more than what is clamped where both are
+    clamped to the same limits: the machine's, whose own rounding is a part of the output's error alone.
     """
     reference = ideal(plan.controller, physical, plan.length, plan.memories)
     seen = physical_trace(plan, trace)
     since = _samples_since_reset(physical)
-    truth = reference.d if plan.integrator else reference.u
-    operator, output = np.abs(seen.d - truth), np.abs(seen.u - reference.u)
+    output = np.abs(seen.u - reference.u)
+    if plan.integrator:
+        operator = np.abs(seen.d - reference.d)
+    else:
+        operator = np.abs(seen.u - _clamped(plan, physical, reference.d))
     allowed = np.full(since.shape, bound.operator)
     if bound.operator_per_sample:
         allowed = np.minimum(allowed, since * bound.operator_per_sample)
     largest = MaxError(float(operator.max()), float(output.max()))
     return ErrorsSeen(largest, _share(operator, allowed), _share(output, since * bound.output_per_sample))
+
+
+def _clamped(plan: Plan, physical: Scenario, d: Numbers) -> Numbers:
+    """``d`` within the limits as the arithmetic holds them, both in physical units."""
+    low, high = limits_of(plan, to_raw(plan, physical))
+    made: Numbers = np.clip(d, *(end.astype(float) * plan.output.lsb for end in (low, high)))
+    return made
 
 
 def _share(errors: Numbers, allowed: Numbers) -> float:

@@ -135,7 +135,8 @@ def _outside(plan: Plan, params: Params, rng: np.random.Generator) -> Params:
     if plan.floating:
         kind = np.float32 if plan.arithmetic == "f32" else np.float64
         beside = [float(np.nextafter(kind(end), kind(to))) for end, to in ((low, -np.inf), (high, np.inf))]
-        choices = [*beside, low - 1e3, high + 1e3, np.nan, np.inf, -np.inf]
+        far = (end + sign * max(1e3, abs(end)) for end, sign in ((low, -1.0), (high, 1.0)))
+        choices = [*beside, *(float(kind(x)) for x in far), np.nan, np.inf, -np.inf]  # as the type has them
     else:
         choices = [x for x in (low - 1, high + 1, -top - 1, top) if not low <= x <= high and abs(x) <= top]
     values = [*params.gain, params.u_min, params.u_max]

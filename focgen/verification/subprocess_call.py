@@ -11,6 +11,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
+from focgen.children import have_children
 from focgen.present import present
 
 
@@ -30,6 +31,7 @@ def in_subprocess(function: Callable[..., Any], *arguments: Any, seconds: float 
     """
     if not hasattr(os, "fork"):
         return function(*arguments)
+    have_children()
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_answer, args=(sender, function, arguments), daemon=True)

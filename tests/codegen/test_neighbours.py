@@ -84,3 +84,15 @@ def test_what_was_edited_of_either_stays(tmp_path, name):
     with pytest.raises(InputError, match=name):
         generate(seed_controller(7), tmp_path, "q15", name=name.partition(".")[0])
     assert (tmp_path / name).read_text() == "mine"
+
+
+def test_names_that_differ_in_capitals_only_are_refused(tmp_path):
+    """VALVE_U_MAX would stand for the limits of either, and of two files one on some file systems."""
+    generate(seed_controller(5), tmp_path, "q15", name="valve")
+    generate(seed_controller(5), tmp_path, "q15", name="two")
+    before = content(tmp_path)
+    for name in ("Valve", "TWO"):
+        with pytest.raises(InputError, match="shares its macros"):
+            generate(seed_controller(6), tmp_path, "q31", name=name, force=True)
+    assert content(tmp_path) == before
+    generate(seed_controller(6), tmp_path / "apart", "q31", name="Valve")

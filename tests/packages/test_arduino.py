@@ -17,12 +17,13 @@ import numpy as np
 import pytest
 
 import focgen
+from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
 from focgen.plan.scenario import Scenario
 from focgen.verification.folder import read_folder
 from tests.c_code import EXACT, compiler, run, tool
-from tests.controllers import seed_controller
+from tests.controllers import seed_controller, simple
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CATEGORIES = """Display, Communication, Signal Input/Output, Sensors, Device Control, Timing, Data Storage,
@@ -110,6 +111,31 @@ def test_a_name_of_arduinos_is_refused(tmp_path):
     with pytest.raises(focgen.FocgenError, match="--name"):
         focgen.generate(seed_controller(9), tmp_path / "out", name="my_Arduino", for_="arduino")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("step", [1e-7, 4000.1, 5000.0, 1e9])
+def test_a_sample_time_that_a_board_cannot_count_is_refused(tmp_path, step):
+    """5000 s were 705 s in 32 bits of microseconds."""
+    made = simple(TransferFunction([(1.0, 0.0)]), sample_time=step)
+    with pytest.raises(focgen.FocgenError, match="by the board's count of microseconds"):
+        focgen.generate(made, tmp_path / "out", "q15", for_="arduino")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("step", "period"),
+    [
+        (4000.0, "SIMPLE_PERIOD_US"),
+        (20.0000004, "20000000UL"),
+        (20.0000006, "20000001UL"),
+        (1e-6, "SIMPLE_P"),
+    ],
+)
+def test_the_period_is_the_sample_time(tmp_path, step, period):
+    made = simple(TransferFunction([(1.0, 0.0)]), sample_time=step)
+    focgen.generate(made, tmp_path / "simple", "q15", for_="arduino")
+    sketch = (tmp_path / "simple" / "examples" / "simple" / "simple.ino").read_text()
+    assert f"PERIOD_US = {period}" in sketch
 
 
 def test_verify_and_load_take_the_folder(library):

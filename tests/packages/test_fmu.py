@@ -242,6 +242,19 @@ def test_texts_of_a_user_are_those_of_the_description(fmpy, tmp_path):
     assert {v.unit for v in description.modelVariables if v.name == "u"} == {unit}
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("units", [("V", "V ", "bar"), ("1/mm", " ", "bar"), ("a\x01", "a\x02", "a?")])
+def test_units_that_look_alike_are_one(fmpy, tmp_path, fmi, units):
+    """Two of one name are no valid description."""
+    from fmpy.validation import validate_fmu
+
+    focgen.generate(seed_controller(9, units=Units(*units)), tmp_path, "q31", name="fin", for_="fmu", fmi=fmi)
+    assert validate_fmu(str(tmp_path / "fin.fmu")) == []
+    found = fmpy.read_model_description(str(tmp_path / "fin.fmu")).unitDefinitions
+    names = [unit.name for unit in found]
+    assert len(names) == len(set(names)) and all(names)
+
+
 def test_the_same_input_gives_the_same_bytes(tmp_path):
     one = made(tmp_path / "a", FILTER, "q31", 3).read_bytes()
     assert one == made(tmp_path / "b", FILTER, "q31", 3).read_bytes()

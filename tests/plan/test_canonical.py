@@ -16,6 +16,9 @@ from focgen.errors import PlanError
 from focgen.fractional.transfer import TransferFunction, polynomial
 from focgen.plan.build import build_plan
 from focgen.plan.canonical import folded, inner_limits, memory_bias, realise, tables, tail_l1
+from focgen.plan.execute import execute
+from focgen.plan.remarks import remarks
+from focgen.plan.scenario import Scenario, physical_trace, to_raw
 from focgen.plan.stability import inverse
 from tests.controllers import random_controller, seed_controller, simple
 
@@ -48,9 +51,31 @@ def test_terms_of_negative_order_leave_a_sum_of_the_remaining_order():
     assert not shifted.direct and [t.order for t in shifted.rest] == pytest.approx([0.6, 0.0])
 
 
-def test_orders_that_are_whole_but_for_rounding_are_whole():
-    form = form_of([(1.0, 0.1 + 0.2 + 0.7)], [(1.0, 1.3), (1.0, 1.3 - 1.0 + 1e-16)])
-    assert {t.order for t in form.den} == {0.0, 1.0}
+def test_an_order_is_the_decimal_number_that_is_written():
+    """1.3 − 0.3 is 1, although the doubles next to them differ by less."""
+    form = form_of([(1.0, 2.3), (1.0, 1.4)], [(1.0, 1.3), (1.0, 0.3)])
+    assert [t.order for t in form.direct] == [2.0, 1.1] and [t.order for t in form.den] == [1.0, 0.0]
+
+
+@pytest.mark.parametrize("arithmetic", ["f64", "q31", "q15"])
+@pytest.mark.parametrize("off", [9e-10, -9e-10, 1e-15])
+def test_an_order_beside_a_whole_number_is_not_that_number(arithmetic, off):
+    """What C computes of 0.1 (h s)^β, whose first weight is 0.1, is within the bound, and has a past."""
+    step, order = 1e-6, 1.0 + off
+    term = 0.1 * float(mpmath.mpf(step) ** mpmath.mpf(order)), order
+    ranges = ControllerRanges((-1.0, 1.0), (0.0, 0.1), (-1.0, 1.0))
+    given = simple(TransferFunction([term]), sample_time=step, length=40, ranges=ranges)
+    plan = build_plan(given, arithmetic)
+    scenario = Scenario(np.array([[1.0] + [0.0] * 39]), np.zeros((1, 40)))
+    seen = physical_trace(plan, execute(plan, to_raw(plan, scenario))).u[0]
+    exact = [float(0.1 * (-1) ** j * mpmath.binomial(mpmath.mpf(order), j)) for j in range(40)]
+    assert np.abs(seen - exact).max() <= plan.error_bound.operator
+    assert plan.direct.last == 40 and any("is no whole number" in said for said in remarks(plan))
+
+
+def test_an_exponential_memory_of_such_an_order_says_what_to_write():
+    with pytest.raises(PlanError, match="write 1, or use memory short"):
+        build_plan(simple(TransferFunction([(0.1, 0.9999999991)])), "f64", memory="exponential")
 
 
 def test_tables_are_equation_10_in_exact_arithmetic():

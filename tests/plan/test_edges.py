@@ -275,10 +275,13 @@ def test_one_integral_may_be_left_over():
                     realise(made)
 
 
-def test_an_order_is_whole_within_a_billionth():
-    for off, whole in ((0.9e-9, True), (-0.9e-9, True), (1.1e-9, False)):
+def test_an_order_is_whole_where_its_decimals_are():
+    for high, low, left in ((1.3, 0.3, 1.0), (2.4, 0.4, 2.0), (1.3, 0.3000000000000003, 0.9999999999999997)):
+        den = realise(simple(TransferFunction([(1.0, 0.0)], [(1.0, high), (1.0, low)]))).den
+        assert [term.order for term in den] == [left, 0.0]
+    for off in (0.9e-9, -0.9e-9, 2.3e-16):
         den = realise(simple(TransferFunction([(1.0, 0.0)], [(1.0, 1.0 + off), (1.0, 0.0)]))).den
-        assert (den[0].order == 1.0) == whole
+        assert den[0].order == 1.0 + off != 1.0
 
 
 def test_v_that_rounds_up_beyond_its_type_is_narrowed_once_more():

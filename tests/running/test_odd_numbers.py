@@ -6,14 +6,17 @@ Red when such a thing raises anything but InputError, or is taken for a number.
 import datetime
 import decimal
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import focgen
 from focgen.codegen.generate import generate
+from focgen.control.controller import Tunable
 from focgen.errors import InputError
-from tests.controllers import seed_controller
+from focgen.fractional.transfer import TransferFunction
+from tests.controllers import seed_controller, simple
 
 ONE = {
     "digits without end": 10**400,
@@ -96,3 +99,19 @@ def test_arrays_of_any_layout_are_the_same_numbers(controller):
     assert np.ptp(right) > 0
     for one in kinds:
         np.testing.assert_array_equal(controller.new().run(one, 0.0, *_scheduled(controller)), right)
+
+
+@pytest.mark.parametrize(
+    "gain", [2.0, None, "1", {1.0: 2}, 1j, ("1",), (None,), [[1.0]], (np.ones(2),), (10**400,)]
+)
+def test_factors_that_are_no_row_of_numbers_are_refused(tmp_path, gain):
+    """One gain has one factor, in a tuple all the same."""
+    made = simple(
+        TransferFunction([(1.0, 0.5)]), length=5, tunable=Tunable((0.5, 2.0), (-10.0, -10.0), (10.0, 10.0))
+    )
+    generate(made, tmp_path, "q31", tunable=True)
+    loaded = focgen.load(tmp_path)
+    for call in (loaded.check, loaded.tune):
+        with pytest.raises(InputError):
+            call(replace(loaded.default(), gain=gain))
+    assert loaded.check(replace(loaded.default(), gain=np.array([1.5]))) == 0

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import focgen
@@ -351,3 +352,45 @@ def test_nothing_of_it_is_imported_by_pytest_alone():
     code = f"import sys, focgen.testing.plugin; print({listed})"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     assert found.stdout.strip() == "[]"
+
+
+# ------------------------------------------------------------------------------------- odd answers
+
+
+@pytest.mark.parametrize("odd", ["0.5", b"1", None, 1j, [0.0], np.zeros(1), np.zeros((2, 2)), True, {}])
+def test_an_answer_that_is_no_number_is_told(folders, odd):
+    """Text of the right number passed."""
+    with pytest.raises(InputError, match=f"type {type(odd).__name__} as its step; return a number"):
+        assert_equivalent(folders / "filter_f32", lambda ref, meas: odd, samples=SAMPLES)
+
+
+class Flagged:
+    """The reference, with flags as a test wants them, or an output."""
+
+    def __init__(self, folder, flags=int, u=float):
+        self.own, self.flag, self.u = focgen.load(folder, raw=True), flags, u
+
+    def reset(self, *given):
+        self.own.reset(*given)
+
+    def track(self, u):
+        self.own.track(u)
+
+    def step(self, *given):
+        return self.u(self.own.step(*given))
+
+    @property
+    def flags(self):
+        return self.flag(self.own.flags)
+
+
+@pytest.mark.parametrize("odd", [str, float, lambda flags: None])
+def test_flags_that_are_no_whole_number_are_told(folders, odd):
+    with pytest.raises(InputError, match="as its flags; return a whole number"):
+        assert_equivalent(folders / "spba_q31", Flagged(folders / "spba_q31", odd), samples=SAMPLES)
+
+
+@pytest.mark.parametrize("u", [np.float64, np.int64, int, np.array])
+def test_numbers_of_any_kind_are_answers(folders, u):
+    whole = Flagged(folders / "spba_q31", np.uint8, u)
+    assert assert_equivalent(folders / "spba_q31", whole, samples=SAMPLES).flags

@@ -10,7 +10,9 @@ from focgen.codegen.literals import literal
 from focgen.codegen.packages.context import BuildContext, Made, build_context, licence, rendered
 from focgen.codegen.state import state_bytes
 from focgen.errors import InputError
-from focgen.plan.plan import Format
+from focgen.plan.plan import Format, Plan
+
+_PERIODS = 1.0, 4e9  # us: micros() counts in 32 bits, and what runs beside has to leave time to look at it
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,7 @@ class SketchContext:
     fixed: bool
     scheduled: bool
     state_bytes: int
-    whole_period: bool
+    period: str
     measurement: tuple[str, str]
     reference: str
     schedule: str
@@ -31,7 +33,8 @@ class SketchContext:
 def arduino_files(made: Made) -> dict[str, str | bytes]:
     """library.properties, keywords.txt, src/, a sketch, the licence, and a section of the README.
 
-    Raises InputError for a name that Arduino keeps for its own libraries.
+    Raises InputError for a name that Arduino keeps for its own libraries, and for a sample time that its
+    clock cannot count.
     """
     name = made.plan.name
     if "arduino" in name.lower():
@@ -88,11 +91,22 @@ def _sketch(made: Made) -> SketchContext:
         fixed=not form.floating,
         scheduled=plan.schedule is not None,
         state_bytes=state_bytes(plan),
-        whole_period=period_us(plan) is not None,
+        period=_period(plan),
         measurement=(_number(ranges.measurement[0], form), _number(ranges.measurement[1], form)),
         reference=_number(sum(ranges.reference) / 2.0, form),
         schedule=_number(at, form) if plan.schedule else "",
     )
+
+
+def _period(plan: Plan) -> str:
+    """The sample time in microseconds as C has it. Raises InputError where micros() cannot count it."""
+    if not _PERIODS[0] <= plan.sample_time * 1e6 <= _PERIODS[1]:
+        what = f"cannot be called every {plan.sample_time:g} s by the board's count of microseconds"
+        remedy = "leave --for out, and call the C by a timer or a clock of your own"
+        raise InputError("--for arduino", what, remedy)
+    if period_us(plan) is not None:
+        return f"{plan.name.upper()}_PERIOD_US"
+    return f"{round(plan.sample_time * 1e6)}UL"
 
 
 def _number(value: float, form: Format) -> str:

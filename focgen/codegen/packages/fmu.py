@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import dataclass
 
 from focgen.codegen.packages.context import Made, licence, release, rendered
-from focgen.codegen.texts import UserText
+from focgen.codegen.texts import UserText, shown
 from focgen.plan.plan import Plan
 
 
@@ -89,6 +89,11 @@ def _context(made: Made) -> FmuContext:
     )
 
 
+def _unit(text: str) -> UserText:
+    """As the description shows it: units that look alike are one, and what shows nothing is none."""
+    return UserText(shown(text))
+
+
 def _value(plan: Plan, count: int | float) -> str:
     """A count of the output in its unit."""
     return repr(float(count) * (1.0 if plan.output.floating else plan.output.lsb))
@@ -103,15 +108,15 @@ def _variables(plan: Plan) -> tuple[list[Variable], Variable]:
     if plan.schedule and ranges.schedule:
         rows.append(("sched", "scheduling signal", ranges.schedule, units.schedule))
     inputs = [
-        Variable(i, name, about, UserText(unit), repr(min(max(0.0, span[0]), span[1])))
+        Variable(i, name, about, _unit(unit), repr(min(max(0.0, span[0]), span[1])))
         for i, (name, about, span, unit) in enumerate(rows, 1)
     ]
-    return inputs, Variable(4, "u", "output", UserText(units.output), "0.0")
+    return inputs, Variable(4, "u", "output", _unit(units.output), "0.0")
 
 
 def _parameters(plan: Plan) -> list[Parameter]:
     """Of a tunable plan: the limits of the output, and a factor for each gain."""
-    box, unit = plan.tuning, UserText(plan.controller.units.output)
+    box, unit = plan.tuning, _unit(plan.controller.units.output)
     if box is None:
         return []
     name, one = plan.name.upper(), 1.0 if plan.output.floating else box.factor.lsb
