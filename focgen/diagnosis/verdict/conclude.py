@@ -226,9 +226,8 @@ def _another(controller: ControllerCheck | None) -> Iterator[str]:
     if controller is not None and controller.unexplained:
         by = f"{controller.departure:.3g} (root mean square)"
         yield (
-            f"the command departs from the controller's file by {by}, and no memory, arithmetic or limit "
-            "explains it: check that this file is the one that ran, with these gains, and that no column is "
-            "a sample late"
+            f"the command departs from the controller's file by {by}, which no memory, arithmetic or limit "
+            "explains; check that this file and these gains ran, and that no column is late"
         )
 
 
