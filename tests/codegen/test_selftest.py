@@ -17,7 +17,7 @@ from focgen.cli.main import main
 from focgen.codegen.generate import folder_files, generate
 from focgen.codegen.selftest import RESET, TRACK, scenario_of, selftest_rows
 from focgen.control.files import controller_text
-from focgen.errors import PlanError
+from focgen.errors import InputError, PlanError
 from focgen.output import write_files
 from focgen.plan.build import build_plan
 from focgen.plan.execute import execute
@@ -263,8 +263,10 @@ def test_a_manifest_that_is_none_removes_nothing_outside(tmp_path, content):
     (tmp_path / "x").write_text("mine")
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "manifest.json").write_text(content)
-    generate(CONTROLLERS["spba"], tmp_path / "out", "q15")
-    assert (tmp_path / "x").is_file()
+    with pytest.raises(InputError, match="manifest.json would be replaced"):
+        generate(CONTROLLERS["spba"], tmp_path / "out", "q15")
+    generate(CONTROLLERS["spba"], tmp_path / "out", "q15", force=True)
+    assert (tmp_path / "x").is_file() and (tmp_path / "out" / "spba.c").is_file()
 
 
 def test_the_manifest_says_what_it_takes(sound):

@@ -9,7 +9,7 @@ CONSTANTS = {
     "belief/standing.py": ["_SURE"],
     "controller/quantisation.py": ["_DECIMAL", "_DIGITS", "_OFF", "_SAME"],
     "controller/replayed.py": ["_SLOWER"],
-    "controller/check.py": ["_NEARLY", "_RESOLVED", "_ROUNDED", "_STEADY", "_TIED"],
+    "controller/check.py": ["_LARGE", "_NEARLY", "_RESOLVED", "_ROUNDED", "_STEADY", "_TIED"],
     "controller/stamps.py": ["LOST", "UNSTEADY", "_FOLLOWING"],
     "fitting/fit.py": ["FIXED", "STEP", "_LAGGING"],
     "fitting/integrating.py": ["_OF_RESPONSE"],

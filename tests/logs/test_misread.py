@@ -178,7 +178,7 @@ def test_groups_of_tdms_with_channels_of_time_that_differ_are_refused(tmp_path):
 def test_logs_that_are_placed_by_their_stamps_are_said_to_be(tmp_path):
     """Monday afternoon and Tuesday morning, by the time of day: nobody can know, but it is said."""
     late = text(tmp_path, [f"15:00:{k:02d},{k},{k}" for k in range(40)], "mon.csv")
-    early = text(tmp_path, [f"09:00:{k:02d},{k},{k}" for k in range(40)], "tue.csv")
+    early = text(tmp_path, [f"09:00:{k:02d},{k},{2 * k}" for k in range(40)], "tue.csv")
     found = read_logs([late, early], PLAIN, 1.0)
     assert [e.name for e in found] == ["tue", "mon"] and "not in the order given" in found[0].notes[0]
     assert not any(e.notes for e in read_logs([early, late], PLAIN, 1.0))

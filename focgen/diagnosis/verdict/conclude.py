@@ -32,7 +32,6 @@ from focgen.logs.notes import notes_of
 from focgen.rig.replay import goodness
 from focgen.rig.rig import Rig
 
-_WORSE = 1.05  # of the mean square without any effect: with more they do not belong together
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
 
@@ -176,8 +175,10 @@ def _at_odds(summary: _Summary) -> list[Explanation]:
         return []
     found, *others = (float(np.mean(summary.squares[k])) for k in ("explained", "as given", "refitted"))
     without = min(others)
-    odd = len(explained) > 1 or summary.floor > NUMBERS.above**2 * without
-    return explained if odd and found > _WORSE * without else []
+    if len(explained) > 1:
+        return explained if found > without else []
+    no_gap, above = summary.floor > NUMBERS.above**2 * without, without < NUMBERS.above**2 * found
+    return explained if no_gap and above else []
 
 
 def _gauges(at_odds: Sequence[Explanation]) -> Iterator[str]:
