@@ -166,9 +166,10 @@ def _present(table: LogTable, signals: Roles) -> tuple[dict[str, Array], tuple[s
 
 
 def _unit_note(table: LogTable, role: str, signals: Roles) -> str | None:
-    """What the file says of a column's unit, where the rig takes it for another."""
+    """What the file or the column's name says of its unit, where the rig takes it for another."""
     column = signals.columns()[role]
     given, own, scale = table.unit(column), signals.units.get(role), signals.scales.get(role)
+    given = given or (unit_of(column) or (None, None))[1]
     taken = own if scale is None else scale.unit
     if given is None or taken is None or given == taken or _alike(given, taken):
         return None

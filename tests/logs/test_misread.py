@@ -261,6 +261,15 @@ def test_another_unit_than_the_rigs_is_said_however_it_is_spelled(tmp_path, unit
     assert not any("is taken as" in note for note in same.notes)
 
 
+def test_another_unit_than_the_columns_name_ends_in_is_said(tmp_path):
+    path = text(tmp_path, ROWS, header="t,p_bar,y_deg")
+    for unit, said in (("kPa", True), ("bar", False)):
+        signals = Signals("t", "y_deg", None, "p_bar", units={"pressure": unit, "output": "deg"})
+        (log,) = read_logs([path], signals, 0.01)
+        assert [n for n in log.notes if "in bar, pressure is taken as kPa" in n] == list(log.notes)
+        assert bool(log.notes) == said
+
+
 @pytest.mark.parametrize("kind", ["frame", "parquet"])
 def test_runs_with_long_numbers_are_told_apart(tmp_path, kind):
     """In six digits 20260131 and 20260132 are one run, and two rigs one experiment."""
