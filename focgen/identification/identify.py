@@ -122,8 +122,8 @@ def _check_unseen(fitted: Sequence[Experiment], shown: Sequence[Experiment]) -> 
     """Raise LogError where a log to show holds the samples of one that is fitted, under whatever name."""
     known = {digest_of(log): log.name for log in fitted}
     for log in shown:
-        if digest_of(log) in known:
-            what = f"holds the samples of {known[digest_of(log)]}, which is fitted"
+        if (name := known.get(digest_of(log))) is not None:
+            what = f"holds the samples of {name}, which is fitted"
             raise LogError(f"--unseen {log.name}", what, "give a log that is not among those fitted")
 
 

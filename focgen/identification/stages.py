@@ -30,7 +30,6 @@ from focgen.identification.shapes import (
 )
 from focgen.identification.stage_notes import notes_of
 from focgen.logs.experiment import Experiment
-from focgen.logs.rates import at_one_rate
 
 _SIGNALS = {"regulator": ("command", "pressure", "zero"), "sensor": ("curvature", "output", "linear")}
 _FEWEST = 30  # samples
@@ -80,7 +79,7 @@ def identify_stage(experiments: Sequence[Experiment], stage: str) -> StageFit:
     Raises FitError where the logs do not determine it.
     """
     check_choice("--stages", stage, _SIGNALS, FitError)
-    used = at_one_rate(_usable(experiments, stage))
+    used = _usable(experiments, stage)
     step = used[0].sample_time
     records = [_record(e, stage) for e in used]
     _check(records, stage)

@@ -75,8 +75,8 @@ def init(
 
     Roles go by the columns' names and units, and by their shape where those do not tell. ``ask(role, likely,
     columns)`` returns the column of a role that is unsure, "" for none. Raises LogError where the logs hold
-    no time, input or output, InputError where ``out`` is one of them, or
-    something else than a rig without a model.
+    no time, input or output, InputError where ``out`` is one of them, or something else than a rig without a
+    model.
     """
     given = each_of(logs)
     if not given:
