@@ -17,6 +17,7 @@ from focgen.identification.identify import identify
 from focgen.logs.experiment import Experiment
 from focgen.logs.rates import at_one_rate
 from focgen.rig.replay import replay
+from tests import diagnosis_rig
 from tests.diagnosis_rig import RIG, H, session
 
 
@@ -120,3 +121,43 @@ def test_a_log_that_is_fitted_is_not_shown_as_unseen(tmp_path):
     copy = written(tmp_path, "copy.csv", logs[0])
     with pytest.raises(LogError, match="holds the samples of 0, which is fitted"):
         identify(RIG, files, unseen=[copy])
+
+
+LEVELS = (1.0, 1.6, 0.6, 1.8, 0.8, 1.3)  # V
+CURVES = ("softening", "gain_nonlinearity", "gain_drift")
+
+
+def few_runs(monkeypatch, late, factor=1.0, soften=0.0):
+    """A run for each level, pressure and output logged. From run ``late`` on the output is ``factor`` times
+    what it was; or the drive loses ``soften`` of itself with the largest there has been."""
+    runs = {f"to {a} V": np.repeat([0.0, a, 0.0], [20, 400, 380]) for a in LEVELS}
+    largest, rubs = [0.0], diagnosis_rig._friction
+
+    def softened(drive, share):
+        most = np.maximum(np.maximum.accumulate(drive), largest[0])
+        largest[0] = most[-1]
+        return rubs(drive * (1.0 - soften * most / 0.012), share)
+
+    monkeypatch.setattr(diagnosis_rig, "commands", lambda: runs)
+    monkeypatch.setattr(diagnosis_rig, "_friction", softened)
+    return altered(
+        session(4, roles=("pressure",)),
+        lambda k, s: s | {"output": s["output"] * (factor if k >= late else 1.0)},
+    )
+
+
+@pytest.mark.parametrize(
+    "late, factor",
+    [(3, 1.3), *(pytest.param(*case, marks=pytest.mark.long) for case in ((2, 1.3), (2, 2.0), (3, 2.0)))],
+)
+def test_a_gain_that_is_switched_between_few_runs_is_no_curve_of_many_values(monkeypatch, late, factor):
+    """A gain for each of six levels follows it as well: ``gain_nonlinearity`` or ``softening`` at 95 %."""
+    found = diagnose(RIG, few_runs(monkeypatch, late, factor), pictures=False, only=CURVES)
+    assert found.verdict == "unknown" and any("at once" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("soften", [-0.5, pytest.param(0.5, marks=pytest.mark.long)])
+def test_a_softening_of_few_runs_is_one(monkeypatch, soften):
+    found = diagnose(RIG, few_runs(monkeypatch, 0, soften=soften), pictures=False, only=CURVES)
+    assert found.causes[0].candidates[0].effect == "softening"
+    assert found.causes[0].candidates[0].confidence > 0.8

@@ -46,6 +46,15 @@ class Free:
             return made
         return np.zeros(0)
 
+    def gain_way(self, vector: np.ndarray) -> np.ndarray:
+        """By what the vector moves where the gain as a whole grows, a unit for each e-fold."""
+        way = np.zeros(len(vector))
+        if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
+            way[2:-1] = vector[2:-1]
+        elif len(vector):
+            way[: len(self._transfer_of().num)] = 1.0
+        return way
+
     def bounds(self, far: bool = True, bent: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds of the vector; not ``far``: of an actuator, three times its uncertainty;
         ``bent``: but for the gain.

@@ -60,6 +60,13 @@ class NominalParameters:
         """Whether there is a gain among them."""
         return len(self._first) > 0 or any(f.kind == "gain" for f in self.factors)
 
+    def gain_way(self, vector: np.ndarray) -> np.ndarray:
+        """By what the vector moves where the gain of what is refitted freely grows as a whole."""
+        count = len(self._first)
+        way = present(self._free).gain_way(vector[:count]) if count else np.zeros(0)
+        made: np.ndarray = np.r_[way, np.zeros(len(self.factors))]
+        return made
+
     def start(self) -> np.ndarray:
         """The vector of the rig as given."""
         made: np.ndarray = np.r_[self._first, np.zeros(len(self.factors))]

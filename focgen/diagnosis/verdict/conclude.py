@@ -21,7 +21,7 @@ from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
-from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once, is_timed
+from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.sizes import estimates
@@ -88,7 +88,14 @@ def _cautions(rig: Rig, summary: _Summary, unknown: Sequence[Explanation]) -> It
         )
     for e in unknown:
         if changed := another(e):
-            yield f"{e.segment.entry} to {e.segment.exit}: {_at_once(changed)}"
+            yield f"{e.segment.entry} to {e.segment.exit}: not slowly, but at once it {_at_once(changed)}"
+    for e in dict.fromkeys(e for e, _ in summary.causes):
+        if (changed := changed_at_once(e)) and changed.sure > 1.0 - NUMBERS.held:
+            named = " and ".join(sorted(changed.instead))
+            yield (
+                f"{e.segment.entry} to {e.segment.exit}: instead of {named} it may be ({changed.sure:.0%}) that "
+                f"at once it {_at_once(changed)}"
+            )
     for e in unknown if summary.causes else ():
         yield f"{e.segment.entry} to {e.segment.exit}: no effect explains what is left there{_nearest(e)}"
 
@@ -99,7 +106,7 @@ def _at_once(changed: Changed) -> str:
         f"{m.within:.4g} s into {m.experiment} by {m.rms:.3g} (root mean square; on average {m.mean:+.3g})"
         for m in changed.moments
     )
-    return f"not slowly, but at once it becomes another: {', '.join(said)}; diagnose the parts by themselves"
+    return f"becomes another: {', '.join(said)}; diagnose the parts by themselves"
 
 
 def _nearest(e: Explanation) -> str:
@@ -285,18 +292,17 @@ def _found(
 ) -> Found:
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
-    sure = sure * _slowly(e, cause)
+    sure = sure * _lasting(e, cause)
     lost = _share_lost(cause, rigs, logs, squares, floor, total or Improvement(0.0, (0.0, 0.0)))
     candidates = tuple(_candidate(r, float(p), rigs.fitted) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
 
 
-def _slowly(e: Explanation, cause: Cause) -> float:
-    """How likely a cause that moves with the session's clock is what it says, and no change at once."""
-    best = cause.rivals[0]
-    timed = (c.effect == best.effect and is_timed(c.form) for c in e.best.problem.candidates)
-    changed = changed_at_once(e) if any(timed) else None
-    return 1.0 - changed.sure if changed is not None else 1.0
+def _lasting(e: Explanation, cause: Cause) -> float:
+    """How likely a cause was there all along, and the rig did not become another at once instead."""
+    changed = changed_at_once(e)
+    instead = changed is not None and cause.rivals[0].effect in changed.instead
+    return 1.0 - changed.sure if changed is not None and instead else 1.0
 
 
 def _share_lost(

@@ -1,0 +1,208 @@
+"""A fit whose parameters may become others at moments of the session: what is left then, by least squares.
+
+The fit's derivatives are known at every sample, so pieces between given moments take a linear equation (G. C.
+Chow, Tests of equality between sets of coefficients in two linear regressions, Econometrica 28, 1960). Where
+all parameters become others, a piece is by itself, and the best moments are found among all by dynamic
+programming (R. Bellman, Communications of the ACM 4, 1961). Where it is one alone, pieces share the others,
+and the moments are found one after the other, each looked at anew beside a later one. What they share, and
+where the one begins, stays within the bounds of the fit: beyond them the rig would be another from the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, innovations, jacobian
+from focgen.diagnosis.problem.problem import Problem
+
+_CELLS = 200  # of a session, between which a moment may lie
+_MOST = 3  # moments
+_SHORTEST = 4  # cells between two of them
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Parameters that become others at ``samples`` (m,), each time ``by`` (m, parameters) less. ``square``:
+    the sum of squares that is left; ``free``: how many numbers the changes take, the moments among them."""
+
+    of_fit: Fit
+    samples: tuple[int, ...]
+    by: np.ndarray
+    square: float
+    free: int
+
+    def changes(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Each moment's sample, and by how much more leaves the segment from there on until the next (n,), of
+        its level. A residual is what was measured less what is simulated: it grows by what a parameter less
+        takes from the output."""
+        problem, vector = self.of_fit.problem, self.of_fit.vector
+        low, high = problem.bounds()
+        rows = jacobian(problem, vector, innovations(problem, vector, WHITE), WHITE, low, high)
+        for by, (first, last) in zip(self.by, pairwise([*self.samples, rows.shape[1]])):
+            yield first, by @ rows[:, first:last]
+
+
+def pieces(fit: Fit, weighing: Weighing) -> Iterator[Pieces]:
+    """For one moment, two and three: the best with all parameters others; with each of the rig's own alone;
+    with its gain as a whole."""
+    cells = _Cells.of(fit, weighing)
+    yield from cells.all_others()
+    for way in _own_ways(fit.problem, fit.vector, cells.ways):
+        yield from cells.one_other(way)
+
+
+def _own_ways(problem: Problem, vector: np.ndarray, ways: np.ndarray) -> Iterator[np.ndarray]:
+    """Along ``ways`` (k, parameters), each of the rig's own parameters (k,), and its gain as a whole."""
+    own = len(problem.nominal_start)
+    yield from (single for single in np.eye(len(ways)) if (single @ ways)[:own].any())
+    gain = ways[:, :own] @ problem.nominals.gain_way(vector[:own])
+    if np.count_nonzero(gain) > 1:
+        yield gain
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """What a fit's innovations and their derivatives along its ``ways`` (k, parameters) make, summed up to
+    the ``ends`` (cells + 1,) of cells, in samples: ``normal`` (cells + 1, k, k), ``slope`` (cells + 1, k) and
+    ``square`` (cells + 1,). ``ridge`` (k, k): what is known of the nuisances beforehand; ``least`` and
+    ``most`` (k,): by what the bounds let parameters be less."""
+
+    of_fit: Fit
+    ways: np.ndarray
+    ends: np.ndarray
+    normal: np.ndarray
+    slope: np.ndarray
+    square: np.ndarray
+    ridge: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+
+    @classmethod
+    def of(cls, fit: Fit, weighing: Weighing) -> _Cells:
+        problem = fit.problem
+        low, high = problem.bounds()
+        now, ways = innovations(problem, fit.vector, weighing), np.eye(len(low))[high - low > FIXED]
+        rows = ways @ jacobian(problem, fit.vector, now, weighing, low, high)
+        ends = _ends(problem, len(now))
+        cells = [(rows[:, a:b], now[a:b]) for a, b in pairwise(ends)]
+        normal = _summed([r @ r.T for r, _ in cells])
+        ridge = ways @ _known(problem) * float(now @ now) / len(now)
+        ridge = np.diag(ridge + 1e-9 * np.trace(normal[-1]))
+        slope, square = _summed([r @ x for r, x in cells]), _summed([np.array(x @ x) for _, x in cells])
+        least, most = ways @ (fit.vector - high), ways @ (fit.vector - low)
+        return cls(fit, ways, ends, normal, slope, square, ridge, least, most)
+
+    def all_others(self) -> Iterator[Pieces]:
+        """All parameters become others."""
+        count = len(self.ends) - 1
+        a, b = np.triu_indices(count + 1, _SHORTEST)
+        cost = np.full((count + 1, count + 1), np.inf)
+        cost[a, b] = self._piece(a, b)[1]
+        least, places = cost[0], [()] * (count + 1)
+        for _ in range(_MOST):
+            ways = least[:, None] + cost
+            last = np.argmin(ways, axis=0)
+            least, places = np.min(ways, axis=0), [(*places[i], int(i)) for i in last]
+            if np.isfinite(least[-1]):
+                edges = np.array([0, *places[-1], count])
+                moved = self._piece(edges[:-1], edges[1:])[0]
+                yield self._made(places[-1], np.diff(moved, axis=0) @ self.ways, least[-1], len(self.ways))
+
+    def _piece(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of pieces from cells ``a`` to cells ``b`` (m,): what their parameters are less (m, k), and the sums
+        of squares that they leave (m,)."""
+        normal = self.normal[b] - self.normal[a] + self.ridge
+        slope = self.slope[b] - self.slope[a]
+        moved = np.linalg.solve(normal, slope[..., None])[..., 0]
+        return moved, self.square[b] - self.square[a] - np.sum(moved * slope, axis=1)
+
+    def one_other(self, way: np.ndarray) -> Iterator[Pieces]:
+        """Only along ``way`` (k,) they become others; the rest of them is one for all pieces."""
+        cuts: tuple[int, ...] = ()
+        for _ in range(_MOST):
+            added = self._one_more(way, cuts)
+            if added is None:
+                return
+            cuts = (*cuts, added)
+            for cut in cuts[:-1]:
+                held = tuple(c for c in cuts if c != cut)
+                cuts = (*held, self._one_more(way, held) or cut)
+            cuts = tuple(sorted(cuts))
+            by, square = self._shared(way, np.array([cuts]))
+            yield self._made(cuts, by[0][:, None] * (way @ self.ways), float(square[0]), 1)
+
+    def _one_more(self, way: np.ndarray, held: tuple[int, ...]) -> int | None:
+        """The cell at whose beginning one more moment leaves least beside those ``held``; None where there is
+        no room."""
+        free = np.arange(_SHORTEST, len(self.ends) - _SHORTEST)
+        for cut in held:
+            free = free[np.abs(free - cut) >= _SHORTEST]
+        if not len(free):
+            return None
+        cuts = np.column_stack([np.broadcast_to(held, (len(free), len(held))), free]).astype(int)
+        return int(free[np.argmin(self._shared(way, cuts)[1])])
+
+    def _shared(self, way: np.ndarray, cuts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """For rows of ``cuts`` (r, m): by what the parameters become less along ``way`` at each (r, m), and
+        the sums of squares that are left (r,)."""
+        r, m, k = *cuts.shape, len(self.slope[-1])
+        behind = self.normal[-1] - self.normal[cuts]
+        beside = self.normal[-1] - self.normal[np.maximum(cuts[:, :, None], cuts[:, None, :])]
+        normal, slope = np.zeros((r, k + m, k + m)), np.zeros((r, k + m))
+        normal[:, :k, :k] = self.normal[-1] + self.ridge
+        normal[:, k:, :k] = behind @ way
+        normal[:, :k, k:] = np.swapaxes(normal[:, k:, :k], 1, 2)
+        normal[:, k:, k:] = beside @ way @ way + np.eye(m) * (way @ self.ridge @ way)
+        slope[:, :k], slope[:, k:] = self.slope[-1], (self.slope[-1] - self.slope[cuts]) @ way
+        any_more = np.full(m, np.inf)
+        moved = _bounded(normal, slope, np.r_[self.least, -any_more], np.r_[self.most, any_more])
+        left = np.einsum("ri,rij,rj->r", moved, normal, moved) - 2.0 * np.sum(moved * slope, axis=1)
+        return moved[:, k:], self.square[-1] + left
+
+    def _made(self, cuts: tuple[int, ...], by: np.ndarray, square: float, each: int) -> Pieces:
+        samples = tuple(int(self.ends[c]) for c in cuts)
+        return Pieces(self.of_fit, samples, by, float(square), len(cuts) * (each + 1))
+
+
+def _bounded(normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Solutions (r, k) of normal equations (r, k, k) within bounds (k,). What would pass its bound by most
+    stays there, one after the other; that leaves the least unless one of them had better come back."""
+    held, ends = np.zeros(slope.shape, bool), np.zeros(slope.shape)
+    diagonal = np.arange(slope.shape[1])
+    for _ in range(len(diagonal) + 1):
+        free = np.where(held[:, :, None] | held[:, None, :], 0.0, normal)
+        free[:, diagonal, diagonal] += held
+        right = np.where(held, ends, slope - np.einsum("rij,rj->ri", normal, ends))
+        moved = np.linalg.solve(free, right[..., None])[..., 0]
+        beyond = np.where(held, 0.0, np.maximum(np.maximum(low - moved, moved - high), 0.0))
+        if not beyond.any():
+            break
+        passing = (beyond > 0.0) & (beyond == np.max(beyond, axis=1, keepdims=True))  # the furthest first
+        held, ends = held | passing, np.where(passing, np.clip(moved, low, high), ends)
+    return moved
+
+
+def _ends(problem: Problem, count: int) -> np.ndarray:
+    """Where cells end: they are alike, and an experiment begins with one."""
+    even = np.linspace(0, count, min(_CELLS, count // 10) + 1).astype(int)
+    begun = [first for first, _ in problem.segment.run.spans if first < count]
+    made: np.ndarray = np.union1d(even, begun) if len(begun) <= len(even) else even
+    return made
+
+
+def _known(problem: Problem) -> np.ndarray:
+    """The inverse variances (k,) of what is known of the parameters: nothing of those of the rig, for what
+    was known holds no more behind a moment."""
+    known = problem.known[1].copy()
+    known[: len(problem.nominal_start)] = 0.0
+    return known
+
+
+def _summed(parts: list[np.ndarray]) -> np.ndarray:
+    """Sums of the parts ahead of each end."""
+    made: np.ndarray = np.concatenate([np.zeros((1, *parts[0].shape)), np.cumsum(parts, axis=0)])
+    return made
