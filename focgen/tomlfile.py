@@ -30,11 +30,11 @@ number."""
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """The content of TOML. Raises TOMLDecodeError for what is none, ValueError for digits without end, and
-    RecursionError for what is nested too deeply."""
+    """The content of TOML, behind the mark that some editors put ahead of UTF-8. Raises TOMLDecodeError for
+    what is none, ValueError for digits without end, and RecursionError for what is nested too deeply."""
     if _DEEP.search(text):
         raise RecursionError
-    return tomllib.loads(text)
+    return tomllib.loads(text.removeprefix("\ufeff"))
 
 
 def check_replaced(path: str | Path, what: str, has: Iterable[str], lacks: Iterable[str] = ()) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from focgen.cli.outcome import Outcome
 from focgen.cli.shown import add_report, check_report, drawn, is_page, write_report
-from focgen.output import former, write_files
+from focgen.output import check_writable, former, write_files
 from focgen.replaced import check_own
 from focgen.report.pages.trials import trials_page
 from focgen.report.trials import pictures
@@ -127,7 +127,8 @@ def _score(args: argparse.Namespace) -> Outcome:
 
 def _check_place(out: Path) -> None:
     """Raise InputError, before work begins, where the table or a picture would take the place of somebody
-    else's file."""
+    else's file, or cannot be written."""
+    check_writable(out, folder=True)
     check_own(out / name for name in ("scores.md", *_drawn_before(out)))
 
 

@@ -29,7 +29,7 @@ from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import Logs, each_of
-from focgen.output import check_apart
+from focgen.output import check_apart, check_writable
 from focgen.progress import step
 from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
@@ -99,9 +99,10 @@ def diagnose(
 
 def _check_place(out: Path, given: Sequence[object]) -> None:
     """Raise InputError, before work begins, where a result would take the place of an input or of somebody
-    else's file."""
+    else's file, or cannot be written."""
     from focgen.diagnosis.write import PICTURES
 
+    check_writable(out, folder=True)
     check_apart((out / name for name in (*WRITTEN, NEXT)), given)
     check_own(out / name for name in (*WRITTEN, NEXT, *PICTURES))
 

@@ -197,3 +197,12 @@ def test_an_empty_argument_is_no_current_folder(results, word, capsys):
     with pytest.raises(InputError, match=r"^\.: is a folder where a file belongs"):
         focgen.report("c.toml", ".")
     assert sorted(results.rglob("*")) == before
+
+
+@pytest.mark.parametrize("command", ["diagnose", "trial score"])
+def test_a_folder_that_cannot_be_written_is_told_before_anything_is_done(results, command, capsys):
+    (results / "f").write_text("a file")
+    parts = ["f/out" if part == "FOLDER" else part for part in OTHERS[command]]
+    assert main(parts) == 2
+    said = capsys.readouterr().err
+    assert "/f: is a file where a folder belongs" in said and said.count("\n") == 1
