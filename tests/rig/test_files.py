@@ -51,7 +51,7 @@ def test_reads_every_table(tmp_path):
 
 
 def test_a_mark_that_an_editor_puts_ahead_is_no_part_of_it(tmp_path):
-    """Notepad's "UTF-8 with BOM": every file of TOML, and it still is a rig or a controller to be replaced."""
+    """Notepad's "UTF-8 with BOM": of every file of TOML, which still may be replaced."""
     plain = read_rig(rig_file(tmp_path, RIG))
     assert read_rig(rig_file(tmp_path, "\ufeff" + RIG)) == plain
     check_replaces_rig(tmp_path / "rig.toml")
