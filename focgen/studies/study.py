@@ -71,10 +71,9 @@ def study(
     the work instead.
 
     What has been measured stays in ``out``/rows and is not measured again for the same inputs, so that an
-    interrupted study goes on. Raises InputError for another subject, for options that cannot be used, and
-    where the study would take the place of somebody else's file,
-    ControllerError and RigError for the files, DesignError where a set point cannot be reached, MissingExtra
-    where Dask is not installed.
+    interrupted study goes on. Raises InputError for another subject, and for options that cannot be used. So
+    it does where the study would take the place of somebody else's file. ControllerError and RigError are for
+    the files, DesignError where a set point cannot be reached, MissingExtra where Dask is not installed.
     """
     if subject not in SUBJECTS:
         raise InputError("study", f"has no subject {subject!r}", f"choose {' or '.join(SUBJECTS)}")
