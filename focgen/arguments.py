@@ -101,8 +101,9 @@ def _is_truth(value: Any) -> bool:
 
 
 def _is_path(value: Any) -> bool:
-    """Whether the system takes a text for a path, there or not."""
-    if not isinstance(value, (str, os.PathLike)):
+    """Whether the system takes a text for a path, there or not; an empty one is none, and no current
+    folder."""
+    if not isinstance(value, (str, os.PathLike)) or value == "":
         return False
     try:
         os.lstat(cast(Any, os.fspath(value)))

@@ -270,11 +270,13 @@ def _move(source: Path, place: Path, stood: str | None, target: Path) -> None:
 
 
 def _remove(path: Path, stood: str | None, target: Path) -> None:
-    """Remove a file as it stood, and its folder where that is empty then."""
+    """Remove a file as it stood, and the folders in ``target`` that are empty then."""
     if stood is not None and _within(path, target) and _digest(path) == stood:
         path.unlink()
-        with suppress(OSError):
-            path.parent.rmdir()
+        inside = path.relative_to(target).parents
+        with suppress(OSError):  # the first that holds something ends it
+            for folder in list(inside)[:-1]:
+                (target / folder).rmdir()
 
 
 def _exchange(whole: Path, place: Path) -> None:

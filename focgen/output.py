@@ -227,11 +227,13 @@ def _write_one(path: Path, content: str | bytes, place: Path) -> None:
 
 def write_file(path: str | Path, text: str, inputs: Iterable[Any] = ()) -> None:
     """Write one file whole or not at all. Raises InputError where it cannot be written, is one of ``inputs``,
-    a pipe or a device, or where ``text`` holds what UTF-8 has no bytes for.
+    a folder, a pipe or a device, or where ``text`` holds what UTF-8 has no bytes for.
     """
     check_apart([path], inputs)
     path = Path(path)
     _check_no_device(path)
+    if path.is_dir():
+        raise InputError(str(path), "is a folder where a file belongs", "name another place")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with scratch_file(path.parent) as (scratch, handle):

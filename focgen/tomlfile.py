@@ -30,26 +30,30 @@ number."""
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """The content of TOML. Raises TOMLDecodeError for what is none, ValueError for digits without end, and
-    RecursionError for what is nested too deeply."""
+    """The content of TOML, behind the mark that some editors put ahead of UTF-8. Raises TOMLDecodeError for
+    what is none, ValueError for digits without end, and RecursionError for what is nested too deeply."""
     if _DEEP.search(text):
         raise RecursionError
-    return tomllib.loads(text)
+    return tomllib.loads(text.removeprefix("\ufeff"))
 
 
 def check_replaced(path: str | Path, what: str, has: Iterable[str], lacks: Iterable[str] = ()) -> None:
     """Raise InputError, before work begins, where a result would take the place of a file that is no
     ``what``: a table with all the keys that it ``has`` and none that it ``lacks``. An empty file is nobody's.
     """
-    place, found = Path(path), {}
-    if not place.is_file() or not place.stat().st_size:
-        return
-    with suppress(OSError, ValueError, RecursionError, InputError):  # no TOML: none of ours
-        found = parsed(read_regular(place, LARGEST_SETTING).decode("utf-8"))
-    if not found.keys() >= set(has) or found.keys() & set(lacks):
+    place = Path(path)
+    if place.is_file() and place.stat().st_size and not has_keys(place, has, lacks):
         raise InputError(
             str(path), f"is no {what}, and would be replaced by one", "name another --out, or move it away"
         )
+
+
+def has_keys(path: Path, has: Iterable[str], lacks: Iterable[str] = ()) -> bool:
+    """Whether a file is TOML with all the keys that it ``has`` and none that it ``lacks``."""
+    found: dict[str, Any] = {}
+    with suppress(OSError, ValueError, RecursionError, InputError):  # no TOML: none of ours
+        found = parsed(read_regular(path, LARGEST_SETTING).decode("utf-8"))
+    return found.keys() >= set(has) and not found.keys() & set(lacks)
 
 
 class Table:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from importlib import import_module
+from itertools import pairwise
 from pkgutil import iter_modules
 from typing import Any, NoReturn
 
@@ -142,6 +144,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
 
 
+def _check_empty(argv: Sequence[str]) -> None:
+    """Raise FocgenError for an argument without a character: a variable of the shell that is not set. As a
+    path it would be the current folder, and files would be written there."""
+    for before, word in pairwise(argv):
+        if not word or re.fullmatch(r"--[\w-]+=", word):
+            where = word.rstrip("=") or (before if before.startswith("--") else "an argument")
+            raise FocgenError(where, "is empty", "name something, or leave it out")
+
+
 def _run(argv: Sequence[str]) -> int:
     if not argv:
         write_out(_short_help() + "\n")
@@ -150,6 +161,7 @@ def _run(argv: Sequence[str]) -> int:
         raise FocgenError(argv[0], "is no command", _meant(argv[0], commands(), "focgen"))
     check_epoch()
     args = parser(argv[0]).parse_args(argv)
+    _check_empty(argv)
     outcome = args.run(args)
     text = to_json(outcome.payload) if args.json else for_terminal(outcome.text.rstrip("\n")) + "\n"
     write_out(text, args.json)

@@ -9,6 +9,7 @@ from typing import Any
 
 from focgen.errors import InputError
 from focgen.output import check_apart, check_writable, new_folder, write_file, write_files
+from focgen.replaced import check_own
 from focgen.report.interactive import library
 from focgen.report.page import Page
 
@@ -26,7 +27,8 @@ def is_page(path: str | None) -> bool:
 
 def check_report(path: str | None, inputs: Iterable[Any], out: str | None = None) -> None:
     """Raise before work begins that cannot be shown: MissingExtra without the library that draws on pages,
-    InputError where the page would replace an input or ``out``, or cannot be written."""
+    InputError where the page would replace an input, ``out`` or somebody else's file, or cannot be
+    written."""
     if path is None:
         return
     if out is not None and Path(path).resolve() == Path(out).resolve():
@@ -34,6 +36,7 @@ def check_report(path: str | None, inputs: Iterable[Any], out: str | None = None
     if is_page(path):
         library()
         check_apart([path], inputs)
+        check_own([path])
     check_writable(Path(path), folder=not is_page(path))
 
 
@@ -53,6 +56,7 @@ def write_report(path: str | None, what: str | Mapping[str, bytes] | None, input
     if isinstance(what, str):
         write_file(path, what, inputs)
         return f"page in {path}\n"
+    _check_pictures(Path(path), what, inputs)
     write_files(path, what, inputs)
     return f"pictures in {path}\n"
 
@@ -68,7 +72,7 @@ def write_with_report(
         told = write_report(path, what, inputs)
         write_file(out, text, inputs)
         return told
-    check_apart((Path(path) / name for name in what), inputs)
+    _check_pictures(Path(path), what, inputs)
     if Path(out).resolve() in {(Path(path) / name).resolve() for name in what}:
         raise InputError(out, "is a picture's name as well, and one would be lost", "give it another name")
     with new_folder(path, inputs) as folder:
@@ -76,3 +80,10 @@ def write_with_report(
             (folder / name).write_bytes(picture)
         write_file(out, text, inputs)
     return f"pictures in {path}\n"
+
+
+def _check_pictures(folder: Path, names: Iterable[str], inputs: Iterable[Any]) -> None:
+    """Raise InputError where a picture would take the place of an input or of somebody else's file."""
+    places = [folder / name for name in names]
+    check_apart(places, inputs)
+    check_own(places)

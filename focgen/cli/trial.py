@@ -9,7 +9,8 @@ from pathlib import Path
 
 from focgen.cli.outcome import Outcome
 from focgen.cli.shown import add_report, check_report, drawn, is_page, write_report
-from focgen.output import former, write_files
+from focgen.output import check_writable, former, write_files
+from focgen.replaced import check_own
 from focgen.report.pages.trials import trials_page
 from focgen.report.trials import pictures
 from focgen.trials.patterns import SUITES
@@ -102,6 +103,8 @@ def _run(args: argparse.Namespace) -> Outcome:
 
 def _score(args: argparse.Namespace) -> Outcome:
     check_report(args.report, (), args.out if is_page(args.report) else None)
+    if args.out:
+        _check_place(Path(args.out))
     summary = trial(
         "score",
         *args.folder,
@@ -114,12 +117,23 @@ def _score(args: argparse.Namespace) -> Outcome:
     text = full_text(summary.sets)
     if args.out:
         files: dict[str, str | bytes] = {"scores.md": markdown(summary.sets), **pictures(summary.sets)}
-        drawn_before = [path.name for path in Path(args.out).glob("*.png") if _DRAWN.fullmatch(path.name)]
+        drawn_before = _drawn_before(Path(args.out))
         write_files(args.out, files, _inputs(args.folder), former(args.out, "scores.md", drawn_before, files))
         text += f"\ntable and pictures in {args.out}"
     shown = drawn(args.report, lambda: trials_page(summary.sets), lambda: pictures(summary.sets))
     text += "\n" + write_report(args.report, shown, _inputs(args.folder))
     return Outcome(summary, text, holds=summary.reached)
+
+
+def _check_place(out: Path) -> None:
+    """Raise InputError, before work begins, where the table or a picture would take the place of somebody
+    else's file, or cannot be written."""
+    check_writable(out, folder=True)
+    check_own(out / name for name in ("scores.md", *_drawn_before(out)))
+
+
+def _drawn_before(out: Path) -> list[str]:
+    return [path.name for path in out.glob("*.png") if _DRAWN.fullmatch(path.name)]
 
 
 def _inputs(folders: Sequence[str]) -> list[Path]:

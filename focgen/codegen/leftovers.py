@@ -32,7 +32,10 @@ def leftovers(folder: Path, name: str, files: Mapping[str, str | bytes]) -> tupl
     package = [file for file, digest in _packaged(manifest, name) if _is(folder / file, digest)]
     archive = [f"{name}.fmu", f"{name}.fmu{DIGEST}"] if _of(manifest.get("package"), "for") == "fmu" else []
     elsewhere = [
-        other for file, text in files.items() for other in moved(file) if _is(folder / other, sha256(text))
+        other
+        for file, text in files.items()
+        for other in moved(file)
+        if _is(folder / other, sha256(text)) or _is(folder / other, _of(manifest.get("files"), other))
     ]
     old = [folder / file for file in (*test, *headers, *package, *archive, *elsewhere) if file not in files]
     needed = {folder / file for _, own in others(folder, name) for file in own}
@@ -53,5 +56,5 @@ def _of(entry: Any, key: str) -> Any:
     return entry.get(key) if isinstance(entry, dict) else None
 
 
-def _is(path: Path, digest: str) -> bool:
-    return sha256_within(path, LARGEST_CODE) == digest
+def _is(path: Path, digest: Any) -> bool:
+    return isinstance(digest, str) and sha256_within(path, LARGEST_CODE) == digest

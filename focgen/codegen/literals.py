@@ -23,9 +23,17 @@ def literal(value: int | float, ctype: str) -> str:
         return _pointed(f"{value:.17g}", value)
     if ctype == "float":
         return _pointed(f"{value:.9g}", float(np.float32(value))) + "f"
+    _check_held(value, ctype)
     if value == -(1 << 63):  # its magnitude alone fits no type
         return f"({value + 1} - 1)"
     return str(int(value))
+
+
+def _check_held(value: int | float, ctype: str) -> None:
+    if bits := re.fullmatch(r"int(\d+)_t", ctype):
+        end = 1 << (int(bits[1]) - 1)
+        if not -end <= value < end:
+            raise ValueError(f"{value} is no {ctype}")
 
 
 def _pointed(text: str, value: float) -> str:

@@ -73,12 +73,12 @@ def sum_text(
 ) -> SumText:
     """The sum ``table`` as C; its weights are called NAME_``name``, and ``about`` says what they are.
 
-    Blocks in which every weight is zero leave nothing behind. ``ahead`` is its layout where it looks ahead;
-    ``prefix`` begins the names of the runtime's functions for the plain form.
+    Blocks in which every weight is zero leave nothing behind, but for one where all are. ``ahead`` is its
+    layout where it looks ahead; ``prefix`` begins the names of the runtime's functions for the plain form.
     """
     if ahead is not None:
         return _ahead_text(plan, table, f"{plan.name}_{name}", about, ahead)
-    blocks = [block for block in table.blocks if any(block.weights)]
+    blocks = [block for block in table.blocks if any(block.weights)] or list(table.blocks[:1])
     weights = f"{plan.name}_{name}"
     made = [_weights(plan, blocks, weights, about)]
     if len(blocks) > 1:

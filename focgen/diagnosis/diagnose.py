@@ -29,8 +29,9 @@ from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import Logs, each_of
-from focgen.output import check_apart
+from focgen.output import check_apart, check_writable
 from focgen.progress import step
+from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import library
 from focgen.rig.plausibility import doubts
@@ -63,13 +64,13 @@ def diagnose(
     ``only``: the effects to consider, by name; each is then taken for granted, and what is left is how
     strong it is. ``pictures``: whether to draw them.
     Raises RigError, LogError, ControllerError for files that cannot be used, InputError where ``out`` holds
-    one of them in the place of a result, FocgenError for an unknown effect.
+    one of them, or somebody else's file, in the place of a result, FocgenError for an unknown effect.
     """
     _check(only)
     each = each_of(logs)
     given = (rig, *each, controller)
     if out is not None:
-        check_apart((Path(out) / name for name in (*WRITTEN, NEXT)), given)
+        _check_place(Path(out), given)
     nominal = rig_of(rig)
     session = _usable(experiments(nominal, each, from_, to))
     ran = check_controller(controller_from(controller), session) if controller is not None else None
@@ -94,6 +95,16 @@ def diagnose(
 
         write(out, diagnosis, proposed[1] if proposed else None, pictures, given)
     return diagnosis
+
+
+def _check_place(out: Path, given: Sequence[object]) -> None:
+    """Raise InputError, before work begins, where a result would take the place of an input or of somebody
+    else's file, or cannot be written."""
+    from focgen.diagnosis.write import PICTURES
+
+    check_writable(out, folder=True)
+    check_apart((out / name for name in (*WRITTEN, NEXT)), given)
+    check_own(out / name for name in (*WRITTEN, NEXT, *PICTURES))
 
 
 def _usable(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from focgen.errors import PlanError
+from focgen.plan.formats import limit as limit_of
 from focgen.plan.formats import nearest
 from focgen.plan.plan import Plan
 from focgen.present import present
@@ -31,7 +32,8 @@ def with_slew(plan: Plan) -> Plan:
     if state.floating:
         slew = float((np.float32 if state.ctype == "float" else np.float64)(most))
     else:
-        slew = min(nearest(most / state.lsb), int(state.high) - int(state.low))
+        # a change that the type cannot hold never is: without this end, the constant in C would be another
+        slew = min(nearest(most / state.lsb), int(state.high) - int(state.low), limit_of(state.bits))
         if slew < _FEWEST:
             what = f"has a slew_limit of {limit:g} a second, only {slew} counts a sample in {plan.arithmetic}"
             raise PlanError(plan.name, what, "choose a wider arithmetic or a longer sample_time")

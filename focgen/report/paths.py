@@ -15,7 +15,7 @@ from focgen.control.files import read_controller
 from focgen.custody import sha256_of
 from focgen.diagnosis.drawn import FILE as SIGNALS
 from focgen.diagnosis.drawn import read_drawn
-from focgen.errors import InputError
+from focgen.errors import FocgenError, InputError
 from focgen.identification.identification import Identification
 from focgen.journal import finish
 from focgen.jsontext import fits, read_json
@@ -23,6 +23,7 @@ from focgen.logs.experiment import Experiment
 from focgen.loop.design import Design
 from focgen.loop.simulate import simulate
 from focgen.output import check_apart, write_file
+from focgen.replaced import check_own
 from focgen.report.interactive import library
 from focgen.report.page import Page, Section
 from focgen.report.pages.chain import (
@@ -45,6 +46,7 @@ from focgen.studies.kept import FILE as CURVES
 from focgen.studies.kept import read_study
 from focgen.textfile import LARGEST_SETTING, read_regular
 from focgen.tomlfile import parsed
+from focgen.verification.folder import read_folder
 
 _TAKEN = (
     "name a rig or a controller (.toml), a folder of generate, study or diagnose, what `verify --json` "
@@ -69,6 +71,7 @@ class _Chain:
     rig: Rig | None = None
     controller: Controller | None = None
     source: Path | None = None  # of the controller, where it is a file
+    rig_source: Path | None = None
     logs: list[Path] = field(default_factory=list)
     folders: dict[Path, dict[str, Any]] = field(default_factory=dict)  # their manifests
     verified: dict[Path, dict[str, Any]] = field(default_factory=dict)
@@ -95,6 +98,7 @@ def report(paths: Part | Sequence[Part], out: str | Path) -> Path:
     places = [part for part in parts if isinstance(part, Path)]
     library()  # before anything takes time
     check_apart([out], [path for given in places for path in _files(given)])
+    check_own([out])
     write_file(out, page_of(parts).self_contained(), [path for path in places if path.is_file()])
     return Path(out)
 
@@ -173,7 +177,10 @@ def _take_toml(path: Path, chain: _Chain) -> None:
         controller = "transfer" in parsed(read_regular(path, LARGEST_SETTING).decode("utf-8"))
     except (OSError, ValueError, RecursionError, InputError):
         controller = False  # the reader of rigs says what is wrong
-    chain.source = path if controller else chain.source
+    if controller:
+        chain.source = path
+    else:
+        chain.rig_source = path
     _take_object(read_controller(path) if controller else read_rig(path), str(path), chain)
 
 
@@ -210,12 +217,24 @@ def _sections(chain: _Chain) -> list[Section]:
         logs: tuple[Experiment, ...] = experiments(rig, chain.logs)
         sections.append(replay_section(rig, logs, replay(rig, logs)))
     if chain.controller is not None:
-        sections.append(controller_section(chain.controller))
+        sections.append(controller_section(chain.controller, _digest(chain.rig_source)))
         if rig is not None and isinstance(rig.actuator, Actuator):
             sections += simulation_sections(simulate(rig, chain.controller))
-    made_from = None if chain.source is None else sha256_of(chain.source)
-    folders = (firmware_section(manifest, made_from) for manifest in chain.folders.values())
+    made_from = _digest(chain.source)
+    folders = (firmware_section(made, made_from, _faults(at)) for at, made in chain.folders.items())
     return [*sections, *folders, *_verifications(chain)]
+
+
+def _digest(path: Path | None) -> str | None:
+    return None if path is None else sha256_of(path)
+
+
+def _faults(folder: Path) -> tuple[str, ...]:
+    """What of a generated folder is not as its controller.toml gives it, so that nothing is proved of it."""
+    try:
+        return read_folder(folder).differences
+    except FocgenError as reason:
+        return (f"whether this is the C in {folder} was not looked at: it {reason.what}",)
 
 
 def _verifications(chain: _Chain) -> Iterator[Section]:

@@ -17,6 +17,7 @@ from focgen.control.setpoints import default_setpoints
 from focgen.custody import sha256_within
 from focgen.errors import ControllerError, DesignError, InputError, check_choice
 from focgen.fractional.transfer import TransferFunction
+from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, file_of, rig_of
 from focgen.rig.files import read_rig
 from focgen.rig.rig import Rig
@@ -32,7 +33,7 @@ from focgen.studies.results import Curves, Ideal, Plant, PlantRow, Row, Setup, S
 from focgen.studies.spectrum import band_of
 from focgen.studies.store import Store
 from focgen.studies.sweep import Workers, sweep
-from focgen.studies.write import write
+from focgen.studies.write import WRITTEN, write
 from focgen.textfile import LARGEST_SETTING
 
 SUBJECTS = ("memory",)
@@ -70,13 +71,15 @@ def study(
     the work instead.
 
     What has been measured stays in ``out``/rows and is not measured again for the same inputs, so that an
-    interrupted study goes on. Raises InputError for another subject and for options that cannot be used,
-    ControllerError and RigError for the files, DesignError where a set point cannot be reached, MissingExtra
-    where Dask is not installed.
+    interrupted study goes on. Raises InputError for another subject, and for options that cannot be used. So
+    it does where the study would take the place of somebody else's file. ControllerError and RigError are for
+    the files, DesignError where a set point cannot be reached, MissingExtra where Dask is not installed.
     """
     if subject not in SUBJECTS:
         raise InputError("study", f"has no subject {subject!r}", f"choose {' or '.join(SUBJECTS)}")
     which = _fractional(controller)
+    if out is not None:
+        check_own(Path(out) / name for name in WRITTEN)
     if target is not None:
         check_choice("--target", target, TARGETS)
     grid = grid_of(which, memory, lengths, tolerances, horizon, arithmetic, sample_times)

@@ -14,7 +14,9 @@ from focgen.shown import files_of
 from focgen.studies.kept import FILE, curves_text
 from focgen.studies.results import Study
 
-_DRAWN = ("accuracy.png", "pareto.png", "frequency.png", "loops.png", "plant.png", "report.html")
+DRAWN = ("accuracy.png", "pareto.png", "frequency.png", "loops.png", "plant.png", "report.html")
+WRITTEN = ("study.json", FILE, *DRAWN)
+"""All that a study may write beside its answers."""
 
 
 def write(study: Study, folder: Path, inputs: Iterable[Any] = ()) -> None:
@@ -26,7 +28,7 @@ def write(study: Study, folder: Path, inputs: Iterable[Any] = ()) -> None:
         FILE: curves_text(study),
     }
     files |= files_of(study)
-    write_files(folder, files, inputs, former(folder, "study.json", _DRAWN, files))
+    write_files(folder, files, inputs, former(folder, "study.json", DRAWN, files))
 
 
 def payload(study: Study) -> dict[str, Any]:

@@ -118,16 +118,22 @@ def _check_numbers(samples: int, seed: int) -> None:
 def _plan(reference: str | Path | Controller | LoadedController) -> tuple[Plan, str]:
     """The plan that is the reference, and its name."""
     if isinstance(reference, LoadedController):
+        _check_unedited(str(reference.path), reference.differences)
         return reference.plan, reference.name
     if isinstance(reference, Controller):
         return build_plan(controller_from(reference)), reference.name
     if Path(reference).is_file():
         return build_plan(controller_from(reference)), str(reference)
     read = read_folder(reference)
-    changed = [d for d in read.differences if d.startswith(("controller.toml", "manifest.json"))]
-    if changed:
-        raise InputError(str(reference), f"has been edited: {changed[0]}", "generate it again")
+    _check_unedited(str(reference), read.differences)
     return read.plan, str(reference)
+
+
+def _check_unedited(where: str, differences: tuple[str, ...]) -> None:
+    """Raise InputError where what a reference is taken from has been edited; its C takes no part."""
+    changed = [d for d in differences if d.startswith(("controller.toml", "manifest.json"))]
+    if changed:
+        raise InputError(where, f"has been edited: {changed[0]}", "generate it again")
 
 
 def _run(candidate: Candidate, plan: Plan, scenarios: list[Scenario]) -> list[Played]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -138,8 +138,8 @@ def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Ite
             yield f"{name}: is missing"
         elif not _same_bytes(path / name, files[name]):
             yield f"{name}: has been edited"
-    folders = {parent.as_posix() for name in files for parent in Path(name).parents}
     beside_it = dict(others(path, controller))
+    folders = _folders([*files, *(name for own in beside_it.values() for name in own)])
     for other in sorted(beside_it):
         its = sorted(name for name in beside_it[other] - files.keys() if (path / name).is_file())
         what = f"stands here as well and was not looked at ({', '.join(its)})"
@@ -149,6 +149,7 @@ def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Ite
         *folders,
         *([] if remembered(path / REMEMBERED) is None else [REMEMBERED]),
         *(name for own in beside_it.values() for name in own),
+        *(name for other, own in beside_it.items() if any(map(_of_fmu, own)) for name in _archive(other)),
         *(_archive(controller) if any(map(_of_fmu, files)) else ()),
     }
     found = [
@@ -158,6 +159,11 @@ def _notes(path: Path, files: Mapping[str, str | bytes], controller: str) -> Ite
     yield from (f"{_shown(name)}: does not belong to the folder" for name in strangers[:_MOST])
     if len(strangers) > _MOST:
         yield f"{len(strangers) - _MOST} more files do not belong to the folder"
+
+
+def _folders(names: Iterable[str]) -> set[str]:
+    """The folders that files lie in."""
+    return {parent.as_posix() for name in names for parent in Path(name).parents}
 
 
 def _archive(controller: str) -> tuple[str, str]:

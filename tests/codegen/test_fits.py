@@ -13,6 +13,7 @@ import pytest
 from focgen.codegen.fits import COUNT
 from focgen.codegen.generate import folder_files, generate
 from focgen.codegen.kernels import Kernels
+from focgen.codegen.literals import literal
 from focgen.codegen.lookahead import look_ahead
 from focgen.control.controller import ControllerRanges, GainSchedule
 from focgen.control.files import MOST_POINTS, controller_table
@@ -86,3 +87,21 @@ def test_those_next_to_them_are_converted(tmp_path, arithmetic, size):
 def test_a_sample_time_that_single_precision_cannot_hold_is_refused(tmp_path, step):
     with pytest.raises(PlanError, match="sample_time"):
         generate(replace(scaled(1.0), sample_time=step), tmp_path, "q31")
+
+
+@pytest.mark.parametrize("kernels", [Kernels(), Kernels("cortex-m4")])
+def test_a_past_whose_weights_are_all_lost_is_a_sum_of_nothing(tmp_path, kernels):
+    """Of an order of 1e-12 q15 has the present alone: the past rounds to zero, lag by lag."""
+    forgetful = TransferFunction([(1.0, 0.0)], [(50.0, 0.0), (0.4, 1e-12)])
+    made = generate(simple(forgetful, length=200), tmp_path, "q15", target=kernels.target)
+    assert not any(any(block.weights) for block in made.plan.feedback.table.blocks)
+    assert verify(tmp_path, samples=500).holds
+
+
+@pytest.mark.parametrize("bits", [16, 32, 64])
+def test_a_constant_that_its_type_cannot_hold_is_none(bits):
+    ctype, end = f"int{bits}_t", 1 << bits - 1
+    assert literal(end - 1, ctype) == str(end - 1) and literal(-end, ctype)
+    for value in (end, -end - 1):
+        with pytest.raises(ValueError, match=f"is no {ctype}"):
+            literal(value, ctype)

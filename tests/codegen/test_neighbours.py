@@ -96,3 +96,27 @@ def test_names_that_differ_in_capitals_only_are_refused(tmp_path):
             generate(seed_controller(6), tmp_path, "q31", name=name, force=True)
     assert content(tmp_path) == before
     generate(seed_controller(6), tmp_path / "apart", "q31", name="Valve")
+
+
+def test_from_one_package_to_another_and_back_nothing_is_edited(tmp_path):
+    """With other options each time: the example of before was left where the package has none."""
+    for k, package in enumerate(("cmake", "arduino", "plain", "arduino", "platformio", "plain")):
+        generate(seed_controller(5), tmp_path, "q15", name="one", length=8 + k, for_=package)
+        read = read_folder(tmp_path)
+        assert read.differences == read.notes == (), package
+    assert {path.name for path in tmp_path.iterdir() if path.is_dir()} == {"example"}
+
+
+@pytest.mark.parametrize("package", ["arduino", "cmake"])
+def test_what_a_package_of_the_other_has_belongs_to_it(tmp_path, package):
+    pair(tmp_path, for_=package)
+    folder = "examples" if package == "arduino" else "example"
+    (note,) = read_folder(tmp_path).notes
+    assert note.startswith("one: stands here as well")
+    (tmp_path / folder / "stranger.c").write_text("mine")
+    assert f"{folder}/stranger.c: does not belong to the folder" in read_folder(tmp_path).notes
+
+
+def test_the_archive_of_the_other_belongs_to_it(tmp_path):
+    pair(tmp_path, for_="fmu")
+    assert (tmp_path / "one.fmu").is_file() and len(read_folder(tmp_path).notes) == 1

@@ -43,6 +43,16 @@ def test_every_bit_is_the_references(arithmetic, tunable, tmp_path):
     assert result.first is None and result.sound and result.selftest == 0
 
 
+@pytest.mark.parametrize("arithmetic", ["q31", "q15"])
+def test_one_that_no_change_reaches_fits_its_type(arithmetic, tmp_path):
+    """From -10 V to 10 V is more than the type of the integral holds: C took a constant of the other sign."""
+    wide = replace(SLOW, ranges=replace(SLOW.ranges, output=(-10.0, 10.0)), slew_limit=1e9)
+    made = generate(wide, tmp_path, arithmetic)
+    state = made.plan.integrator.state
+    assert state.high - state.low > made.plan.integrator.slew == 2 ** (state.bits - 1) - 1
+    assert focgen.verify(tmp_path, samples=500).holds
+
+
 @pytest.mark.parametrize("arithmetic", ["f32", "q15"])
 def test_without_its_clamp_the_c_is_found_wrong(arithmetic, tmp_path):
     generate(SLOW, tmp_path, arithmetic)

@@ -3,16 +3,24 @@
 Red when a page says of C that was never compared that the comparison holds.
 """
 
+import hashlib
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
 import focgen
 from focgen.cli.main import main
+from focgen.control.controller import Source
+from focgen.control.files import read_controller, write_controller
 from focgen.errors import InputError
+from focgen.report import paths
+from focgen.report.page import Section
+from focgen.report.pages.chain import controller_section
 from focgen.report.verified import read_verified
-from tests.conftest import paper_controller
+from focgen.rig.files import write_rig
+from tests.conftest import paper_controller, paper_rig
 
 pytest.importorskip("bokeh")
 
@@ -122,3 +130,35 @@ def test_c_of_another_controller_is_told_of(given):
     path = given / "controller.toml"
     path.write_bytes(path.read_bytes() + b"\n")
     assert "generated from another controller.toml" in page_of(given, "fw", "controller.toml")
+
+
+CLAIM = "which is proved"
+
+
+@pytest.mark.parametrize("name", ["spba.c", "foc_rt.h", "manifest.json"])
+def test_c_that_was_edited_is_told_of_where_the_page_says_what_is_proved(given, name):
+    text = page_of(given, "fw")
+    assert CLAIM in text and "Warning: " not in text
+    path = given / "fw" / name
+    text = path.read_text()
+    path.write_text(text.replace('"worst": ', '"worst": 1') if name == "manifest.json" else text + "\n")
+    assert f"Warning: {name}" in page_of(given, "fw")
+
+
+def test_a_folder_that_is_not_whole_is_told_of(given):
+    (given / "fw" / "spba.c").unlink()
+    assert "was not looked at: it lacks spba.c" in page_of(given, "fw")
+
+
+def test_a_controller_of_another_rig_is_told_of(given, monkeypatch):
+    write_rig(paper_rig(), given / "rig.toml")
+    digest = hashlib.sha256((given / "rig.toml").read_bytes()).hexdigest()
+    for of, told in ((digest, False), ("0" * 64, True)):
+        made = replace(paper_controller(), designed_from=Source("rig.toml", of))
+        write_controller(made, given / "c.toml")
+        section = controller_section(read_controller(given / "c.toml"), digest)
+        assert ("designed from another rig" in " ".join(section.sentences)) == told
+    monkeypatch.setattr(paths, "rig_section", lambda rig: Section("Model"))  # each takes seconds
+    monkeypatch.setattr(paths, "simulate", lambda *given: None)
+    monkeypatch.setattr(paths, "simulation_sections", lambda found: [])
+    assert "designed from another rig" in page_of(given, "rig.toml", "c.toml")

@@ -7,9 +7,14 @@ from dataclasses import replace
 
 import pytest
 
+from focgen.codegen.generate import generate
+from focgen.control.files import check_replaces_controller, controller_text
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import LinearActuator, read_rig, write_rig
+from focgen.rig.files import check_replaces_rig
+from focgen.verification.folder import read_folder
+from tests.conftest import paper_controller
 
 RIG = """
 name = "spba"
@@ -43,6 +48,19 @@ def test_reads_every_table(tmp_path):
     assert rig.regulator.dc_gain == pytest.approx(152.48 / 1528)
     assert rig.ranges.pressure == (0.0, 0.25) and rig.ranges.output is None
     assert rig.sensor.dc_gain == 1.0
+
+
+def test_a_mark_that_an_editor_puts_ahead_is_no_part_of_it(tmp_path):
+    """Notepad's "UTF-8 with BOM": of every file of TOML, which still may be replaced."""
+    plain = read_rig(rig_file(tmp_path, RIG))
+    assert read_rig(rig_file(tmp_path, "\ufeff" + RIG)) == plain
+    check_replaces_rig(tmp_path / "rig.toml")
+    marked = tmp_path / "controller.toml"
+    marked.write_text("\ufeff" + controller_text(paper_controller(8)), encoding="utf-8")
+    check_replaces_controller(marked)
+    generate(marked, tmp_path / "fw", "q15")
+    assert (tmp_path / "fw" / "controller.toml").read_bytes() == marked.read_bytes()
+    assert not read_folder(tmp_path / "fw").differences
 
 
 def test_written_rig_reads_back_equal(tmp_path, paper_rig):

@@ -126,8 +126,8 @@ def replay_section(rig: Rig, logs: Sequence[Experiment], found: Replay) -> Secti
 # ------------------------------------------------------------------------------------------ controller
 
 
-def controller_section(controller: Controller) -> Section:
-    """What a controller.toml says."""
+def controller_section(controller: Controller, rig: str | None = None) -> Section:
+    """What a controller.toml says; ``rig``: the SHA-256 of the rig on the same page."""
     integral = ", then the integrator" if controller.integrator else ""
     gain = "the gain schedule" if controller.scheduled else f"{controller.gain:.4g}"
     told = (
@@ -135,6 +135,7 @@ def controller_section(controller: Controller) -> Section:
             f"{controller.name}: error → {controller.transfer} → × {gain}{integral}, every "
             f"{controller.sample_time:g} s."
         ),
+        *notes(_designed_from_another(controller, rig)),
     )
     spans = vars(controller.ranges).items()
     rows = tuple((name, f"{span[0]:g} to {span[1]:g}") for name, span in spans if span is not None)
@@ -142,6 +143,12 @@ def controller_section(controller: Controller) -> Section:
     return Section(
         "Controller", told, tables, figures=(_schedule(controller),) if controller.scheduled else ()
     )
+
+
+def _designed_from_another(controller: Controller, digest: str | None) -> tuple[str, ...]:
+    source = controller.designed_from
+    other = digest is not None and source is not None and source.sha256 != digest
+    return ("this controller was designed from another rig than the one above",) * other
 
 
 def _schedule(controller: Controller) -> Figure:
@@ -173,9 +180,11 @@ def _schedule(controller: Controller) -> Figure:
 # --------------------------------------------------------------------------------------------- folder
 
 
-def firmware_section(manifest: Mapping[str, Any], made_from: str | None = None) -> Section:
+def firmware_section(
+    manifest: Mapping[str, Any], made_from: str | None = None, faults: Sequence[str] = ()
+) -> Section:
     """What a manifest says of the generated C: its size, and what is proved of it; ``made_from``: the SHA-256
-    of the controller.toml on the same page."""
+    of the controller.toml on the same page. ``faults``: why the C that stands there may be another one."""
     bound, sizes = manifest["error_bound"]["quantisation"], manifest["sizes"]
     told = (
         (
@@ -184,7 +193,7 @@ def firmware_section(manifest: Mapping[str, Any], made_from: str | None = None) 
             f"{sizes['table_bytes']} B. Against the same controller in float64 the signal ahead of the "
             f"integrator is off by {bound['operator']:.3g} at most, which is proved."
         ),
-        *warnings(_made_from_another(manifest, made_from)),
+        *warnings((*faults, *_made_from_another(manifest, made_from))),
     )
     rows = tuple(
         (p["node"], number(p["worst"]), p["type"], number(p["margin_bits"]), p["how"])
