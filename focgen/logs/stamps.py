@@ -71,7 +71,8 @@ def skips_seconds(values: Array) -> bool:
     """Whether times of day (m,) in s begin every minute at its first second and leave it at the same one, as
     mm:ss:ff does that is read as hh:mm:ss: frames, or tenths, never come to 60.
 
-    >>> skips_seconds(np.arange(400.0)), skips_seconds(np.add.outer(60.0 * np.arange(9), np.arange(20)).ravel())
+    >>> frames = np.add.outer(60.0 * np.arange(9), np.arange(20)).ravel()
+    >>> skips_seconds(np.arange(400.0)), skips_seconds(frames)
     (False, True)
     """
     usual = _usual_step(values)

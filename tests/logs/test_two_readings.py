@@ -7,12 +7,14 @@ stand for nothing pass without a word.
 import numpy as np
 import pytest
 
+from focgen import init
 from focgen.errors import LogError
 from focgen.logs import read_logs
 from focgen.logs.lvm_file import read as read_lvm
 from focgen.logs.outliers import stand_in
 from focgen.logs.scales import Scale
 from focgen.logs.table import read_table
+from focgen.logs.units import unit_named, unit_of
 from focgen.rig.rig import Signals
 from tests.logs.test_dialects import lvm
 from tests.logs.test_misread import PLAIN, text
@@ -102,6 +104,7 @@ def test_thousands_in_texts_of_a_frame_are_no_decimals():
     assert np.allclose(found["pressure"], SECONDS)
 
 
+@pytest.mark.long
 def test_thousands_in_texts_of_a_parquet_are_no_decimals(tmp_path):
     pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     columns = {"t": SECONDS, "p": SECONDS, "y": [f"{10 * k:,d}".replace(",", ".") for k in range(COUNT)]}
@@ -131,6 +134,23 @@ def test_a_number_that_stands_for_no_reading_is_told_of(tmp_path):
 )
 def test_what_swings_or_rests_stands_for_itself(swing):
     assert stand_in(swing) is None
+
+
+@pytest.mark.parametrize("name", ["p_A", "chamber_pressure_A", "p_m", "angle_A", "kappa_A", "p_s"])
+def test_the_letter_of_a_channel_is_no_unit(name):
+    """The pressure of chamber A was in ampere, without a word."""
+    assert unit_of(name) is None and unit_named(name) == ""
+
+
+def test_letters_that_are_units_stay_units():
+    names = ["u_V", "current_A", "valve_A", "force_N", "y_m", "temperature_C", "p_V", "A"]
+    assert [unit_named(name) for name in names] == ["V", "A", "A", "N", "m", "C", "V", "A"]
+
+
+def test_init_takes_the_letter_of_a_chamber_for_no_unit(tmp_path):
+    lines = [f"{t:.2f},{k // 100},{k / 100},{k / 100}" for k, t in enumerate(SECONDS)]
+    found = str(init(text(tmp_path, lines, header="t_s,u_V,p_A,angle_A")))
+    assert '= "A"' not in found and "the unit of 'p_A' is not known" in found
 
 
 # ---------------------------------------------------------------------------------------------------- LabVIEW
