@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, overload
 
 import numpy as np
@@ -116,6 +116,19 @@ class Points:
     def decimal(self) -> bool:
         """Whether a point is a decimal one for sure."""
         return self._decimal
+
+
+def doubtful(columns: Mapping[str, Sequence[str] | Array]) -> frozenset[str]:
+    """Those columns of texts whose points may stand between thousands, where no text says otherwise."""
+    seen = {name: Points() for name, cells in columns.items() if not _of_numbers(cells)}
+    for name, points in seen.items():
+        points.see(cell for cell in columns[name] if isinstance(cell, str))
+    told = any(points.decimal for points in seen.values())
+    return frozenset(name for name, points in seen.items() if points.doubtful and not told)
+
+
+def _of_numbers(cells: Sequence[str] | Array) -> bool:
+    return isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub"
 
 
 class _Growing:

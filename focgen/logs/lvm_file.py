@@ -100,6 +100,7 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
     runs = [str(k) for k, s in enumerate(segments, start=1) for _ in s.lines] if len(segments) > 1 else None
     units, *others = (dict(zip(first[1:], s.settings.get("Y_Unit_Label", ()))) for s in segments)
     check_units(path, [units, *others])
+    units |= _unit_of_time(path, segments)
     return LogTable(
         str(path),
         columns,
@@ -109,6 +110,20 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
         clock=clock,
         runs=runs,
     )
+
+
+def _unit_of_time(path: Path, segments: Sequence[_Segment]) -> dict[str, str]:
+    """The unit of the column of X values, where the file gives one. Raises LogError where these are no time:
+    the frequencies of a spectrum."""
+    said = [s.settings.get("X_Dimension", [""])[0].strip() for s in segments]
+    other = next((what for what in said if what.lower() == "frequency"), None)
+    if other:
+        raise LogError(
+            str(path), f"goes over {other.lower()}, not over time", "save what was measured over time"
+        )
+    given = [{_TIME: (s.settings.get("X_Unit_Label") or [""])[0]} for s in segments]
+    check_units(path, given)
+    return {name: unit for name, unit in given[0].items() if unit}
 
 
 def _clock(path: Path, segment: _Segment) -> Array:

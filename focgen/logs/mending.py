@@ -9,7 +9,7 @@ import numpy as np
 from focgen.arrays import Array, Ints
 from focgen.logs.clock import HELD, between
 from focgen.logs.notes import Note
-from focgen.logs.outliers import barred_by, outliers, straightened
+from focgen.logs.outliers import barred_by, outliers, stand_in, straightened
 from focgen.logs.repeats import fresh_rows, frozen
 
 _DRIVES = ("command", "pressure")
@@ -47,12 +47,25 @@ def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Arra
             what = f"outliers of {role} replaced by the straight line between their neighbours"
             notes.append(Note(what, int(wrong.sum()), f"at {time[rows][np.argmax(wrong)]:g} s"))
             y = _with(y, rows, straightened(time[rows], y[rows], wrong))
+        notes += _stand_in_note(role, y[rows], time[rows])
     if gone.any():
         how = "held" if role in HELD else "bridged by straight lines"
         notes.append(
             Note(f"readings of {role} missing, {how}", int(gone.sum()), f"at {time[np.argmax(gone)]:g} s")
         )
     return _filled(role, time, y, rows, there), notes
+
+
+def _stand_in_note(role: str, y: Array, time: Array) -> list[str]:
+    """A word on a number that a logger writes where it has no reading: too often there for an outlier."""
+    found = stand_in(y)
+    if found is None:
+        return []
+    value, first = found
+    what = (
+        f"{role} is {value:.6g} again and again, far off the readings on both sides: leave such cells empty"
+    )
+    return [Note(f"{what} if nothing was read", 1, f"at {time[first]:g} s")]
 
 
 def _with(y: Array, rows: Ints | slice, straight: Array) -> Array:

@@ -21,6 +21,11 @@ _FEWEST = 20  # readings
 _AHEAD, _AFTER = 3, 10  # readings around a jump of the command that are left alone
 _PART = 1 << 16  # windows that are looked at side by side
 _FINE = 1e-3  # of the span: what noise there is at least
+_FAR_OFF = 0.2  # of the span: so far off both sides is a number that stands for no reading …
+_AGREE = 0.25  # … times that, the two sides differ by at most
+_STRETCH = 10  # rows of it in a row, at most
+_AGAIN = 5  # stretches of exactly the same number, at least …
+_ALONE = 0.9  # … and of all that are so far off: what swings has two ends
 
 
 def outliers(y: Array, barred: Bools | None = None) -> Bools:
@@ -136,3 +141,31 @@ def _largest_jump(y: Array) -> float:
     middle = np.median(sliding_window_view(y, 7), axis=1)
     lasting = np.abs(middle[7:] - middle[:-7])
     return float(np.minimum(lasting, np.abs(np.diff(y))[6 : 6 + len(lasting)]).max())
+
+
+def stand_in(y: Array) -> tuple[float, int] | None:
+    """A number that stands for readings (n,) that are missing, and the first row that has it; None where
+    there is none: exactly the same one each time, while what is ahead of it and behind it agree.
+
+    >>> y = np.sin(0.01 * np.arange(900.0))
+    >>> stand_in(y), stand_in(np.where(np.arange(900) % 90 == 60, -1.0, y))
+    (None, (-1.0, 60))
+    """
+    least = _FAR_OFF * float(np.ptp(y)) if len(y) else 0.0
+    jumps = _leaps(y, least)
+    held, ends = jumps[:-1], jumps[1:]  # each stretch between two jumps
+    value, before, after = y[held], y[held - 1], y[ends]
+    far = np.minimum(np.abs(value - before), np.abs(value - after))
+    alike = (y[ends - 1] == value) & (np.abs(after - before) < _AGREE * far) & (ends - held <= _STRETCH)
+    values, counts = np.unique(value[alike], return_counts=True)
+    if not len(values) or counts.max() < max(_AGAIN, _ALONE * counts.sum()):
+        return None
+    found = float(values[np.argmax(counts)])
+    return found, int(held[alike & (value == found)][0])
+
+
+def _leaps(y: Array, least: float) -> Ints:
+    """The rows that are farther than ``least`` from the one ahead, looked for in parts: a log may be long."""
+    parts = [y[at : at + _PART + 1] for at in range(0, len(y), _PART)]
+    found = [np.flatnonzero(np.abs(np.diff(part)) > least) + 1 + k * _PART for k, part in enumerate(parts)]
+    return np.concatenate([np.empty(0, int), *found])

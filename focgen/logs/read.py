@@ -19,9 +19,9 @@ from focgen.logs.experiment import Experiment
 from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
-from focgen.logs.scales import Scale, known, same
+from focgen.logs.scales import Scale, known, same, unit_of_time
 from focgen.logs.table import LogTable, read_table, stem
-from focgen.logs.units import unit_of
+from focgen.logs.units import time_unit_named, unit_of
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
@@ -130,11 +130,29 @@ def _experiments(
 def _time(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
     """The time stamps (m,) in s, and a note where no column gives them."""
     if signals.time in table:
-        return _scaled(table, "time", table.seconds(signals.time), signals), ()
+        said = _time_unit_note(table, signals)
+        return _scaled(table, "time", table.seconds(signals.time), signals), said
     if table.clock is None:
         raise table.missing("time", signals.time, {signals.run or "", *signals.columns().values()})
     step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
     return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
+
+
+def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
+    """What the file or the column's name says of the unit of time, where the rig names another. Raises
+    LogError where the rig names none and it is no second: minutes pass for a log of another rate."""
+    name, scale = signals.time, signals.scales.get("time")
+    given = table.unit(name) or time_unit_named(name) or "s"
+    taken = (scale.unit or "") if scale else "s"
+    if given == taken or not taken or table.is_dated(name):
+        return ()
+    own, other = unit_of_time(given), unit_of_time(taken)
+    if own is None or other is None or own[1] == other[1]:
+        return ()
+    if scale is not None:
+        return (f"the log gives {name!r} in {given}, time is taken as {taken}",)
+    remedy = f"write time = {{ column = {name!r}, unit = {own[0]!r} }} in the rig's [signals]"
+    raise LogError(f"{table.path} [{name}]", f"is in {given}, and the rig takes it for seconds", remedy)
 
 
 def _scaled(table: LogTable, role: str, values: Array, signals: Roles) -> Array:

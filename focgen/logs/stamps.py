@@ -10,36 +10,88 @@ import numpy as np
 from focgen.arrays import Array
 
 _DAY = 86400.0
+_PACKED = (1.0, 1e3, 1e6)  # of a second: what hhmmss may count behind its seconds
+_PART = 1 << 14  # stamps that are looked at side by side
+_MINUTES = 4  # that lack the same seconds: fewer may be chance
 
 
 def seconds(cells: Sequence[str]) -> Array:
     """Seconds (m,): since 1970 of dates (without a zone: UTC), since midnight of times of day.
 
     A time of day that falls back by more than half a day has passed midnight. Empty cells become NaN. Raises
-    ValueError for anything else, and for "12:34": hours and minutes, or minutes and seconds?
+    ValueError for anything else, for dates of which some have a zone, and for "12:34": hours and minutes, or
+    minutes and seconds?
     """
-    filled = [cell for cell in cells if cell]
-    of = _since_1970 if filled and _has_date(filled[0]) else _since_midnight
-    found = np.array([of(cell) if cell else np.nan for cell in cells])
-    return found if of is _since_1970 else _past_midnight(found)
+    filled = next((cell for cell in cells if cell), "")
+    if _has_date(filled):
+        return _since_1970(cells)
+    return _past_midnight(np.array([_since_midnight(cell) if cell else np.nan for cell in cells]))
 
 
 def is_packed(values: Array) -> bool:
-    """Whether numbers (m,) are times of day written as hhmmss: seconds 60 to 99 are stepped over.
+    """Whether numbers (m,) are times of day written as hhmmss, with a date ahead or decimals behind or not:
+    seconds 60 to 99 are stepped over.
 
-    >>> is_packed(np.array([115958.0, 115959.0, 120000.0])), is_packed(np.array([58.0, 59.0, 102.0]))
+    >>> is_packed(np.array([57.0, 58.0, 59.0, 100.0])), is_packed(np.array([57.0, 58.0, 59.0, 102.0]))
     (True, False)
+    >>> is_packed(1e3 * np.array([115957.0, 115958.0, 115959.0, 120000.0]))
+    True
     """
-    steps = np.diff(values)
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    if not (0.0 < usual < 20.0 and values.min() >= 0.0 and values.max() < 240_000.0):
+    return any(_is_packed(values, unit) for unit in _PACKED)
+
+
+def _is_packed(values: Array, unit: float) -> bool:
+    """The same of numbers that count ``unit`` to a second. A part at a time: a log may be long."""
+    usual = _usual_step(values[:_PART]) / unit
+    if not 0.0 < usual < 20.0:
         return False
+    parts = (values[at : at + _PART + 1] / unit for at in range(0, len(values), _PART))
+    over = 0
+    for part in parts:
+        count = _minutes_over(part, usual)
+        if count is None:
+            return False
+        over += count
+    return over > 0
+
+
+def _minutes_over(values: Array, usual: float) -> int | None:
+    """How often a minute ends and 40 are stepped over; None where the numbers are no hhmmss."""
     minutes, left = np.divmod(values, 100.0)
-    if (left >= 60.0).any() or (minutes % 100.0 >= 60.0).any():
+    if not values.min() >= 0.0 or (left >= 60.0).any() or (minutes % 100.0 >= 60.0).any():
+        return None
+    hours = np.diff(minutes // 100.0)
+    beyond = np.where(hours != 0.0, 4040.0, 40.0)
+    over = (np.diff(minutes) != 0.0) & (np.abs(hours) <= 1.0)  # a new day steps over more
+    fits = np.abs(np.diff(values) - beyond - usual)[over] < 0.5 * usual
+    return int(over.sum()) if np.all(fits) else None
+
+
+def skips_seconds(values: Array) -> bool:
+    """Whether times of day (m,) in s begin every minute at its first second and leave it at the same one, as
+    mm:ss:ff does that is read as hh:mm:ss: frames, or tenths, never come to 60.
+
+    >>> frames = np.add.outer(60.0 * np.arange(9), np.arange(20)).ravel()
+    >>> skips_seconds(np.arange(400.0)), skips_seconds(frames)
+    (False, True)
+    """
+    usual = _usual_step(values)
+    if not 0.0 < usual < 20.0 or values.max() >= 2.0 * _DAY or (values % 1.0 != 0.0).any():
         return False
-    over = np.diff(minutes) != 0.0
-    beyond = np.where(np.diff(minutes // 100.0) != 0.0, 4040.0, 40.0)
-    return bool(over.any() and np.all(np.abs(steps - beyond - usual)[over] < 0.5 * usual))
+    steps, over = np.diff(values), np.diff(values // 60.0) != 0.0
+    within, between, begins = steps[~over], steps[over], values[1:][over] % 60.0
+    return bool(
+        len(between) >= _MINUTES
+        and np.all(within < 1.5 * usual)
+        and np.all(between > 1.5 * usual)
+        and np.ptp(between) < usual
+        and np.all(begins < usual)
+    )
+
+
+def _usual_step(values: Array) -> float:
+    steps = np.diff(values)
+    return float(np.median(steps)) if len(steps) else 0.0
 
 
 def is_time(values: Array) -> bool:
@@ -60,9 +112,17 @@ def _has_date(cell: str) -> bool:
     return "-" in cell or len(cell) > len("23:59:59.999999999")
 
 
-def _since_1970(cell: str) -> float:
-    stamp = datetime.fromisoformat(cell)
-    return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
+def _since_1970(cells: Sequence[str]) -> Array:
+    """Dates in s. Raises ValueError where some have a zone and some have none, which may be hours apart."""
+    found, zoned = np.full(len(cells), np.nan), set[bool]()
+    for row, cell in enumerate(cells):
+        if cell:
+            stamp = datetime.fromisoformat(cell)
+            zoned.add(stamp.tzinfo is not None)
+            found[row] = (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
+    if len(zoned) > 1:
+        raise ValueError("some have a zone, some have none")
+    return found
 
 
 def _since_midnight(cell: str) -> float:

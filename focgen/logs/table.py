@@ -123,18 +123,31 @@ class LogTable:
         cell that is none of these.
         """
         column = self.column(name)
-        if not isinstance(column, np.ndarray) and any(is_stamp(cell) for cell in column[:_LOOK]):
+        if self.is_dated(name):
             try:
-                return stamps.seconds(column)
+                found = stamps.seconds(column)
             except ValueError as reason:
                 what = f"has a time that cannot be read ({reason})"
                 remedy = "write it as 2026-01-31T12:00:00.000, or in seconds"
                 raise LogError(f"{self.path} [{name}]", what, remedy) from None
+            self._check_seconds(name, found)
+            return found
         values = self.numbers(name)
         if stamps.is_packed(values):
             what = "counts to 59 and goes on at 100: it may be a time of day as hhmmss"
             raise LogError(f"{self.path} [{name}]", what, "write it as 12:00:59.98, or in seconds")
         return values
+
+    def is_dated(self, name: str) -> bool:
+        """Whether a column is one of dates or times of day, in text."""
+        column = self.column(name)
+        return not isinstance(column, np.ndarray) and any(is_stamp(str(cell)) for cell in column[:_LOOK])
+
+    def _check_seconds(self, name: str, found: Array) -> None:
+        """Raise LogError where times of day may be minutes, seconds and frames."""
+        if stamps.skips_seconds(found):
+            what = "lacks the same seconds of every minute: it may be mm:ss and frames, read as hh:mm:ss"
+            raise LogError(f"{self.path} [{name}]", what, "write it as 12:00:59.98, or in seconds")
 
     def numbers(self, name: str) -> Array:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no

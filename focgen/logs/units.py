@@ -18,15 +18,20 @@ _OTHERS = frozenset("mm cm m um N mN kN Nm s ms Hz rpm K C pct".split())  # thes
 _SPELLED = {"permm": "1/mm", "percm": "1/cm", "perm": "1/m", "1pm": "1/m", "1pmm": "1/mm", "hpa": "mbar"}
 _TIMES = frozenset("ns us µs μs ms msec s sec secs seconds min mins minutes h hr hrs hours day days".split())
 _ALONE = frozenset("s h min day".split())  # names of other things as well
+_PRESSURES = frozenset("p pressure press druck presion chamber".split())
+_ANGLES = frozenset("angle theta bend bending curvature curv kappa flex winkel".split())
+_LETTERS = {"A": _PRESSURES | _ANGLES, **dict.fromkeys("msNKC", _PRESSURES)}  # of a channel, or of a word
 _ANY_CASE = ("bar", "kPa", "mbar", "psi", "rad", "deg", "1/mm", "1/cm", "1/m")  # a name in v is no voltage
 
 
 def unit_of(text: str) -> tuple[str, str] | None:
     """(kind, unit) that a unit or a column's name ends in, or None where it is none of :data:`SIZES`.
 
-    >>> unit_of("p_kPa"), unit_of("kappa_cam_per_mm"), unit_of("angle")
-    (('pressure', 'kPa'), ('curvature', '1/mm'), None)
+    >>> unit_of("p_kPa"), unit_of("kappa_cam_per_mm"), unit_of("angle"), unit_of("p_A")
+    (('pressure', 'kPa'), ('curvature', '1/mm'), None, None)
     """
+    if _is_letter(text):
+        return None
     words = re.sub(r"_?per_?", "_per", text.replace("1/", "_per")).strip("]) ").split("_")
     last = re.split(r"[\s\[(]+", words[-1])[-1]
     last = _SPELLED.get(last.lower(), last)
@@ -35,6 +40,12 @@ def unit_of(text: str) -> tuple[str, str] | None:
             if unit == last or (unit in _ANY_CASE and unit.lower() == last.lower()):
                 return kind, unit
     return None
+
+
+def _is_letter(column: str) -> bool:
+    """Whether a name ends in a letter that is no unit of what it names: the pressure of chamber A."""
+    *words, last = column.split("_")
+    return not _LETTERS.get(last, frozenset()).isdisjoint(word.lower() for word in words)
 
 
 def time_unit_named(column: str) -> str | None:
@@ -62,6 +73,6 @@ def unit_named(column: str | None) -> str:
     if known:
         return known[1]
     *before, last = (column or "").split("_")
-    if not before or last not in _OTHERS:
+    if not before or last not in _OTHERS or _is_letter(column or ""):
         return ""  # a lone letter is a name
     return f"1/{last}" if before[-1] == "per" else last

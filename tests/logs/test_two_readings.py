@@ -1,0 +1,165 @@
+"""What loggers, PLCs and spreadsheets write that can be read in two ways: refused, or told of.
+
+Red when minutes, packed dates, frames, dates without a zone, thousands in a frame's texts, or numbers that
+stand for nothing pass without a word.
+"""
+
+import numpy as np
+import pytest
+
+from focgen import init
+from focgen.errors import LogError
+from focgen.logs import read_logs
+from focgen.logs.lvm_file import read as read_lvm
+from focgen.logs.outliers import stand_in
+from focgen.logs.scales import Scale
+from focgen.logs.table import read_table
+from focgen.logs.units import unit_named, unit_of
+from focgen.rig.rig import Signals
+from tests.logs.test_dialects import lvm
+from tests.logs.test_misread import PLAIN, text
+
+COUNT = 400
+SECONDS = 0.05 * np.arange(COUNT)
+
+
+def log(tmp_path, times, header="t,p,y", readings=None):
+    readings = np.arange(COUNT) if readings is None else readings
+    return text(tmp_path, [f"{t},{k},{y}" for k, (t, y) in enumerate(zip(times, readings))], header=header)
+
+
+# ------------------------------------------------------------------------------------------------------ time
+
+
+@pytest.mark.parametrize("header", ["t (min),p,y", "t,p,y\nmin,bar,1/mm"])
+def test_minutes_that_the_file_tells_of_are_no_seconds(tmp_path, header):
+    """A factor of 60 passes for a log of another rate."""
+    path = log(tmp_path, [f"{t / 60:.8f}" for t in SECONDS], header)
+    with pytest.raises(LogError, match="is in min, and the rig takes it for seconds"):
+        read_logs(path, PLAIN, 0.05)
+
+
+def test_minutes_that_a_name_tells_of_are_no_seconds(tmp_path):
+    path = log(tmp_path, [f"{t / 60:.8f}" for t in SECONDS], "t_min,p,y")
+    with pytest.raises(LogError, match="unit = 'min'"):
+        read_logs(path, Signals("t_min", "y", None, "p"), 0.05)
+    scale = Scale(unit="min")
+    (found,) = read_logs(path, Signals("t_min", "y", None, "p", scales={"time": scale}), 0.05)
+    assert found.sample_time == 0.05 and not found.notes
+
+
+def test_seconds_by_any_name_and_dates_stay(tmp_path):
+    for header, name in (("t_s,p,y", "t_s"), ("t [sec],p,y", "t"), ("t (UTC),p,y", "t")):
+        path = log(tmp_path, [f"{t:.2f}" for t in SECONDS], header)
+        (found,) = read_logs(path, Signals(name, "y", None, "p"), 0.05)
+        assert found.sample_time == 0.05 and not found.notes
+    path = log(tmp_path, [f"2026-01-31T12:00:{t:05.2f}" for t in SECONDS], "t (min),p,y")
+    assert len(read_logs(path, PLAIN, 0.05)[0]) == COUNT
+
+
+def packed(t, form):
+    return form.format(int(t) // 60, t % 60, round(1000 * (t % 60)))
+
+
+@pytest.mark.parametrize(
+    "form", ["2026013112{0:02d}{1:05.2f}", "12{0:02d}{2:05d}", "2026013123{0:02d}{2:05d}", "{0:d}{2:05d}"]
+)
+def test_dates_and_milliseconds_in_one_number_are_refused(tmp_path, form):
+    """A minute ends at 59 and goes on at 100: 40 s that never were, each minute an experiment of its own."""
+    path = log(tmp_path, [packed(t, form) for t in SECONDS + 50.0])
+    with pytest.raises(LogError, match="hhmmss"):
+        read_table(path).seconds("t")
+
+
+def test_minutes_seconds_and_frames_are_no_hours(tmp_path):
+    frames = np.arange(COUNT)
+    path = log(tmp_path, [f"{k // 1200:02d}:{k // 20 % 60:02d}:{k % 20:02d}" for k in frames])
+    with pytest.raises(LogError, match="frames"):
+        read_table(path).seconds("t")
+    for keeps in (
+        lambda t: f"{t // 3600:02d}:{t // 60 % 60:02d}:{t % 60:02d}",
+        lambda t: f"0:{t // 60:02d}:07",
+    ):
+        path = log(tmp_path, [keeps(int(k)) for k in frames])
+        read_table(path).seconds("t")
+
+
+def test_dates_of_which_some_have_a_zone_are_refused(tmp_path):
+    times = [f"2026-01-31T12:00:{t:05.2f}{'+01:00' if k < 200 else ''}" for k, t in enumerate(SECONDS)]
+    with pytest.raises(LogError, match="some have a zone, some have none"):
+        read_table(log(tmp_path, times)).seconds("t")
+    mixed = [f"2026-01-31T1{k % 2}:00:{t:05.2f}+0{k % 2}:00" for k, t in enumerate(SECONDS)]
+    assert np.allclose(np.diff(read_table(log(tmp_path, mixed)).seconds("t")), 0.05)
+
+
+# --------------------------------------------------------------------------------------------------- numbers
+
+
+def test_thousands_in_texts_of_a_frame_are_no_decimals():
+    """The rule of files of text holds for texts in frames, .parquet and .mat."""
+    frame = {"t": SECONDS, "p": SECONDS, "y": [f"{10 * k:,d}".replace(",", ".") for k in range(COUNT)]}
+    with pytest.raises(LogError, match="thousands"):
+        read_logs(frame, PLAIN, 0.05)
+    (found,) = read_logs(frame | {"p": [f"{t:.2f}" for t in SECONDS], "y": SECONDS}, PLAIN, 0.05)
+    assert np.allclose(found["pressure"], SECONDS)
+
+
+@pytest.mark.long
+def test_thousands_in_texts_of_a_parquet_are_no_decimals(tmp_path):
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    columns = {"t": SECONDS, "p": SECONDS, "y": [f"{10 * k:,d}".replace(",", ".") for k in range(COUNT)]}
+    pq.write_table(pa.table(columns), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match="thousands"):
+        read_table(tmp_path / "log.parquet").numbers("y")
+
+
+def test_a_number_that_stands_for_no_reading_is_told_of(tmp_path):
+    """A camera that writes 0 where it sees nothing: of outliers these would be too many."""
+    seen = 3.0 + np.sin(0.05 * np.arange(COUNT))
+    lost = np.where(np.arange(COUNT) % 25 == 7, 0.0, seen)
+    (found,) = read_logs(log(tmp_path, SECONDS, readings=lost), PLAIN, 0.05)
+    (note,) = (note for note in found.notes if "again and again" in note)
+    assert note.startswith("output is 0") and "0.35 s" in note
+
+
+@pytest.mark.parametrize(
+    "swing",
+    [
+        np.tile([0.0, 1.0, 2.0, 1.0], 100),
+        np.tile([0.0, 1.0], 200),
+        np.repeat([0.0, 1.0, 0.0, 2.0, 0.0, 3.0, 0.0, 4.0], 50),
+        np.round(np.random.default_rng(5).normal(size=COUNT)),
+    ],
+    ids=["sine", "square", "steps", "coarse"],
+)
+def test_what_swings_or_rests_stands_for_itself(swing):
+    assert stand_in(swing) is None
+
+
+@pytest.mark.parametrize("name", ["p_A", "chamber_pressure_A", "p_m", "angle_A", "kappa_A", "p_s"])
+def test_the_letter_of_a_channel_is_no_unit(name):
+    """The pressure of chamber A was in ampere, without a word."""
+    assert unit_of(name) is None and unit_named(name) == ""
+
+
+def test_letters_that_are_units_stay_units():
+    names = ["u_V", "current_A", "valve_A", "force_N", "y_m", "temperature_C", "p_V", "A"]
+    assert [unit_named(name) for name in names] == ["V", "A", "A", "N", "m", "C", "V", "A"]
+
+
+def test_init_takes_the_letter_of_a_chamber_for_no_unit(tmp_path):
+    lines = [f"{t:.2f},{k // 100},{k / 100},{k / 100}" for k, t in enumerate(SECONDS)]
+    found = str(init(text(tmp_path, lines, header="t_s,u_V,p_A,angle_A")))
+    assert '= "A"' not in found and "the unit of 'p_A' is not known" in found
+
+
+# ---------------------------------------------------------------------------------------------------- LabVIEW
+
+
+def test_x_values_of_labview_have_the_unit_that_the_file_gives(tmp_path):
+    path = tmp_path / "log.lvm"
+    path.write_text(lvm(".", "One", 1).replace("X_Dimension\t", "X_Unit_Label\tmin\tmin\nX_Dimension\t"))
+    assert read_lvm(path).unit("X_Value") == "min"
+    path.write_text(lvm(".", "One", 1).replace("X_Dimension\tTime", "X_Dimension\tFrequency"))
+    with pytest.raises(LogError, match="goes over frequency"):
+        read_lvm(path)
