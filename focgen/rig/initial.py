@@ -47,7 +47,7 @@ class _Asked:
     """What a past has to show. ``off``: by what share of a signal's largest magnitude the first samples are
     off from rest; ``mended``: what part of that a past may leave at most, and ``surely``: so little that it
     rules a rest out where they are off by more than ``far``; ``offset``: shares up to there are no past;
-    ``nats``: twice the evidence."""
+    ``nats``: twice the evidence; ``cost``: what part of a rest's a past may leave over all of them."""
 
     off: float
     mended: float
@@ -55,11 +55,15 @@ class _Asked:
     far: float
     offset: float
     nats: float
+    cost: float = np.inf
 
 
 _DRIVEN = _Asked(0.02, 0.7, 0.5, 0.15, 0.05, 0.0)
 _IDLE = _Asked(0.05, 0.35, 0.0, np.inf, np.inf, 12.0)
 """At an input of 0 nothing but a past moves the rig; but a drift or an offset holds it off, too."""
+_PASSING = replace(_IDLE, cost=0.05)
+"""An input that is at 0 for a moment may be on its way through it, as every sine of a rig of both signs is. No
+decay at rest shows the past then, so the past has to explain nearly all of what a rest leaves."""
 
 
 def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
@@ -162,11 +166,16 @@ class _Setting:
         self.y = np.stack([y / unit for y, unit in zip(measured, self.units)], axis=1)
         self.level = float(self.x[0] if entry == "command" else np.mean(self.x[:_FIRST]))
         self.counts = (pace / (pace + np.arange(n) * self.h))[:, None]
-        self.asked, self.shown = _DRIVEN, True
+        self.asked = _DRIVEN
         if abs(self.level) < _NOTHING * self.reach:
-            still = self._still()
-            self.asked, self.shown = _IDLE, still >= max(_SHOWN * pace / self.h, 2 * _FIRST)
-            self.counts[max(still, 1) :] = 0.0
+            self._near_nothing(max(_SHOWN * pace / self.h, 2 * _FIRST))
+
+    def _near_nothing(self, least: float) -> None:
+        """What counts where the input is 0 at first: its rest there, where that is as long as ``least``."""
+        still = self._still()
+        self.asked = _IDLE if still >= least else _PASSING
+        if still >= least:
+            self.counts[still:] = 0.0
 
     def _still(self) -> int:
         """For how many samples the input stays what it was at first."""
@@ -193,13 +202,13 @@ class _Setting:
         rest, asked = self.at(REST, 0), self.asked
         noise = np.array([_white(y) for y in self.y.T])
         moved = rest.first > np.maximum(_APART * noise / np.sqrt(_FIRST), asked.off)
-        if not moved.any() or not self.shown:
+        if not moved.any():
             return REST
 
         def off(t: _Try) -> float:
             return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
 
-        tries = [t for t in self.tries() if off(t) < asked.mended]
+        tries = [t for t in self.tries() if off(t) < asked.mended and t.cost < asked.cost * rest.cost]
         if not tries:
             return REST
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
@@ -221,10 +230,21 @@ class _Setting:
         stepped = [self.at(Begin((0.0, self.level), (float(t),)), 1) for t in grid]
         best = min(stepped, key=lambda each: each.cost)
         one = self._descended([np.log(best.begin.ago[0])], self._stepped)
-        from_level = self._descended([np.log(one.begin.ago[0]), 0.0], self._stepped)
+        from_level = self._descended(self._before(one, grid), self._stepped)
         later, level = np.log(from_level.begin.ago[0]), from_level.begin.levels[0] / self.reach
         two = self._descended([later, level, later + 1.0], self._twice)
         return [held, one, from_level, two]
+
+    def _before(self, one: _Try, grid: Array) -> Array:
+        """Where to begin to look for a step from a level: at one from rest, or at one from an end of the range.
+
+        Where the input is near 0 at first, a step from rest to there is next to nothing at any time, and
+        tells no time.
+        """
+        ends = [end for end in self.range if abs(end) > _NOTHING]
+        starts = [np.array([np.log(one.begin.ago[0]), 0.0])]
+        starts += [np.array([np.log(t), end]) for end in ends for t in grid]
+        return min(starts, key=lambda x: self.at(self._stepped(x), 0).cost)
 
     def _stepped(self, x: Array) -> Begin:
         earlier = float(x[1]) * self.reach if len(x) > 1 else 0.0

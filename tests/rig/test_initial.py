@@ -185,6 +185,28 @@ def test_a_moment_at_zero_tells_nothing():
     assert told.begins == {}
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_an_input_that_passes_through_zero_hides_no_past(turn):
+    """A rig of both signs, held at a level and then driven by a sine: its log begins where that is near 0."""
+    rig = actuator_alone(Actuator(0.8, 1.0, (8.0,)))
+    sine = np.sin(0.05 * np.arange(-1, 500)) * 1.2
+    whole = turn * np.r_[np.zeros(200), np.full(30, 1.1), sine]
+    y = answer(rig, whole)[230:]
+    y = y + 0.05 * np.random.default_rng(2).normal(size=len(y))
+    log = Experiment("sine", H, {"pressure": whole[230:], "output": y})
+    (told,) = begun(rig, [log])
+    left = y - answer(rig, log["pressure"], told.before("pressure"))
+    assert np.sqrt(np.mean((y - answer(rig, log["pressure"]))[:60] ** 2)) > 1.0
+    assert np.sqrt(np.mean(left[:60] ** 2)) < 0.1
+
+
+def test_an_offset_behind_an_input_that_passes_through_zero_is_no_past():
+    rig = actuator_alone(Actuator(0.8, 1.0, (8.0,)))
+    p = np.sin(0.05 * np.arange(-1, 500)) * 1.2
+    y = answer(rig, p) + 1.5 + 0.05 * np.random.default_rng(3).normal(size=len(p))
+    assert begun(rig, [Experiment("sine", H, {"pressure": p, "output": y})])[0].begins == {}
+
+
 def test_a_rig_that_integrates_is_left_alone():
     rig = replace(RIG, actuator=LinearActuator(TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])))
     logs = [cut(session(seed=1)[0], 10.0)]
