@@ -31,6 +31,7 @@ _SEEN = 40.0  # response times from the beginning that are looked at,
 _LEAST = 200  # and samples
 _LONGEST = 20.0  # response times before the first sample: a step is looked for up to here
 _TIMES = 10  # of a step, on the first grid
+_SOONEST = 0.5  # samples before the first: a step to what that one shows, as the log begins
 _FIRST = 5  # samples that tell what the input was last, and where the output began
 _ROUNDS = 8  # of Gauss-Newton
 _DAMPED, _STEP = 1e-3, 1e-3  # its damping at first, and its steps for derivatives
@@ -226,25 +227,45 @@ class _Setting:
     def tries(self) -> list[_Try]:
         """The best of each kind of begin but a rest."""
         held = self.at(Begin((self.level,)), 0)
-        grid = np.geomspace(self.h, self.longest, _TIMES)
-        stepped = [self.at(Begin((0.0, self.level), (float(t),)), 1) for t in grid]
-        best = min(stepped, key=lambda each: each.cost)
-        one = self._descended([np.log(best.begin.ago[0])], self._stepped)
-        from_level = self._descended(self._before(one, grid), self._stepped)
-        later, level = np.log(from_level.begin.ago[0]), from_level.begin.levels[0] / self.reach
-        two = self._descended([later, level, later + 1.0], self._twice)
+        times = np.log(np.geomspace(_SOONEST * self.h, self.longest, _TIMES))
+        stepped = [self.at(self._stepped(np.array([t])), 1) for t in times]
+        one = self._descended([times[int(np.argmin([t.cost for t in stepped]))]], self._stepped)
+        from_level = self._descended(self._one_start(times, stepped), self._stepped)
+        two = self._descended(self._two_start(times, from_level.begin), self._twice)
         return [held, one, from_level, two]
 
-    def _before(self, one: _Try, grid: Array) -> Array:
-        """Where to begin to look for a step from a level: at one from rest, or at one from an end of the range.
+    def _one_start(self, times: Array, stepped: Sequence[_Try]) -> Array:
+        """Where to begin to look for a step from a level: the time and the level that leave least.
 
-        Where the input is near 0 at first, a step from rest to there is next to nothing at any time, and
-        tells no time.
+        A step from rest does not tell the time: where the input is near 0 at first, that one is next to nothing.
         """
-        ends = [end for end in self.range if abs(end) > _NOTHING]
-        starts = [np.array([np.log(one.begin.ago[0]), 0.0])]
-        starts += [np.array([np.log(t), end]) for end in ends for t in grid]
-        return min(starts, key=lambda x: self.at(self._stepped(x), 0).cost)
+        found = [(self._asking(base, lambda level, t=t: [t, level], self._stepped), t) for t, base in zip(times, stepped)]
+        (_, level), time = min(found)
+        return np.array([time, level])
+
+    def _two_start(self, times: Array, one: Begin) -> Array:
+        """The same of two steps from rest, the later as the log begins or where the ``one`` step was found."""
+        found = []
+        for late in (times[0], float(np.log(one.ago[0]))):
+            base = self.at(self._stepped(np.array([late])), 1)
+            for early in times[times > late]:
+                begin = lambda level, late=late, early=early: [late, level, early]
+                found.append((self._asking(base, begin, self._twice), late, early))
+        (_, level), late, early = min(found)
+        return np.array([late, level, early])
+
+    def _asking(
+        self, base: _Try, at: Callable[[float], Sequence[float]], begin: Callable[[Array], Begin]
+    ) -> tuple[float, float]:
+        """What a begin leaves, and at which level before, taken as if the answer were in proportion to that.
+
+        ``base``: the same begin with a level of 0.
+        """
+        end = max(self.range, key=abs) or 1.0
+        toward = (self.at(begin(np.array(at(end))), 0).left - base.left) / end
+        level = -float(np.sum(toward * base.left)) / max(float(np.sum(toward**2)), 1e-300)
+        level = float(np.clip(level, self.range[0] - _BEYOND, self.range[1] + _BEYOND))
+        return float(np.sum((base.left + level * toward) ** 2)), level
 
     def _stepped(self, x: Array) -> Begin:
         earlier = float(x[1]) * self.reach if len(x) > 1 else 0.0
@@ -275,7 +296,7 @@ class _Setting:
 
     def _bounds(self, count: int) -> tuple[Array, Array]:
         """Of the log time of a step, the level before, and the log time of an earlier step."""
-        first, last = np.log([self.h, self.longest])
+        first, last = np.log([_SOONEST * self.h, self.longest])
         rows = [(first, last), (self.range[0] - _BEYOND, self.range[1] + _BEYOND), (first, last)]
         low, high = np.array(rows[:count]).T
         return low, high
