@@ -31,7 +31,7 @@ _SEEN = 40.0  # response times from the beginning that are looked at,
 _LEAST = 200  # and samples
 _LONGEST = 20.0  # response times before the first sample: a step is looked for up to here
 _TIMES = 10  # of a step, on the first grid
-_SOONEST = 0.5  # samples before the first: a step to what that one shows, as the log begins
+_SOONEST = 0.5  # samples before the first: a step as the log begins
 _FIRST = 5  # samples that tell what the input was last, and where the output began
 _ROUNDS = 8  # of Gauss-Newton
 _DAMPED, _STEP = 1e-3, 1e-3  # its damping at first, and its steps for derivatives
@@ -63,8 +63,8 @@ _DRIVEN = _Asked(0.02, 0.7, 0.5, 0.15, 0.05, 0.0)
 _IDLE = _Asked(0.05, 0.35, 0.0, np.inf, np.inf, 12.0)
 """At an input of 0 nothing but a past moves the rig; but a drift or an offset holds it off, too."""
 _PASSING = replace(_IDLE, cost=0.05)
-"""An input that is at 0 for a moment may be on its way through it, as every sine of a rig of both signs is. No
-decay at rest shows the past then, so the past has to explain nearly all of what a rest leaves."""
+"""An input that is at 0 for a moment may be on its way through it, as every sine of a rig of both signs is.
+No decay at rest shows the past then, so the past has to explain nearly all of what a rest leaves."""
 
 
 def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
@@ -209,7 +209,8 @@ class _Setting:
         def off(t: _Try) -> float:
             return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
 
-        tries = [t for t in self.tries() if off(t) < asked.mended and t.cost < asked.cost * rest.cost]
+        most = asked.cost * rest.cost
+        tries = [t for t in self.tries() if off(t) < asked.mended and t.cost < most]
         if not tries:
             return REST
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
@@ -237,14 +238,17 @@ class _Setting:
     def _one_start(self, times: Array, stepped: Sequence[_Try]) -> Array:
         """Where to begin to look for a step from a level: the time and the level that leave least.
 
-        A step from rest does not tell the time: where the input is near 0 at first, that one is next to nothing.
+        A step from rest does not tell the time: where the input is near 0 at first, that is nothing.
         """
-        found = [(self._asking(base, lambda level, t=t: [t, level], self._stepped), t) for t, base in zip(times, stepped)]
+        found = []
+        for time, base in zip(times, stepped):
+            asked = self._asking(base, lambda level, time=time: [time, level], self._stepped)
+            found.append((asked, time))
         (_, level), time = min(found)
         return np.array([time, level])
 
     def _two_start(self, times: Array, one: Begin) -> Array:
-        """The same of two steps from rest, the later as the log begins or where the ``one`` step was found."""
+        """The same of two steps from rest, the later as the log begins or where the ``one`` was found."""
         found = []
         for late in (times[0], float(np.log(one.ago[0]))):
             base = self.at(self._stepped(np.array([late])), 1)
@@ -257,7 +261,7 @@ class _Setting:
     def _asking(
         self, base: _Try, at: Callable[[float], Sequence[float]], begin: Callable[[Array], Begin]
     ) -> tuple[float, float]:
-        """What a begin leaves, and at which level before, taken as if the answer were in proportion to that.
+        """What a begin leaves, and at which level before, as if the answer were in proportion to that.
 
         ``base``: the same begin with a level of 0.
         """

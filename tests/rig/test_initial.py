@@ -205,20 +205,16 @@ def test_a_log_that_begins_with_a_step_is_told_the_hold_ahead_of_it(held):
     """The command steps as the log begins, from a level that it held for a while after a rest."""
     sine = 0.5 + 0.4 * np.sin(0.05 * np.arange(600) - 1.2)
     u = np.r_[np.zeros(400), np.full(int(held / H), 0.85), sine]
-    tap = {}
-    run = Run.of([len(u)], [0.0], H)
-    y = Chain(RIG).run(u, "regulator", "sensor", run, True, tap)
+    tap: dict[str, np.ndarray] = {}
+    y = Chain(RIG).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], H), True, tap)
+    true = {"pressure": tap["regulator"][-600:], "output": y[-600:]}
     rng = np.random.default_rng(4)
-    signals = {"command": u, "pressure": tap["regulator"], "output": y}
-    noisy = {k: (v + (k != "command") * 3e-3 * v.max() * rng.normal(size=len(v)))[-600:] for k, v in signals.items()}
-    (told,) = begun(RIG, [Experiment("sine", H, noisy)])
-    again: dict[str, np.ndarray] = {}
+    noisy = {k: v + 3e-3 * v.max() * rng.normal(size=600) for k, v in true.items()}
+    (told,) = begun(RIG, [Experiment("sine", H, {"command": sine, **noisy})])
     run = Run.of([600], [0.0], H, [told.before("command")])
-    Chain(RIG).run(noisy["command"], "regulator", "sensor", run, True, again)
-    left = again["regulator"] - signals["pressure"][-600:]
-    assert np.abs(left).max() < 0.02 * signals["pressure"].max()
-    left = again["sensor"] - y[-600:]
-    assert np.abs(left).max() < 0.02 * y.max()
+    made = Chain(RIG).run(sine, "regulator", "sensor", run, True, tap)
+    assert np.abs(tap["regulator"] - true["pressure"]).max() < 0.02 * true["pressure"].max()
+    assert np.abs(made - true["output"]).max() < 0.02 * true["output"].max()
 
 
 def test_an_offset_behind_an_input_that_passes_through_zero_is_no_past():
