@@ -98,9 +98,15 @@ class _Scales:
         return cls(ranges, sizes, response_time(rig, logs[0].sample_time, longest))
 
     def behind(self, entry: str) -> dict[str, str]:
-        """The measured signals behind an input, by the stage that they leave."""
+        """The measured signals that tell what an input was before, by the stage that they leave.
+
+        The first input of a log runs through all stages, and all that is measured tells of it. One in between
+        is simulated up to the next measured signal: what a gauge further on shows may be that one's fault.
+        """
         stages = STAGES[STAGES.index(ENTERS[entry]) :]
-        return {stage: LEAVES[stage] for stage in stages if LEAVES[stage] in self.sizes}
+        found = {stage: LEAVES[stage] for stage in stages if LEAVES[stage] in self.sizes}
+        first = next(role for role in ENTERS if role in self.sizes)
+        return found if entry == first else dict(list(found.items())[:1])
 
 
 def _range(logs: Sequence[Experiment], role: str) -> tuple[float, float]:

@@ -217,6 +217,20 @@ def test_a_log_that_begins_with_a_step_is_told_the_hold_ahead_of_it(held):
     assert np.abs(made - true["output"]).max() < 0.02 * true["output"].max()
 
 
+def test_a_fault_of_a_gauge_further_on_moves_no_past_ahead_of_the_one_before_it():
+    """Log begun in a transient, four signals: what the pressure was before is told by the curvature alone."""
+    tap: dict[str, np.ndarray] = {}
+    u = np.r_[np.zeros(200), np.full(40, 1.0), np.full(300, 0.3)]
+    y = Chain(RIG).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], H), True, tap)
+    signals = {"command": u, "pressure": tap["regulator"], "curvature": tap["actuator"], "output": y}
+    late = {**signals, "output": np.r_[np.zeros(10), y[:-10]]}
+    told = [
+        begun(RIG, [Experiment("cut", H, {k: v[240:] for k, v in s.items()})])[0] for s in (signals, late)
+    ]
+    assert not told[0].before("pressure").at_rest
+    assert told[0].before("pressure") == told[1].before("pressure")
+
+
 def test_an_offset_behind_an_input_that_passes_through_zero_is_no_past():
     rig = actuator_alone(Actuator(0.8, 1.0, (8.0,)))
     p = np.sin(0.05 * np.arange(-1, 500)) * 1.2
