@@ -31,6 +31,7 @@ _SEEN = 40.0  # response times from the beginning that are looked at,
 _LEAST = 200  # and samples
 _LONGEST = 20.0  # response times before the first sample: a step is looked for up to here
 _TIMES = 10  # of a step, on the first grid
+_SOONEST = 0.5  # samples before the first: a step as the log begins
 _FIRST = 5  # samples that tell what the input was last, and where the output began
 _ROUNDS = 8  # of Gauss-Newton
 _DAMPED, _STEP = 1e-3, 1e-3  # its damping at first, and its steps for derivatives
@@ -47,7 +48,7 @@ class _Asked:
     """What a past has to show. ``off``: by what share of a signal's largest magnitude the first samples are
     off from rest; ``mended``: what part of that a past may leave at most, and ``surely``: so little that it
     rules a rest out where they are off by more than ``far``; ``offset``: shares up to there are no past;
-    ``nats``: twice the evidence."""
+    ``nats``: twice the evidence; ``cost``: what part of a rest's a past may leave over all of them."""
 
     off: float
     mended: float
@@ -55,11 +56,15 @@ class _Asked:
     far: float
     offset: float
     nats: float
+    cost: float = np.inf
 
 
 _DRIVEN = _Asked(0.02, 0.7, 0.5, 0.15, 0.05, 0.0)
 _IDLE = _Asked(0.05, 0.35, 0.0, np.inf, np.inf, 12.0)
 """At an input of 0 nothing but a past moves the rig; but a drift or an offset holds it off, too."""
+_PASSING = replace(_IDLE, cost=0.05)
+"""An input that is at 0 for a moment may be on its way through it, as every sine of a rig of both signs is.
+No decay at rest shows the past then, so the past has to explain nearly all of what a rest leaves."""
 
 
 def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
@@ -93,9 +98,15 @@ class _Scales:
         return cls(ranges, sizes, response_time(rig, logs[0].sample_time, longest))
 
     def behind(self, entry: str) -> dict[str, str]:
-        """The measured signals behind an input, by the stage that they leave."""
+        """The measured signals that tell what an input was before, by the stage that they leave.
+
+        The first input of a log runs through all stages, and all that is measured tells of it. One in between
+        is simulated up to the next measured signal: what a gauge further on shows may be that one's fault.
+        """
         stages = STAGES[STAGES.index(ENTERS[entry]) :]
-        return {stage: LEAVES[stage] for stage in stages if LEAVES[stage] in self.sizes}
+        found = {stage: LEAVES[stage] for stage in stages if LEAVES[stage] in self.sizes}
+        first = next(role for role in ENTERS if role in self.sizes)
+        return found if entry == first else dict(list(found.items())[:1])
 
 
 def _range(logs: Sequence[Experiment], role: str) -> tuple[float, float]:
@@ -162,11 +173,16 @@ class _Setting:
         self.y = np.stack([y / unit for y, unit in zip(measured, self.units)], axis=1)
         self.level = float(self.x[0] if entry == "command" else np.mean(self.x[:_FIRST]))
         self.counts = (pace / (pace + np.arange(n) * self.h))[:, None]
-        self.asked, self.shown = _DRIVEN, True
+        self.asked = _DRIVEN
         if abs(self.level) < _NOTHING * self.reach:
-            still = self._still()
-            self.asked, self.shown = _IDLE, still >= max(_SHOWN * pace / self.h, 2 * _FIRST)
-            self.counts[max(still, 1) :] = 0.0
+            self._near_nothing(max(_SHOWN * pace / self.h, 2 * _FIRST))
+
+    def _near_nothing(self, least: float) -> None:
+        """What counts where the input is 0 at first: its rest there, where that is as long as ``least``."""
+        still = self._still()
+        self.asked = _IDLE if still >= least else _PASSING
+        if still >= least:
+            self.counts[still:] = 0.0
 
     def _still(self) -> int:
         """For how many samples the input stays what it was at first."""
@@ -193,13 +209,14 @@ class _Setting:
         rest, asked = self.at(REST, 0), self.asked
         noise = np.array([_white(y) for y in self.y.T])
         moved = rest.first > np.maximum(_APART * noise / np.sqrt(_FIRST), asked.off)
-        if not moved.any() or not self.shown:
+        if not moved.any():
             return REST
 
         def off(t: _Try) -> float:
             return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
 
-        tries = [t for t in self.tries() if off(t) < asked.mended]
+        most = asked.cost * rest.cost
+        tries = [t for t in self.tries() if off(t) < asked.mended and t.cost < most]
         if not tries:
             return REST
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
@@ -217,14 +234,48 @@ class _Setting:
     def tries(self) -> list[_Try]:
         """The best of each kind of begin but a rest."""
         held = self.at(Begin((self.level,)), 0)
-        grid = np.geomspace(self.h, self.longest, _TIMES)
-        stepped = [self.at(Begin((0.0, self.level), (float(t),)), 1) for t in grid]
-        best = min(stepped, key=lambda each: each.cost)
-        one = self._descended([np.log(best.begin.ago[0])], self._stepped)
-        from_level = self._descended([np.log(one.begin.ago[0]), 0.0], self._stepped)
-        later, level = np.log(from_level.begin.ago[0]), from_level.begin.levels[0] / self.reach
-        two = self._descended([later, level, later + 1.0], self._twice)
+        times = np.log(np.geomspace(_SOONEST * self.h, self.longest, _TIMES))
+        stepped = [self.at(self._stepped(np.array([t])), 1) for t in times]
+        one = self._descended([times[int(np.argmin([t.cost for t in stepped]))]], self._stepped)
+        from_level = self._descended(self._one_start(times, stepped), self._stepped)
+        two = self._descended(self._two_start(times, from_level.begin), self._twice)
         return [held, one, from_level, two]
+
+    def _one_start(self, times: Array, stepped: Sequence[_Try]) -> Array:
+        """Where to begin to look for a step from a level: the time and the level that leave least.
+
+        A step from rest does not tell the time: where the input is near 0 at first, that is nothing.
+        """
+        found = []
+        for time, base in zip(times, stepped):
+            asked = self._asking(base, lambda level, time=time: [time, level], self._stepped)
+            found.append((asked, time))
+        (_, level), time = min(found)
+        return np.array([time, level])
+
+    def _two_start(self, times: Array, one: Begin) -> Array:
+        """The same of two steps from rest, the later as the log begins or where the ``one`` was found."""
+        found = []
+        for late in (times[0], float(np.log(one.ago[0]))):
+            base = self.at(self._stepped(np.array([late])), 1)
+            for early in times[times > late]:
+                begin = lambda level, late=late, early=early: [late, level, early]
+                found.append((self._asking(base, begin, self._twice), late, early))
+        (_, level), late, early = min(found)
+        return np.array([late, level, early])
+
+    def _asking(
+        self, base: _Try, at: Callable[[float], Sequence[float]], begin: Callable[[Array], Begin]
+    ) -> tuple[float, float]:
+        """What a begin leaves, and at which level before, as if the answer were in proportion to that.
+
+        ``base``: the same begin with a level of 0.
+        """
+        end = max(self.range, key=abs) or 1.0
+        toward = (self.at(begin(np.array(at(end))), 0).left - base.left) / end
+        level = -float(np.sum(toward * base.left)) / max(float(np.sum(toward**2)), 1e-300)
+        level = float(np.clip(level, self.range[0] - _BEYOND, self.range[1] + _BEYOND))
+        return float(np.sum((base.left + level * toward) ** 2)), level
 
     def _stepped(self, x: Array) -> Begin:
         earlier = float(x[1]) * self.reach if len(x) > 1 else 0.0
@@ -255,7 +306,7 @@ class _Setting:
 
     def _bounds(self, count: int) -> tuple[Array, Array]:
         """Of the log time of a step, the level before, and the log time of an earlier step."""
-        first, last = np.log([self.h, self.longest])
+        first, last = np.log([_SOONEST * self.h, self.longest])
         rows = [(first, last), (self.range[0] - _BEYOND, self.range[1] + _BEYOND), (first, last)]
         low, high = np.array(rows[:count]).T
         return low, high

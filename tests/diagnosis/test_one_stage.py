@@ -54,6 +54,18 @@ def test_a_limit_is_found_on_its_side_of_the_dynamics(where, effect):
     assert found.causes[0].candidates[0].confidence > 0.8
 
 
+def test_a_gauge_behind_the_only_stage_given_has_effects_of_its_own():
+    """A second gauge logs the speed, and the calibration of the first is bent; the rig gives no sensor."""
+    seen = replace(MOTOR, signals=Signals("t", "w", "u", curvature="c"))
+    rng, logs = np.random.default_rng(5), []
+    for log in session():
+        true = answered(log["command"])
+        roles = {"curvature": true + 0.05 * rng.normal(size=800), "output": log["output"] + 0.004 * true**2}
+        logs.append(replace(log, signals={"command": log["command"], **roles}))
+    (cause,) = diagnose(seen, logs).causes
+    assert cause.stage == "sensor" and cause.candidates[0].effect == "sensor_nonlinearity"
+
+
 @pytest.mark.parametrize("where, effect", [("ahead", "slow_regulator"), ("behind", "sensor_lag")])
 def test_a_lag_is_found_on_its_side_of_a_bent_gain(where, effect):
     """T y' + y = 2 u², and a lag of a fifth of T ahead of the square or behind everything."""

@@ -185,6 +185,59 @@ def test_a_moment_at_zero_tells_nothing():
     assert told.begins == {}
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_an_input_that_passes_through_zero_hides_no_past(turn):
+    """A rig of both signs, held at a level and then driven by a sine: its log begins where that is near 0."""
+    rig = actuator_alone(Actuator(0.8, 1.0, (8.0,)))
+    sine = np.sin(0.05 * np.arange(-1, 500)) * 1.2
+    whole = turn * np.r_[np.zeros(200), np.full(30, 1.1), sine]
+    y = answer(rig, whole)[230:]
+    y = y + 0.05 * np.random.default_rng(2).normal(size=len(y))
+    log = Experiment("sine", H, {"pressure": whole[230:], "output": y})
+    (told,) = begun(rig, [log])
+    left = y - answer(rig, log["pressure"], told.before("pressure"))
+    assert np.sqrt(np.mean((y - answer(rig, log["pressure"]))[:60] ** 2)) > 1.0
+    assert np.sqrt(np.mean(left[:60] ** 2)) < 0.1
+
+
+@pytest.mark.parametrize("held", [0.4, 1.5, 4.0])
+def test_a_log_that_begins_with_a_step_is_told_the_hold_ahead_of_it(held):
+    """The command steps as the log begins, from a level that it held for a while after a rest."""
+    sine = 0.5 + 0.4 * np.sin(0.05 * np.arange(600) - 1.2)
+    u = np.r_[np.zeros(400), np.full(int(held / H), 0.85), sine]
+    tap: dict[str, np.ndarray] = {}
+    y = Chain(RIG).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], H), True, tap)
+    true = {"pressure": tap["regulator"][-600:], "output": y[-600:]}
+    rng = np.random.default_rng(4)
+    noisy = {k: v + 3e-3 * v.max() * rng.normal(size=600) for k, v in true.items()}
+    (told,) = begun(RIG, [Experiment("sine", H, {"command": sine, **noisy})])
+    run = Run.of([600], [0.0], H, [told.before("command")])
+    made = Chain(RIG).run(sine, "regulator", "sensor", run, True, tap)
+    assert np.abs(tap["regulator"] - true["pressure"]).max() < 0.02 * true["pressure"].max()
+    assert np.abs(made - true["output"]).max() < 0.02 * true["output"].max()
+
+
+def test_a_fault_of_a_gauge_further_on_moves_no_past_ahead_of_the_one_before_it():
+    """Log begun in a transient, four signals: what the pressure was before is told by the curvature alone."""
+    tap: dict[str, np.ndarray] = {}
+    u = np.r_[np.zeros(200), np.full(40, 1.0), np.full(300, 0.3)]
+    y = Chain(RIG).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], H), True, tap)
+    signals = {"command": u, "pressure": tap["regulator"], "curvature": tap["actuator"], "output": y}
+    late = {**signals, "output": np.r_[np.zeros(10), y[:-10]]}
+    told = [
+        begun(RIG, [Experiment("cut", H, {k: v[240:] for k, v in s.items()})])[0] for s in (signals, late)
+    ]
+    assert not told[0].before("pressure").at_rest
+    assert told[0].before("pressure") == told[1].before("pressure")
+
+
+def test_an_offset_behind_an_input_that_passes_through_zero_is_no_past():
+    rig = actuator_alone(Actuator(0.8, 1.0, (8.0,)))
+    p = np.sin(0.05 * np.arange(-1, 500)) * 1.2
+    y = answer(rig, p) + 1.5 + 0.05 * np.random.default_rng(3).normal(size=len(p))
+    assert begun(rig, [Experiment("sine", H, {"pressure": p, "output": y})])[0].begins == {}
+
+
 def test_a_rig_that_integrates_is_left_alone():
     rig = replace(RIG, actuator=LinearActuator(TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])))
     logs = [cut(session(seed=1)[0], 10.0)]

@@ -97,8 +97,14 @@ def candidates_for(segment: Segment, rig: Rig) -> list[CandidateEffect]:
     return every if segment.run.begins else [c for c in every if not c.form.begun]
 
 
+def _is_whole(segment: Segment, rig: Rig) -> bool:
+    """Whether this is the one stage that a rig is given as. A gauge that is logged beside it has a segment of
+    its own, which the rig takes for 1: what is there at fault is at home there."""
+    return is_single(rig) and owner(rig) in segment.stages
+
+
 def _placed_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
-    if not is_single(rig):
+    if not _is_whole(segment, rig):
         return [
             CandidateEffect(e.name, form, stage)
             for e in library().values()
@@ -128,7 +134,7 @@ def _place(effect: Effect, segment: Segment) -> str | None:
 def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
     """Forms that are at home in another stage and may sit in this one: tried where those at home leave
     much."""
-    if is_single(rig):
+    if _is_whole(segment, rig):
         return []
     return [
         CandidateEffect(e.name, form, stage)
