@@ -35,6 +35,7 @@ CONSTANTS = {
     "proposals/candidate_rigs.py": ["_STEP"],
     "proposals/menu.py": ["_SHORTEST"],
     "proposals/next_experiment.py": ["_ENOUGH", "_MOST", "_SHARES"],
+    "proposals/separation.py": ["_NOISIER"],
     "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_FINE", "_LONGEST"],
     "proposals/limits.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
     "verdict/evidence.py": ["_STILL"],

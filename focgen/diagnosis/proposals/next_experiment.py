@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.control.units import unit_of_role
-from focgen.diagnosis.fitting.noise import whiten
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.model import Found, NextExperiment
@@ -24,6 +23,7 @@ from focgen.diagnosis.problem.segments import cuts
 from focgen.diagnosis.proposals.candidate_rigs import CandidateRig, candidate_rigs
 from focgen.diagnosis.proposals.limits import Bounds, bounds_of, limits_of
 from focgen.diagnosis.proposals.menu import Choice, menu
+from focgen.diagnosis.proposals.separation import alone, in_session, without
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
 from focgen.rig.rig import Rig
@@ -48,8 +48,25 @@ def propose(
             for cause in e.causes:
                 rivals = [r for r in cause.rivals if r.effect in names]
                 if len(rivals) > 1 and cause.rivals[0].effect == names[0]:
-                    return _between(rig, logs, explanations, e, rivals[: 1 + _RIVALS])
+                    out = [r for r in cause.rivals if r.effect not in names]
+                    asked = _Question(e, tuple(rivals[: 1 + _RIVALS]), tuple(out[:_RIVALS]))
+                    return _answered(rig, logs, explanations, asked)
     return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Question:
+    """Which of the ``rivals`` is the cause in the segment ``e``; ``out``: the next ones, that the session has
+    ruled out."""
+
+    e: Explanation
+    rivals: tuple[Rival, ...]
+    out: tuple[Rival, ...]
+
+    @property
+    def anew(self) -> tuple[Rival, ...]:
+        """All that a diagnosis has to decide between that does not know of the session."""
+        return (*self.rivals, *self.out, without(self.e, self.rivals[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,32 +112,44 @@ class _Option:
         return float(np.min(self.apart[telling]))
 
 
-def _between(
-    rig: Rig,
-    logs: Sequence[Experiment],
-    explanations: Sequence[Explanation],
-    e: Explanation,
-    rivals: Sequence[Rival],
+def _answered(
+    rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation], question: _Question
 ) -> tuple[NextExperiment, Choice] | None:
-    """The experiment that tells the first of ``rivals`` from the others. First asked is what the rig has done
+    """The experiment that tells the first of the rivals from the others. First asked is what the rig has done
     before and the logs hold; steps where there were none, or a further signal, only where that does not
     do."""
+    e, rivals = question.e, question.rivals
     entry, bounds = cuts(logs)[0], bounds_of(rig, logs)
     limits, rigs = limits_of(rig, logs, entry), candidate_rigs(explanations, e, rivals)
     tiers: list[list[_Option]] = []
     choices: list[tuple[Choice, list[CandidateRig]]] = []
     for one in dict.fromkeys((limits, limits.faster)):
         choices = _showing(_allowed(menu(one), rigs, bounds), e, rivals)
-        tiers.append([_Option(choice, None, _apart(e, made, None)) for choice, made in choices])
-    if not np.any([o.apart >= _ENOUGH for tier in tiers for o in tier]):
-        logged = [(c, made, stage) for c, made in choices[:4] for stage in e.segment.stages[:-1]]
-        tiers.append([_Option(c, stage, _apart(e, made, stage)) for c, made, stage in logged])
+        tiers.append([_Option(choice, None, in_session(e, made)) for choice, made in choices])
+    if not np.all(_told([o for tier in tiers for o in tier])):
+        tiers.append(_with_a_further_signal(question, [c for c, _ in choices], explanations))
     found = _best([tier for tier in tiers if tier])
     if found is None:
         return None
     value, option = found
     asked = _Asked(option.choice, entry, option.stage, bounds, limits.rate)
     return _proposed(rig, e, rivals, float(min(value, _MOST)), asked), option.choice
+
+
+def _with_a_further_signal(
+    question: _Question, choices: Sequence[Choice], explanations: Sequence[Explanation]
+) -> list[_Option]:
+    """The experiments with what leaves a stage logged besides. Such a log is diagnosed alone, so it has to
+    tell the first rival also from those that only the session rules out, and from nothing at all."""
+    e, found = question.e, []
+    rigs = candidate_rigs(explanations, e, question.anew)
+    for choice in choices:
+        made = [one.making(choice) for one in rigs]
+        for stage in e.segment.stages[:-1]:
+            apart = alone(e, made, stage)
+            tied, others = np.split(apart, [len(question.rivals) - 1])
+            found.append(_Option(choice, stage, np.minimum(tied, np.min(others))))
+    return found
 
 
 def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
@@ -130,7 +159,7 @@ def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
     options = [o for tier in tiers for o in tier]
     if not options:
         return None
-    told = np.any([o.apart >= _ENOUGH for o in options], axis=0)
+    told = _told(options)
     telling = told if np.any(told) else np.ones(len(told), bool)
     for tier in tiers:
         good = [o for o in tier if o.least(telling) >= _ENOUGH]
@@ -140,6 +169,11 @@ def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
     plain = [o for o in options if o.stage is None] or options  # a further signal is asked for where it tells
     best = max(plain, key=lambda o: o.least(telling))
     return best.least(telling), best
+
+
+def _told(options: Sequence[_Option]) -> np.ndarray:
+    """Of each rival (k,) whether any option tells it; False where there is none."""
+    return np.any([o.apart >= _ENOUGH for o in options], axis=0)
 
 
 def _allowed(
@@ -197,27 +231,3 @@ def _lacking(e: Explanation, names: Sequence[str]) -> str:
     """What the segment's experiments lack to show any of the effects."""
     missing = dict.fromkeys(m for name in names if (m := e.nominal.problem.lacks(name)))
     return f" (so far, {'; '.join(missing)})" if missing else ""
-
-
-def _apart(e: Explanation, made: Sequence[CandidateRig], stage: str | None) -> np.ndarray:
-    """The expected separation of the first rival from each of the others."""
-    return np.array([_separation(e, made[0], other, stage) for other in made[1:]])
-
-
-def _separation(e: Explanation, a: CandidateRig, b: CandidateRig, stage: str | None) -> float:
-    """Expected standard deviations between the two on what they made, seen at the segment's output or at what
-    leaves ``stage``."""
-    fit, base = b.rival.fit, b.left_by(stage)
-    level = e.segment.level_out if stage is None else max(float(np.max(np.abs(base))), 1e-300)
-    sigma2 = fit.sse / len(fit.innovations)
-
-    def seen(y: np.ndarray) -> np.ndarray:
-        return whiten(np.repeat(y, a.coarse) / level, e.ar)
-
-    difference = seen(a.left_by(stage) - base)
-    jacobian = np.stack([seen(column) for column in b.slopes(stage)], axis=1)
-    information = fit.information + jacobian.T @ jacobian
-    slope = jacobian.T @ difference
-    left = float(difference @ difference - slope @ np.linalg.pinv(information) @ slope)
-    # what tells them apart is not the size but its square over the spread of the likelihood ratio
-    return float(np.sqrt(max(left, 0.0) / max(sigma2, 1e-300)) / 2)
