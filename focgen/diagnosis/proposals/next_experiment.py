@@ -126,7 +126,7 @@ def _answered(
     for one in dict.fromkeys((limits, limits.faster)):
         choices = _showing(_allowed(menu(one), rigs, bounds), e, rivals)
         tiers.append([_Option(choice, None, in_session(e, made)) for choice, made in choices])
-    if not np.all(_told([o for tier in tiers for o in tier])):
+    if not _all_told(tiers):
         tiers.append(_with_a_further_signal(question, [c for c, _ in choices], explanations))
     found = _best([tier for tier in tiers if tier])
     if found is None:
@@ -171,9 +171,15 @@ def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
     return best.least(telling), best
 
 
+def _all_told(tiers: Sequence[Sequence[_Option]]) -> bool:
+    """Whether every rival is told by some option: one that is not may be the likeliest."""
+    return bool(np.all(_told([o for tier in tiers for o in tier])))
+
+
 def _told(options: Sequence[_Option]) -> np.ndarray:
     """Of each rival (k,) whether any option tells it; False where there is none."""
-    return np.any([o.apart >= _ENOUGH for o in options], axis=0)
+    told: np.ndarray = np.any([o.apart >= _ENOUGH for o in options], axis=0)
+    return told
 
 
 def _allowed(

@@ -43,7 +43,8 @@ def in_session(e: Explanation, made: Sequence[CandidateRig]) -> np.ndarray:
 
 def alone(e: Explanation, made: Sequence[CandidateRig], stage: str) -> np.ndarray:
     """Of the first from each of the others (k,), with what leaves ``stage`` logged, by themselves."""
-    return np.array([_separation(b, _views(e, made[0], b, stage), _beforehand(b.rival.fit)) for b in made[1:]])
+    apart = [_separation(b, _views(e, made[0], b, stage), _beforehand(b.rival.fit)) for b in made[1:]]
+    return np.array(apart)
 
 
 def without(e: Explanation, like: Rival) -> Rival:
