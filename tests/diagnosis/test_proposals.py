@@ -166,9 +166,14 @@ def option(apart, seconds=100.0):
 @pytest.mark.parametrize(
     "tiers, chosen",
     [
-        ([[([4.0, 9.0], 100), ([20.0, 3.5], 100)]], 0),  # the least counts
-        ([[([4.0], 100), ([5.0], 400)]], 0),  # by the second
-        ([[([4.0], 100)], [([90.0], 100)]], 0),  # what has been done before comes first
+        ([[([6.0, 9.0], 100), ([20.0, 5.5], 100)]], 0),  # the least counts
+        ([[([6.0], 100), ([7.0], 400)]], 0),  # by the second
+        (
+            [[([4.0], 100), ([4.5], 400)]],
+            1,
+        ),  # but for one that is not sure to tell, where that does not count
+        ([[([5.1], 100)], [([90.0], 100)]], 0),  # what has been done before comes first
+        ([[([4.9], 100)], [([90.0], 100)]], 1),  # unless it is not sure to tell
         ([[([2.0], 100)], [([90.0], 100)]], 1),  # unless it does not tell
         ([[([9.0, 0.2], 100), ([5.0, 0.3], 100)]], 0),  # what none tells does not count
         ([[([0.2, 0.9], 100), ([0.4, 0.5], 100)]], 1),  # the best of a bad lot
@@ -190,8 +195,8 @@ def test_nothing_is_proposed_where_nothing_is_allowed():
 
 
 def test_a_further_signal_is_looked_at_while_some_rival_is_told_by_nothing():
-    assert _all_told([[option([4.0, 1.0])], [option([1.0, 3.1])]])
-    assert not _all_told([[option([4.7, 2.9])], [option([9.0, 1.0])]])
+    assert _all_told([[option([6.0, 1.0])], [option([1.0, 5.1])]])
+    assert not _all_told([[option([6.7, 4.9])], [option([9.0, 1.0])]])
     assert not _all_told([[]])
 
 

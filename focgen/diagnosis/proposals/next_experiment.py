@@ -29,7 +29,8 @@ from focgen.rig.effects import library
 from focgen.rig.rig import Rig
 
 NEXT = "next_experiment.csv"  # beside the diagnosis: the input that makes the experiment
-_ENOUGH = 3.0  # standard deviations
+_ENOUGH = 3.0  # standard deviations of the noise
+_SURE = 5.0  # the same with forms a little wrong: of experiments expected to do less, most resolved nothing
 _MOST = 99.0
 _RIVALS = 3  # of those tied, the likeliest
 _SHARES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1)  # of the way to the input's ends, until all stay in range
@@ -153,32 +154,33 @@ def _with_a_further_signal(
 
 
 def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
-    """The most telling option a second of the first tier that tells enough, and what it tells. A rival that
-    none tells, as one that holds the other as a special case, does not count where others can be told: such
+    """The most telling option a second of the first tier that is sure to tell, and what it tells; where none
+    is, the most telling. A rival that none tells, as one that holds the other as a special case, does not count where others can be told: such
     are told by needing more parameters for the same."""
     options = [o for tier in tiers for o in tier]
     if not options:
         return None
-    told = _told(options)
+    told = _told(options, _ENOUGH)
     telling = told if np.any(told) else np.ones(len(told), bool)
     for tier in tiers:
-        good = [o for o in tier if o.least(telling) >= _ENOUGH]
+        good = [o for o in tier if o.least(telling) >= _SURE]
         if good:
             best = max(good, key=lambda o: o.least(telling) / np.sqrt(o.choice.seconds))
             return best.least(telling), best
-    plain = [o for o in options if o.stage is None] or options  # a further signal is asked for where it tells
+    # a further signal is asked for where it tells
+    plain = [o for o in options if o.stage is None or o.least(telling) >= _ENOUGH] or options
     best = max(plain, key=lambda o: o.least(telling))
     return best.least(telling), best
 
 
 def _all_told(tiers: Sequence[Sequence[_Option]]) -> bool:
     """Whether every rival is told by some option: one that is not may be the likeliest."""
-    return bool(np.all(_told([o for tier in tiers for o in tier])))
+    return bool(np.all(_told([o for tier in tiers for o in tier], _SURE)))
 
 
-def _told(options: Sequence[_Option]) -> np.ndarray:
-    """Of each rival (k,) whether any option tells it; False where there is none."""
-    told: np.ndarray = np.any([o.apart >= _ENOUGH for o in options], axis=0)
+def _told(options: Sequence[_Option], enough: float) -> np.ndarray:
+    """Of each rival (k,) whether any option tells it by ``enough``; False where there is none."""
+    told: np.ndarray = np.any([o.apart >= enough for o in options], axis=0)
     return told
 
 
