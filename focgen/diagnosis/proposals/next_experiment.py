@@ -155,8 +155,8 @@ def _with_a_further_signal(
 
 def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
     """The most telling option a second of the first tier that is sure to tell, and what it tells; where none
-    is, the most telling. A rival that none tells, as one that holds the other as a special case, does not count where others can be told: such
-    are told by needing more parameters for the same."""
+    is, the most telling. A rival that none tells, as one that holds the other as a special case, does not
+    count where others can be told: such are told by needing more parameters for the same."""
     options = [o for tier in tiers for o in tier]
     if not options:
         return None
