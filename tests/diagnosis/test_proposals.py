@@ -14,10 +14,20 @@ from focgen.diagnosis.fitting.fit import WHITE, fit
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.segments import make
+from focgen.diagnosis.proposals import next_experiment
 from focgen.diagnosis.proposals.candidate_rigs import CandidateRig, Part
 from focgen.diagnosis.proposals.limits import Bounds, InputLimits, bounds_of, limits_of
 from focgen.diagnosis.proposals.menu import Choice, menu
-from focgen.diagnosis.proposals.next_experiment import _allowed, _best, _Option, _showing
+from focgen.diagnosis.proposals.next_experiment import (
+    _all_told,
+    _allowed,
+    _best,
+    _Option,
+    _Question,
+    _showing,
+    _with_a_further_signal,
+)
+from focgen.diagnosis.proposals.separation import alone, in_session
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
@@ -156,9 +166,14 @@ def option(apart, seconds=100.0):
 @pytest.mark.parametrize(
     "tiers, chosen",
     [
-        ([[([4.0, 9.0], 100), ([20.0, 3.5], 100)]], 0),  # the least counts
-        ([[([4.0], 100), ([5.0], 400)]], 0),  # by the second
-        ([[([4.0], 100)], [([90.0], 100)]], 0),  # what has been done before comes first
+        ([[([6.0, 9.0], 100), ([20.0, 5.5], 100)]], 0),  # the least counts
+        ([[([6.0], 100), ([7.0], 400)]], 0),  # by the second
+        (
+            [[([4.0], 100), ([4.5], 400)]],
+            1,
+        ),  # but for one that is not sure to tell, where that does not count
+        ([[([5.1], 100)], [([90.0], 100)]], 0),  # what has been done before comes first
+        ([[([4.9], 100)], [([90.0], 100)]], 1),  # unless it is not sure to tell
         ([[([2.0], 100)], [([90.0], 100)]], 1),  # unless it does not tell
         ([[([9.0, 0.2], 100), ([5.0, 0.3], 100)]], 0),  # what none tells does not count
         ([[([0.2, 0.9], 100), ([0.4, 0.5], 100)]], 1),  # the best of a bad lot
@@ -177,3 +192,55 @@ def test_a_further_signal_is_asked_for_where_it_tells_enough(apart, asked):
 
 def test_nothing_is_proposed_where_nothing_is_allowed():
     assert _best([]) is None
+
+
+def test_a_further_signal_is_looked_at_while_some_rival_is_told_by_nothing():
+    assert _all_told([[option([6.0, 1.0])], [option([1.0, 5.1])]])
+    assert not _all_told([[option([6.7, 4.9])], [option([9.0, 1.0])]])
+    assert not _all_told([[]])
+
+
+@pytest.fixture(scope="module")
+def two():
+    """The rig, and the same with another gain, having made steps; and the segment with its noise."""
+    logs = session(2, roles=())
+    limits = InputLimits(0.0, 1.8, 0.0, np.inf, 60.0, 1.0, 0.05)
+    steps = Choice("steps", np.repeat([0.0, 1.0, 0.0, 0.5], 100), limits)
+    found = []
+    for gain in (1.05, 1.0):
+        rig = replace(RIG, actuator=replace(RIG.actuator, gain=tuple(gain * g for g in RIG.actuator.gain)))
+        problem = problem_of(rig, make(logs, "command", "output"), logs)
+        got = fit(problem, problem.nominal(), WHITE, 0)
+        got = replace(got, sse=1e-6 * len(got.innovations), information=1e3 * np.eye(len(got.vector)))
+        rival = SimpleNamespace(effect="creep", stage="actuator", fit=got)
+        found.append(CandidateRig(rival, Part.of(got), (), ()).making(steps))
+    e = SimpleNamespace(segment=problem.segment, ar=np.ones(1), nominal=got)
+    return e, found
+
+
+def test_what_the_session_told_does_not_count_for_a_log_that_is_diagnosed_alone(two):
+    e, made = two
+    assert in_session(e, made)[0] > 20.0  # another gain, where the session knows it
+    assert alone(e, made, "actuator")[0] < 3.0  # alone, either rig may have it
+
+
+def test_what_is_ahead_of_a_logged_signal_is_not_seen_a_second_time_behind_it(two):
+    e, (a, b) = two
+    odd = replace(
+        a, signals=a.signals | {"output": a.signals["output"] * np.linspace(0.5, 2.0, len(b.entering))}
+    )
+    assert alone(e, [odd, b], "actuator") == pytest.approx(alone(e, [a, b], "actuator"))
+    behind = replace(b, rival=SimpleNamespace(effect="sensor_lag", stage="sensor", fit=b.rival.fit))
+    assert alone(e, [odd, behind], "actuator")[0] > 3.0 * alone(e, [a, behind], "actuator")[0]
+
+
+def test_a_log_by_itself_has_to_tell_also_what_only_the_session_ruled_out(monkeypatch):
+    rival = SimpleNamespace(stage="actuator")
+    e = SimpleNamespace(segment=SimpleNamespace(stages=("actuator", "sensor")), nominal=None)
+    question = _Question(e, (rival, rival, rival), (rival,))
+    assert len(question.anew) == 5 and question.anew[-1].effect == ""  # the last: that nothing is there
+    monkeypatch.setattr(next_experiment, "candidate_rigs", lambda *_: [])
+    for apart, left in (([9.0, 5.0, 2.0, 7.0], [2.0, 2.0]), ([9.0, 5.0, 8.0, 6.0], [6.0, 5.0])):
+        monkeypatch.setattr(next_experiment, "alone", lambda *_, apart=apart: np.array(apart))
+        [one] = _with_a_further_signal(question, [SimpleNamespace(seconds=1.0)], ())
+        assert list(one.apart) == left

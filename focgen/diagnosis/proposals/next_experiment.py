@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from focgen.control.units import unit_of_role
-from focgen.diagnosis.fitting.noise import whiten
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.model import Found, NextExperiment
@@ -24,12 +23,14 @@ from focgen.diagnosis.problem.segments import cuts
 from focgen.diagnosis.proposals.candidate_rigs import CandidateRig, candidate_rigs
 from focgen.diagnosis.proposals.limits import Bounds, bounds_of, limits_of
 from focgen.diagnosis.proposals.menu import Choice, menu
+from focgen.diagnosis.proposals.separation import alone, in_session, without
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
 from focgen.rig.rig import Rig
 
 NEXT = "next_experiment.csv"  # beside the diagnosis: the input that makes the experiment
-_ENOUGH = 3.0  # standard deviations
+_ENOUGH = 3.0  # standard deviations of the noise
+_SURE = 5.0  # the same with forms a little wrong: of experiments expected to do less, most resolved nothing
 _MOST = 99.0
 _RIVALS = 3  # of those tied, the likeliest
 _SHARES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1)  # of the way to the input's ends, until all stay in range
@@ -48,8 +49,25 @@ def propose(
             for cause in e.causes:
                 rivals = [r for r in cause.rivals if r.effect in names]
                 if len(rivals) > 1 and cause.rivals[0].effect == names[0]:
-                    return _between(rig, logs, explanations, e, rivals[: 1 + _RIVALS])
+                    out = [r for r in cause.rivals if r.effect not in names]
+                    asked = _Question(e, tuple(rivals[: 1 + _RIVALS]), tuple(out[:_RIVALS]))
+                    return _answered(rig, logs, explanations, asked)
     return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Question:
+    """Which of the ``rivals`` is the cause in the segment ``e``; ``out``: the next ones, that the session has
+    ruled out."""
+
+    e: Explanation
+    rivals: tuple[Rival, ...]
+    out: tuple[Rival, ...]
+
+    @property
+    def anew(self) -> tuple[Rival, ...]:
+        """All that a diagnosis has to decide between that does not know of the session."""
+        return (*self.rivals, *self.out, without(self.e, self.rivals[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,26 +113,22 @@ class _Option:
         return float(np.min(self.apart[telling]))
 
 
-def _between(
-    rig: Rig,
-    logs: Sequence[Experiment],
-    explanations: Sequence[Explanation],
-    e: Explanation,
-    rivals: Sequence[Rival],
+def _answered(
+    rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation], question: _Question
 ) -> tuple[NextExperiment, Choice] | None:
-    """The experiment that tells the first of ``rivals`` from the others. First asked is what the rig has done
+    """The experiment that tells the first of the rivals from the others. First asked is what the rig has done
     before and the logs hold; steps where there were none, or a further signal, only where that does not
     do."""
+    e, rivals = question.e, question.rivals
     entry, bounds = cuts(logs)[0], bounds_of(rig, logs)
     limits, rigs = limits_of(rig, logs, entry), candidate_rigs(explanations, e, rivals)
     tiers: list[list[_Option]] = []
     choices: list[tuple[Choice, list[CandidateRig]]] = []
     for one in dict.fromkeys((limits, limits.faster)):
         choices = _showing(_allowed(menu(one), rigs, bounds), e, rivals)
-        tiers.append([_Option(choice, None, _apart(e, made, None)) for choice, made in choices])
-    if not np.any([o.apart >= _ENOUGH for tier in tiers for o in tier]):
-        logged = [(c, made, stage) for c, made in choices[:4] for stage in e.segment.stages[:-1]]
-        tiers.append([_Option(c, stage, _apart(e, made, stage)) for c, made, stage in logged])
+        tiers.append([_Option(choice, None, in_session(e, made)) for choice, made in choices])
+    if not _all_told(tiers):
+        tiers.append(_with_a_further_signal(question, [c for c, _ in choices], explanations))
     found = _best([tier for tier in tiers if tier])
     if found is None:
         return None
@@ -123,23 +137,51 @@ def _between(
     return _proposed(rig, e, rivals, float(min(value, _MOST)), asked), option.choice
 
 
+def _with_a_further_signal(
+    question: _Question, choices: Sequence[Choice], explanations: Sequence[Explanation]
+) -> list[_Option]:
+    """The experiments with what leaves a stage logged besides. Such a log is diagnosed alone, so it has to
+    tell the first rival also from those that only the session rules out, and from nothing at all."""
+    e, found = question.e, []
+    rigs = candidate_rigs(explanations, e, question.anew)
+    for choice in choices:
+        made = [one.making(choice) for one in rigs]
+        for stage in e.segment.stages[:-1]:
+            apart = alone(e, made, stage)
+            tied, others = np.split(apart, [len(question.rivals) - 1])
+            found.append(_Option(choice, stage, np.minimum(tied, np.min(others))))
+    return found
+
+
 def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
-    """The most telling option a second of the first tier that tells enough, and what it tells. A rival that
-    none tells, as one that holds the other as a special case, does not count where others can be told: such
-    are told by needing more parameters for the same."""
+    """The most telling option a second of the first tier that is sure to tell, and what it tells; where none
+    is, the most telling. A rival that none tells, as one that holds the other as a special case, does not
+    count where others can be told: such are told by needing more parameters for the same."""
     options = [o for tier in tiers for o in tier]
     if not options:
         return None
-    told = np.any([o.apart >= _ENOUGH for o in options], axis=0)
+    told = _told(options, _ENOUGH)
     telling = told if np.any(told) else np.ones(len(told), bool)
     for tier in tiers:
-        good = [o for o in tier if o.least(telling) >= _ENOUGH]
+        good = [o for o in tier if o.least(telling) >= _SURE]
         if good:
             best = max(good, key=lambda o: o.least(telling) / np.sqrt(o.choice.seconds))
             return best.least(telling), best
-    plain = [o for o in options if o.stage is None] or options  # a further signal is asked for where it tells
+    # a further signal is asked for where it tells
+    plain = [o for o in options if o.stage is None or o.least(telling) >= _ENOUGH] or options
     best = max(plain, key=lambda o: o.least(telling))
     return best.least(telling), best
+
+
+def _all_told(tiers: Sequence[Sequence[_Option]]) -> bool:
+    """Whether every rival is told by some option: one that is not may be the likeliest."""
+    return bool(np.all(_told([o for tier in tiers for o in tier], _SURE)))
+
+
+def _told(options: Sequence[_Option], enough: float) -> np.ndarray:
+    """Of each rival (k,) whether any option tells it by ``enough``; False where there is none."""
+    told: np.ndarray = np.any([o.apart >= enough for o in options], axis=0)
+    return told
 
 
 def _allowed(
@@ -197,27 +239,3 @@ def _lacking(e: Explanation, names: Sequence[str]) -> str:
     """What the segment's experiments lack to show any of the effects."""
     missing = dict.fromkeys(m for name in names if (m := e.nominal.problem.lacks(name)))
     return f" (so far, {'; '.join(missing)})" if missing else ""
-
-
-def _apart(e: Explanation, made: Sequence[CandidateRig], stage: str | None) -> np.ndarray:
-    """The expected separation of the first rival from each of the others."""
-    return np.array([_separation(e, made[0], other, stage) for other in made[1:]])
-
-
-def _separation(e: Explanation, a: CandidateRig, b: CandidateRig, stage: str | None) -> float:
-    """Expected standard deviations between the two on what they made, seen at the segment's output or at what
-    leaves ``stage``."""
-    fit, base = b.rival.fit, b.left_by(stage)
-    level = e.segment.level_out if stage is None else max(float(np.max(np.abs(base))), 1e-300)
-    sigma2 = fit.sse / len(fit.innovations)
-
-    def seen(y: np.ndarray) -> np.ndarray:
-        return whiten(np.repeat(y, a.coarse) / level, e.ar)
-
-    difference = seen(a.left_by(stage) - base)
-    jacobian = np.stack([seen(column) for column in b.slopes(stage)], axis=1)
-    information = fit.information + jacobian.T @ jacobian
-    slope = jacobian.T @ difference
-    left = float(difference @ difference - slope @ np.linalg.pinv(information) @ slope)
-    # what tells them apart is not the size but its square over the spread of the likelihood ratio
-    return float(np.sqrt(max(left, 0.0) / max(sigma2, 1e-300)) / 2)
