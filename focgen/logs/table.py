@@ -123,7 +123,7 @@ class LogTable:
         cell that is none of these.
         """
         column = self.column(name)
-        if self.is_dated(name):
+        if not isinstance(column, np.ndarray) and _is_dated(column):
             try:
                 found = stamps.seconds(column)
             except ValueError as reason:
@@ -141,7 +141,7 @@ class LogTable:
     def is_dated(self, name: str) -> bool:
         """Whether a column is one of dates or times of day, in text."""
         column = self.column(name)
-        return not isinstance(column, np.ndarray) and any(is_stamp(str(cell)) for cell in column[:_LOOK])
+        return not isinstance(column, np.ndarray) and _is_dated(column)
 
     def _check_seconds(self, name: str, found: Array) -> None:
         """Raise LogError where times of day may be minutes, seconds and frames."""
@@ -255,3 +255,8 @@ def _is_number(cell: object, decimal: str) -> bool:
         return bool(parsed([cell], decimal))
     except (ValueError, TypeError):
         return False
+
+
+def _is_dated(column: Sequence[str]) -> bool:
+    """Whether a text column begins with dates or times of day."""
+    return any(is_stamp(str(cell)) for cell in column[:_LOOK])

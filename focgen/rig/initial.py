@@ -248,8 +248,7 @@ class _Setting:
         """
         found = []
         for time, base in zip(times, stepped):
-            asked = self._asking(base, lambda level, time=time: [time, level], self._stepped)
-            found.append((asked, time))
+            found.append((self._asking(base, self._stepped, [time]), time))
         (_, level), time = min(found)
         return np.array([time, level])
 
@@ -259,20 +258,23 @@ class _Setting:
         for late in (times[0], float(np.log(one.ago[0]))):
             base = self.at(self._stepped(np.array([late])), 1)
             for early in times[times > late]:
-                begin = lambda level, late=late, early=early: [late, level, early]
-                found.append((self._asking(base, begin, self._twice), late, early))
+                found.append((self._asking(base, self._twice, [late], [early]), late, early))
         (_, level), late, early = min(found)
         return np.array([late, level, early])
 
     def _asking(
-        self, base: _Try, at: Callable[[float], Sequence[float]], begin: Callable[[Array], Begin]
+        self,
+        base: _Try,
+        begin: Callable[[Array], Begin],
+        ahead: Sequence[float],
+        behind: Sequence[float] = (),
     ) -> tuple[float, float]:
         """What a begin leaves, and at which level before, as if the answer were in proportion to that.
 
-        ``base``: the same begin with a level of 0.
+        ``base``: the same begin with a level of 0; ``ahead`` and ``behind``: its numbers around the level.
         """
         end = max(self.range, key=abs) or 1.0
-        toward = (self.at(begin(np.array(at(end))), 0).left - base.left) / end
+        toward = (self.at(begin(np.array([*ahead, end, *behind])), 0).left - base.left) / end
         level = -float(np.sum(toward * base.left)) / max(float(np.sum(toward**2)), 1e-300)
         level = float(np.clip(level, self.range[0] - _BEYOND, self.range[1] + _BEYOND))
         return float(np.sum((base.left + level * toward) ** 2)), level
@@ -285,7 +287,7 @@ class _Setting:
         late, early = float(np.exp(x[0])), float(np.exp(max(x[2], x[0])))
         return Begin((0.0, float(x[1]) * self.reach, self.level), (early, late))
 
-    def _descended(self, start: Sequence[float], begin: Callable[[Array], Begin]) -> _Try:
+    def _descended(self, start: Sequence[float] | Array, begin: Callable[[Array], Begin]) -> _Try:
         """Gauss-Newton on log times and levels, damped where it fails."""
         low, high = self._bounds(len(start))
         x: Array = np.clip(np.array(start, float), low, high)

@@ -93,8 +93,8 @@ def _cautions(rig: Rig, summary: _Summary, unknown: Sequence[Explanation]) -> It
         if (changed := changed_at_once(e)) and changed.sure > 1.0 - NUMBERS.held:
             named = " and ".join(sorted(changed.instead))
             yield (
-                f"{e.segment.entry} to {e.segment.exit}: instead of {named} it may be ({changed.sure:.0%}) that "
-                f"at once it {_at_once(changed)}"
+                f"{e.segment.entry} to {e.segment.exit}: instead of {named} it may be ({changed.sure:.0%}) "
+                f"that at once it {_at_once(changed)}"
             )
     for e in unknown if summary.causes else ():
         yield f"{e.segment.entry} to {e.segment.exit}: no effect explains what is left there{_nearest(e)}"
