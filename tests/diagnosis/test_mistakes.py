@@ -62,6 +62,18 @@ def test_an_amplifier_that_is_switched_between_experiments_is_no_curve():
     assert any(abs(moment["at"] - first) < 0.1 * (logs[-1].start + len(logs[-1]) * H) for moment in moments)
 
 
+def test_a_command_in_another_range_in_one_experiment_is_no_curve():
+    """It was a bent gain of the regulator at 95 %: the hold alone is at that level."""
+
+    def louder(k, signals):
+        return signals | {"command": signals["command"] * (1.5 if k == 3 else 1.0)}
+
+    logs, curves = altered(session(41), louder), ("gain_nonlinearity", "valve_asymmetry")
+    found = diagnose(RIG, logs, pictures=False, only=curves)
+    assert found.verdict == "unknown"
+    assert any("0 s into hold" in note and "0 s into triangle" in note for note in found.notes)
+
+
 def faster(log, times, rng):
     """The same experiment recorded so many times as often, the command held."""
     count = (len(log) - 1) * times + 1

@@ -103,3 +103,20 @@ def test_bounded_solutions_are_the_best_within_bounds(seed):
     best = lsq_linear(table, right, (low, high), method="bvls").cost
     assert np.all(moved >= low) and np.all(moved <= high)
     assert 0.5 * np.sum((table @ moved - right) ** 2) == pytest.approx(best, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_best_experiment_of_another_parameter_is_found(seed):
+    rng, way = np.random.default_rng(seed), np.array([0.0, 1.0, 0.0])
+    made, rows, now = cells(rng, np.zeros(K), at=0)
+    spans = [(40, 100), (100, 180), (180, 260)]
+    inside = [(a <= np.arange(N)) & (np.arange(N) < b) for a, b in spans]
+    there = cells_of(rows, now + 0.5 * rows[1] * inside[1], made)
+    (one,) = there.one_experiment(way, spans)
+    left = [
+        np.linalg.lstsq(np.vstack([rows, rows[1] * i]).T, now + 0.5 * rows[1] * inside[1], rcond=None)[1][0]
+        for i in inside
+    ]
+    assert one.samples == spans[1] and (one.free, one.things) == (2, 1)
+    assert one.square == pytest.approx(min(left), rel=1e-9)
+    assert np.allclose(one.by[:, 1], [0.5, -0.5], atol=0.1)

@@ -87,7 +87,7 @@ def _judged(e: Explanation, cut: Pieces) -> tuple[float, Pieces]:
     floor = max(min(after * (1.0 - e.predictability.share), square), 1e-300)
     count = len(e.segment.y)
     families = len(e.best.problem.families)
-    others = len(cut.of_fit.problem.families) + len(cut.samples)
+    others = len(cut.of_fit.problem.families) + cut.things
     found = _log_odds(before, after, floor, count, e.best.size, families)
     at_once = _log_odds(before, square, floor, count, cut.of_fit.size + cut.free, others)
     return at_once - found, cut

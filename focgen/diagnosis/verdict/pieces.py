@@ -1,4 +1,4 @@
-"""A fit whose parameters may become others at moments of the session: what is left then, by least squares.
+"""What a fit leaves whose parameters may become others at moments of the session, or in one experiment.
 
 The fit's derivatives are known at every sample, so pieces between given moments take a linear equation (G. C.
 Chow, Tests of equality between sets of coefficients in two linear regressions, Econometrica 28, 1960). Where
@@ -6,12 +6,13 @@ all parameters become others, a piece is by itself, and the best moments are fou
 programming (R. Bellman, Communications of the ACM 4, 1961). Where it is one alone, pieces share the others,
 and the moments are found one after the other, each looked at anew beside a later one. What they share, and
 where the one begins, stays within the bounds of the fit: beyond them the rig would be another from the start.
+One experiment that was recorded under other settings is one thing, though it begins and ends at a moment.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -27,13 +28,15 @@ _SHORTEST = 4  # cells between two of them
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """Parameters that become others at ``samples`` (m,), each time ``by`` (m, parameters) less. ``square``:
-    the sum of squares that is left; ``free``: how many numbers the changes take, the moments among them."""
+    the sum of squares that is left; ``free``: how many numbers the changes take, the moments among them;
+    ``things``: how many happened."""
 
     of_fit: Fit
     samples: tuple[int, ...]
     by: np.ndarray
     square: float
     free: int
+    things: int
 
     def changes(self) -> Iterator[tuple[int, np.ndarray]]:
         """Each moment's sample, and by how much more leaves the segment from there on until the next (n,), of
@@ -48,11 +51,12 @@ class Pieces:
 
 def pieces(fit: Fit, weighing: Weighing) -> Iterator[Pieces]:
     """For one moment, two and three: the best with all parameters others; with each of the rig's own alone;
-    with its gain as a whole."""
-    cells = _Cells.of(fit, weighing)
+    with its gain as a whole. And for one experiment, with one alone."""
+    cells, spans = _Cells.of(fit, weighing), fit.problem.segment.run.spans
     yield from cells.all_others()
     for way in _own_ways(fit.problem, fit.vector, cells.ways):
         yield from cells.one_other(way)
+        yield from cells.one_experiment(way, spans[1:-1])  # the others have a moment at one end
 
 
 def _own_ways(problem: Problem, vector: np.ndarray, ways: np.ndarray) -> Iterator[np.ndarray]:
@@ -146,18 +150,37 @@ class _Cells:
         cuts = np.column_stack([np.broadcast_to(held, (len(free), len(held))), free]).astype(int)
         return int(free[np.argmin(self._shared(way, cuts)[1])])
 
+    def one_experiment(self, way: np.ndarray, spans: Sequence[tuple[int, int]]) -> Iterator[Pieces]:
+        """Only along ``way`` (k,) another, and only within one of ``spans``, in samples."""
+        first, last = np.searchsorted(self.ends, np.array(spans, int).reshape(-1, 2).T)
+        wide = last > first
+        if not wide.any():
+            return
+        first, last = first[wide], last[wide]
+        moved, square = self._apart(way, first[:, None], last[:, None])
+        k = int(np.argmin(square))
+        by = np.array([moved[k], -moved[k]]) * (way @ self.ways)
+        yield replace(self._made((first[k], last[k]), by, square[k], 1), free=2, things=1)
+
     def _shared(self, way: np.ndarray, cuts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """For rows of ``cuts`` (r, m): by what the parameters become less along ``way`` at each (r, m), and
         the sums of squares that are left (r,)."""
-        r, m, k = *cuts.shape, len(self.slope[-1])
-        behind = self.normal[-1] - self.normal[cuts]
-        beside = self.normal[-1] - self.normal[np.maximum(cuts[:, :, None], cuts[:, None, :])]
+        return self._apart(way, cuts, np.full_like(cuts, len(self.ends) - 1))
+
+    def _apart(self, way: np.ndarray, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """For rows of stretches from cells ``first`` to cells ``last`` (r, m): by what the parameters are
+        less along ``way`` in each (r, m), and the sums of squares that are left (r,)."""
+        (r, m), k = first.shape, len(self.slope[-1])
+        begin = np.maximum(first[:, :, None], first[:, None, :])
+        end = np.maximum(np.minimum(last[:, :, None], last[:, None, :]), begin)
         normal, slope = np.zeros((r, k + m, k + m)), np.zeros((r, k + m))
         normal[:, :k, :k] = self.normal[-1] + self.ridge
-        normal[:, k:, :k] = behind @ way
+        normal[:, k:, :k] = (self.normal[last] - self.normal[first]) @ way
         normal[:, :k, k:] = np.swapaxes(normal[:, k:, :k], 1, 2)
-        normal[:, k:, k:] = beside @ way @ way + np.eye(m) * (way @ self.ridge @ way)
-        slope[:, :k], slope[:, k:] = self.slope[-1], (self.slope[-1] - self.slope[cuts]) @ way
+        normal[:, k:, k:] = (self.normal[end] - self.normal[begin]) @ way @ way + np.eye(m) * (
+            way @ self.ridge @ way
+        )
+        slope[:, :k], slope[:, k:] = self.slope[-1], (self.slope[last] - self.slope[first]) @ way
         any_more = np.full(m, np.inf)
         moved = _bounded(normal, slope, np.r_[self.least, -any_more], np.r_[self.most, any_more])
         left = np.einsum("ri,rij,rj->r", moved, normal, moved) - 2.0 * np.sum(moved * slope, axis=1)
@@ -165,7 +188,7 @@ class _Cells:
 
     def _made(self, cuts: tuple[int, ...], by: np.ndarray, square: float, each: int) -> Pieces:
         samples = tuple(int(self.ends[c]) for c in cuts)
-        return Pieces(self.of_fit, samples, by, float(square), len(cuts) * (each + 1))
+        return Pieces(self.of_fit, samples, by, float(square), len(cuts) * (each + 1), len(cuts))
 
 
 def _bounded(normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
