@@ -194,9 +194,10 @@ class Numbers:
     )
     unlikely: float = _number(
         0.7,
-        "left at most by an actuator far from the one given, and how sure a cause beside it may be",
+        "left at most by an actuator far from the one given; "
+        "how sure a cause beside it, or beside a larger one, may be",
         "of the mean square, of the confidence",
-        "tuning cases",
+        "tuning cases; rigs of other physics",
         _SAME,
         _SAME,
     )

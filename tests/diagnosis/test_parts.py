@@ -14,12 +14,15 @@ from focgen.diagnosis.fitting.fit import WHITE, fit
 from focgen.diagnosis.fitting.predictability import predictable_share
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.nuisances import problem_of
+from focgen.diagnosis.hypotheses.rivals import Cause
+from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.scales import references
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.problem.smooth import freed
 from focgen.diagnosis.verdict import unexplained
+from focgen.diagnosis.verdict.conclude import _beside
 from focgen.diagnosis.verdict.improvement import predict
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import kernels
@@ -316,3 +319,11 @@ def _later(signals, roles, samples):
     return {
         role: np.r_[np.zeros(samples), y][: len(y)] if role in roles else y for role, y in signals.items()
     }
+
+
+def test_a_cause_beside_a_larger_one_is_less_sure():
+    """What the larger one's form lacks looks like it on rigs that no simulator here has."""
+    large, small = Cause((), 0.0, 0.8), Cause((), 0.0, 0.2)
+    both, alone = SimpleNamespace(causes=(large, small)), SimpleNamespace(causes=(small,))
+    assert _beside(both, large) == _beside(alone, small) == 1.0
+    assert _beside(both, small) == NUMBERS.unlikely

@@ -292,7 +292,7 @@ def _found(
 ) -> Found:
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
-    sure = sure * _lasting(e, cause)
+    sure = sure * _lasting(e, cause) * _beside(e, cause)
     lost = _share_lost(cause, rigs, logs, squares, floor, total or Improvement(0.0, (0.0, 0.0)))
     candidates = tuple(_candidate(r, float(p), rigs.fitted) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
@@ -303,6 +303,12 @@ def _lasting(e: Explanation, cause: Cause) -> float:
     changed = changed_at_once(e)
     instead = changed is not None and cause.rivals[0].effect in changed.instead
     return 1.0 - changed.sure if changed is not None and instead else 1.0
+
+
+def _beside(e: Explanation, cause: Cause) -> float:
+    """How sure a cause can be beside another one of its segment that closes more: what looks like it may be
+    what the other one's form lacks of this rig."""
+    return 1.0 if cause.share >= max(c.share for c in e.causes) else NUMBERS.unlikely
 
 
 def _share_lost(
