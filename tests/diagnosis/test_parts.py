@@ -321,9 +321,19 @@ def _later(signals, roles, samples):
     }
 
 
+def cause(share, wanders=False):
+    """A cause that closes ``share``, of one form."""
+    form = SimpleNamespace(wanders=wanders)
+    problem = SimpleNamespace(candidates=[SimpleNamespace(effect="one", form=form)])
+    rival = SimpleNamespace(effect="one", fit=SimpleNamespace(problem=problem))
+    return Cause((rival,), 0.0, share)
+
+
 def test_a_cause_beside_a_larger_one_is_less_sure():
-    """What the larger one's form lacks looks like it on rigs that no simulator here has."""
-    large, small = Cause((), 0.0, 0.8), Cause((), 0.0, 0.2)
+    """What the larger one's form lacks looks like it on rigs of others. A wander is never the larger one."""
+    large, small, wander = cause(0.8), cause(0.2), cause(0.9, wanders=True)
     both, alone = SimpleNamespace(causes=(large, small)), SimpleNamespace(causes=(small,))
     assert _beside(both, large) == _beside(alone, small) == 1.0
     assert _beside(both, small) == NUMBERS.unlikely
+    followed = SimpleNamespace(causes=(wander, small))
+    assert _beside(followed, small) == 1.0 and _beside(followed, wander) == NUMBERS.unlikely

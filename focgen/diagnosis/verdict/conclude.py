@@ -307,8 +307,19 @@ def _lasting(e: Explanation, cause: Cause) -> float:
 
 def _beside(e: Explanation, cause: Cause) -> float:
     """How sure a cause can be beside another one of its segment that closes more: what looks like it may be
-    what the other one's form lacks of this rig."""
-    return 1.0 if cause.share >= max(c.share for c in e.causes) else NUMBERS.unlikely
+    what the other one's form lacks of this rig. A wander follows whatever is left, so it is never the larger.
+    """
+
+    def size(c: Cause) -> float:
+        return 0.0 if _wanders(c) else c.share
+
+    return 1.0 if size(cause) >= max(size(c) for c in e.causes) else NUMBERS.unlikely
+
+
+def _wanders(cause: Cause) -> bool:
+    """Whether a cause, at its likeliest, is followed through the session instead of foretold."""
+    best = cause.rivals[0]
+    return any(c.form.wanders and c.effect == best.effect for c in best.fit.problem.candidates)
 
 
 def _share_lost(
@@ -328,8 +339,7 @@ def _share_lost(
     without = compose.squares(logs, compose.simulated(rigs.fitted, others, logs))
     could = max(float(np.mean(squares["refitted"])) - floor, 1e-300)
     lost = np.mean(np.minimum(without, squares["refitted"])) - np.mean(squares["explained"])
-    wanders = any(c.form.wanders and c.effect == best.effect for c in best.fit.problem.candidates)
-    value = 0.0 if wanders else float(np.clip(lost / could, 0, 1))
+    value = 0.0 if _wanders(cause) else float(np.clip(lost / could, 0, 1))
     wide = (total.interval[1] - total.interval[0]) / 2
     return Improvement(value, (max(value - wide, -1.0), min(value + wide, 1.0)))
 
