@@ -23,6 +23,7 @@ from focgen.diagnosis.hypotheses.rivals import left_out
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import Segment
 from focgen.diagnosis.verdict.pieces import Pieces, pieces
+from focgen.rig.effects import library
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,10 @@ class Changed:
 @lru_cache(maxsize=16)
 def changed_at_once(e: Explanation) -> Changed | None:
     """How likely the rig became another at up to three moments instead of what was found, or of one part of
-    it; None where its session is too short for that."""
+    it. None where its session is too short for that, or where a rounding was found: its steps are no noise,
+    and what is smaller than they are tells nothing."""
+    if any(library()[family].rounds for family in e.best.problem.families):
+        return None
     found = [_judged(e, cut) for fit in _bases(e) for cut in pieces(fit, Weighing(e.ar))]
     odds, best = max(found, key=lambda f: f[0], default=(0.0, None))
     if best is None:
