@@ -71,6 +71,31 @@ def test_dates_and_milliseconds_in_one_number_are_refused(tmp_path, form):
         read_table(path).seconds("t")
 
 
+@pytest.mark.parametrize("lost", [-1, 0], ids=["the last of a minute", "the first"])
+def test_a_row_that_is_lost_does_not_hide_packed_times(tmp_path, lost):
+    times = [packed(t, "12{0:02d}{1:05.2f}") for t in SECONDS + 50.0]
+    del times[int(np.argmax(SECONDS + 50.0 >= 60.0)) + lost]
+    with pytest.raises(LogError, match="hhmmss"):
+        read_table(log(tmp_path, times)).seconds("t")
+
+
+@pytest.mark.parametrize("unit", [10, 100])
+def test_tenths_and_hundredths_in_one_number_are_refused(tmp_path, unit):
+    """Tenths passed for seconds, at a tenth of the rate."""
+    whole = np.arange(58 * unit, 58 * unit + COUNT)
+    width = len(f"59{unit}") - 1
+    times = [f"12{k // (60 * unit):02d}{k % (60 * unit):0{width}d}" for k in whole.tolist()]
+    with pytest.raises(LogError, match="hhmmss"):
+        read_table(log(tmp_path, times)).seconds("t")
+
+
+def test_a_frame_that_is_lost_does_not_hide_frames(tmp_path):
+    frames = [k for k in range(COUNT + 2) if k not in (130, 220)]
+    path = log(tmp_path, [f"{k // 1200:02d}:{k // 20 % 60:02d}:{k % 20:02d}" for k in frames])
+    with pytest.raises(LogError, match="frames"):
+        read_table(path).seconds("t")
+
+
 def test_minutes_seconds_and_frames_are_no_hours(tmp_path):
     frames = np.arange(COUNT)
     path = log(tmp_path, [f"{k // 1200:02d}:{k // 20 % 60:02d}:{k % 20:02d}" for k in frames])
