@@ -129,6 +129,17 @@ def test_thousands_in_texts_of_a_frame_are_no_decimals():
     assert np.allclose(found["pressure"], SECONDS)
 
 
+@pytest.mark.parametrize("other", ["31.01.2026", "2026-01-31T12:00:00.05", "192.168.0.12", "no.1"])
+def test_the_point_of_a_date_tells_nothing_of_thousands(tmp_path, other):
+    """1.200 was 1.2 beside a column of dates as they are written where it is 1200."""
+    thousands = [f"{10 * k:,d}".replace(",", ".") for k in range(COUNT)]
+    lines = [f"{k};{k};{y};{other}" for k, y in enumerate(thousands)]
+    with pytest.raises(LogError, match="thousands"):
+        read_table(text(tmp_path, lines, header="t;p;y;d")).numbers("y")
+    with pytest.raises(LogError, match="thousands"):
+        read_logs({"t": SECONDS, "p": SECONDS, "y": thousands, "d": [other] * COUNT}, PLAIN, 0.05)
+
+
 @pytest.mark.long
 def test_thousands_in_texts_of_a_parquet_are_no_decimals(tmp_path):
     pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
