@@ -97,8 +97,8 @@ class Points:
         self._whole = self._grouped = self._decimal = False
 
     def see(self, cells: Iterable[str]) -> None:
-        """More of its texts. A point that is a decimal one for sure ends the matter; one of a date, a version or
-        an address says nothing of numbers."""
+        """More of its texts. A point that is a decimal one for sure ends the matter; the point of a date says
+        nothing of numbers."""
         if self._decimal:
             return
         for cell in cells:
