@@ -172,7 +172,9 @@ def test_what_swings_or_rests_stands_for_itself(swing):
     assert stand_in(swing) is None
 
 
-@pytest.mark.parametrize("name", ["p_A", "chamber_pressure_A", "p_m", "angle_A", "kappa_A", "p_s"])
+@pytest.mark.parametrize(
+    "name", ["p_A", "chamber_pressure_A", "p_m", "angle_A", "kappa_A", "p_s", "p1_A", "p A", "pSet_A"]
+)
 def test_the_letter_of_a_channel_is_no_unit(name):
     """The pressure of chamber A was in ampere, without a word."""
     assert unit_of(name) is None and unit_named(name) == ""
