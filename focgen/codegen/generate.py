@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ from focgen.plan.plan import LONGEST, Plan
 from focgen.resources import shipped
 from focgen.shown import Shown
 from focgen.spelling import respelled
+from focgen.tomlfile import parsed
 
 __all__ = ["PACKAGES", "Generated", "folder_files", "generate"]
 
@@ -120,6 +121,14 @@ def _going(
     return old
 
 
+def _titled(plan: Plan, controller_toml: bytes) -> Plan:
+    """A plan whose controller is called as the C is, where its file has no name: the file's own name, which a
+    reader takes then, is another one in the folder."""
+    if "name" in parsed(controller_toml.decode("utf-8")):
+        return plan
+    return replace(plan, controller=replace(plan.controller, name=plan.name))
+
+
 def folder_files(
     plan: Plan,
     controller_toml: bytes,
@@ -133,6 +142,7 @@ def folder_files(
 
     Raises PlanError for what C cannot express or count, InputError where the plan's name is no name in C.
     """
+    plan = _titled(plan, controller_toml)
     check_name(plan.name, plan.controller.name)
     check_fits(plan)
     title, digest = plan.controller.name, sha256(controller_toml)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, overload
 
@@ -13,6 +14,7 @@ from focgen.logs.dialect import MISSING, grouped
 
 PART = 400_000
 """Cells that are held as texts before they are put away: of fewer, all stay as they stand in the file."""
+_NUMBER = re.compile(r"\s*[-+]?\d*\.\d+(?:[eEdD][-+]?\d+)?\s*")
 _LEVELS = 4096  # different texts that a column is kept as: names of runs, levels of a command
 
 
@@ -95,7 +97,8 @@ class Points:
         self._whole = self._grouped = self._decimal = False
 
     def see(self, cells: Iterable[str]) -> None:
-        """More of its texts. A point that is a decimal one for sure ends the matter."""
+        """More of its texts. A point that is a decimal one for sure ends the matter; the point of a date says
+        nothing of numbers."""
         if self._decimal:
             return
         for cell in cells:
@@ -103,7 +106,7 @@ class Points:
                 self._whole = self._whole or cell.isdigit()
             elif grouped(cell, "."):
                 self._grouped = True
-            elif cell[-1:].isdigit():
+            elif _NUMBER.fullmatch(cell):
                 self._decimal = True
                 return
 

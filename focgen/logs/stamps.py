@@ -10,9 +10,11 @@ import numpy as np
 from focgen.arrays import Array
 
 _DAY = 86400.0
-_PACKED = (1.0, 1e3, 1e6)  # of a second: what hhmmss may count behind its seconds
+_PACKED = tuple(10.0**k for k in range(10))  # of a second: what hhmmss may count behind its seconds
 _PART = 1 << 14  # stamps that are looked at side by side
 _MINUTES = 4  # that lack the same seconds: fewer may be chance
+_MOST = 0.75  # of the minutes have to show it: a row is lost at the end of some
+_LOST = 2.5  # samples after which a minute begins at most, one row lost
 
 
 def seconds(cells: Sequence[str]) -> Array:
@@ -46,25 +48,25 @@ def _is_packed(values: Array, unit: float) -> bool:
     if not 0.0 < usual < 20.0:
         return False
     parts = (values[at : at + _PART + 1] / unit for at in range(0, len(values), _PART))
-    over = 0
+    over = fit = 0
     for part in parts:
         count = _minutes_over(part, usual)
         if count is None:
             return False
-        over += count
-    return over > 0
+        over, fit = over + count[0], fit + count[1]
+    return over > 0 and fit >= _MOST * over
 
 
-def _minutes_over(values: Array, usual: float) -> int | None:
-    """How often a minute ends and 40 are stepped over; None where the numbers are no hhmmss."""
+def _minutes_over(values: Array, usual: float) -> tuple[int, int] | None:
+    """How often a minute ends, and how often 40 are stepped over then; None of numbers that are no hhmmss."""
     minutes, left = np.divmod(values, 100.0)
     if not values.min() >= 0.0 or (left >= 60.0).any() or (minutes % 100.0 >= 60.0).any():
         return None
     hours = np.diff(minutes // 100.0)
     beyond = np.where(hours != 0.0, 4040.0, 40.0)
     over = (np.diff(minutes) != 0.0) & (np.abs(hours) <= 1.0)  # a new day steps over more
-    fits = np.abs(np.diff(values) - beyond - usual)[over] < 0.5 * usual
-    return int(over.sum()) if np.all(fits) else None
+    begins = ((np.diff(values) - beyond) / usual)[over]
+    return int(over.sum()), int(((begins > 0.5) & (begins < _LOST)).sum())
 
 
 def skips_seconds(values: Array) -> bool:
@@ -80,13 +82,10 @@ def skips_seconds(values: Array) -> bool:
         return False
     steps, over = np.diff(values), np.diff(values // 60.0) != 0.0
     within, between, begins = steps[~over], steps[over], values[1:][over] % 60.0
-    return bool(
-        len(between) >= _MINUTES
-        and np.all(within < 1.5 * usual)
-        and np.all(between > 1.5 * usual)
-        and np.ptp(between) < usual
-        and np.all(begins < usual)
-    )
+    if len(between) < _MINUTES or (between <= 1.5 * usual).any():
+        return False
+    alike = np.abs(between - np.median(between)) < usual
+    return all(np.mean(each) >= _MOST for each in (within < 1.5 * usual, alike, begins < usual))
 
 
 def _usual_step(values: Array) -> float:

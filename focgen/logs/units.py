@@ -44,8 +44,8 @@ def unit_of(text: str) -> tuple[str, str] | None:
 
 def _is_letter(column: str) -> bool:
     """Whether a name ends in a letter that is no unit of what it names: the pressure of chamber A."""
-    *words, last = column.split("_")
-    return not _LETTERS.get(last, frozenset()).isdisjoint(word.lower() for word in words)
+    *words, last = re.split(r"[\s_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column).strip())
+    return not _LETTERS.get(last, frozenset()).isdisjoint(word.lower().rstrip("0123456789") for word in words)
 
 
 def time_unit_named(column: str) -> str | None:

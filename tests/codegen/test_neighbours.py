@@ -12,6 +12,7 @@ from focgen.codegen.generate import generate
 from focgen.errors import InputError
 from focgen.verification.folder import read_folder
 from tests.controllers import seed_controller
+from tests.every_form import EXAMPLE
 
 
 def pair(folder, **options):
@@ -120,3 +121,11 @@ def test_what_a_package_of_the_other_has_belongs_to_it(tmp_path, package):
 def test_the_archive_of_the_other_belongs_to_it(tmp_path):
     pair(tmp_path, for_="fmu")
     assert (tmp_path / "one.fmu").is_file() and len(read_folder(tmp_path).notes) == 1
+
+
+def test_a_controller_without_a_name_is_unedited(tmp_path):
+    """Its file is called otherwise in the folder, and the C was another's there."""
+    text = EXAMPLE.with_name("controller.toml").read_text(encoding="utf-8")
+    (tmp_path / "valve.toml").write_text(text.replace('name = "spba"\n', ""), encoding="utf-8")
+    generate(tmp_path / "valve.toml", tmp_path / "firmware")
+    assert not read_folder(tmp_path / "firmware").differences

@@ -71,6 +71,31 @@ def test_dates_and_milliseconds_in_one_number_are_refused(tmp_path, form):
         read_table(path).seconds("t")
 
 
+@pytest.mark.parametrize("lost", [-1, 0], ids=["the last of a minute", "the first"])
+def test_a_row_that_is_lost_does_not_hide_packed_times(tmp_path, lost):
+    times = [packed(t, "12{0:02d}{1:05.2f}") for t in SECONDS + 50.0]
+    del times[int(np.argmax(SECONDS + 50.0 >= 60.0)) + lost]
+    with pytest.raises(LogError, match="hhmmss"):
+        read_table(log(tmp_path, times)).seconds("t")
+
+
+@pytest.mark.parametrize("unit", [10, 100])
+def test_tenths_and_hundredths_in_one_number_are_refused(tmp_path, unit):
+    """Tenths passed for seconds, at a tenth of the rate."""
+    whole = np.arange(58 * unit, 58 * unit + COUNT)
+    width = len(f"59{unit}") - 1
+    times = [f"12{k // (60 * unit):02d}{k % (60 * unit):0{width}d}" for k in whole.tolist()]
+    with pytest.raises(LogError, match="hhmmss"):
+        read_table(log(tmp_path, times)).seconds("t")
+
+
+def test_a_frame_that_is_lost_does_not_hide_frames(tmp_path):
+    frames = [k for k in range(COUNT + 2) if k not in (130, 220)]
+    path = log(tmp_path, [f"{k // 1200:02d}:{k // 20 % 60:02d}:{k % 20:02d}" for k in frames])
+    with pytest.raises(LogError, match="frames"):
+        read_table(path).seconds("t")
+
+
 def test_minutes_seconds_and_frames_are_no_hours(tmp_path):
     frames = np.arange(COUNT)
     path = log(tmp_path, [f"{k // 1200:02d}:{k // 20 % 60:02d}:{k % 20:02d}" for k in frames])
@@ -102,6 +127,17 @@ def test_thousands_in_texts_of_a_frame_are_no_decimals():
         read_logs(frame, PLAIN, 0.05)
     (found,) = read_logs(frame | {"p": [f"{t:.2f}" for t in SECONDS], "y": SECONDS}, PLAIN, 0.05)
     assert np.allclose(found["pressure"], SECONDS)
+
+
+@pytest.mark.parametrize("other", ["31.01.2026", "2026-01-31T12:00:00.05", "192.168.0.12", "no.1"])
+def test_the_point_of_a_date_tells_nothing_of_thousands(tmp_path, other):
+    """1.200 was 1.2 beside a column of dates as they are written where it is 1200."""
+    thousands = [f"{10 * k:,d}".replace(",", ".") for k in range(COUNT)]
+    lines = [f"{k};{k};{y};{other}" for k, y in enumerate(thousands)]
+    with pytest.raises(LogError, match="thousands"):
+        read_table(text(tmp_path, lines, header="t;p;y;d")).numbers("y")
+    with pytest.raises(LogError, match="thousands"):
+        read_logs({"t": SECONDS, "p": SECONDS, "y": thousands, "d": [other] * COUNT}, PLAIN, 0.05)
 
 
 @pytest.mark.long
@@ -136,7 +172,9 @@ def test_what_swings_or_rests_stands_for_itself(swing):
     assert stand_in(swing) is None
 
 
-@pytest.mark.parametrize("name", ["p_A", "chamber_pressure_A", "p_m", "angle_A", "kappa_A", "p_s"])
+@pytest.mark.parametrize(
+    "name", ["p_A", "chamber_pressure_A", "p_m", "angle_A", "kappa_A", "p_s", "p1_A", "p A", "pSet_A"]
+)
 def test_the_letter_of_a_channel_is_no_unit(name):
     """The pressure of chamber A was in ampere, without a word."""
     assert unit_of(name) is None and unit_named(name) == ""
