@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -39,14 +39,21 @@ class Moment:
     rms: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Changed:
-    """The ``moments`` at which a segment became another, ``instead`` of these families, and the log ``odds``
+    """How a segment became another, ``cut`` into pieces, ``instead`` of these families, and the log ``odds``
     of that over what was found."""
 
-    moments: tuple[Moment, ...]
+    cut: Pieces
     instead: frozenset[str]
     odds: float
+
+    @cached_property
+    def moments(self) -> tuple[Moment, ...]:
+        """What becomes another at each of the cuts."""
+        segment = self.cut.of_fit.problem.segment
+        changes = self.cut.changes()
+        return tuple(_moment(segment, sample, segment.level_out * by) for sample, by in changes)
 
     @property
     def sure(self) -> float:
@@ -66,7 +73,7 @@ def changed_at_once(e: Explanation) -> Changed | None:
     if best is None:
         return None
     instead = frozenset(e.best.problem.families) - frozenset(best.of_fit.problem.families)
-    return Changed(_told(best), instead, odds)
+    return Changed(best, instead, odds)
 
 
 def _bases(e: Explanation) -> Iterator[Fit]:
@@ -104,12 +111,6 @@ def _log_odds(before: float, left: float, floor: float, count: int, free: int, t
     scale = Scale(0.5 * count * NUMBERS.other).of(gained)
     prior = things * float(np.log(NUMBERS.rare))
     return log_likelihood(misfit, scale) - paid(free, gained, misfit, scale) + prior
-
-
-def _told(cut: Pieces) -> tuple[Moment, ...]:
-    """What becomes another at each of the cuts."""
-    segment = cut.of_fit.problem.segment
-    return tuple(_moment(segment, sample, segment.level_out * by) for sample, by in cut.changes())
 
 
 def _moment(segment: Segment, sample: int, by: np.ndarray) -> Moment:
