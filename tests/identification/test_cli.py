@@ -170,8 +170,9 @@ def test_a_degree_that_makes_no_sense_is_refused(tmp_path, capsys, degree):
 
 
 def test_no_stage_at_all_is_refused(tmp_path, capsys):
-    argv = ["identify", str(STEPS), "--rig", str(RIG), "--stages", ""]
-    assert "--stages: names no stage; give one or more of" in refused(argv, tmp_path, capsys)
+    argv = ["identify", str(STEPS), "--rig", str(RIG), "--stages"]
+    assert "--stages: names no stage; give one or more of" in refused([*argv, ","], tmp_path, capsys)
+    assert "--stages: is empty; name something" in refused([*argv, ""], tmp_path, capsys)
 
 
 def test_missing_files_are_refused(tmp_path, capsys):

@@ -179,7 +179,7 @@ def test_a_pipe_that_goes_away_hides_no_failed_check(monkeypatch, tmp_path):
             "length = " + "9" * 5000 + "\n",
             "a = " + "[" * 3000,
             "a\0b",
-            "\ufeff",
+            "\ufeff\ufeff",
             "length = 1e999\n",
             "[" * 70000,
         ),
@@ -314,7 +314,7 @@ def test_the_folder_one_stands_in_is_no_fault(tmp_path, monkeypatch, capsys):
     controller, log = str(EXAMPLES / "controller.toml"), str(EXAMPLES / "logs" / "steps.csv")
     for asked in (["init", log], ["report", controller]):
         assert main([*asked, "--out", "."]) == 2
-        assert line(capsys).startswith("focgen: error: .: cannot be written")
+        assert line(capsys).startswith("focgen: error: .: is a folder where a file belongs; name another")
     assert main(["generate", controller, "--length", "5", "--out", "."]) == 0
     assert (tmp_path / "spba.c").is_file() and capsys.readouterr().err == ""
 
