@@ -68,7 +68,9 @@ def changed_at_once(e: Explanation) -> Changed | None:
     and what is smaller than they are tells nothing."""
     if any(library()[family].rounds for family in e.best.problem.families):
         return None
-    found = [_judged(e, cut) for fit in _bases(e) for cut in pieces(fit, Weighing(e.ar))]
+    weighing = Weighing(e.ar)
+    before, after = (square_by(f, weighing) for f in (e.nominal, e.best))
+    found = [_judged(e, before, after, cut) for fit in _bases(e) for cut in pieces(fit, weighing)]
     odds, best = max(found, key=lambda f: f[0], default=(0.0, None))
     if best is None:
         return None
@@ -91,10 +93,10 @@ def another(e: Explanation) -> Changed | None:
     return changed if changed is not None and changed.odds > 0.0 else None
 
 
-def _judged(e: Explanation, cut: Pieces) -> tuple[float, Pieces]:
-    """The log odds of what is cut so over what was found."""
-    weighing, square = Weighing(e.ar), cut.square
-    before, after = (square_by(f, weighing) for f in (e.nominal, e.best))
+def _judged(e: Explanation, before: float, after: float, cut: Pieces) -> tuple[float, Pieces]:
+    """The log odds of what is cut so over what was found, which leaves the sum of squares ``after`` of
+    ``before``."""
+    square = cut.square
     floor = max(min(after * (1.0 - e.predictability.share), square), 1e-300)
     count = len(e.segment.y)
     families = len(e.best.problem.families)
