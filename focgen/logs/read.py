@@ -13,6 +13,7 @@ import numpy as np
 
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
+from focgen.logs import clock
 from focgen.logs.cells import Levels
 from focgen.logs.dialect import MISSING
 from focgen.logs.experiment import Experiment
@@ -118,9 +119,10 @@ def _experiments(
     """Yield (path, experiment) for each run of a log, or part of one."""
     columns, notes = _present(table, signals)
     time, said = _time(table, signals)
+    reading = _reading(table, signals)
     notes = (*table.notes, *said, *notes)
     for name, rows in _runs(table, signals.run):
-        run = Raw(name, table.path, "", time, columns, table.line, notes).part(rows)
+        run = Raw(name, table.path, "", time, columns, table.line, notes, reading).part(rows)
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
         run = replace(run, where=where, stamps=f"{where} [{signals.time}]")
         for experiment in experiments_of(run, sample_time, window):
@@ -131,11 +133,26 @@ def _time(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
     """The time stamps (m,) in s, and a note where no column gives them."""
     if signals.time in table:
         said = _time_unit_note(table, signals)
-        return _scaled(table, "time", table.seconds(signals.time), signals), said
+        scale = signals.scales.get("time")
+        found = table.seconds(signals.time, told=scale is not None)
+        if table.is_dated(signals.time) and scale is not None and scale.unit is not None:
+            return found, said  # a date is what it is, in whatever unit other logs count
+        return _scaled(table, "time", found, signals), said
     if table.clock is None:
         raise table.missing("time", signals.time, {signals.run or "", *signals.columns().values()})
     step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
     return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
+
+
+def _reading(table: LogTable, signals: Roles) -> clock.Reading:
+    """What tells that the time is in seconds, or what else it may be."""
+    name = signals.time
+    if name not in table or signals.scales.get("time") is not None:
+        return clock.Reading.TOLD
+    if table.is_dated(name):
+        return clock.Reading.STAMPS
+    said = unit_of_time(table.unit(name) or time_unit_named(name) or "")
+    return clock.Reading.TOLD if said is not None else clock.Reading.NUMBERS
 
 
 def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
@@ -144,7 +161,10 @@ def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
     name, scale = signals.time, signals.scales.get("time")
     given = table.unit(name) or time_unit_named(name) or "s"
     taken = (scale.unit or "") if scale else "s"
-    if given == taken or not taken or table.is_dated(name):
+    if table.is_dated(name):
+        what = f"{name!r} holds dates or times of day, which are not in {taken}, as the rig has it"
+        return () if taken in ("", "s") else (what,)
+    if given == taken or not taken:
         return ()
     own, other = unit_of_time(given), unit_of_time(taken)
     if own is None or other is None or own[1] == other[1]:
