@@ -272,3 +272,46 @@ def test_x_values_of_labview_have_the_unit_that_the_file_gives(tmp_path):
             read_lvm(path)
     path.write_text(lvm(".", "One", 1).replace("X_Dimension\tTime", "X_Dimension\tZeit"))
     assert len(read_lvm(path))
+
+
+def tdms(path, **properties):
+    """A channel of time beside two waveforms; ``properties`` are those of the pressure."""
+    nptdms = pytest.importorskip("nptdms")
+    own = {"wf_increment": 0.05, "wf_start_offset": 0.0}
+    with nptdms.TdmsWriter(str(path)) as writer:
+        columns = ("t", {}), ("p", own | properties), ("y", own)
+        writer.write_segment(
+            [nptdms.ChannelObject("g", n, SECONDS, properties=own_of) for n, own_of in columns]
+        )
+    return path
+
+
+@pytest.mark.parametrize(
+    "properties, said",
+    [
+        ({"wf_start_offset": 1.0}, "clocks differ"),
+        ({"wf_increment": 0.1}, "clocks differ"),
+        ({"wf_xname": "Frequency", "wf_xunit_string": "Hz"}, "goes over Frequency in Hz"),
+        ({"wf_xunit_string": "ms"}, "clocks differ"),
+    ],
+    ids=["another start", "another step", "a spectrum", "another unit"],
+)
+def test_a_channel_of_time_does_not_hide_the_clocks_of_waveforms(tmp_path, properties, said):
+    """A second between pressure and output, as a dead time that no rig has."""
+    with pytest.raises(LogError, match=said):
+        read_logs(tdms(tmp_path / "log.tdms", **properties), PLAIN, 0.05)
+
+
+def test_the_rig_says_that_a_channel_of_time_is_right(tmp_path):
+    signals = Signals("t", "y", None, "p", scales={"time": Scale(unit="s")})
+    path = tdms(tmp_path / "log.tdms", wf_start_offset=1.0)
+    assert len(read_logs(path, signals, 0.05)[0]) == COUNT
+    assert len(read_logs(tdms(path), PLAIN, 0.05)[0]) == COUNT
+
+
+def test_waveforms_have_the_unit_that_the_file_gives(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    own = {"wf_increment": 0.05 / 60.0, "wf_start_offset": 0.0, "wf_xname": "Time", "wf_xunit_string": "min"}
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        writer.write_segment([nptdms.ChannelObject("g", n, SECONDS, properties=own) for n in "py"])
+    assert read_logs(tmp_path / "log.tdms", PLAIN, 0.05)[0].sample_time == 0.05
