@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from enum import Enum
 
 import numpy as np
 
@@ -21,6 +22,7 @@ _FEW = 0.1  # of the samples are lost: more are taken for a clock that ticks oth
 _TICKING = 0.75  # of the steps within half of their median: holes are told from an irregular clock
 _IRREGULAR = 0.95  # quantile of the steps that stands for the pace of an irregular clock
 _SAME_RATE = 1e-4  # relative
+_NEAR = 0.02  # relative: a clock's rate is the rig's
 _PLAUSIBLE = 99.0  # a log is recorded at a rate within this factor of the rig's
 _LONGEST = 5_000_000  # samples that few rows may be resampled to; many rows, twice as many as they are
 _COUNTABLE = 2**53  # ticks that float64 tells apart
@@ -138,7 +140,42 @@ def check_unit(time: Array, sample_time: float, where: str) -> None:
     what = (
         f"has samples {ratio * sample_time:g} s apart{unit} where the rig's sample_time is {sample_time:g} s"
     )
-    raise LogError(where, what, "give time in seconds, or correct sample_time")
+    remedy = "give time in seconds, or its unit by time = { column = …, unit = 'ms' }, or correct sample_time"
+    raise LogError(where, what, remedy)
+
+
+class Reading(Enum):
+    """Why a column of time is taken for seconds."""
+
+    TOLD = "the rig, the file or the column's name says its unit"
+    STAMPS = "texts as hh:mm:ss"
+    NUMBERS = "nothing says another unit"
+
+
+def check_reading(time: Array, sample_time: float, where: str, reading: Reading) -> None:
+    """Raise LogError where nothing tells that a time is in seconds, and another reading explains it better.
+
+    Seconds pass at the rig's own rate. At another one, a clock that has the rig's rate in minutes or frames
+    is taken for these, and whole numbers may count samples or ticks as well.
+    """
+    step = float(np.median(np.diff(time)))
+    if reading is Reading.TOLD or _is_near(step, sample_time):
+        return
+    other = None
+    if reading is Reading.STAMPS:
+        other = "mm:ss and frames, read as hh:mm:ss" if _is_near(step, 60.0 * sample_time) else None
+    elif _is_near(60.0 * step, sample_time):
+        other = "minutes"
+    elif (time % 1.0 == 0.0).all():
+        other = "a count of samples or of ticks"
+    if other is not None:
+        what = f"has steps of {step:g} where the rig's sample_time is {sample_time:g} s: it may be {other}"
+        remedy = "say which by time = { column = …, unit = 's' }, or another unit or scale, in [signals]"
+        raise LogError(where, what, remedy)
+
+
+def _is_near(step: float, other: float) -> bool:
+    return abs(step / other - 1.0) <= _NEAR
 
 
 def holes(time: Array) -> Ints:

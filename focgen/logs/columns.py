@@ -14,10 +14,9 @@ from focgen.errors import LogError
 from focgen.logs.scales import known as measures
 from focgen.logs.scales import unit_of_time
 from focgen.logs.table import LogTable, stem
-from focgen.logs.units import time_unit_named, unit_named, unit_of
+from focgen.logs.units import TIME_WORDS, time_unit_named, unit_named, unit_of
 
 SIGNALS = ("command", "pressure", "curvature", "output", "reference")
-_TIME = frozenset("t time zeit timestamp stamp clock sec seconds secs ms tiempo temps x".split())
 _RUN = frozenset(
     "run runs experiment exp trial test segment session series versuch messung lauf essai prueba "
     "ensayo".split()
@@ -117,7 +116,7 @@ def time_of(table: LogTable) -> str | None:
 
 def is_time_named(name: str) -> bool:
     """Whether a column's name says that it is time."""
-    return bool(set(Column(name, "s", np.empty(0)).words) & _TIME)
+    return bool(set(Column(name, "s", np.empty(0)).words) & TIME_WORDS)
 
 
 def is_dated(table: LogTable, name: str) -> bool:

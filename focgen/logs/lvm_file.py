@@ -17,6 +17,7 @@ from focgen.errors import LogError
 from focgen.logs.dialect import lines_of
 from focgen.logs.table import LARGEST, LogTable, check_units
 from focgen.logs.text_file import decoded, table_of
+from focgen.logs.units import TIME_WORDS
 from focgen.textfile import read_log_bytes
 
 _END = "***End_of_Header***"
@@ -116,11 +117,10 @@ def _unit_of_time(path: Path, segments: Sequence[_Segment]) -> dict[str, str]:
     """The unit of the column of X values, where the file gives one. Raises LogError where these are no time:
     the frequencies of a spectrum."""
     said = [s.settings.get("X_Dimension", [""])[0].strip() for s in segments]
-    other = next((what for what in said if what.lower() == "frequency"), None)
+    other = next((what for what in said if what and what.lower() not in TIME_WORDS), None)
     if other:
-        raise LogError(
-            str(path), f"goes over {other.lower()}, not over time", "save what was measured over time"
-        )
+        what = f"goes over {other.lower()}, not over time"
+        raise LogError(str(path), what, "save what was measured over time, or write Time as X_Dimension")
     given = [{_TIME: (s.settings.get("X_Unit_Label") or [""])[0]} for s in segments]
     check_units(path, given)
     return {name: unit for name, unit in given[0].items() if unit}

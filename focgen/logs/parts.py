@@ -34,6 +34,7 @@ class Raw:
     values: Mapping[str, Array]
     line: clock.Line
     notes: tuple[str, ...] = ()
+    reading: clock.Reading = clock.Reading.TOLD
 
     def __len__(self) -> int:
         return len(self.time)
@@ -132,6 +133,7 @@ def _windowed(run: Raw, window: Window) -> Raw:
 def _uncut(run: Raw, sample_time: float) -> Iterator[tuple[Raw, bool]]:
     """Yield (part, whether the rig ran unseen before it) for each part between long holes."""
     clock.check_unit(run.time, sample_time, run.stamps)
+    clock.check_reading(run.time, sample_time, run.stamps, run.reading)
     kept = missing.keep(run.values, run.time)
     _check_present(run, kept)
     run = replace(run, values={role: run.values[role] for role in kept.roles})

@@ -13,6 +13,7 @@ import numpy as np
 
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
+from focgen.logs import clock
 from focgen.logs.cells import Levels
 from focgen.logs.dialect import MISSING
 from focgen.logs.experiment import Experiment
@@ -20,11 +21,12 @@ from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.scales import Scale, known, same, unit_of_time
-from focgen.logs.table import LogTable, read_table, stem
+from focgen.logs.table import LogTable, in_seconds, read_table, stem
 from focgen.logs.units import time_unit_named, unit_of
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
+_ONE_CLOCK = 0.02  # relative: so far apart are the steps of one clock
 _DATED = 1e8  # s: a clock this far on counts from 1970, no other one does
 _MOVED = "placed by its time stamps, not in the order given"
 _GIVE = "give a path, a frame, a dictionary of arrays, or a list of these"
@@ -118,9 +120,10 @@ def _experiments(
     """Yield (path, experiment) for each run of a log, or part of one."""
     columns, notes = _present(table, signals)
     time, said = _time(table, signals)
+    reading = _reading(table, signals)
     notes = (*table.notes, *said, *notes)
     for name, rows in _runs(table, signals.run):
-        run = Raw(name, table.path, "", time, columns, table.line, notes).part(rows)
+        run = Raw(name, table.path, "", time, columns, table.line, notes, reading).part(rows)
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
         run = replace(run, where=where, stamps=f"{where} [{signals.time}]")
         for experiment in experiments_of(run, sample_time, window):
@@ -131,11 +134,43 @@ def _time(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
     """The time stamps (m,) in s, and a note where no column gives them."""
     if signals.time in table:
         said = _time_unit_note(table, signals)
-        return _scaled(table, "time", table.seconds(signals.time), signals), said
+        scale = signals.scales.get("time")
+        found = table.seconds(signals.time, told=scale is not None)
+        if table.is_dated(signals.time) and scale is not None and scale.unit is not None:
+            return found, said  # a date is what it is, in whatever unit other logs count
+        found = _scaled(table, "time", found, signals)
+        if scale is None:
+            _check_one_clock(table, signals.time, found)
+        return found, said
     if table.clock is None:
         raise table.missing("time", signals.time, {signals.run or "", *signals.columns().values()})
     step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
     return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
+
+
+def _check_one_clock(table: LogTable, name: str, time: Array) -> None:
+    """Raise LogError where a column of time and the clocks that the file gives its channels contradict each
+    other: the rows would be of the one or of the other."""
+    differs = "holds a time beside channels whose clocks differ, so a row is not of one time"
+    what = differs if table.differing else ""
+    if table.clock is not None and len(time) > 1:
+        step, own = (float(np.median(np.diff(t))) for t in (time, table.clock))
+        if own > 0.0 and not abs(step / own - 1.0) <= _ONE_CLOCK:
+            what = f"has {step:g} s between samples where the log's own clock has {own:g} s"
+    if what:
+        remedy = f"log all channels by one clock, or, where the column is right, {in_seconds(name)}"
+        raise LogError(f"{table.path} [{name}]", what, remedy)
+
+
+def _reading(table: LogTable, signals: Roles) -> clock.Reading:
+    """What tells that the time is in seconds, or what else it may be."""
+    name = signals.time
+    if name not in table or signals.scales.get("time") is not None:
+        return clock.Reading.TOLD
+    if table.is_dated(name):
+        return clock.Reading.STAMPS
+    said = unit_of_time(table.unit(name) or time_unit_named(name) or "")
+    return clock.Reading.TOLD if said is not None else clock.Reading.NUMBERS
 
 
 def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
@@ -144,7 +179,10 @@ def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
     name, scale = signals.time, signals.scales.get("time")
     given = table.unit(name) or time_unit_named(name) or "s"
     taken = (scale.unit or "") if scale else "s"
-    if given == taken or not taken or table.is_dated(name):
+    if table.is_dated(name):
+        what = f"{name!r} holds dates or times of day, which are not in {taken}, as the rig has it"
+        return () if taken in ("", "s") else (what,)
+    if given == taken or not taken:
         return ()
     own, other = unit_of_time(given), unit_of_time(taken)
     if own is None or other is None or own[1] == other[1]:

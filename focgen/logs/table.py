@@ -118,9 +118,9 @@ class LogTable:
         column = self.column(name)
         return column if isinstance(column, Levels) else Levels.of(self.texts(name))
 
-    def seconds(self, name: str) -> Array:
+    def seconds(self, name: str, told: bool = False) -> Array:
         """A column of time (m,): numbers as they are, ISO dates and times of day in s. Raises LogError for a
-        cell that is none of these.
+        cell that is none of these, and where it may be read otherwise, unless the rig has ``told`` its unit.
         """
         column = self.column(name)
         if not isinstance(column, np.ndarray) and _is_dated(column):
@@ -130,24 +130,25 @@ class LogTable:
                 what = f"has a time that cannot be read ({reason})"
                 remedy = "write it as 2026-01-31T12:00:00.000, or in seconds"
                 raise LogError(f"{self.path} [{name}]", what, remedy) from None
-            self._check_seconds(name, found)
+            if not told and stamps.skips_seconds(found):
+                what = "lacks the same seconds of every minute: it may be mm:ss and frames, read as hh:mm:ss"
+                raise self.two_readings(name, what, "write it as 12:00:59.98")
             return found
         values = self.numbers(name)
-        if stamps.is_packed(values):
+        if not told and stamps.is_packed(values):
             what = "counts to 59 and goes on at 100: it may be a time of day as hhmmss"
-            raise LogError(f"{self.path} [{name}]", what, "write it as 12:00:59.98, or in seconds")
+            raise self.two_readings(name, what, "write it as 12:00:59.98")
         return values
+
+    def two_readings(self, name: str, what: str, otherwise: str) -> LogError:
+        """The error for a column of time that may be seconds or something else: the rig can tell which."""
+        remedy = f"{otherwise}, or, where it is no such thing, {in_seconds(name)}"
+        return LogError(f"{self.path} [{name}]", what, remedy)
 
     def is_dated(self, name: str) -> bool:
         """Whether a column is one of dates or times of day, in text."""
         column = self.column(name)
         return not isinstance(column, np.ndarray) and _is_dated(column)
-
-    def _check_seconds(self, name: str, found: Array) -> None:
-        """Raise LogError where times of day may be minutes, seconds and frames."""
-        if stamps.skips_seconds(found):
-            what = "lacks the same seconds of every minute: it may be mm:ss and frames, read as hh:mm:ss"
-            raise LogError(f"{self.path} [{name}]", what, "write it as 12:00:59.98, or in seconds")
 
     def numbers(self, name: str) -> Array:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no
@@ -184,6 +185,11 @@ class LogTable:
         return LogError(
             f"{self.path} [{name}]", f"holds {cell!r} in {self.line(row)}, which is no number", remedy
         )
+
+
+def in_seconds(name: str) -> str:
+    """What to write where a column of time is in seconds, and does not say so."""
+    return f"write time = {{ column = {name!r}, unit = 's' }} in the rig's [signals]"
 
 
 def check_units(path: Path, units: Sequence[Mapping[str, str]]) -> None:

@@ -17,8 +17,10 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
 from focgen.logs.columns import is_time_named
+from focgen.logs.scales import unit_of_time
 from focgen.logs.stamps import of_numpy
 from focgen.logs.table import LARGEST, LogTable, check_units
+from focgen.logs.units import TIME_WORDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +50,8 @@ def read(path: Path) -> LogTable:
     log_manager.set_level(logging.ERROR)  # what it warns of is refused below, in one line
     path.open("rb").close()
     try:
-        groups = [_group(group) for group in nptdms.TdmsFile.read(path).groups()]
-    except MemoryError:
+        groups = [_group(path, group) for group in nptdms.TdmsFile.read(path).groups()]
+    except (LogError, MemoryError):
         raise
     except Exception:  # noqa: BLE001 - nptdms has no error of its own for damaged files
         raise LogError(str(path), "is not a whole TDMS file", "write it again") from None
@@ -62,7 +64,9 @@ def read(path: Path) -> LogTable:
     return _one_after_the_other(path, groups) if runs else _side_by_side(path, groups)
 
 
-def _group(group: Any) -> _Group:
+def _group(path: Path, group: Any) -> _Group:
+    for channel in group.channels():
+        _check_over_time(path, channel.properties)
     found = {c.name: (c, of_numpy(np.asarray(c[:]))) for c in group.channels()}
     channels = {name: values for name, (_, values) in found.items() if len(values)}
     units = {name: str(c.properties.get("unit_string", "")) for name, (c, _) in found.items()}
@@ -78,14 +82,25 @@ def _common(clocks: Sequence[Array | None]) -> Array | None:
     return known[0] if known and all(np.array_equal(clock, known[0]) for clock in known) else None
 
 
+def _check_over_time(path: Path, properties: Mapping[str, Any]) -> None:
+    """Raise LogError for a waveform over something else than time, as the frequencies of a spectrum."""
+    name, unit = (str(properties.get(f"wf_x{key}", "")).strip() for key in ("name", "unit_string"))
+    named = not name or not {word.lower() for word in name.split()}.isdisjoint(TIME_WORDS)
+    if not named or (unit and unit_of_time(unit) is None):
+        what = f"goes over {' in '.join(filter(None, (name, unit)))}, not over time"
+        raise LogError(str(path), what, "save what was measured over time, or name it Time, in s")
+
+
 def _clock(properties: Mapping[str, Any], count: int) -> Array | None:
     """The time (m,) in s that a waveform's properties give: from its start, where that is known."""
-    step = float(properties.get("wf_increment", 0.0))
+    unit = unit_of_time(str(properties.get("wf_xunit_string", "")).strip() or "s")
+    scale = unit[1] if unit is not None else 1.0
+    step = scale * float(properties.get("wf_increment", 0.0))
     if not 0.0 < step <= LARGEST:
         return None
     start = properties.get("wf_start_time")
     begin = of_numpy(np.array([start], "datetime64[us]"))[0] if start is not None else 0.0
-    return begin + float(properties.get("wf_start_offset", 0.0)) + step * np.arange(count)
+    return begin + scale * float(properties.get("wf_start_offset", 0.0)) + step * np.arange(count)
 
 
 def _check_lengths(path: Path, columns: Mapping[str, Array]) -> None:

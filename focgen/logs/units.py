@@ -18,9 +18,13 @@ _OTHERS = frozenset("mm cm m um N mN kN Nm s ms Hz rpm K C pct".split())  # thes
 _SPELLED = {"permm": "1/mm", "percm": "1/cm", "perm": "1/m", "1pm": "1/m", "1pmm": "1/mm", "hpa": "mbar"}
 _TIMES = frozenset("ns us µs μs ms msec s sec secs seconds min mins minutes h hr hrs hours day days".split())
 _ALONE = frozenset("s h min day".split())  # names of other things as well
+TIME_WORDS = frozenset("t time zeit timestamp stamp clock sec seconds secs ms tiempo temps x".split())
+"""Words that a column of time is named by."""
 _PRESSURES = frozenset("p pressure press druck presion chamber".split())
-_ANGLES = frozenset("angle theta bend bending curvature curv kappa flex winkel".split())
-_LETTERS = {"A": _PRESSURES | _ANGLES, **dict.fromkeys("msNKC", _PRESSURES)}  # of a channel, or of a word
+_CURRENTS = frozenset(
+    "i current strom courant corriente valve coil solenoid motor pump heater drive u cmd command".split()
+)
+_LETTERS = dict.fromkeys("msNKC", _PRESSURES)  # of a channel, or of a word
 _ANY_CASE = ("bar", "kPa", "mbar", "psi", "rad", "deg", "1/mm", "1/cm", "1/m")  # a name in v is no voltage
 
 
@@ -43,9 +47,13 @@ def unit_of(text: str) -> tuple[str, str] | None:
 
 
 def _is_letter(column: str) -> bool:
-    """Whether a name ends in a letter that is no unit of what it names: the pressure of chamber A."""
+    """Whether a name ends in a letter that is no unit of what it names: the pressure of chamber A. An A is
+    ampere only where the name speaks of what a current goes through."""
     *words, last = re.split(r"[\s_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column).strip())
-    return not _LETTERS.get(last, frozenset()).isdisjoint(word.lower().rstrip("0123456789") for word in words)
+    bare = {word.lower().rstrip("0123456789") for word in words}
+    if last == "A" and words:
+        return bare.isdisjoint(_CURRENTS)
+    return not bare.isdisjoint(_LETTERS.get(last, frozenset()))
 
 
 def time_unit_named(column: str) -> str | None:
@@ -53,14 +61,19 @@ def time_unit_named(column: str) -> str | None:
 
     >>> time_unit_named("t_us"), time_unit_named("Zeit [h]"), time_unit_named("TimeMs")
     ('us', 'h', 'ms')
+    >>> time_unit_named("t/min"), time_unit_named("t_atoms"), time_unit_named("n U/min")
+    ('min', None, None)
     """
     if bracketed := re.search(r"[\[(]([^\[\]()]+)[\])]\s*$", column):
         return bracketed[1].strip()
     words = re.split(r"[\s_.\-]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column).strip())
+    over, slash, under = column.rpartition("/")  # as German standards write it: t / min
+    if slash and over.strip().lower() in TIME_WORDS:
+        words = [over, under.strip()]
     last = words[-1].lower()
     if last in _TIMES:
         return last if len(words) > 1 or last not in _ALONE else None
-    return "ms" if last.endswith("ms") else None
+    return "ms" if last.endswith("ms") and last[:-2] in TIME_WORDS else None
 
 
 def unit_named(column: str | None) -> str:

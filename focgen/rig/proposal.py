@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -203,7 +204,9 @@ def _next(files: Sequence[str], roles: Mapping[str, Column], out: str | Path | N
         rig = "proposal.rig" if out is None else _quoted(str(out))
         return f"focgen.identify({rig}, logs{asked})"
     asked = f" --stages {','.join(stages)}" if len(stages) > 1 else ""
-    return f"focgen identify {' '.join(files)} --rig {out or 'rig.toml'}{asked} --out identified.toml"
+    named = " ".join(shlex.quote(f"./{file}" if file.startswith("-") else file) for file in files)
+    rig = shlex.quote(str(out or "rig.toml"))  # a shell takes what is pasted at its word
+    return f"focgen identify {named} --rig {rig}{asked} --out identified.toml"
 
 
 def _text(

@@ -117,6 +117,61 @@ def test_dates_of_which_some_have_a_zone_are_refused(tmp_path):
     assert np.allclose(np.diff(read_table(log(tmp_path, mixed)).seconds("t")), 0.05)
 
 
+@pytest.mark.parametrize(
+    "times, step, may_be",
+    [
+        (np.arange(COUNT), 0.05, "a count of samples or of ticks"),
+        (2 * np.arange(COUNT), 0.05, "a count of samples or of ticks"),
+        ([f"{t / 60:.8f}" for t in SECONDS], 0.05, "minutes"),
+        ([f"{k // 3600:02d}:{k // 60 % 60:02d}:{k % 60:02d}" for k in range(COUNT)], 1 / 60, "frames"),
+    ],
+    ids=["samples", "ticks", "minutes", "frames"],
+)
+def test_a_clock_that_fits_the_rig_otherwise_is_no_seconds_until_the_rig_says_so(
+    tmp_path, times, step, may_be
+):
+    """A factor of 20 or 60 passed for a log of another rate. What is refused has a door."""
+    path = log(tmp_path, times)
+    with pytest.raises(LogError, match=f"may be .*{may_be}"):
+        read_logs(path, PLAIN, step)
+    (found,) = read_logs(path, Signals("t", "y", None, "p", scales={"time": Scale(unit="s")}), step)
+    assert len(found) == COUNT and "kept so" in found.notes[-1]
+
+
+def test_whole_seconds_pass_at_the_rate_of_the_rig_and_where_the_file_says_so(tmp_path):
+    path = log(tmp_path, range(COUNT))
+    assert read_logs(path, PLAIN, 1.0)[0].sample_time == 1.0
+    path = log(tmp_path, range(COUNT), "t (s),p,y")
+    assert read_logs(path, PLAIN, 0.1)[0].sample_time == 1.0
+    path = log(tmp_path, [f"{0.01 * k:.2f}" for k in range(COUNT)])
+    assert read_logs(path, PLAIN, 0.05)[0].sample_time == 0.01
+
+
+@pytest.mark.parametrize(
+    "times, step",
+    [
+        ([f"{100 * (k // 200) + 0.3 * (k % 200):.1f}" for k in range(COUNT)], 0.3),
+        ([f"12:{k // 20:02d}:{k % 20:02d}" for k in range(COUNT)], 1.0),
+    ],
+    ids=["a minute in each 100 s", "20 s in each minute"],
+)
+def test_the_rig_opens_what_looks_like_another_clock(tmp_path, times, step):
+    path = log(tmp_path, times)
+    with pytest.raises(LogError, match="unit = 's'"):
+        read_logs(path, PLAIN, step)
+    found = read_logs(path, Signals("t", "y", None, "p", scales={"time": Scale(unit="s")}), step)
+    assert len(found) > 1 and {e.sample_time for e in found} == {step}
+
+
+@pytest.mark.parametrize("unit", ["min", "ms", "s"])
+@pytest.mark.parametrize("form", ["2026-01-31T12:00:{:06.3f}", "12:00:{:06.3f}"])
+def test_the_unit_of_other_logs_does_not_scale_dates(tmp_path, unit, form):
+    """Minutes, as the rig has it for its other logs, made 0.05 s of a date 3 s."""
+    signals = Signals("t", "y", None, "p", scales={"time": Scale(unit=unit)})
+    (found,) = read_logs(log(tmp_path, [form.format(t) for t in SECONDS]), signals, 0.05)
+    assert found.sample_time == 0.05 and len(found.notes) == (unit != "s")
+
+
 # --------------------------------------------------------------------------------------------------- numbers
 
 
@@ -173,7 +228,20 @@ def test_what_swings_or_rests_stands_for_itself(swing):
 
 
 @pytest.mark.parametrize(
-    "name", ["p_A", "chamber_pressure_A", "p_m", "angle_A", "kappa_A", "p_s", "p1_A", "p A", "pSet_A"]
+    "name",
+    [
+        "p_A",
+        "chamber_pressure_A",
+        "p_m",
+        "angle_A",
+        "kappa_A",
+        "p_s",
+        "p1_A",
+        "p A",
+        "pSet_A",
+        "sensor_A",
+        "force_A",
+    ],
 )
 def test_the_letter_of_a_channel_is_no_unit(name):
     """The pressure of chamber A was in ampere, without a word."""
@@ -198,6 +266,52 @@ def test_x_values_of_labview_have_the_unit_that_the_file_gives(tmp_path):
     path = tmp_path / "log.lvm"
     path.write_text(lvm(".", "One", 1).replace("X_Dimension\t", "X_Unit_Label\tmin\tmin\nX_Dimension\t"))
     assert read_lvm(path).unit("X_Value") == "min"
-    path.write_text(lvm(".", "One", 1).replace("X_Dimension\tTime", "X_Dimension\tFrequency"))
-    with pytest.raises(LogError, match="goes over frequency"):
-        read_lvm(path)
+    for other in ("Frequency", "Frequenz", "Fréquence"):
+        path.write_text(lvm(".", "One", 1).replace("X_Dimension\tTime", f"X_Dimension\t{other}"))
+        with pytest.raises(LogError, match="goes over fr"):
+            read_lvm(path)
+    path.write_text(lvm(".", "One", 1).replace("X_Dimension\tTime", "X_Dimension\tZeit"))
+    assert len(read_lvm(path))
+
+
+def tdms(path, **properties):
+    """A channel of time beside two waveforms; ``properties`` are those of the pressure."""
+    nptdms = pytest.importorskip("nptdms")
+    own = {"wf_increment": 0.05, "wf_start_offset": 0.0}
+    with nptdms.TdmsWriter(str(path)) as writer:
+        columns = ("t", {}), ("p", own | properties), ("y", own)
+        writer.write_segment(
+            [nptdms.ChannelObject("g", n, SECONDS, properties=own_of) for n, own_of in columns]
+        )
+    return path
+
+
+@pytest.mark.parametrize(
+    "properties, said",
+    [
+        ({"wf_start_offset": 1.0}, "clocks differ"),
+        ({"wf_increment": 0.1}, "clocks differ"),
+        ({"wf_xname": "Frequency", "wf_xunit_string": "Hz"}, "goes over Frequency in Hz"),
+        ({"wf_xunit_string": "ms"}, "clocks differ"),
+    ],
+    ids=["another start", "another step", "a spectrum", "another unit"],
+)
+def test_a_channel_of_time_does_not_hide_the_clocks_of_waveforms(tmp_path, properties, said):
+    """A second between pressure and output, as a dead time that no rig has."""
+    with pytest.raises(LogError, match=said):
+        read_logs(tdms(tmp_path / "log.tdms", **properties), PLAIN, 0.05)
+
+
+def test_the_rig_says_that_a_channel_of_time_is_right(tmp_path):
+    signals = Signals("t", "y", None, "p", scales={"time": Scale(unit="s")})
+    path = tdms(tmp_path / "log.tdms", wf_start_offset=1.0)
+    assert len(read_logs(path, signals, 0.05)[0]) == COUNT
+    assert len(read_logs(tdms(path), PLAIN, 0.05)[0]) == COUNT
+
+
+def test_waveforms_have_the_unit_that_the_file_gives(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    own = {"wf_increment": 0.05 / 60.0, "wf_start_offset": 0.0, "wf_xname": "Time", "wf_xunit_string": "min"}
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        writer.write_segment([nptdms.ChannelObject("g", n, SECONDS, properties=own) for n in "py"])
+    assert read_logs(tmp_path / "log.tdms", PLAIN, 0.05)[0].sample_time == 0.05

@@ -6,6 +6,7 @@ Red when a column gets the wrong role without a doubt being said.
 import io
 import json
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -196,6 +197,16 @@ def test_names_from_strangers_stay_names(tmp_path):
     assert (
         odd in (found.rig.signals.output, found.rig.signals.command) or odd.replace("\n", " ") in found.text
     )
+
+
+@pytest.mark.parametrize("name", ["a; id $(id) `id`.csv", "two words.csv", "it's.csv"])
+def test_the_next_command_names_the_log_to_a_shell(tmp_path, name):
+    """A log from a stranger is called as he likes: pasted, its name ran."""
+    path = tmp_path / name
+    rows = [f"{t},{u},{y}" for t, u, y in zip(TIME, HELD, ANSWER)]
+    path.write_text("\n".join(["t_s,u_V,y", *rows]))
+    words = shlex.split(focgen.init(path, tmp_path / "a $(id).toml").next)
+    assert words[2] == str(path) and words[4] == str(tmp_path / "a $(id).toml")
 
 
 def test_the_command_writes_a_rig_that_identify_takes(tmp_path, capsys):
