@@ -173,7 +173,7 @@ def test_a_signal_is_freed_of_its_noise_where_its_model_holds():
 
 
 def test_what_a_freed_signal_may_be_off_by_is_as_large_as_what_stays_in_it():
-    """What is smoothed a little keeps noise of a known size; what is simulated has lost what inputs predict."""
+    """What is smoothed keeps noise of a known size; what is simulated has lost what inputs predict."""
     problem, clean = actuator(), actuator(noise=0.0).segment.y
     segment, none = problem.segment, np.zeros(len(clean))
     for left in (0.2, 0.5):
