@@ -22,7 +22,8 @@ from focgen.rig.effects import library
 class AcceptanceCriteria:
     """What an effect has to show to be one. ``threshold``: nats of evidence that noise alone does not reach;
     ``carried``: the mean square, as a share of the output's level, of what the output may lack for what its
-    input has lost; ``noise`` (n,): what stays in that of its noise; ``converter``: that hides small ones. ``granted``: it is there, and only its strength is asked."""
+    input has lost; ``noise`` (n,): what stays in that of its noise; ``converter``: that hides small ones.
+    ``granted``: it is there, and only its strength is asked."""
 
     threshold: float
     carried: float
