@@ -229,9 +229,13 @@ def _interruptible():
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
-def test_an_interrupted_and_a_killed_study_go_on(alone, tmp_path):
+@pytest.mark.parametrize(
+    "ends", [(signal.SIGKILL,), pytest.param((signal.SIGINT, signal.SIGKILL), marks=pytest.mark.long)]
+)
+def test_an_interrupted_and_a_killed_study_go_on(alone, tmp_path, ends):
     command, rows = _files(tmp_path), {}
-    for how, status in ((signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)):
+    for how in ends:
+        status = 130 if how == signal.SIGINT else -how
         pipes = dict(stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         process = subprocess.Popen(command, preexec_fn=_interruptible, **pipes)
         _some_rows(tmp_path, process, len(rows) + 2)

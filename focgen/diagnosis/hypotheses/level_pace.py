@@ -18,8 +18,8 @@ _PART = 1.0 / 3.0  # of the uncertainty of a time: a standard deviation, of whic
 
 
 def level_pace(rig: Rig, segment: Segment) -> np.ndarray | None:
-    """What the output (n,) is another by, in its unit, where a stage is slower at its largest level than at 0,
-    by a third of the uncertainty of its time. None where no stage of the segment has dynamics.
+    """What the output (n,) is another by, in its unit, where a stage is slower at its largest level than at
+    0, by a third of the uncertainty of its time. None where no stage of the segment has dynamics.
 
     To first order: with Q y = g u − y, g the gain, a factor 1 + c y/max|y| of Q is c y/max|y| (y/g − u) more
     of u.
