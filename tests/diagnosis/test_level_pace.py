@@ -73,8 +73,4 @@ def test_a_loop_is_no_such_time():
         return np.array(made)
 
     found = diagnose(rig("transfer"), logs(play, 2e-3), pictures=False)
-    assert found.verdict in ("named", "set")
-    assert (
-        "hysteresis" in found.causes[0].candidates[0].effect
-        or "dead_zone" == found.causes[0].candidates[0].effect
-    )
+    assert found.causes and "hysteresis" in found.causes[0].candidates[0].effect
