@@ -20,7 +20,7 @@ from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.decimate import decimated
 from focgen.diagnosis.problem.segments import cuts, make
-from focgen.diagnosis.problem.smooth import freed
+from focgen.diagnosis.problem.smooth import freed, strays
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.conclude import conclude
@@ -136,20 +136,21 @@ def explain_all(
     sessions simulated for the threshold of each; where it comes out higher than ``threshold``, the segment
     is explained anew."""
     found: list[Explanation] = []
-    roles, x, trusted = cuts(logs), None, True
+    roles, x, unsure = cuts(logs), None, None
     for entry, exit in pairwise(roles):
         segment = loosened(rig, make(logs, entry, exit, x, input_covariance(found[-1]) if found else None))
         step(f"{entry} to {exit}")
-        e = explain(rig, segment, logs, threshold, only, trusted)
+        e = explain(rig, segment, logs, threshold, only, unsure)
         if draws > 1 and e.causes and only is None:
             candidates = [c for c in candidates_for(e.segment, rig) if c.form.seen is None]
             asked = bootstrapped(e, candidates, draws, threshold)
             if min(c.gain for c in e.causes) < asked:
-                e = explain(rig, segment, logs, asked, only, trusted)
+                e = explain(rig, segment, logs, asked, only, unsure)
         found.append(e)
         problem, unknown = e.best.problem, is_unknown(e)
-        trusted = e.predictability.share < NUMBERS.much and not e.causes and not unknown
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
-        x = freed(segment, made, response, e.predictability.share, not unknown)
+        left = e.predictability.share
+        x = freed(segment, made, left, not unknown)
+        unsure = strays(segment, made, response, left, not unknown)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)

@@ -24,7 +24,7 @@ def _number(
 class Numbers:
     """Every number by which a diagnosis decides. Half and double: of 140 steps and 97 causes of 127
     tuning cases, as :mod:`focgen.diagnosis.belief` decides them on the same fits. For the odds of a second
-    form, what an input carries and the two levels of evidence: of ten cases diagnosed anew. For what makes a
+    form and the two levels of evidence: of ten cases diagnosed anew. For what makes a
     verdict ``unknown``: of 23 verdicts on the same explanations."""
 
     turns: float = _number(
@@ -57,14 +57,6 @@ class Numbers:
         "of the noise's mean square",
         "fitted",
         "1 more wrong above 0.9",
-        _SAME,
-    )
-    carried: float = _number(
-        0.05,
-        "the same behind an input that still carries noise",
-        "of the noise's mean square",
-        "healthy rigs, a noisy camera before a precise sensor",
-        _SAME,
         _SAME,
     )
     uneven: float = _number(

@@ -3,12 +3,14 @@
 Red when misfit counts as evidence for an effect, or a set is not the least that holds what it should.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from focgen.diagnosis.belief import further
 from focgen.diagnosis.belief.choice import likeliest
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
@@ -145,11 +147,33 @@ def test_free_values_that_the_experiments_cannot_show_are_not_counted():
     assert ground.odds(rich, 1) == pytest.approx(ground.odds(simple))
 
 
-@pytest.mark.parametrize("around", [{"hidden": 0.05}, {"trusted": False}])
-def test_an_uneven_converter_and_a_noisy_input_hide_small_effects(around):
+@pytest.mark.parametrize("around", [{"hidden": 0.05}, {"carried": 0.05}])
+def test_an_uneven_converter_and_an_input_that_lost_something_hide_small_effects(around):
     base, better = _fit(1.03), _fit(1.0, ["leak"])
     assert likeliest(_ground(base, [better]), [better])[1] > 0.0
     assert likeliest(_ground(base, [better], **around), [better])[1] < 0.0
+
+
+def test_to_leave_less_for_being_deaf_to_noise_of_the_input_is_no_merit(monkeypatch):
+    """Noise of 0.03 in the output comes from the input: one form keeps it out, one mends as much of a gap."""
+    base, deaf, better = _fit(1.03), _fit(1.0, ["sensor_lag"]), _fit(1.0, ["leak"])
+    answers = {base: 0.03, deaf: 0.0, better: 0.03}
+    monkeypatch.setattr(further, "answer", lambda of, *_: _COUNT * answers[of])
+    ground = replace(_ground(base, [deaf, better]), noise=np.zeros(_COUNT))
+    assert likeliest(ground, [better])[1] > 0.0 > likeliest(ground, [deaf])[1]
+    assert ground.misfit(deaf) == pytest.approx(ground.misfit(base)) and ground.misfit(better) == 0.0
+
+
+def test_an_answer_to_the_input_is_that_of_the_simulation():
+    """A stage that is 1 hands on what its input is off by."""
+    u, off = np.repeat([0.0, 1.0, 0.5], 200), np.linspace(0.0, 0.1, 600)
+    y = u + 0.01 * np.random.default_rng(3).standard_normal(600)
+    logs = [Experiment("steps", H, {"command": u, "pressure": y, "output": y})]
+    rig = Rig(Actuator(0.5, 1.0, (1.0,)), H, Signals(time="t", output="y"))
+    problem = uncertain(rig, make(logs, "command", "pressure"), logs)
+    bare = fit(problem, problem.nominal(), WHITE, 0)
+    assert further.answer(bare, off, WHITE) == pytest.approx(np.sum((off * problem.segment.weight) ** 2))
+    assert further.answer(bare, 0.0 * off, WHITE) == 0.0
 
 
 def test_the_set_is_the_least_that_holds_what_is_asked():

@@ -53,6 +53,7 @@ def session() -> list[Experiment]:
     return logs
 
 
+@pytest.mark.long
 def test_an_orifice_that_drains_a_tank_is_a_bent_gain():
     found = diagnose(TANKS, session())
     assert [c.candidates[0].effect for c in found.causes] == ["gain_nonlinearity"]

@@ -124,17 +124,20 @@ def _not_finite(kept):
     kept["answer"]["row"]["error"] = float("nan")
 
 
-@pytest.mark.parametrize("edit", [_other_number, _other_kind, _no_key, _no_seal, _not_finite])
-def test_what_was_edited_is_done_again_and_said(done, alone, tmp_path, counted, capsys, edit):
+def test_what_was_edited_is_done_again_and_said(done, alone, tmp_path, counted, capsys):
+    """Five answers, each edited in another way."""
     shutil.copytree(done, tmp_path / "out")
-    rows = (p for p in sorted((tmp_path / "out" / "rows").iterdir()) if '"row"' in p.read_text())
-    edited = next(rows)
-    kept = json.loads(edited.read_text())
-    edit(kept)
-    edited.write_text(json.dumps(kept))
+    rows = [p for p in sorted((tmp_path / "out" / "rows").iterdir()) if '"row"' in p.read_text()]
+    edits = (_other_number, _other_kind, _no_key, _no_seal, _not_finite)
+    for edited, edit in zip(rows, edits):
+        kept = json.loads(edited.read_text())
+        edit(kept)
+        edited.write_text(json.dumps(kept))
     focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
-    assert [f"{job.key}.json" for job in counted] == [edited.name]
-    assert f"{edited} is not as it was kept" in capsys.readouterr().err
+    names = sorted(p.name for p in rows[: len(edits)])
+    assert len(names) == len(edits) and sorted(f"{job.key}.json" for job in counted) == names
+    said = capsys.readouterr().err
+    assert all(f"{edited} is not as it was kept" in said for edited in rows[: len(edits)])
     assert (tmp_path / "out" / "study.json").read_text() == alone
 
 
@@ -226,9 +229,13 @@ def _interruptible():
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
-def test_an_interrupted_and_a_killed_study_go_on(alone, tmp_path):
+@pytest.mark.parametrize(
+    "ends", [(signal.SIGKILL,), pytest.param((signal.SIGINT, signal.SIGKILL), marks=pytest.mark.long)]
+)
+def test_an_interrupted_and_a_killed_study_go_on(alone, tmp_path, ends):
     command, rows = _files(tmp_path), {}
-    for how, status in ((signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)):
+    for how in ends:
+        status = 130 if how == signal.SIGINT else -how
         pipes = dict(stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         process = subprocess.Popen(command, preexec_fn=_interruptible, **pipes)
         _some_rows(tmp_path, process, len(rows) + 2)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
-from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, square_by
+from focgen.diagnosis.fitting.fit import Fit, Weighing, answer, fit, square_by
 from focgen.diagnosis.numbers import NUMBERS
 
 _STEPS = 6  # iterations of the fit that asks
@@ -17,14 +17,16 @@ _STEPS = 6  # iterations of the fit that asks
 @dataclass(frozen=True)
 class Surroundings:
     """What makes a misfit beside the forms. ``hidden``: the mean square that a coarse converter may make, as
-    a share of the level's; ``trusted``: whether the input is free of noise."""
+    a share of the level's; ``carried``: likewise what an input has lost; ``noise`` (n,): a draw of what
+    stays in the input of its noise, in its unit."""
 
     hidden: float = 0.0
-    trusted: bool = True
+    carried: float = 0.0
+    noise: np.ndarray | None = None
 
     def nats(self, count: int, noise: float) -> float:
         """Of ``count`` samples whose noise has the mean square ``noise``, a share of the level's."""
-        share = NUMBERS.other + NUMBERS.carried * (not self.trusted) + self.hidden / max(noise, 1e-300)
+        share = NUMBERS.other + (self.hidden + self.carried) / max(noise, 1e-300)
         return 0.5 * count * share
 
 
@@ -39,6 +41,10 @@ class Ground:
     judged more mildly, for every form is a little wrong. So a fit that has moved them further than noise does
     is made anew, with what is known of them weighed as much more, and the better one speaks for the
     hypothesis.
+
+    Noise that is left in an input was not in the rig. A form that answers less to it than ``base``, as a lag,
+    a dead zone or a loop does, leaves less by that alone: it is no merit (as of W. A. Fuller, Measurement
+    error models, 1987, where such noise lets a slope seem smaller than it is).
     """
 
     base: Fit
@@ -46,6 +52,8 @@ class Ground:
     changed: float
     scale: Scale
     weighing: Weighing
+    noise: np.ndarray | None = None
+    _answers: dict[Fit, float] = field(default_factory=dict, init=False)
     _found: dict[Fit, Fit] = field(default_factory=dict, init=False)
 
     @classmethod
@@ -65,11 +73,24 @@ class Ground:
         floor = best.sse * (1.0 - told)
         before = square_by(first, weighing) if base.problem.candidates else base.sse
         scale = Scale(surroundings.nats(count, noise))
-        return cls(base, floor, _nats(before - base.sse, floor, count), scale, weighing)
+        return cls(base, floor, _nats(before - base.sse, floor, count), scale, weighing, surroundings.noise)
 
     def misfit(self, of: Fit) -> float:
-        """Nats by which a fit leaves more than noise."""
-        return max(_nats(of.sse - self.floor, self.floor, len(of.innovations)), 0.0)
+        """Nats by which a fit leaves more than noise, and those by which it leaves less for being deaf."""
+        left = _nats(of.sse - self.floor, self.floor, len(of.innovations))
+        return max(left, 0.0) + self._deaf(of)
+
+    def _deaf(self, of: Fit) -> float:
+        """Nats by which a fit answers less than ``base`` to noise of the input."""
+        if self.noise is None:
+            return 0.0
+        less = self._answer(self.base, self.noise) - self._answer(of, self.noise)
+        return max(_nats(less, self.floor, len(of.innovations)), 0.0)
+
+    def _answer(self, of: Fit, noise: np.ndarray) -> float:
+        if of not in self._answers:
+            self._answers[of] = answer(of, noise, self.weighing)
+        return self._answers[of]
 
     def odds(self, of: Fit, most: int | None = None) -> float:
         """Log odds, before any prior, of a fit with one more effect over ``base``; at most ``most`` of its

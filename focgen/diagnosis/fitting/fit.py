@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -197,6 +197,17 @@ def _step(
 def problem_residual(of: Fit) -> np.ndarray:
     """Measured less simulated (n,)."""
     return of.problem.residual(of.vector)
+
+
+def answer(of: Fit, stray: np.ndarray, weighing: Weighing) -> float:
+    """The sum of squares, as of innovations, of what a fit's output is another by where its input is another
+    by ``stray`` (n,)."""
+    problem, segment = of.problem, replace(of.problem.segment, x=of.problem.segment.x + stray)
+    moved = replace(problem, segment=segment, memory={}).simulate(of.vector)
+    off = segment.recent(moved - problem.simulate(of.vector))
+    rest = segment.run.rest
+    found = innovated(off, np.zeros_like(off), segment.weight, rest, weighing.coarse, weighing.ar)
+    return float(found @ found)
 
 
 def square_by(of: Fit, weighing: Weighing) -> float:

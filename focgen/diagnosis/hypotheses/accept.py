@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from focgen.diagnosis.belief.choice import likeliest
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.fitting.fit import Fit, Weighing
@@ -19,18 +21,20 @@ from focgen.rig.effects import library
 @dataclass(frozen=True)
 class AcceptanceCriteria:
     """What an effect has to show to be one. ``threshold``: nats of evidence that noise alone does not reach;
-    ``trusted``: whether the input could be freed of its noise; ``converter``: that hides small ones.
+    ``carried``: the mean square, as a share of the output's level, of what the output may lack for what its
+    input has lost; ``noise`` (n,): what stays in that of its noise; ``converter``: that hides small ones.
     ``granted``: it is there, and only its strength is asked."""
 
     threshold: float
-    trusted: bool
+    carried: float
+    noise: np.ndarray | None
     converter: Converter | None
     granted: bool = False
 
     @property
     def surroundings(self) -> Surroundings:
         """What makes a misfit beside the forms."""
-        return Surroundings(self.converter.uneven**2 if self.converter else 0.0, self.trusted)
+        return Surroundings(self.converter.uneven**2 if self.converter else 0.0, self.carried, self.noise)
 
 
 def select(rankings: Sequence[Ranking], criteria: AcceptanceCriteria) -> Fit | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, answer, fit
 from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.fitting.predictability import Predictability, predictability
 from focgen.diagnosis.fitting.realign import realigned
@@ -21,6 +21,7 @@ from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import Segment, is_single, owner
+from focgen.diagnosis.problem.smooth import Strays
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.present import present
@@ -157,19 +158,19 @@ def explain(
     logs: Sequence[Experiment],
     threshold: float,
     only: Sequence[str] | None = None,
-    trusted: bool = True,
+    unsure: Strays | None = None,
 ) -> Explanation:
     """Find the segment's effects; ``threshold``: nats of evidence that noise alone does not reach.
 
-    ``only``: the effects to consider, of which each that finds anything to mend is taken; ``trusted``:
-    whether the input could be freed of its noise.
+    ``only``: the effects to consider, of which each that finds anything to mend is taken; ``unsure``:
+    what the input may be off by, where it is not as logged.
     """
     problem = uncertain(rig, segment, logs)
-    found = _explained(rig, problem, threshold, only, trusted)
+    found = _explained(rig, problem, threshold, only, unsure)
     if problem.segment.pace and not found.causes:
         segment = replace(problem.segment, pace=_KEPT * problem.segment.pace)
         kept = replace(problem, segment=segment, memory={})
-        other = _explained(rig, kept, threshold, only, trusted)
+        other = _explained(rig, kept, threshold, only, unsure)
         problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
     if not found.strained or problem.nominals.far or found.predictability.share < NUMBERS.left:
         return found
@@ -180,7 +181,7 @@ def explain(
     beside = freed.with_candidates(found.best.problem.candidates)
     if beside.candidates and np.mean(fit(beside, found.best.vector, Weighing(found.ar)).weighed ** 2) > asked:
         return found
-    other = _explained(rig, freed, threshold, only, trusted)
+    other = _explained(rig, freed, threshold, only, unsure)
     return other if other.square < asked else found
 
 
@@ -195,13 +196,14 @@ def _borne_out(kept: Explanation, usual: Explanation) -> bool:
 
 
 def _explained(
-    rig: Rig, problem: Problem, threshold: float, only: Sequence[str] | None, trusted: bool
+    rig: Rig, problem: Problem, threshold: float, only: Sequence[str] | None, unsure: Strays | None
 ) -> Explanation:
     candidates, guests = candidates_for(problem.segment, rig), guests_in(problem.segment, rig)
     if only is not None:
         candidates, guests, threshold = [c for c in candidates if c.effect in only], [], 0.0
     given, converter = problem.nominal(), converter_of(problem, candidates)
-    asked = AcceptanceCriteria(threshold, trusted, converter, only is not None)
+    carried, noise = (0.0, None) if unsure is None else (_carried(problem, given, unsure.lost), unsure.noise)
+    asked = AcceptanceCriteria(threshold, carried, noise, converter, only is not None)
     rankings, candidates = _grown(problem, given, candidates, guests, asked)
     weighing = Weighing(rankings[-1].ar)
     best = _dropped(rankings[-1].base, weighing, threshold)
@@ -231,6 +233,13 @@ def _explained(
         errors,
         converter,
     )
+
+
+def _carried(problem: Problem, vector: np.ndarray, lost: np.ndarray) -> float:
+    """The mean square, as a share of the output's level, of what the output lacks where the input has
+    ``lost`` (n,)."""
+    fitted = fit(problem, vector, WHITE, 0)
+    return answer(fitted, lost, WHITE) / len(lost)
 
 
 def _between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:

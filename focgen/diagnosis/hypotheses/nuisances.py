@@ -14,6 +14,7 @@ import numpy as np
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.fitting.integrating import pace
 from focgen.diagnosis.hypotheses.disturbance import disturbance
+from focgen.diagnosis.hypotheses.level_pace import level_pace
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.problem import Problem
@@ -33,7 +34,7 @@ _RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth c
 
 def uncertain(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     """The segment's problem without effects, with all that explains a log without one let go."""
-    return _widened(_gauged(_zeroed(_held(rig, segment, logs))))
+    return _widened(_gauged(_zeroed(_paced(_held(rig, segment, logs)))))
 
 
 def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
@@ -76,6 +77,18 @@ def _zeroed(problem: Problem) -> Problem:
     if problem.segment.pace or len(problem.segment.run.spans) < 2:
         return problem
     return _where_all(problem, replace(problem, uneven=True, memory={}))
+
+
+def _paced(problem: Problem) -> Problem:
+    """The problem with a pace that depends on the level, as much as the pace itself may be off, where that is
+    all there is. Where errors add up there is no pace."""
+    if problem.segment.pace or not seems_more(problem, problem.nominal()):
+        return problem
+    column = level_pace(problem.nominals.rig, problem.segment)
+    if column is None:
+        return problem
+    segment = replace(problem.segment, loose=np.column_stack([problem.segment.loose, column]))
+    return _where_all(problem, replace(problem, segment=segment, memory={}))
 
 
 def _gauged(problem: Problem) -> Problem:

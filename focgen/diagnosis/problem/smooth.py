@@ -1,10 +1,13 @@
 """A measured signal freed of its noise, to be the next stage's input.
 
 Noise in an input looks like a lag of the stage behind it. What the stage before is simulated to give is free
-of noise; what it lacks is added back, smoothed by the colour of the noise.
+of noise; what it lacks is added back, smoothed a little. How much noise stays is known as well.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -14,19 +17,52 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import Segment
 
 
-def freed(segment: Segment, simulated: np.ndarray, response: float, left: float, noise: bool) -> np.ndarray:
-    """The segment's output: as simulated, plus the residual below the pace of the rig; ``response`` in s.
+def freed(segment: Segment, simulated: np.ndarray, left: float, noise: bool) -> np.ndarray:
+    """The segment's output: as simulated, plus the residual less its quickest noise.
 
-    ``left``: the share of the residual that inputs predict; where there is one, or the residual is not but
-    ``noise`` (it hums, comes in bursts), little is smoothed away; else all that is not predicted.
+    ``left``: the share of the residual that inputs predict. Where it is small, and the residual is nothing
+    but ``noise`` (no hum, no bursts), the simulation alone.
     """
-    if noise and left < NUMBERS.left:
+    if _is_explained(left, noise):
         return simulated
-    residual = segment.parts(segment.y - simulated)
-    if left > NUMBERS.left or not noise:
-        slow = [savgol_filter(p, 7, 3) if len(p) > 7 else p for p in residual]
-    else:
-        width = max(4.0, 0.15 * response / segment.run.h)
-        slow = [gaussian_filter1d(part, min(width, len(part) / 6), mode="nearest") for part in residual]
-    made: np.ndarray = simulated + np.concatenate(slow)
+    made: np.ndarray = simulated + _smoothed(segment.parts(segment.y - simulated))
     return made
+
+
+@dataclass(frozen=True, eq=False)
+class Strays:
+    """What an input that was freed of its noise may be off by (n,), in its unit, a draw of each kind: the
+    ``noise`` that stays in it, and what was ``lost`` of it, though inputs foretell that."""
+
+    noise: np.ndarray
+    lost: np.ndarray
+
+
+def strays(segment: Segment, simulated: np.ndarray, response: float, left: float, noise: bool) -> Strays:
+    """What :func:`freed` may be off by; ``response`` in s.
+
+    The residual backwards in time has the size and the colour of the noise, and nothing to do with the input.
+    Smoothed, it is what stays. Where the simulation alone is taken nothing stays; its slow part, as large as
+    what inputs predict, is what may be lost.
+    """
+    backwards = [part[::-1] for part in segment.parts(segment.y - simulated)]
+    none = np.zeros(len(segment.y))
+    if not _is_explained(left, noise):
+        return Strays(np.sqrt(max(1.0 - left, 0.0)) * _smoothed(backwards), none)
+    return Strays(none, _slow(segment, backwards, response, left))
+
+
+def _slow(segment: Segment, backwards: Sequence[np.ndarray], response: float, left: float) -> np.ndarray:
+    width = max(4.0, 0.15 * response / segment.run.h)
+    slow = np.concatenate([gaussian_filter1d(p, min(width, len(p) / 6), mode="nearest") for p in backwards])
+    most = left * sum(float(part @ part) for part in backwards)
+    made: np.ndarray = slow * np.sqrt(max(most, 0.0) / max(float(slow @ slow), 1e-300))
+    return made
+
+
+def _is_explained(left: float, noise: bool) -> bool:
+    return noise and left <= NUMBERS.left
+
+
+def _smoothed(parts: Sequence[np.ndarray]) -> np.ndarray:
+    return np.concatenate([savgol_filter(p, 7, 3) if len(p) > 7 else p for p in parts])
