@@ -1,4 +1,4 @@
-"""A time that depends on the level: as much as it is uncertain it is no effect; beyond, it is not taken for one.
+"""A time that depends on the level is no effect, as long as it is within the uncertainty of the time.
 
 Red when what a nominal time leaves of such a rig is named, or when an effect is taken for such a time.
 """
