@@ -228,11 +228,14 @@ class _Setting:
 
     def _kept(self, rest: _Try) -> Begin:
         """The first level held for ever where a log begins near rest: a valve that sticks keeps a little in
-        the rig. No less is known of it than of a rest, so neither has to earn its place."""
+        the rig. The rig has to be found where that level holds it: what is off for another reason stays so."""
         least = _APART * _white(self.x) / np.sqrt(_FIRST)
         if self.asked is not _IDLE or abs(self.level) <= max(least, _LITTLE * self.reach):
             return REST
-        return _likeliest([rest, self.at(Begin((self.level,)), 0)], self.asked.nats).begin
+        held = self.at(Begin((self.level,)), 0)
+        if np.linalg.norm(held.first) > self.asked.mended * np.linalg.norm(rest.first):
+            return REST
+        return _likeliest([rest, held], self.asked.nats).begin
 
     def _offset_explains(self, rest: _Try, tries: Sequence[_Try]) -> bool:
         """Whether a rest, with an offset of any size, is much better than any past without one."""
