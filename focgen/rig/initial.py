@@ -228,7 +228,7 @@ class _Setting:
 
     def _kept(self, rest: _Try) -> Begin:
         """The first level held for ever where a log begins near rest: a valve that sticks keeps a little in
-        the rig. The rig has to be found where that level holds it: what is off for another reason stays so."""
+        the rig. The rig has to be found where that level holds it: what is off otherwise stays so."""
         least = _APART * _white(self.x) / np.sqrt(_FIRST)
         if self.asked is not _IDLE or abs(self.level) <= max(least, _LITTLE * self.reach):
             return REST

@@ -116,7 +116,7 @@ def test_two_forms_of_one_family_carry_on_each_its_own_history():
 
 
 def test_a_pressed_play_against_tension_over_a_drum():
-    """Capstan: what is held on the far side lies between the pull by 1 − c and by 1 + c, beside an even drag."""
+    """Capstan: what is held on the far side lies between 0.7 and 1.3 of the pull, beside an even drag."""
     x = np.abs(np.cumsum(np.random.default_rng(1).normal(size=500)))
     held, expected = 0.0, []
     for pull in x:
