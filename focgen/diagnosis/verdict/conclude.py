@@ -16,7 +16,6 @@ from focgen.diagnosis.hypotheses.search import evidence as nats
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
-from focgen.diagnosis.verdict.cancelling import cancelling
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
@@ -90,11 +89,6 @@ def _cautions(rig: Rig, summary: _Summary, unknown: Sequence[Explanation]) -> It
     for e in unknown:
         if changed := another(e):
             yield f"{e.segment.entry} to {e.segment.exit}: not slowly, but at once it {_at_once(changed)}"
-        if cancelling(e.best):
-            yield (
-                f"{e.segment.entry} to {e.segment.exit}: only two curves that cancel at rest explain it; "
-                "its speed may depend on the level, which is no effect of the library"
-            )
     for e in dict.fromkeys(e for e, _ in summary.causes):
         if (changed := changed_at_once(e)) and changed.sure > 1.0 - NUMBERS.held:
             named = " and ".join(sorted(changed.instead))
