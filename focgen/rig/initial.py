@@ -5,6 +5,7 @@ The state is told by what the input was before the first sample. Tried are, from
 level; two steps from rest. A further unknown has to earn its place (Schwarz's criterion, on as many samples
 as the residual's correlation leaves). And none is tried where the first samples are those of a rig at rest:
 there it cannot have moved yet, whatever its parameters are, so that a past shows, and a misfit does not.
+But an input that rests a little off 0 was held there, where the rig shows no step to it.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ _FALLEN = 1e-4  # of the cost: less is no descent
 _APART = 5.0  # standard errors by which the first samples have to be off from rest
 _OFFSET = 4.0  # times better than any past: then a rest with an offset of any size is what there is
 _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0
+_LITTLE = 0.01  # of it: less, held before a log, does not show
 _BEYOND = 0.2  # of it: by so much earlier levels may leave the input's range
 _SHOWN = 0.3  # of a response time at 0: what is shorter shows no decay
 
@@ -210,7 +212,7 @@ class _Setting:
         noise = np.array([_white(y) for y in self.y.T])
         moved = rest.first > np.maximum(_APART * noise / np.sqrt(_FIRST), asked.off)
         if not moved.any():
-            return REST
+            return self._kept(rest)
 
         def off(t: _Try) -> float:
             return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
@@ -223,6 +225,17 @@ class _Setting:
         if sure and self._offset_explains(rest, tries):
             return REST
         return _likeliest(tries if sure else [rest, *tries], asked.nats).begin
+
+    def _kept(self, rest: _Try) -> Begin:
+        """The first level held for ever where a log begins near rest: a valve that sticks keeps a little in
+        the rig. The rig has to be found where that level holds it: what is off otherwise stays so."""
+        least = _APART * _white(self.x) / np.sqrt(_FIRST)
+        if self.asked is not _IDLE or abs(self.level) <= max(least, _LITTLE * self.reach):
+            return REST
+        held = self.at(Begin((self.level,)), 0)
+        if np.linalg.norm(held.first) > self.asked.mended * np.linalg.norm(rest.first):
+            return REST
+        return _likeliest([rest, held], self.asked.nats).begin
 
     def _offset_explains(self, rest: _Try, tries: Sequence[_Try]) -> bool:
         """Whether a rest, with an offset of any size, is much better than any past without one."""

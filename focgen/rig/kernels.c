@@ -131,6 +131,19 @@ void focgen_play(int n, const double *x, double *y, const unsigned char *rest, d
     }
 }
 
+/* Play whose half width `even` grows by `growing` of the level at which it is, starting in the middle of its slack at 0. */
+void focgen_pressed(int n, const double *x, double *y, const unsigned char *rest, double even, double growing)
+{
+    double now = 0.0;
+    for (int k = 0; k < n; k++) {
+        double width = even + growing * fabs(x[k]);
+        if (rest[k]) now = 0.0;
+        if (now < x[k] - width) now = x[k] - width;
+        if (now > x[k] + width) now = x[k] + width;
+        y[k] = now;
+    }
+}
+
 /* Stick-slip: held until x has left the band around it, then jumps to x less `left` of the band, and follows there until x turns
  * round; `anew`: it is held again at once. Where x was the same for ever, it lies `place` below x, or where coming from 0 left it. */
 void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double left, int anew, double place)

@@ -34,6 +34,8 @@ void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, d
     double tau, int soft, int sub);
 void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double
     start);
+void focgen_pressed(int n, const double *x, double *y, const unsigned char *rest, double even, double
+    growing);
 void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double
     left, int anew, double place);
 void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width);
@@ -150,6 +152,11 @@ def rate_limit(x: Array, rest: Bytes, h: float, rate: float, tau: float = 0.0, s
 def play(x: Array, rest: Bytes, width: float, start: float = 0.0) -> Array:
     """Backlash of half width ``width``, units of x."""
     return _call("focgen_play", x, rest, float(width), float(start))
+
+
+def pressed(x: Array, rest: Bytes, even: float, growing: float) -> Array:
+    """Backlash of half width ``even``, units of x, and ``growing`` of the magnitude of x more."""
+    return _call("focgen_pressed", x, rest, float(even), float(growing))
 
 
 def stick(

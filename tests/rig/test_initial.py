@@ -165,6 +165,28 @@ def test_a_held_level_is_told():
     assert told.before("pressure") == Begin((pytest.approx(0.1),))
 
 
+def kept(before):
+    """A log that begins with a pressure a little off 0, which was ``before`` for ever ahead of it."""
+    p = np.repeat([0.008, 0.18, 0.008], 120)
+    y = answer(KEEPING, p, Begin((before,)))
+    y = y + 3e-4 * np.random.default_rng(1).normal(size=len(p))
+    return Experiment("kept", H, {"command": np.where(p > 0.1, 1.8, 0.0), "pressure": p, "output": y})
+
+
+KEEPING = replace(RIG, actuator=Actuator(0.8, 1.0, (0.34,)))
+
+
+def test_what_a_valve_keeps_in_a_rig_between_logs_is_held_before_them():
+    """4 % of the pressure: too little to be off from rest by, and not nothing."""
+    (told,) = begun(KEEPING, [kept(0.008)])
+    assert told.begins == {"pressure": Begin((pytest.approx(0.008),))}
+
+
+def test_a_little_pressure_that_comes_with_the_log_was_not_held_before_it():
+    (told,) = begun(KEEPING, [kept(0.0)])
+    assert told.begins == {}
+
+
 def test_an_offset_or_a_drift_is_no_past():
     logs = session(seed=5, noise=0.004)
     moved = [shifted(log, 0.0015 * (1 + i / 5)) for i, log in enumerate(logs)]

@@ -115,6 +115,17 @@ def test_two_forms_of_one_family_carry_on_each_its_own_history():
     np.testing.assert_allclose(later, whole[105:], rtol=1e-12)
 
 
+def test_a_pressed_play_against_tension_over_a_drum():
+    """Capstan: what is held on the far side lies between 0.7 and 1.3 of the pull, beside an even drag."""
+    x = np.abs(np.cumsum(np.random.default_rng(1).normal(size=500)))
+    held, expected = 0.0, []
+    for pull in x:
+        held = min(max(held, 0.7 * pull - 0.2), 1.3 * pull + 0.2)
+        expected.append(held)
+    np.testing.assert_allclose(kernels.pressed(x, rest(500), 0.2, 0.3), expected, rtol=1e-12)
+    np.testing.assert_array_equal(kernels.pressed(x, rest(500), 0.7, 0.0), kernels.play(x, rest(500), 0.7))
+
+
 def test_play_against_a_loop_in_python():
     x = np.cumsum(np.random.default_rng(0).normal(size=500))
     now, expected = 0.0, []

@@ -52,6 +52,10 @@ def _widening(x: Array, values: Values, run: Run) -> Array:
     return x + loops + growing * (kernels.play(square, run.rest, width) - square)
 
 
+def _pressed(x: Array, values: Values, run: Run) -> Array:
+    return kernels.pressed(x, run.rest, *values)
+
+
 def forms(slot: str) -> list[Form]:
     """The forms of a hysteresis at ``slot``."""
     return [
@@ -101,5 +105,14 @@ def forms(slot: str) -> list[Form]:
                 LARGEST,
             ),
             _widening,
+        ),
+        Form(
+            "pressed",  # a play held by dry friction between parts that the level presses together
+            slot,
+            (
+                Parameter("even", level=1, lower=0.0, upper=0.6, starts=(0.01, 0.02), zero=0.0),
+                Parameter("growing", lower=0.0, upper=0.6, starts=(0.1, 0.2), zero=0.0),
+            ),
+            _pressed,
         ),
     ]
