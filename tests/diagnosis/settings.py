@@ -34,7 +34,7 @@ CONSTANTS = {
     "problem/segments.py": ["_FOLLOWED", "_TIMING"],
     "proposals/candidate_rigs.py": ["_STEP"],
     "proposals/menu.py": ["_SHORTEST"],
-    "proposals/next_experiment.py": ["_ENOUGH", "_MOST", "_SHARES", "_SURE"],
+    "proposals/next_experiment.py": ["_CERTAIN", "_ENOUGH", "_MOST", "_SHARES", "_SURE"],
     "proposals/separation.py": ["_NOISIER"],
     "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_FINE", "_LONGEST"],
     "proposals/limits.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],

@@ -22,6 +22,7 @@ from focgen.diagnosis.proposals.next_experiment import (
     _all_told,
     _allowed,
     _best,
+    _in_a_row,
     _Option,
     _Question,
     _showing,
@@ -244,3 +245,62 @@ def test_a_log_by_itself_has_to_tell_also_what_only_the_session_ruled_out(monkey
         monkeypatch.setattr(next_experiment, "alone", lambda *_, apart=apart: np.array(apart))
         [one] = _with_a_further_signal(question, [SimpleNamespace(seconds=1.0)], ())
         assert list(one.apart) == left
+
+
+LIMITS = InputLimits(0.0, 2.0, 0.0, np.inf, 10.0, 1.0, 0.5)
+
+
+def made(apart, what="steps", share=1.0, **other):
+    """An option of a real experiment of 5 s."""
+    return _Option(
+        Choice(what, np.r_[0.0, np.ones(9)], LIMITS, share), None, np.asarray(apart, float), **other
+    )
+
+
+def row_of(options, holds=lambda choice: True):
+    row = _in_a_row(options[0], [options], holds)
+    return row, row.choice.what.split(", then ")
+
+
+def test_what_is_certain_to_tell_is_made_alone():
+    first = made([15.1], "first")
+    assert row_of([first, made([90.0], "other")])[0] is first
+
+
+def test_what_is_less_than_certain_is_followed_by_what_tells_most_beside_it():
+    first, alike, other = made([9.0, 5.0], "a"), made([12.0, 2.0], "b"), made([1.0, 14.5], "c")
+    row, names = row_of([first, alike, other])
+    assert names == ["a", "c", "b"] and row.choice.parts == 3
+    assert row.apart == pytest.approx([np.sqrt(81 + 144 + 1), np.sqrt(25 + 4 + 14.5**2)])
+    assert row_of([first, alike, made([14.0, 14.5], "c")])[1] == ["a", "c"]  # no longer than it needs to be
+
+
+def test_a_row_has_three_experiments_at_most_and_each_once():
+    row, names = row_of([made([4.0], str(i)) for i in range(6)])
+    assert len(set(names)) == len(names) == row.choice.parts == 3
+
+
+def test_no_time_is_spent_where_a_row_would_not_tell_either():
+    options = [made([1.0], str(i)) for i in range(6)]
+    assert row_of(options)[0] is options[0]
+
+
+def test_a_row_is_of_one_kind_and_stays_within_the_bounds():
+    first, wide, fine = made([4.0], "a"), made([9.0], "wide"), made([4.0], "fine")
+    logged = replace(made([9.0], "logged"), stage="actuator")
+    faster = replace(logged, stage=None, choice=replace(logged.choice, limits=replace(LIMITS, rate=1.0)))
+    options = [first, logged, faster, wide, fine]
+    assert row_of(options, lambda choice: "wide" not in choice.what)[1] == ["a", "fine"]
+
+
+def test_what_shows_too_little_alone_may_follow():
+    first, other = made([4.0], "a"), made([9.0], "b", shows=False)
+    assert _best([[first, other]])[1] is first and not _all_told([[first, other]])
+    assert row_of([first, other])[1] == ["a", "b"]
+
+
+def test_a_row_is_one_input_of_all_its_experiments():
+    half, full = made([4.0], share=0.5).choice, made([4.0]).choice
+    row = half.then(full)
+    assert np.array_equal(row.input, np.r_[half.input, full.input]) and half.input.max() == 1.0
+    assert row.seconds == half.seconds + full.seconds == 10.0

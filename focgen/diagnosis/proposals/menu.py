@@ -23,12 +23,13 @@ _SHORTEST = 1.5  # response times: a level held for less shows no level
 @dataclass(frozen=True, eq=False)
 class Choice:
     """One experiment: ``what`` to do, and the ``levels`` (n,) of −1 … 1 that the input of ``limits`` goes
-    through, at most ``share`` of the way to its ends."""
+    through, at most ``share`` of the way to its ends; ``parts``: experiments of the menu in a row."""
 
     what: str
     levels: np.ndarray
     limits: InputLimits
     share: float = 1.0
+    parts: int = 1
 
     @property
     def input(self) -> np.ndarray:
@@ -39,6 +40,11 @@ class Choice:
     def seconds(self) -> float:
         """How long it takes."""
         return len(self.levels) * self.limits.h
+
+    def then(self, other: Choice) -> Choice:
+        """It with ``other`` behind it, as one input."""
+        levels = np.concatenate([self.share * self.levels, other.share * other.levels])
+        return Choice(f"{self.what}, then {other.what}", levels, self.limits, 1.0, self.parts + other.parts)
 
 
 def menu(limits: InputLimits) -> tuple[Choice, ...]:

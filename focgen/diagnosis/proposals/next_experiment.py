@@ -9,7 +9,7 @@ made smaller, until it stays inside.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +31,9 @@ from focgen.rig.rig import Rig
 NEXT = "next_experiment.csv"  # beside the diagnosis: the input that makes the experiment
 _ENOUGH = 3.0  # standard deviations of the noise
 _SURE = 5.0  # the same with forms a little wrong: of experiments expected to do less, most resolved nothing
+_CERTAIN = 15.0  # the same where no second form may help a rival: below that, a second experiment follows
 _MOST = 99.0
+_IN_A_ROW = 3  # experiments of the menu in one proposal
 _RIVALS = 3  # of those tied, the likeliest
 _SHARES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1)  # of the way to the input's ends, until all stay in range
 _ROLES = {"regulator": "pressure", "actuator": "curvature"}
@@ -102,15 +104,21 @@ class _Asked:
 @dataclass(frozen=True, eq=False)
 class _Option:
     """A ``choice``, made as it is or with what leaves ``stage`` logged too: ``apart``, the expected
-    separation of the first rival from each of the others (k,)."""
+    separation of the first rival from each of the others (k,); ``shows``: whether it is made to show most
+    of them."""
 
     choice: Choice
     stage: str | None
     apart: np.ndarray
+    shows: bool = True
 
     def least(self, telling: np.ndarray) -> float:
         """The separation from the rival that it tells least, of those that count (k,)."""
         return float(np.min(self.apart[telling]))
+
+    def then(self, other: _Option) -> _Option:
+        """It with ``other`` behind it: what each tells by itself, put together."""
+        return replace(self, choice=self.choice.then(other.choice), apart=np.hypot(self.apart, other.apart))
 
 
 def _answered(
@@ -123,18 +131,23 @@ def _answered(
     entry, bounds = cuts(logs)[0], bounds_of(rig, logs)
     limits, rigs = limits_of(rig, logs, entry), candidate_rigs(explanations, e, rivals)
     tiers: list[list[_Option]] = []
-    choices: list[tuple[Choice, list[CandidateRig]]] = []
+    shown: list[Choice] = []
+    allowed: list[tuple[Choice, list[CandidateRig]]] = []
     for one in dict.fromkeys((limits, limits.faster)):
-        choices = _showing(_allowed(menu(one), rigs, bounds), e, rivals)
-        tiers.append([_Option(choice, None, in_session(e, made)) for choice, made in choices])
+        allowed = _allowed(menu(one), rigs, bounds)
+        shown = [choice for choice, _ in _showing(allowed, e, rivals)]
+        tiers.append(
+            [_Option(choice, None, in_session(e, made), choice in shown) for choice, made in allowed]
+        )
     if not _all_told(tiers):
-        tiers.append(_with_a_further_signal(question, [c for c, _ in choices], explanations))
-    found = _best([tier for tier in tiers if tier])
-    if found is None:
+        further = _with_a_further_signal(question, [choice for choice, _ in allowed], explanations)
+        tiers.append([replace(o, shows=o.choice in shown) for o in further])
+    if (best := _best(tiers)) is None:
         return None
-    value, option = found
-    asked = _Asked(option.choice, entry, option.stage, bounds, limits.rate)
-    return _proposed(rig, e, rivals, float(min(value, _MOST)), asked), option.choice
+    row = _in_a_row(best[1], tiers, lambda choice: _holds(choice, rigs, bounds))
+    asked = _Asked(row.choice, entry, row.stage, bounds, limits.rate)
+    value = float(min(row.least(_telling(tiers)), _MOST))
+    return _proposed(rig, e, rivals, value, asked), row.choice
 
 
 def _with_a_further_signal(
@@ -157,13 +170,12 @@ def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
     """The most telling option a second of the first tier that is sure to tell, and what it tells; where none
     is, the most telling. A rival that none tells, as one that holds the other as a special case, does not
     count where others can be told: such are told by needing more parameters for the same."""
-    options = [o for tier in tiers for o in tier]
+    options = _shown(tiers)
     if not options:
         return None
-    told = _told(options, _ENOUGH)
-    telling = told if np.any(told) else np.ones(len(told), bool)
+    telling = _telling(tiers)
     for tier in tiers:
-        good = [o for o in tier if o.least(telling) >= _SURE]
+        good = [o for o in tier if o.shows and o.least(telling) >= _SURE]
         if good:
             best = max(good, key=lambda o: o.least(telling) / np.sqrt(o.choice.seconds))
             return best.least(telling), best
@@ -175,7 +187,33 @@ def _best(tiers: Sequence[Sequence[_Option]]) -> tuple[float, _Option] | None:
 
 def _all_told(tiers: Sequence[Sequence[_Option]]) -> bool:
     """Whether every rival is told by some option: one that is not may be the likeliest."""
-    return bool(np.all(_told([o for tier in tiers for o in tier], _SURE)))
+    return bool(np.all(_told(_shown(tiers), _SURE)))
+
+
+def _shown(tiers: Sequence[Sequence[_Option]]) -> list[_Option]:
+    """The options that may be chosen alone."""
+    return [o for tier in tiers for o in tier if o.shows]
+
+
+def _telling(tiers: Sequence[Sequence[_Option]]) -> np.ndarray:
+    """Of each rival (k,) whether it counts: those that some option tells, or all where none is told."""
+    told = _told(_shown(tiers), _ENOUGH)
+    return told if np.any(told) else np.ones(len(told), bool)
+
+
+def _in_a_row(first: _Option, tiers: Sequence[Sequence[_Option]], holds: Callable[[Choice], bool]) -> _Option:
+    """``first`` with the most telling others behind it, until they are certain to tell: a rival may take up
+    one experiment by another of its forms, but hardly all. It alone where that would not tell either."""
+    alike = (o for tier in tiers for o in tier if o.stage == first.stage)
+    left = [o for o in alike if o is not first and o.choice.limits == first.choice.limits]
+    telling, row = _telling(tiers), first
+    while left and row.least(telling) < _CERTAIN and row.choice.parts < _IN_A_ROW:
+        longer = {id(o): row.then(o) for o in left}
+        best = max(left, key=lambda o: longer[id(o)].least(telling))
+        left.remove(best)
+        if holds(longer[id(best)].choice):
+            row = longer[id(best)]
+    return row if row.least(telling) >= _ENOUGH else first
 
 
 def _told(options: Sequence[_Option], enough: float) -> np.ndarray:
@@ -198,6 +236,11 @@ def _allowed(
                 found.append((smaller, made))
                 break
     return found
+
+
+def _holds(choice: Choice, rigs: Sequence[CandidateRig], bounds: Bounds) -> bool:
+    """Whether all candidate rigs stay within the bounds."""
+    return all(bounds.hold(one.making(choice).signals) for one in rigs)
 
 
 def _showing(
@@ -224,7 +267,7 @@ def _proposed(
         value,
         {
             "seconds": asked.choice.seconds,
-            "at_most_s": asked.choice.limits.seconds,
+            "at_most_s": asked.choice.limits.seconds * asked.choice.parts,
             "entry": asked.entry,
             "low": float(made.min()),
             "high": float(made.max()),
