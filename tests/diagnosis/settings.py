@@ -24,6 +24,7 @@ CONSTANTS = {
     "hypotheses/explain.py": ["_BELIEVED", "_KEPT"],
     "hypotheses/initial.py": ["_LEVEL", "_SEEN", "_TIME"],
     "hypotheses/left.py": ["_ERRORS", "_OFF", "_STILL"],
+    "hypotheses/level_pace.py": ["_PART"],
     "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK", "_QUICKEST"],
     "problem/decimate.py": ["_WITHIN"],
