@@ -31,7 +31,7 @@ from focgen.rig.rig import Rig
 NEXT = "next_experiment.csv"  # beside the diagnosis: the input that makes the experiment
 _ENOUGH = 3.0  # standard deviations of the noise
 _SURE = 5.0  # the same with forms a little wrong: of experiments expected to do less, most resolved nothing
-_CERTAIN = 15.0  # the same where no second form may help a rival: below that, a second experiment follows
+_CERTAIN = 11.0  # the same with any form: with the signals at hand, all expected to do more resolved the set
 _MOST = 99.0
 _IN_A_ROW = 3  # experiments of the menu in one proposal
 _RIVALS = 3  # of those tied, the likeliest
@@ -202,12 +202,14 @@ def _telling(tiers: Sequence[Sequence[_Option]]) -> np.ndarray:
 
 
 def _in_a_row(first: _Option, tiers: Sequence[Sequence[_Option]], holds: Callable[[Choice], bool]) -> _Option:
-    """``first`` with the most telling others behind it, until they are certain to tell: a rival may take up
+    """``first`` with the most telling others behind it where it is not certain to tell: a rival may take up
     one experiment by another of its forms, but hardly all. It alone where that would not tell either."""
     alike = (o for tier in tiers for o in tier if o.stage == first.stage)
     left = [o for o in alike if o is not first and o.choice.limits == first.choice.limits]
     telling, row = _telling(tiers), first
-    while left and row.least(telling) < _CERTAIN and row.choice.parts < _IN_A_ROW:
+    if first.least(telling) >= _CERTAIN:
+        return first
+    while left and row.choice.parts < _IN_A_ROW:
         longer = {id(o): row.then(o) for o in left}
         best = max(left, key=lambda o: longer[id(o)].least(telling))
         left.remove(best)
