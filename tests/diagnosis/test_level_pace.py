@@ -56,6 +56,13 @@ def test_its_share_of_the_output_is_that_of_the_equation(kind):
     assert np.max(np.abs(column - expected)) < 0.06 * np.max(np.abs(expected))
 
 
+def test_a_stage_that_holds_no_level_has_none():
+    """A high-pass is at 0 in the end, whatever drives it."""
+    passing = LinearActuator(TransferFunction([(T, 1.0)], [(T, 1.0), (1.0, 0.0)]))
+    of = Rig("high-pass", H, Signals(time="t", pressure="u", output="y"), passing)
+    assert level_pace(of, make(logs(lambda u: u - lag(u, 0.0)), "pressure", "output")) is None
+
+
 def test_within_the_uncertainty_it_is_no_effect():
     """A tenth of the time beside noise of 0.2 %; taken for one number the rig is `unknown`."""
     found = diagnose(rig("transfer"), logs(lambda u: lag(u, 0.1), 2e-3), pictures=False)

@@ -202,7 +202,7 @@ def _explained(
     if only is not None:
         candidates, guests, threshold = [c for c in candidates if c.effect in only], [], 0.0
     given, converter = problem.nominal(), converter_of(problem, candidates)
-    carried, noise = (0.0, None) if unsure is None else (_carried(problem, given, unsure.lost), unsure.noise)
+    carried, noise = _unsure(problem, given, unsure)
     asked = AcceptanceCriteria(threshold, carried, noise, converter, only is not None)
     rankings, candidates = _grown(problem, given, candidates, guests, asked)
     weighing = Weighing(rankings[-1].ar)
@@ -235,11 +235,14 @@ def _explained(
     )
 
 
-def _carried(problem: Problem, vector: np.ndarray, lost: np.ndarray) -> float:
-    """The mean square, as a share of the output's level, of what the output lacks where the input has
-    ``lost`` (n,)."""
-    fitted = fit(problem, vector, WHITE, 0)
-    return answer(fitted, lost, WHITE) / len(lost)
+def _unsure(problem: Problem, vector: np.ndarray, unsure: Strays | None) -> tuple[float, np.ndarray | None]:
+    """The mean square, as a share of the output's level, of what the output lacks for what the input has
+    lost; and the noise (n,) that stays in the input, None where there is none."""
+    if unsure is None:
+        return 0.0, None
+    lost, noise = unsure.lost, unsure.noise
+    carried = answer(fit(problem, vector, WHITE, 0), lost, WHITE) / len(lost) if np.any(lost) else 0.0
+    return carried, noise if np.any(noise) else None
 
 
 def _between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:

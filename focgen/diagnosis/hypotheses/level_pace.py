@@ -19,7 +19,8 @@ _PART = 1.0 / 3.0  # of the uncertainty of a time: a standard deviation, of whic
 
 def level_pace(rig: Rig, segment: Segment) -> np.ndarray | None:
     """What the output (n,) is another by, in its unit, where a stage is slower at its largest level than at
-    0, by a third of the uncertainty of its time. None where no stage of the segment has dynamics.
+    0, by a third of the uncertainty of its time. None where no stage of the segment has dynamics, or the
+    stage holds no level: its gain is 0 or infinite.
 
     To first order: with Q y = g u − y, g the gain, a factor 1 + c y/max|y| of Q is c y/max|y| (y/g − u) more
     of u.
@@ -28,6 +29,8 @@ def level_pace(rig: Rig, segment: Segment) -> np.ndarray | None:
     if stage is None:
         return None
     core, gain = _core(rig, stage)
+    if gain == 0.0 or not np.isfinite(gain):
+        return None
     known: Relative = getattr(rig.uncertainty, stage)
 
     def act(u: Array, values: tuple[float, ...], run: Run) -> Array:

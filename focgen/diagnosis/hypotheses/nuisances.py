@@ -82,9 +82,7 @@ def _zeroed(problem: Problem) -> Problem:
 def _paced(problem: Problem) -> Problem:
     """The problem with a pace that depends on the level, as much as the pace itself may be off, where that is
     all there is. Where errors add up there is no pace."""
-    if problem.segment.pace or not seems_more(problem, problem.nominal()):
-        return problem
-    column = level_pace(problem.nominals.rig, problem.segment)
+    column = None if problem.segment.pace else level_pace(problem.nominals.rig, problem.segment)
     if column is None:
         return problem
     segment = replace(problem.segment, loose=np.column_stack([problem.segment.loose, column]))
