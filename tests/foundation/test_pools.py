@@ -19,23 +19,23 @@ from focgen.children import environment, python
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="the system has no groups of processes")
 
+#: Of this worker alone: another may run these tests at the same time, and ends what it finds.
+SLEEP = f"7337.{os.getpid()}"
 STARTS = [start for start in ("spawn", "fork") if start in multiprocessing.get_all_start_methods()]
 SCRIPT = """
 import sys
-from pathlib import Path
 from focgen.cli.faults import ending_in_order
 from focgen.pools import pool
 from focgen.programs import ran
 from focgen.scratch import temporary_folder
 
-def job(place, number):
+def job(seconds):
     with temporary_folder("job"):
-        Path(place, f"begun{number}").touch()
-        ran(["sleep", "7337"])
+        ran(["sleep", seconds])
 
 if __name__ == "__main__":
-    with ending_in_order(), pool(2, start=sys.argv[2]) as called:
-        list(called.map(job, [sys.argv[1]] * 3, range(3)))
+    with ending_in_order(), pool(2, start=sys.argv[1]) as called:
+        list(called.map(job, [sys.argv[2]] * 3))
 """
 
 
@@ -45,7 +45,7 @@ def begun(request, tmp_path):
     (tmp_path / "script.py").write_text(SCRIPT)
     (tmp_path / "temp").mkdir()
     process = subprocess.Popen(
-        python(str(tmp_path / "script.py"), str(tmp_path), request.param),
+        python(str(tmp_path / "script.py"), request.param, SLEEP),
         env=environment(TMPDIR=str(tmp_path / "temp")),
         stderr=subprocess.PIPE,
         text=True,
@@ -53,10 +53,9 @@ def begun(request, tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     end = time.monotonic() + 60.0
-    while not all((tmp_path / f"begun{i}").exists() for i in range(2)) and time.monotonic() < end:
-        time.sleep(0.01)
-    time.sleep(0.3)
-    assert sleeping(), "none had begun"
+    while len(sleeping()) < 2 and time.monotonic() < end:
+        time.sleep(0.05)
+    assert len(sleeping()) == 2, "they had not begun"
     yield process
     process.kill()
     process.communicate()
@@ -67,7 +66,7 @@ def begun(request, tmp_path):
 def sleeping() -> list[int]:
     said = subprocess.run(["ps", "-eo", "pid,stat,args"], capture_output=True, text=True).stdout.splitlines()
     rows = [line.split(None, 2) for line in said]
-    return [int(pid) for pid, stat, args in rows if args == "sleep 7337" and not stat.startswith("Z")]
+    return [int(pid) for pid, stat, args in rows if args == f"sleep {SLEEP}" and not stat.startswith("Z")]
 
 
 def check_gone(place: Path) -> None:

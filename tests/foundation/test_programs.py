@@ -23,6 +23,8 @@ from tests.controllers import seed_controller
 pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="the system has no groups of processes")
 
 # As the driver of a compiler does: a file of its own in the temporary folder, and a further program.
+# The times are of this worker alone: another may run these tests at the same time, and ends what it finds.
+LIMITED, KILLED = f"7117.{os.getpid()}", f"7227.{os.getpid()}"
 DRIVER = "#!/bin/sh\necho text > $TMPDIR/ccBETWEEN.s\nsleep {secs} &\ntouch {mark}\nwait\n"
 
 
@@ -36,7 +38,7 @@ def place(tmp_path, monkeypatch) -> Path:
     scratch._swept.clear()
 
 
-def driver(folder: Path, seconds: int) -> Path:
+def driver(folder: Path, seconds: str) -> Path:
     path = folder / "driver"
     path.write_text(DRIVER.format(mark=folder / "begun", secs=seconds))
     path.chmod(0o755)
@@ -71,9 +73,9 @@ def test_a_full_disk_is_no_fault_of_the_c(place):
 
 def test_a_limit_of_time_ends_all_that_it_began(place, tmp_path):
     with pytest.raises(subprocess.TimeoutExpired):
-        programs.ran([str(driver(tmp_path, 7117))], seconds=1.0)
+        programs.ran([str(driver(tmp_path, LIMITED))], seconds=1.0)
     assert (tmp_path / "begun").exists(), "it had not begun"
-    assert ended("sleep 7117") and not list(place.iterdir())
+    assert ended(f"sleep {LIMITED}") and not list(place.iterdir())
 
 
 @pytest.fixture
@@ -81,7 +83,7 @@ def begun(tmp_path):
     """``focgen verify`` as soon as its compiler has begun a program of its own."""
     generate(seed_controller(5), tmp_path / "fw", "q15")
     (tmp_path / "temp").mkdir()
-    own = {"TMPDIR": str(tmp_path / "temp"), "CC": str(driver(tmp_path, 7227))}
+    own = {"TMPDIR": str(tmp_path / "temp"), "CC": str(driver(tmp_path, KILLED))}
     words = python("-m", "focgen", "verify", str(tmp_path / "fw"))
     process = subprocess.Popen(
         words,
@@ -92,14 +94,14 @@ def begun(tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     end = time.monotonic() + 60.0
-    while not (tmp_path / "begun").exists() and time.monotonic() < end:
-        time.sleep(0.01)
-    assert running("sleep 7227"), "it had not begun"
+    while not running(f"sleep {KILLED}") and time.monotonic() < end:
+        time.sleep(0.05)
+    assert running(f"sleep {KILLED}"), "it had not begun"
     yield process
     process.kill()
     process.communicate()
     for line in subprocess.run(["ps", "-eo", "pid,args"], capture_output=True, text=True).stdout.splitlines():
-        if line.split(None, 1)[1:] == ["sleep 7227"]:
+        if line.split(None, 1)[1:] == [f"sleep {KILLED}"]:
             os.kill(int(line.split()[0]), signal.SIGKILL)
 
 
@@ -108,7 +110,7 @@ def test_an_interrupt_ends_a_compiler_and_what_it_began(begun, tmp_path, number,
     begun.send_signal(number)
     said = begun.communicate(timeout=20.0)[1]
     assert begun.returncode == status and said.count("\n") == 1, said
-    assert ended("sleep 7227") and not list((tmp_path / "temp").iterdir())
+    assert ended(f"sleep {KILLED}") and not list((tmp_path / "temp").iterdir())
 
 
 def test_what_a_kill_leaves_in_the_temporary_folder_the_next_run_clears(begun, tmp_path):
