@@ -84,9 +84,10 @@ def _new_folder(place: Path, begins: str = ".focgen-") -> tuple[Path, int | None
     for _ in range(_TRIES):
         path = place / _name(begins)
         path.mkdir(mode=0o700)
-        os.chmod(path, 0o700)  # whatever the umask takes away: what cannot be opened cannot be locked
-        held = lock(path)
-        if path.is_dir() and (held is not None or not lockable(path)):
+        with suppress(FileNotFoundError):  # taken away already: there is nothing to lock either
+            os.chmod(path, 0o700)  # whatever the umask takes away: what cannot be opened cannot be locked
+        held, reason = _locked(path)
+        if reason not in (*_HELD, errno.ENOENT) and path.is_dir():
             return path, held
         unlock(held)
         with suppress(OSError):
@@ -196,8 +197,10 @@ def _locked(path: Path) -> tuple[int | None, int]:
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     try:
         handle = os.open(path, flags)
-    except OSError:
+    except FileNotFoundError:
         return None, errno.ENOENT
+    except OSError:
+        return None, errno.ENOSYS
     if reason := _flocked(handle):
         os.close(handle)
         return None, reason

@@ -86,6 +86,23 @@ def test_a_scratch_that_others_take_away_is_tried_a_few_times_only(tmp_path, mon
     assert not [name for name in names(tmp_path) if not name.endswith(".part")]
 
 
+@pytest.mark.parametrize("step", ["chmod", "open"])
+def test_a_new_scratch_that_another_process_clears_gets_a_further_one(tmp_path, monkeypatch, step):
+    """Before it is locked it looks like one that was left. Two processes that began at once met there."""
+    real, seen = getattr(os, step), []
+
+    def cleared(path, *args, **kwargs):
+        if not seen and Path(path).is_dir():
+            seen.append(Path(path))
+            Path(path).rmdir()
+        return real(path, *args, **kwargs)
+
+    monkeypatch.setattr(os, step, cleared)
+    scratch.clear(tmp_path)
+    with scratch.scratch_folder(tmp_path) as folder:
+        assert seen and folder != seen[0] and names(tmp_path) == [folder.name]
+
+
 def test_two_do_not_move_files_at_once_however_long_one_takes(tmp_path, monkeypatch):
     held = scratch.lock(tmp_path)
     monkeypatch.setattr(scratch, "PATIENCE", 0.1)
