@@ -21,8 +21,8 @@ from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.scales import Scale, known, same, unit_of_time
-from focgen.logs.table import LogTable, in_seconds, read_table, stem
-from focgen.logs.units import time_unit_named, unit_of
+from focgen.logs.table import LogTable, read_table, stem
+from focgen.logs.units import in_unit, time_unit_named, unit_of
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
@@ -120,10 +120,10 @@ def _experiments(
     """Yield (path, experiment) for each run of a log, or part of one."""
     columns, notes = _present(table, signals)
     time, said = _time(table, signals)
-    reading = _reading(table, signals)
+    reading, column = _reading(table, signals), signals.time if signals.time in table else None
     notes = (*table.notes, *said, *notes)
     for name, rows in _runs(table, signals.run):
-        run = Raw(name, table.path, "", time, columns, table.line, notes, reading).part(rows)
+        run = Raw(name, table.path, "", time, columns, table.line, notes, reading, column).part(rows)
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
         run = replace(run, where=where, stamps=f"{where} [{signals.time}]")
         for experiment in experiments_of(run, sample_time, window):
@@ -158,7 +158,7 @@ def _check_one_clock(table: LogTable, name: str, time: Array) -> None:
         if own > 0.0 and not abs(step / own - 1.0) <= _ONE_CLOCK:
             what = f"has {step:g} s between samples where the log's own clock has {own:g} s"
     if what:
-        remedy = f"log all channels by one clock, or, where the column is right, {in_seconds(name)}"
+        remedy = f"log all channels by one clock, or, where the column is right, {in_unit(name)}"
         raise LogError(f"{table.path} [{name}]", what, remedy)
 
 
@@ -189,8 +189,8 @@ def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
         return ()
     if scale is not None:
         return (f"the log gives {name!r} in {given}, time is taken as {taken}",)
-    remedy = f"write time = {{ column = {name!r}, unit = {own[0]!r} }} in the rig's [signals]"
-    raise LogError(f"{table.path} [{name}]", f"is in {given}, and the rig takes it for seconds", remedy)
+    what = f"is in {given}, and the rig takes it for seconds"
+    raise LogError(f"{table.path} [{name}]", what, in_unit(name, own[0]))
 
 
 def _scaled(table: LogTable, role: str, values: Array, signals: Roles) -> Array:

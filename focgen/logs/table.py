@@ -17,6 +17,7 @@ from focgen.errors import LogError
 from focgen.logs import stamps
 from focgen.logs.cells import Levels, parsed
 from focgen.logs.dialect import grouped, is_stamp
+from focgen.logs.units import in_unit
 from focgen.textfile import check_regular
 
 # The reader of each kind of file: a module of this room with ``read(path) -> LogTable``.
@@ -142,7 +143,7 @@ class LogTable:
 
     def two_readings(self, name: str, what: str, otherwise: str) -> LogError:
         """The error for a column of time that may be seconds or something else: the rig can tell which."""
-        remedy = f"{otherwise}, or, where it is no such thing, {in_seconds(name)}"
+        remedy = f"{otherwise}, or, where it is no such thing, {in_unit(name)}"
         return LogError(f"{self.path} [{name}]", what, remedy)
 
     def is_dated(self, name: str) -> bool:
@@ -185,11 +186,6 @@ class LogTable:
         return LogError(
             f"{self.path} [{name}]", f"holds {cell!r} in {self.line(row)}, which is no number", remedy
         )
-
-
-def in_seconds(name: str) -> str:
-    """What to write where a column of time is in seconds, and does not say so."""
-    return f"write time = {{ column = {name!r}, unit = 's' }} in the rig's [signals]"
 
 
 def check_units(path: Path, units: Sequence[Mapping[str, str]]) -> None:
