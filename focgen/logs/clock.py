@@ -27,7 +27,12 @@ _NEAR = 0.02  # relative: a clock's rate is the rig's
 _PLAUSIBLE = 99.0  # a log is recorded at a rate within this factor of the rig's
 _LONGEST = 5_000_000  # samples that few rows may be resampled to; many rows, twice as many as they are
 _COUNTABLE = 2**53  # ticks that float64 tells apart
-_OTHERS = {"ms": 1e-3, "us": 1e-6, "h": 3600.0, "day": 86400.0}  # s: units too far from a second to pass for it
+_OTHERS = {
+    "ms": 1e-3,
+    "us": 1e-6,
+    "h": 3600.0,
+    "day": 86400.0,
+}  # s: units too far from a second to pass for it
 _UNITS = {"ms": "milliseconds", "us": "microseconds", "h": "hours", "day": "days"}
 
 Line = Callable[[int], str]
@@ -157,9 +162,7 @@ class Reading(Enum):
     NUMBERS = "nothing says another unit"
 
 
-def check_reading(
-    time: Array, sample_time: float, where: str, column: str | None, reading: Reading
-) -> None:
+def check_reading(time: Array, sample_time: float, where: str, column: str | None, reading: Reading) -> None:
     """Raise LogError where nothing tells that a time is in seconds, and another reading explains it better.
 
     Seconds pass at the rig's own rate. At another one, a clock that has the rig's rate in minutes or frames

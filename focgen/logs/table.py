@@ -124,27 +124,21 @@ class LogTable:
         cell that is none of these, and where it may be read otherwise, unless the rig has ``told`` its unit.
         """
         column = self.column(name)
-        if not isinstance(column, np.ndarray) and _is_dated(column):
+        dated = not isinstance(column, np.ndarray) and _is_dated(column)
+        if dated:
             try:
                 found = stamps.seconds(column)
             except ValueError as reason:
                 what = f"has a time that cannot be read ({reason})"
                 remedy = "write it as 2026-01-31T12:00:00.000, or in seconds"
                 raise LogError(f"{self.path} [{name}]", what, remedy) from None
-            if not told and stamps.skips_seconds(found):
-                what = "lacks the same seconds of every minute: it may be mm:ss and frames, read as hh:mm:ss"
-                raise self.two_readings(name, what, "write it as 12:00:59.98")
-            return found
-        values = self.numbers(name)
-        if not told and stamps.is_packed(values):
-            what = "counts to 59 and goes on at 100: it may be a time of day as hhmmss"
-            raise self.two_readings(name, what, "write it as 12:00:59.98")
-        return values
-
-    def two_readings(self, name: str, what: str, otherwise: str) -> LogError:
-        """The error for a column of time that may be seconds or something else: the rig can tell which."""
-        remedy = f"{otherwise}, or, where it is no such thing, {in_unit(name)}"
-        return LogError(f"{self.path} [{name}]", what, remedy)
+        else:
+            found = self.numbers(name)
+        other = None if told else stamps.other_reading(found, dated)
+        if other is not None:
+            remedy = f"{other[1]}, or, where it is no such thing, {in_unit(name)}"
+            raise LogError(f"{self.path} [{name}]", other[0], remedy)
+        return found
 
     def is_dated(self, name: str) -> bool:
         """Whether a column is one of dates or times of day, in text."""

@@ -85,7 +85,11 @@ def in_unit(column: str, unit: str = "s") -> str:
     >>> in_unit("it's", "min")
     'write time = { column = "it\'s", unit = \'min\' } in the rig\'s [signals]'
     """
-    name = f"'{column}'" if "'" not in column and column.isprintable() else json.dumps(column)
+    name = (
+        f"'{column}'"
+        if "'" not in column and column.isprintable()
+        else json.dumps(column, ensure_ascii=False)
+    )
     return f"write time = {{ column = {name}, unit = '{unit}' }} in the rig's [signals]"
 
 

@@ -1,0 +1,96 @@
+"""Columns of time that are another clock than they look: refused with what to write, or read with a note.
+
+Red when digits without their zeros, minutes and seconds in one number, rows of several sensors, or a clock that
+is put back tear experiments or open holes that the rig never had; and when a good clock is taken for one of them.
+"""
+
+import numpy as np
+import pytest
+
+from focgen.errors import LogError
+from focgen.logs import read_logs, stamps
+from focgen.logs.scales import Scale
+from focgen.logs.table import read_table
+from focgen.rig.rig import Signals
+from tests.logs.test_misread import PLAIN
+from tests.logs.test_two_readings import COUNT, SECONDS, log
+
+MILLI = 50 * np.arange(COUNT)
+TOLD = Signals("t", "y", None, "p", scales={"time": Scale(unit="s")})
+
+
+def bare(ms, form="{0}.{1}"):
+    """Seconds and milliseconds, neither with zeros ahead."""
+    return [form.format(t // 1000, t % 1000) for t in ms.tolist()]
+
+
+# ------------------------------------------------------------------------------------------- one number of two
+
+
+@pytest.mark.parametrize(
+    "times, step",
+    [
+        (bare(MILLI), 0.05),
+        (bare(MILLI, "12:00:{0:02d}.{1}"), 0.05),
+        (bare(MILLI, "2026-01-31T12:00:{0:02d}.{1}"), 0.05),
+        (bare(MILLI, "{0}.{1}000"), 0.05),
+        (bare(np.arange(4000)), 0.001),
+        (bare(10 * np.arange(COUNT)), 0.01),
+        (bare(3 * MILLI), 0.15),
+        (bare(MILLI + np.random.default_rng(1).integers(0, 8, COUNT)), 0.05),
+        (bare(np.concatenate([MILLI, MILLI])), 0.05),
+    ],
+    ids=["numbers", "of a day", "dates", "microseconds", "1 ms", "10 ms", "150 ms", "jitter", "a restart"],
+)
+def test_milliseconds_without_their_zeros_are_no_decimals(tmp_path, times, step):
+    """`5.50` for 50 ms comes ahead of `5.100`: parts of experiments, with holes between."""
+    with pytest.raises(LogError, match="may lack zeros; write 50 ms as 0.050, or, .* unit = 's'"):
+        read_logs(log(tmp_path, times, readings=range(len(times))), PLAIN, step)
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        SECONDS,
+        np.tile(0.01 * np.arange(1, 51), 8),
+        np.concatenate([0.1 + SECONDS[:12], 0.1 + SECONDS]),
+        0.25 * np.arange(COUNT) - 0.25 * (np.arange(COUNT) % 7 == 3),
+        np.concatenate([0.25 * np.arange(40), 0.25 * np.arange(40) + 0.1]),
+        np.column_stack([0.25 * np.arange(2, 42), 0.25 * np.arange(1, 41)]).ravel(),
+        np.column_stack([0.2 * np.arange(2, 42) + 0.1, 0.2 * np.arange(1, 41) + 0.1]).ravel(),
+        1.7e9 + SECONDS,
+    ],
+    ids=["even", "short runs", "a restart", "out of order", "two", "two at once", "two by 0.2 s", "1970"],
+)
+def test_a_clock_that_falls_back_otherwise_does_not_lack_zeros(times):
+    assert not stamps.lacks_zeros(np.round(times, 6))
+
+
+@pytest.mark.parametrize(
+    "times, step, may_be",
+    [
+        ([f"{k // 60}.{k % 60:02d}" for k in range(COUNT)], 1.0, "mm.ss"),
+        ([f"{k // 60}.{k % 60:02d}" for k in range(COUNT)], 0.01, "mm.ss"),
+        ([f"{t // 60000}.{t % 60000:05d}" for t in (4 * MILLI).tolist()], 0.2, "mm.ss"),
+        ([f"12.{k // 60:02d}{k % 60:02d}" for k in range(COUNT)], 1.0, "mm.ss"),
+        ([f"{k // 25}.{k % 25:02d}" for k in range(COUNT)], 0.04, "seconds and frames"),
+        ([f"{k // 50}.{k % 50:02d}" for k in range(COUNT)], 0.02, "seconds and frames"),
+    ],
+    ids=["mm.ss", "at the rate", "mm.ssfff", "h.mmss", "25 frames", "50 frames"],
+)
+def test_minutes_or_frames_behind_a_point_are_no_decimals(tmp_path, times, step, may_be):
+    """12.59 goes on at 13.00: a hole of 0.41 s in every second."""
+    with pytest.raises(LogError, match=may_be):
+        read_logs(log(tmp_path, times), PLAIN, step)
+    assert len(read_table(log(tmp_path, times)).seconds("t", told=True)) == COUNT
+
+
+@pytest.mark.parametrize(
+    "step", [0.5, 0.25, 0.2, 0.1, 0.05, 0.04, 0.02, 0.01, 0.001, 1 / 60, 1 / 30, 0.55, 0.3]
+)
+@pytest.mark.parametrize("begin", [0.0, 0.4, 1.7e9, 59.5])
+def test_even_clocks_count_neither_minutes_nor_frames(step, begin):
+    times = np.round(begin + step * np.arange(4000), 6)
+    assert stamps.other_reading(times, dated=False) is None
+    lost = np.delete(times, np.arange(7, 3900, 41))
+    assert stamps.other_reading(lost, dated=False) is None
