@@ -32,7 +32,7 @@ _OTHERS = {
     "us": 1e-6,
     "h": 3600.0,
     "day": 86400.0,
-}  # s: units too far from a second to pass for it
+}  # s: too far from one to pass for it
 _UNITS = {"ms": "milliseconds", "us": "microseconds", "h": "hours", "day": "days"}
 
 Line = Callable[[int], str]

@@ -21,6 +21,7 @@ from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.scales import Scale, known, same, unit_of_time
+from focgen.logs.stacked import check_one_row_a_moment
 from focgen.logs.table import LogTable, read_table, stem
 from focgen.logs.units import in_unit, time_unit_named, unit_of
 
@@ -126,6 +127,7 @@ def _experiments(
         run = Raw(name, table.path, "", time, columns, table.line, notes, reading, column).part(rows)
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
         run = replace(run, where=where, stamps=f"{where} [{signals.time}]")
+        check_one_row_a_moment(table, run, rows, _taken(signals))
         for experiment in experiments_of(run, sample_time, window):
             yield table.path, experiment
 
@@ -143,7 +145,7 @@ def _time(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
             _check_one_clock(table, signals.time, found)
         return found, said
     if table.clock is None:
-        raise table.missing("time", signals.time, {signals.run or "", *signals.columns().values()})
+        raise table.missing("time", signals.time, _taken(signals) - {signals.time})
     step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
     return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
 
@@ -193,6 +195,11 @@ def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
     raise LogError(f"{table.path} [{name}]", what, in_unit(name, own[0]))
 
 
+def _taken(signals: Roles) -> set[str]:
+    """The columns that have a role."""
+    return {signals.time, signals.run or "", *signals.columns().values()}
+
+
 def _scaled(table: LogTable, role: str, values: Array, signals: Roles) -> Array:
     """A column's values (m,) as the role's signal. Raises LogError where its unit cannot be converted."""
     scale = signals.scales.get(role)
@@ -209,7 +216,7 @@ def _scaled(table: LogTable, role: str, values: Array, signals: Roles) -> Array:
 def _present(table: LogTable, signals: Roles) -> tuple[dict[str, Array], tuple[str, ...]]:
     """The signals that are there, by role, and notes on those that are not, or in another unit."""
     wanted = signals.columns()
-    taken = {signals.time, signals.run or "", *wanted.values()}
+    taken = _taken(signals)
     inputs = [role for role in ("command", "pressure") if role in wanted]
     there = [role for role, name in wanted.items() if name in table]
     for role in ["output", *inputs[: 0 if any(role in there for role in inputs) else 1]]:

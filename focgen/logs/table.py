@@ -94,6 +94,11 @@ class LogTable:
             return self.without_clock()
         near = self.closest(name, taken)
         there = ", ".join(self.columns)
+        holder = next((n for n, c in self.columns.items() if n not in taken and _holds(c, name)), None)
+        if holder is not None:
+            what = f"has no column {name!r} ({role}), but rows that {holder!r} names so".replace(";", ",")
+            remedy = "give each sensor a column of its own, and each time stamp one row"
+            return LogError(self.path, what, remedy)
         hint = (
             f"write {role} = {near!r} in the rig's [signals]"
             if near
@@ -229,6 +234,10 @@ def stem(path: str | Path) -> str:
     """The file's name without folder and ending."""
     name = Path(path).name
     return Path(name[: -len(".gz")] if name.lower().endswith(".gz") else name).stem
+
+
+def _holds(column: Column, word: str) -> bool:
+    return not isinstance(column, np.ndarray) and word in column[:_LOOK]
 
 
 def _plain(column: Column) -> list[Any]:

@@ -1,8 +1,11 @@
 """Columns of time that are another clock than they look: refused with what to write, or read with a note.
 
-Red when digits without their zeros, minutes and seconds in one number, rows of several sensors, or a clock that
-is put back tear experiments or open holes that the rig never had; and when a good clock is taken for one of them.
+Red when digits without their zeros, minutes and seconds in one number, rows of several sensors, or a clock
+that is put back tear experiments or open holes that the rig never had; and when a good clock is taken for one
+of them.
 """
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +15,7 @@ from focgen.logs import read_logs, stamps
 from focgen.logs.scales import Scale
 from focgen.logs.table import read_table
 from focgen.rig.rig import Signals
-from tests.logs.test_misread import PLAIN
+from tests.logs.test_misread import PLAIN, text
 from tests.logs.test_two_readings import COUNT, SECONDS, log
 
 MILLI = 50 * np.arange(COUNT)
@@ -24,7 +27,7 @@ def bare(ms, form="{0}.{1}"):
     return [form.format(t // 1000, t % 1000) for t in ms.tolist()]
 
 
-# ------------------------------------------------------------------------------------------- one number of two
+# ------------------------------------------------------------------------------------------ one number of two
 
 
 @pytest.mark.parametrize(
@@ -94,3 +97,70 @@ def test_even_clocks_count_neither_minutes_nor_frames(step, begin):
     assert stamps.other_reading(times, dated=False) is None
     lost = np.delete(times, np.arange(7, 3900, 41))
     assert stamps.other_reading(lost, dated=False) is None
+
+
+# ------------------------------------------------------------------------------------- one sensor under the other
+
+GAUGE = 3.0 * np.sin(0.02 * np.arange(COUNT)) + 5.0
+BEND = np.sin(0.02 * np.arange(COUNT) - 0.2)
+TWO = [f"{t:.2f},{y:.4f},{name}" for t, p, b in zip(SECONDS, GAUGE, BEND) for name, y in (("p", p), ("b", b))]
+CELLS = [row.partition(",") for row in TWO]
+OFF = [f"{float(t) + 0.001 * (k % 2):.3f},{rest}" for k, (t, _, rest) in enumerate(CELLS)]
+ONE = Signals("t", "y", None, "y")
+
+
+@pytest.mark.parametrize(
+    "lines, header, said",
+    [
+        (TWO, "t,y,sensor", "as 'sensor' says"),
+        (OFF, "t,y,which", "as 'which' says"),
+        ([row for k, row in enumerate(OFF) if k % 4 != 3], "t,y,tag", "as 'tag' says"),
+        ([row.replace(",p", ",1").replace(",b", ",2") for row in TWO], "t,y,id", "2 rows of each time stamp"),
+        ([row[:-2] for row in TWO], "t,y", "2 rows of each time stamp"),
+        (TWO[::2] + TWO[1::2], "t,y,Sensor 1", "the same time stamps for each 'Sensor 1'"),
+    ],
+    ids=["in turn", "at other moments", "two rates", "numbered", "without a name", "in blocks"],
+)
+def test_rows_of_several_sensors_are_no_faster_clock(tmp_path, lines, header, said):
+    """Pressure and bending one under the other are not one signal at twice the rate."""
+    path = text(tmp_path, lines, header=header)
+    with pytest.raises(LogError, match=f"{said}.*; give each sensor a column of its own"):
+        read_logs(path, ONE, 0.05)
+    name = header.split(",")[-1]
+    if name not in ("y", "id"):
+        found = read_logs(path, replace(ONE, run=name), 0.05)
+        assert len(found) == 2 and not any("rounded" in note for e in found for note in e.notes)
+
+
+def test_signals_that_are_never_in_one_row_are_of_one_moment(tmp_path):
+    """Half a sample between pressure and output would be a dead time that no rig has."""
+    rows = [f"{t:.2f},{p:.4f},\n{t:.2f},,{b:.4f}" for t, p, b in zip(SECONDS, GAUGE, BEND)]
+    with pytest.raises(LogError, match="2 rows of each time stamp"):
+        read_logs(text(tmp_path, rows), PLAIN, 0.05)
+
+
+def test_a_role_that_is_a_word_in_the_rows_is_said_to_be(tmp_path):
+    with pytest.raises(LogError, match="no column 'b' .output., but rows that 'sensor' names so; give each"):
+        read_logs(text(tmp_path, TWO, header="t,value,sensor"), Signals("t", "b", None, "p"), 0.05)
+
+
+@pytest.mark.parametrize(
+    "word", [lambda k: k // 50 % 2, lambda k: k % 2, lambda k: k // 2 % 2, lambda k: k % 3 == 0, lambda k: 0]
+)
+@pytest.mark.parametrize("stamps", [0.05, 0.001])
+@pytest.mark.parametrize("names", [("open", "shut"), ("0", "1")])
+def test_words_beside_one_sensor_name_no_other(tmp_path, word, stamps, names):
+    times = np.floor(SECONDS / stamps + 1e-6) * stamps
+    rows = [
+        f"{t:.3f},{p:.4f},{b:.4f},{names[word(k)]}" for k, (t, p, b) in enumerate(zip(times, GAUGE, BEND))
+    ]
+    (found,) = read_logs(text(tmp_path, rows, header="t,p,y,sensor"), PLAIN, 0.05)
+    assert len(found) == COUNT
+
+
+def test_rounded_stamps_and_a_slow_camera_are_of_one_sensor(tmp_path):
+    times = np.floor(SECONDS / 0.1 + 1e-6) * 0.1
+    ends = ["" if k % 2 else f"{b:.4f}" for k, b in enumerate(BEND)]
+    rows = [f"{t:.1f},{p:.4f},{b:.4f},{e}" for t, p, b, e in zip(times, GAUGE, BEND, ends)]
+    path = text(tmp_path, rows, header="t,p,y,c")
+    assert len(read_logs(path, replace(PLAIN, curvature="c"), 0.05)[0]) >= COUNT - 1
