@@ -10,7 +10,7 @@ import numpy as np
 
 from focgen.arrays import Array, Bools, Ints
 from focgen.errors import LogError
-from focgen.logs import clock, missing
+from focgen.logs import clock, missing, stamps
 from focgen.logs.clock import FEWEST
 from focgen.logs.experiment import Experiment
 from focgen.logs.mending import mended
@@ -53,6 +53,15 @@ class Raw:
             return lambda row: line(first + row)
         rows = np.flatnonzero(kept) if kept.dtype == bool else kept
         return lambda row: line(int(rows[row]))
+
+    def carried_on(self) -> Raw:
+        """The same on a clock that nobody puts back, with a note where somebody did."""
+        time, found = stamps.carried_on(self.time)
+        if not found:
+            return self
+        row, hours = next(iter(found.items()))
+        what = f"the clock is put back by {hours:g} h, the time taken as going on"
+        return replace(self, time=time).with_notes(Note(what, len(found), f"in {self.line(row)}"))
 
     def with_notes(self, *notes: str) -> Raw:
         """The same, with more to be said of it."""

@@ -86,9 +86,19 @@ def read_logs(
     tables = tables_of(logs)
     if not tables:
         raise LogError("logs", "none is given", "name at least one log")
+    _check_zones(tables, signals.time)
     found = [part for table in tables for part in _experiments(table, signals, sample_time, (first, last))]
     _check_limits(found, dict(limits or {}), signals.columns())
     return _with_twins(in_session_order(_with_own_names(found)))
+
+
+def _check_zones(tables: Sequence[LogTable], name: str) -> None:
+    """Raise LogError where some logs have dates with a zone and some without: hours may lie between them."""
+    zones = {table.path: table.has_zone(name) for table in tables}
+    bare = next((path for path, zone in zones.items() if zone is False), None)
+    if bare is not None and True in zones.values():
+        what = "has dates without a zone, beside a log with one"
+        raise LogError(f"{bare} [{name}]", what, "write the zone in all logs of a session, or in none")
 
 
 def each_of(logs: Logs) -> list[Log]:
@@ -128,6 +138,8 @@ def _experiments(
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
         run = replace(run, where=where, stamps=f"{where} [{signals.time}]")
         check_one_row_a_moment(table, run, rows, _taken(signals))
+        if column is not None and (table.is_dated(column) or run.time[0] > _DATED):
+            run = run.carried_on()
         for experiment in experiments_of(run, sample_time, window):
             yield table.path, experiment
 

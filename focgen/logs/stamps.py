@@ -15,6 +15,8 @@ _POINTED = (0.01, 0.0001)  # the same of mm.ss and of h.mmss
 _PART = 1 << 14  # stamps that are looked at side by side
 _MINUTES = 4  # that lack the same seconds: fewer may be chance
 _MOST = 0.75  # of the minutes have to show it: a row is lost at the end of some
+_HOURS = (1.0, 12.0)  # by which a clock is put back
+_NIGHT = (23.0, 0.0, 1.0, 2.0, 3.0)  # hours to which a clock is put back by one
 _ROUND = 1e-6  # s: a clock from 1970 is rounded so far
 _LOST = 2.5  # samples after which a minute begins at most, one row lost
 
@@ -165,6 +167,50 @@ def of_numpy(values: Array) -> Array:
     if kind is None:
         return values
     return np.where(np.isnat(values), np.nan, values.astype(kind).astype(np.int64) * 1e-9)
+
+
+def carried_on(values: Array) -> tuple[Array, dict[int, float]]:
+    """Dates or times of day (m,) in s without the falls of a clock that is put back, and the hours of each by
+    its row.
+
+    By an hour at the end of summer time: at night, to a full hour. By twelve at one o'clock, where no stamp
+    is of an hour that a clock of twelve has not. Either way the stamps go on as if nothing had been.
+    """
+    steps = np.diff(values)
+    rows = np.flatnonzero(steps < -1800.0)
+    if not len(rows) or not (steps > 0.0).any():
+        return values, {}
+    reach = _LOST * float(np.median(steps[steps > 0.0]))
+    found = {
+        row + 1: hours for row in rows.tolist() for hours in _HOURS if _is_put_back(values, row, hours, reach)
+    }
+    if not found:
+        return values, {}
+    shift = np.zeros(len(values))
+    shift[list(found)] = [3600.0 * hours for hours in found.values()]
+    return values + np.cumsum(shift), found
+
+
+def _is_put_back(values: Array, row: int, hours: float, reach: float) -> bool:
+    before, after = values[row], values[row + 1]
+    hour, beyond = divmod(after % _DAY, 3600.0)
+    if not (-_ROUND <= after + 3600.0 * hours - before <= reach and beyond <= reach):
+        return False
+    return hour in _NIGHT if hours == 1.0 else hour == 1.0 and _of_twelve(values)
+
+
+def _of_twelve(values: Array) -> bool:
+    hours = values % _DAY // 3600.0
+    return bool(((hours >= 1.0) & (hours <= 12.0)).all())
+
+
+def has_zone(cells: Sequence[str]) -> bool | None:
+    """Whether dates have a zone; None of times of day, and of what is no date."""
+    filled = next((cell for cell in cells if cell), "")
+    try:
+        return datetime.fromisoformat(filled).tzinfo is not None if _has_date(filled) else None
+    except ValueError:
+        return None
 
 
 def _has_date(cell: str) -> bool:

@@ -129,8 +129,8 @@ class LogTable:
         cell that is none of these, and where it may be read otherwise, unless the rig has ``told`` its unit.
         """
         column = self.column(name)
-        dated = not isinstance(column, np.ndarray) and _is_dated(column)
-        if dated:
+        dated = self.is_dated(name)
+        if not isinstance(column, np.ndarray) and dated:
             try:
                 found = stamps.seconds(column)
             except ValueError as reason:
@@ -149,6 +149,11 @@ class LogTable:
         """Whether a column is one of dates or times of day, in text."""
         column = self.column(name)
         return not isinstance(column, np.ndarray) and _is_dated(column)
+
+    def has_zone(self, name: str) -> bool | None:
+        """Whether the dates of a column have a zone; None of one that holds no dates, or is not there."""
+        column = self.column(name) if name in self else []
+        return None if isinstance(column, np.ndarray) or not _is_dated(column) else stamps.has_zone(column)
 
     def numbers(self, name: str) -> Array:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no

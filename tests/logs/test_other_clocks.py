@@ -6,6 +6,7 @@ of them.
 """
 
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -99,7 +100,7 @@ def test_even_clocks_count_neither_minutes_nor_frames(step, begin):
     assert stamps.other_reading(lost, dated=False) is None
 
 
-# ------------------------------------------------------------------------------------- one sensor under the other
+# --------------------------------------------------------------------------------- one sensor under the other
 
 GAUGE = 3.0 * np.sin(0.02 * np.arange(COUNT)) + 5.0
 BEND = np.sin(0.02 * np.arange(COUNT) - 0.2)
@@ -164,3 +165,75 @@ def test_rounded_stamps_and_a_slow_camera_are_of_one_sensor(tmp_path):
     rows = [f"{t:.1f},{p:.4f},{b:.4f},{e}" for t, p, b, e in zip(times, GAUGE, BEND, ends)]
     path = text(tmp_path, rows, header="t,p,y,c")
     assert len(read_logs(path, replace(PLAIN, curvature="c"), 0.05)[0]) >= COUNT - 1
+
+
+# ------------------------------------------------------------------------------------------- clocks put back
+
+
+def put_back(begin, hours, at, form="%H:%M:%S.%f", step=0.05, lost=0):
+    """Stamps of a clock that begins at ``begin`` and is put back by ``hours`` after ``at`` s."""
+    times = [begin + timedelta(seconds=step * k) for k in range(COUNT + lost)]
+    back = [timedelta(hours=hours * (step * k > at - 1e-9)) for k in range(COUNT + lost)]
+    made = [(time - less).strftime(form) for time, less in zip(times, back)]
+    return made[: int(at / step)] + made[int(at / step) + lost :]
+
+
+DATE = "%Y-%m-%dT%H:%M:%S.%f"
+SUMMER = datetime(2026, 10, 25, 2, 59, 50, tzinfo=UTC)
+NOON = datetime(2026, 1, 31, 12, 59, 50, tzinfo=UTC)
+
+
+@pytest.mark.parametrize("lost", [0, 1])
+@pytest.mark.parametrize("form", ["%H:%M:%S.%f", DATE])
+@pytest.mark.parametrize("begin, hours", [(SUMMER, 1), (NOON, 12)], ids=["end of summer", "one o'clock"])
+def test_a_clock_that_is_put_back_tears_no_experiment(tmp_path, begin, hours, form, lost):
+    """The state of the rig goes on: what follows did not begin at rest."""
+    (found,) = read_logs(log(tmp_path, put_back(begin, hours, 10.0, form, lost=lost)), PLAIN, 0.05)
+    assert len(found) == COUNT + lost and found.sample_time == 0.05
+    (note,) = [note for note in found.notes if "put back" in note]
+    assert f"put back by {hours} h" in note and "in line 202" in note
+
+
+def test_times_of_a_frame_are_put_back_alike(tmp_path):
+    times = np.array(put_back(SUMMER, 1, 10.0, DATE), dtype="datetime64[us]")
+    (found,) = read_logs({"t": times, "p": SECONDS, "y": SECONDS}, PLAIN, 0.05)
+    assert len(found) == COUNT and "put back by 1 h" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    "begin, hours",
+    [
+        (SUMMER + timedelta(hours=8), 1),
+        (SUMMER - timedelta(minutes=30), 1),
+        (SUMMER, 1.01),
+        (NOON, 11),
+        (NOON - timedelta(hours=1), 12),
+    ],
+    ids=["by day", "within an hour", "a little more", "eleven hours", "at twelve"],
+)
+def test_a_clock_that_falls_back_otherwise_starts_anew(tmp_path, begin, hours):
+    found = read_logs(log(tmp_path, put_back(begin, hours, 10.0)), PLAIN, 0.05)
+    assert [len(e) for e in found] == [200, 200] and "starts anew" in found[0].notes[0]
+
+
+def test_a_clock_of_24_hours_is_not_put_back_by_12(tmp_path):
+    """Who logs at 13:00 or at 0:30 has no clock of twelve hours."""
+    times = put_back(NOON, 12, 10.0)
+    times[:8] = [f"00:30:0{k}.000" for k in range(8)]
+    found = read_logs(log(tmp_path, times), PLAIN, 0.05)
+    assert len(found) > 1 and not any("put back" in note for e in found for note in e.notes)
+
+
+def test_logs_of_which_some_have_a_zone_are_of_no_one_clock(tmp_path):
+    """Hours may lie between them, in which a drift goes on or a softening rests."""
+    zoned, bare_of_it = (tmp_path / name for name in "ab")
+    for folder, zone in ((zoned, "+02:00"), (bare_of_it, "")):
+        folder.mkdir()
+        log(folder, [f"2026-01-31T12:00:{t:06.3f}{zone}" for t in SECONDS])
+    with pytest.raises(LogError, match="b/log.csv .*without a zone, beside a log with one; write the zone"):
+        read_logs([zoned / "log.csv", bare_of_it / "log.csv"], PLAIN, 0.05)
+    log(bare_of_it, [f"2026-01-31T10:05:{t:06.3f}Z" for t in SECONDS])
+    first, second = read_logs([zoned / "log.csv", bare_of_it / "log.csv"], PLAIN, 0.05)
+    assert second.start - first.start == pytest.approx(300.0)
+    log(bare_of_it, [f"{t:.2f}" for t in SECONDS])
+    assert len(read_logs([zoned / "log.csv", bare_of_it / "log.csv"], PLAIN, 0.05)) == 2
