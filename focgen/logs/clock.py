@@ -160,6 +160,7 @@ class Reading(Enum):
     TOLD = "the rig, the file or the column's name says its unit"
     STAMPS = "texts as hh:mm:ss"
     NUMBERS = "nothing says another unit"
+    UNSURE = "nothing says another unit, and points may stand between thousands"
 
 
 def check_reading(time: Array, sample_time: float, where: str, column: str | None, reading: Reading) -> None:
@@ -176,6 +177,8 @@ def check_reading(time: Array, sample_time: float, where: str, column: str | Non
         other = "mm:ss and frames, read as hh:mm:ss" if _is_near(step, 60.0 * sample_time) else None
     elif _is_near(60.0 * step, sample_time):
         other = "minutes"
+    elif reading is Reading.UNSURE:
+        other = "a thousand times as much, with points between thousands"
     elif (time % 1.0 == 0.0).all():
         other = "a count of samples or of ticks"
     if other is not None:

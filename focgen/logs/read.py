@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -68,6 +68,7 @@ def read_logs(
     first: float | None = None,
     last: float | None = None,
     limits: Limits | None = None,
+    ranged: Collection[str] = (),
 ) -> tuple[Experiment, ...]:
     """Read the experiments of one session, in the order of their time stamps, or as given where those
     overlap.
@@ -77,7 +78,8 @@ def read_logs(
 
     ``sample_time`` (s) is the rig's: what is not uniformly sampled is resampled to it. ``first`` and ``last``
     cut each experiment (s since its first sample). ``limits`` are each role's (low, high) in its unit, which
-    reveal a wrong unit. Raises LogError naming file, column, line and remedy.
+    reveal a wrong unit; roles that are ``ranged`` have one that is not asked for here. Raises LogError naming
+    file, column, line and remedy.
     """
     logs = each_of(paths)
     read = [log for log in logs if isinstance(log, Experiment)]
@@ -87,6 +89,8 @@ def read_logs(
     if not tables:
         raise LogError("logs", "none is given", "name at least one log")
     _check_zones(tables, signals.time)
+    for table in tables:
+        _check_marks(table, signals, {*(limits or {}), *ranged})
     found = [part for table in tables for part in _experiments(table, signals, sample_time, (first, last))]
     _check_limits(found, dict(limits or {}), signals.columns())
     return _with_twins(in_session_order(_with_own_names(found)))
@@ -99,6 +103,19 @@ def _check_zones(tables: Sequence[LogTable], name: str) -> None:
     if bare is not None and True in zones.values():
         what = "has dates without a zone, beside a log with one"
         raise LogError(f"{bare} [{name}]", what, "write the zone in all logs of a session, or in none")
+
+
+def _check_marks(table: LogTable, signals: Roles, ranged: Collection[str]) -> None:
+    """Raise LogError where the columns of all roles show numbers like 1.200 only, which may be thousands: the
+    rig tells by the range of one of them, or by its scale."""
+    unsure = {role: name for role, name in signals.columns().items() if table.is_unsure(name)}
+    if not unsure or unsure.keys() & {*ranged, *signals.scales}:
+        return
+    role, name = next(iter(unsure.items()))
+    what = "has nothing but numbers like 1.200, whose point may stand between thousands"
+    scaled = f"write {role} = {{ column = {name!r}, scale = 1 }} in the rig's [signals]"
+    remedy = f"write one of them as 1.2 or 1200, or, where the point is a decimal one, {scaled}"
+    raise LogError(f"{table.path} [{name}]", what, remedy)
 
 
 def each_of(logs: Logs) -> list[Log]:
@@ -183,6 +200,8 @@ def _reading(table: LogTable, signals: Roles) -> clock.Reading:
         return clock.Reading.TOLD
     if table.is_dated(name):
         return clock.Reading.STAMPS
+    if table.is_unsure(name):
+        return clock.Reading.UNSURE
     said = unit_of_time(table.unit(name) or time_unit_named(name) or "")
     return clock.Reading.TOLD if said is not None else clock.Reading.NUMBERS
 

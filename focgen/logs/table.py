@@ -50,7 +50,7 @@ class LogTable:
     ``clock`` (m,): the time in s that a file gives without a column for it. ``runs`` (m,): the name of the
     run of each row, where the file has them apart. ``notes``: how the file was read. ``differing``: its
     columns have clocks of their own that differ, so there is none. ``grouped``: columns whose points may
-    stand between thousands.
+    stand between thousands; ``unsure``: those that show nothing else but numbers like "1.200".
     """
 
     path: str
@@ -64,6 +64,7 @@ class LogTable:
     notes: tuple[str, ...] = ()
     differing: bool = False
     grouped: frozenset[str] = frozenset()
+    unsure: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -154,6 +155,10 @@ class LogTable:
         """Whether the dates of a column have a zone; None of one that holds no dates, or is not there."""
         column = self.column(name) if name in self else []
         return None if isinstance(column, np.ndarray) or not _is_dated(column) else stamps.has_zone(column)
+
+    def is_unsure(self, name: str) -> bool:
+        """Whether nothing in the file tells 1.200 from 1200 in a column."""
+        return (name if name in self.columns else self.aliases.get(name, name)) in self.unsure
 
     def numbers(self, name: str) -> Array:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no

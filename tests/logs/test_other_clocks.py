@@ -5,6 +5,7 @@ that is put back tear experiments or open holes that the rig never had; and when
 of them.
 """
 
+import tomllib
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -15,6 +16,7 @@ from focgen.errors import LogError
 from focgen.logs import read_logs, stamps
 from focgen.logs.scales import Scale
 from focgen.logs.table import read_table
+from focgen.rig.files import read_rig, rig_text
 from focgen.rig.rig import Signals
 from tests.logs.test_misread import PLAIN, text
 from tests.logs.test_two_readings import COUNT, SECONDS, log
@@ -237,3 +239,46 @@ def test_logs_of_which_some_have_a_zone_are_of_no_one_clock(tmp_path):
     assert second.start - first.start == pytest.approx(300.0)
     log(bare_of_it, [f"{t:.2f}" for t in SECONDS])
     assert len(read_logs([zoned / "log.csv", bare_of_it / "log.csv"], PLAIN, 0.05)) == 2
+
+
+# ----------------------------------------------------------------------------------------------- thousands
+
+
+@pytest.mark.parametrize("kind", ["text", "frame"])
+def test_numbers_that_all_look_like_thousands_are_asked_for(tmp_path, kind):
+    """1.013 is a pressure in bar, and one in mbar with its thousands marked."""
+    path = tmp_path / "log.csv"
+    dates = [f"2026-01-31T12:00:{t:06.3f}" for t in SECONDS]
+    p, y = ([f"{v:.3f}" for v in values] for values in (1.0 + GAUGE, 2.5 + BEND))
+    path.write_text("\n".join(["t;p;y", *map(";".join, zip(dates, p, y))]) + "\n")
+    given = path if kind == "text" else {"t": SECONDS, "p": p, "y": y}
+    with pytest.raises(LogError, match=r"\[p\]: .*like 1.200.* pressure = { column = 'p', scale = 1 }"):
+        read_logs(given, PLAIN, 0.05)
+    scaled = replace(PLAIN, scales={"pressure": Scale()})
+    for found in (read_logs(given, scaled, 0.05), read_logs(given, PLAIN, 0.05, ranged={"output"})):
+        assert found[0]["pressure"][0] == pytest.approx(6.0)
+    (found,) = read_logs(given, PLAIN, 0.05, limits={"output": (0.0, 5.0)})
+    assert found["output"].max() < 4.0
+
+
+def test_one_number_that_is_no_thousand_tells_of_all(tmp_path):
+    for one in ("0.999", "12.5", "1200.125"):
+        rows = [f"{k + 1000};{1.5 + k / 1000:.3f};{one}" for k in range(COUNT)]
+        (found,) = read_logs(text(tmp_path, rows, header="t;p;y"), PLAIN, 1.0)
+        assert found["pressure"][0] == 1.5
+
+
+def test_a_time_that_looks_like_thousands_is_in_seconds_at_the_rate_of_the_rig_only(tmp_path):
+    rows = [f"{1 + k / 1000:.3f};{k};{k}" for k in range(COUNT)]
+    path = text(tmp_path, rows, header="t;p;y")
+    with pytest.raises(LogError, match="may be a thousand times as much"):
+        read_logs(path, PLAIN, 0.05)
+    assert read_logs(path, PLAIN, 0.001)[0].sample_time == 0.001
+    assert read_logs(path, TOLD, 0.05)[0].sample_time == 0.001
+
+
+def test_a_rig_says_by_a_scale_of_1_that_a_point_is_a_decimal_one():
+    given = {"time": "t", "pressure": {"column": "p", "scale": 1}, "output": "y"}
+    rig = read_rig({"name": "r", "sample_time": 0.05, "signals": given})
+    assert rig.signals.scales == {"pressure": Scale()}
+    assert read_rig(tomllib.loads(rig_text(rig))).signals == rig.signals
