@@ -10,6 +10,7 @@ import numpy as np
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
 from focgen.logs.notes import Note
+from focgen.logs.stamps import skips_frames
 from focgen.logs.units import in_unit
 
 HELD = ("command", "reference")  # set by a controller and held until the next sample
@@ -179,6 +180,8 @@ def check_reading(time: Array, sample_time: float, where: str, column: str | Non
         other = "minutes"
     elif reading is Reading.UNSURE:
         other = "a thousand times as much, with points between thousands"
+    elif skips_frames(time):
+        other = "seconds and frames, as 12.24 that goes on at 13.00"
     elif (time % 1.0 == 0.0).all():
         other = "a count of samples or of ticks"
     if other is not None:

@@ -47,9 +47,6 @@ def other_reading(values: Array, dated: bool) -> tuple[str, str] | None:
         return what, "write it as 12:00:59.98"
     if not dated and is_packed(values, _POINTED):
         return "counts to .59 and goes on at 1.00: it may be minutes as mm.ss", "write it as 12:00:59"
-    if not dated and skips_frames(values):
-        what = "lacks the same hundredths of every second: it may be seconds and frames"
-        return what, "write it in seconds"
     return None
 
 

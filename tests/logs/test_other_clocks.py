@@ -97,9 +97,16 @@ def test_minutes_or_frames_behind_a_point_are_no_decimals(tmp_path, times, step,
 @pytest.mark.parametrize("begin", [0.0, 0.4, 1.7e9, 59.5])
 def test_even_clocks_count_neither_minutes_nor_frames(step, begin):
     times = np.round(begin + step * np.arange(4000), 6)
-    assert stamps.other_reading(times, dated=False) is None
-    lost = np.delete(times, np.arange(7, 3900, 41))
-    assert stamps.other_reading(lost, dated=False) is None
+    for each in (times, np.delete(times, np.arange(7, 3900, 41))):
+        assert stamps.other_reading(each, dated=False) is None and not stamps.skips_frames(each)
+
+
+def test_short_parts_at_the_rate_of_the_rig_are_no_frames(tmp_path):
+    """A logger that is triggered every second: of two readings the one at the rig's rate."""
+    path = log(tmp_path, [f"{k // 20 + 0.01 * (k % 20):.2f}" for k in range(COUNT)])
+    assert len(read_logs(path, PLAIN, 0.01)) == COUNT // 20
+    with pytest.raises(LogError, match="seconds and frames"):
+        read_logs(path, PLAIN, 0.05)
 
 
 # --------------------------------------------------------------------------------- one sensor under the other
