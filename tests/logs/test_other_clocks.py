@@ -116,6 +116,7 @@ BEND = np.sin(0.02 * np.arange(COUNT) - 0.2)
 TWO = [f"{t:.2f},{y:.4f},{name}" for t, p, b in zip(SECONDS, GAUGE, BEND) for name, y in (("p", p), ("b", b))]
 CELLS = [row.partition(",") for row in TWO]
 OFF = [f"{float(t) + 0.001 * (k % 2):.3f},{rest}" for k, (t, _, rest) in enumerate(CELLS)]
+ALIKE = [f"{t:.2f},{b + 0.001 * k:.4f},{'pb'[k]}" for t, b in zip(SECONDS, BEND) for k in range(2)]
 ONE = Signals("t", "y", None, "y")
 
 
@@ -123,13 +124,14 @@ ONE = Signals("t", "y", None, "y")
     "lines, header, said",
     [
         (TWO, "t,y,sensor", "as 'sensor' says"),
+        (ALIKE, "t,y,sensor", "as 'sensor' says"),
         (OFF, "t,y,which", "as 'which' says"),
         ([row for k, row in enumerate(OFF) if k % 4 != 3], "t,y,tag", "as 'tag' says"),
         ([row.replace(",p", ",1").replace(",b", ",2") for row in TWO], "t,y,id", "2 rows of each time stamp"),
         ([row[:-2] for row in TWO], "t,y", "2 rows of each time stamp"),
         (TWO[::2] + TWO[1::2], "t,y,Sensor 1", "the same time stamps for each 'Sensor 1'"),
     ],
-    ids=["in turn", "at other moments", "two rates", "numbered", "without a name", "in blocks"],
+    ids=["in turn", "alike", "at other moments", "two rates", "numbered", "without a name", "in blocks"],
 )
 def test_rows_of_several_sensors_are_no_faster_clock(tmp_path, lines, header, said):
     """Pressure and bending one under the other are not one signal at twice the rate."""
