@@ -12,6 +12,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
+from focgen import init
 from focgen.errors import LogError
 from focgen.logs import read_logs, stamps
 from focgen.logs.scales import Scale
@@ -268,6 +269,13 @@ def test_numbers_that_all_look_like_thousands_are_asked_for(tmp_path, kind):
         assert found[0]["pressure"][0] == pytest.approx(6.0)
     (found,) = read_logs(given, PLAIN, 0.05, limits={"output": (0.0, 5.0)})
     assert found["output"].max() < 4.0
+
+
+def test_init_says_that_it_takes_points_for_decimal_ones(tmp_path):
+    """It writes ranges, which tell the other commands."""
+    rows = [f"{k};{p:.3f};{y:.3f}" for k, (p, y) in enumerate(zip(1.0 + GAUGE, 2.5 + BEND))]
+    found = init(text(tmp_path, rows, header="t;p;y"))
+    assert sum("point is taken for a decimal one" in doubt for doubt in found.doubts) == 2
 
 
 def test_one_number_that_is_no_thousand_tells_of_all(tmp_path):
