@@ -114,7 +114,7 @@ def identify(
 
 
 def _read(logs: Logs, rig: Rig, first: float | None, last: float | None) -> tuple[Experiment, ...]:
-    limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
+    limits = rig.ranges.stated()
     return at_one_rate(read_logs(logs, rig.signals, rig.sample_time, first, last, limits))
 
 

@@ -116,18 +116,31 @@ class Points:
         return self._whole and self._grouped and not self._decimal
 
     @property
+    def open(self) -> bool:
+        """Whether all its points stand in numbers like "1.200", none of them beside a whole number."""
+        return self._grouped and not self._whole and not self._decimal
+
+    @property
     def decimal(self) -> bool:
         """Whether a point is a decimal one for sure."""
         return self._decimal
 
 
-def doubtful(columns: Mapping[str, Sequence[str] | Array]) -> frozenset[str]:
-    """Those columns of texts whose points may stand between thousands, where no text says otherwise."""
+def marks(columns: Mapping[str, Sequence[str] | Array]) -> tuple[frozenset[str], frozenset[str]]:
+    """Those columns of texts whose points may stand between thousands, where no text says otherwise: a
+    table's ``grouped`` and ``unsure``."""
     seen = {name: Points() for name, cells in columns.items() if not _of_numbers(cells)}
     for name, points in seen.items():
         points.see(cell for cell in columns[name] if isinstance(cell, str))
-    told = any(points.decimal for points in seen.values())
-    return frozenset(name for name, points in seen.items() if points.doubtful and not told)
+    return marks_of(seen, told=False)
+
+
+def marks_of(seen: Mapping[str, Points], told: bool) -> tuple[frozenset[str], frozenset[str]]:
+    """The same of columns that have been seen; ``told``: the file says in another way what its points are."""
+    if told or any(points.decimal for points in seen.values()):
+        return frozenset(), frozenset()
+    grouped = frozenset(name for name, points in seen.items() if points.doubtful)
+    return grouped, frozenset(name for name, points in seen.items() if points.open)
 
 
 def _of_numbers(cells: Sequence[str] | Array) -> bool:

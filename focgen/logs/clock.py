@@ -10,6 +10,8 @@ import numpy as np
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
 from focgen.logs.notes import Note
+from focgen.logs.stamps import skips_frames
+from focgen.logs.units import in_unit
 
 HELD = ("command", "reference")  # set by a controller and held until the next sample
 SHORT = 5  # samples: a longer hole is never bridged. On a response whose fastest time constant spans ten
@@ -26,6 +28,13 @@ _NEAR = 0.02  # relative: a clock's rate is the rig's
 _PLAUSIBLE = 99.0  # a log is recorded at a rate within this factor of the rig's
 _LONGEST = 5_000_000  # samples that few rows may be resampled to; many rows, twice as many as they are
 _COUNTABLE = 2**53  # ticks that float64 tells apart
+_OTHERS = {
+    "ms": 1e-3,
+    "us": 1e-6,
+    "h": 3600.0,
+    "day": 86400.0,
+}  # s: too far from one to pass for it
+_UNITS = {"ms": "milliseconds", "us": "microseconds", "h": "hours", "day": "days"}
 
 Line = Callable[[int], str]
 
@@ -131,17 +140,19 @@ def _line(x: Array | Ints, y: Array) -> tuple[float, float]:
     return slope, mean - slope * middle
 
 
-def check_unit(time: Array, sample_time: float, where: str) -> None:
-    """Raise LogError where samples lie so far apart, or so close, that the unit of time must be wrong."""
+def check_unit(time: Array, sample_time: float, where: str, column: str | None) -> None:
+    """Raise LogError where samples lie so far apart, or so close, that the unit of time must be wrong;
+    ``column`` counts the time, None where dates or the log's own clock give it."""
     ratio = float(np.median(np.diff(time))) / sample_time
     if 1.0 / _PLAUSIBLE < ratio < _PLAUSIBLE:
         return
-    unit = " (milliseconds?)" if 500 < ratio < 2000 else " (microseconds?)" if 5e5 < ratio < 2e6 else ""
+    likely = next((unit for unit, size in _OTHERS.items() if 0.5 < ratio * size < 2.0), None)
+    guess = f" ({_UNITS[likely]}?)" if likely else ""
     what = (
-        f"has samples {ratio * sample_time:g} s apart{unit} where the rig's sample_time is {sample_time:g} s"
+        f"has samples {ratio * sample_time:g} s apart{guess} where the rig's sample_time is {sample_time:g} s"
     )
-    remedy = "give time in seconds, or its unit by time = { column = …, unit = 'ms' }, or correct sample_time"
-    raise LogError(where, what, remedy)
+    told = "" if column is None else f"give time in seconds, or {in_unit(column, likely or 'ms')}, or "
+    raise LogError(where, what, f"{told}correct sample_time")
 
 
 class Reading(Enum):
@@ -150,27 +161,32 @@ class Reading(Enum):
     TOLD = "the rig, the file or the column's name says its unit"
     STAMPS = "texts as hh:mm:ss"
     NUMBERS = "nothing says another unit"
+    UNSURE = "nothing says another unit, and points may stand between thousands"
 
 
-def check_reading(time: Array, sample_time: float, where: str, reading: Reading) -> None:
+def check_reading(time: Array, sample_time: float, where: str, column: str | None, reading: Reading) -> None:
     """Raise LogError where nothing tells that a time is in seconds, and another reading explains it better.
 
     Seconds pass at the rig's own rate. At another one, a clock that has the rig's rate in minutes or frames
     is taken for these, and whole numbers may count samples or ticks as well.
     """
     step = float(np.median(np.diff(time)))
-    if reading is Reading.TOLD or _is_near(step, sample_time):
+    if column is None or reading is Reading.TOLD or _is_near(step, sample_time):
         return
     other = None
     if reading is Reading.STAMPS:
         other = "mm:ss and frames, read as hh:mm:ss" if _is_near(step, 60.0 * sample_time) else None
     elif _is_near(60.0 * step, sample_time):
         other = "minutes"
+    elif reading is Reading.UNSURE:
+        other = "a thousand times as much, with points between thousands"
+    elif skips_frames(time):
+        other = "seconds and frames, as 12.24 that goes on at 13.00"
     elif (time % 1.0 == 0.0).all():
         other = "a count of samples or of ticks"
     if other is not None:
         what = f"has steps of {step:g} where the rig's sample_time is {sample_time:g} s: it may be {other}"
-        remedy = "say which by time = { column = …, unit = 's' }, or another unit or scale, in [signals]"
+        remedy = f"{in_unit(column)}, or another unit or scale there, which says what it is"
         raise LogError(where, what, remedy)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.errors import LogError
-from focgen.logs.cells import doubtful
+from focgen.logs.cells import marks
 from focgen.logs.stamps import is_time, of_numpy
 from focgen.logs.table import LogTable
 
@@ -51,7 +51,8 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
         raise LogError(name, f"holds columns of different lengths ({sizes})", "give one value a sample")
     if not columns or not len(next(iter(columns.values()))):
         raise LogError(name, "holds no samples", "give one row a sample")
-    return LogTable(name, columns, units=units, clock=clock, grouped=doubtful(columns))
+    grouped, unsure = marks(columns)
+    return LogTable(name, columns, units=units, clock=clock, grouped=grouped, unsure=unsure)
 
 
 def _keys(frame: Frame | Mapping[Any, Any]) -> list[Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from focgen.arrays import Array, Bools, Ints
 from focgen.errors import LogError
-from focgen.logs import clock, missing
+from focgen.logs import clock, missing, stamps
 from focgen.logs.clock import FEWEST
 from focgen.logs.experiment import Experiment
 from focgen.logs.mending import mended
@@ -25,7 +25,8 @@ Window = tuple[float | None, float | None]
 @dataclass(frozen=True, eq=False)
 class Raw:
     """Rows of a log as they stand in the file: ``time`` (m,) in s, ``values`` by role (m,), NaN where a
-    reading is missing; ``where``, ``stamps`` and ``line`` name log, column of time and row in messages."""
+    reading is missing; ``where``, ``stamps`` and ``line`` name log, clock and row in messages; ``column``
+    holds the time, where one does."""
 
     name: str
     where: str
@@ -35,6 +36,7 @@ class Raw:
     line: clock.Line
     notes: tuple[str, ...] = ()
     reading: clock.Reading = clock.Reading.TOLD
+    column: str | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -51,6 +53,15 @@ class Raw:
             return lambda row: line(first + row)
         rows = np.flatnonzero(kept) if kept.dtype == bool else kept
         return lambda row: line(int(rows[row]))
+
+    def carried_on(self) -> Raw:
+        """The same on a clock that nobody puts back, with a note where somebody did."""
+        time, found = stamps.carried_on(self.time)
+        if not found:
+            return self
+        row, hours = next(iter(found.items()))
+        what = f"the clock is put back by {hours:g} h, the time taken as going on"
+        return replace(self, time=time).with_notes(Note(what, len(found), f"in {self.line(row)}"))
 
     def with_notes(self, *notes: str) -> Raw:
         """The same, with more to be said of it."""
@@ -132,8 +143,9 @@ def _windowed(run: Raw, window: Window) -> Raw:
 
 def _uncut(run: Raw, sample_time: float) -> Iterator[tuple[Raw, bool]]:
     """Yield (part, whether the rig ran unseen before it) for each part between long holes."""
-    clock.check_unit(run.time, sample_time, run.stamps)
-    clock.check_reading(run.time, sample_time, run.stamps, run.reading)
+    counts = run.column if run.reading is not clock.Reading.STAMPS else None  # a date has no unit
+    clock.check_unit(run.time, sample_time, run.stamps, counts)
+    clock.check_reading(run.time, sample_time, run.stamps, run.column, run.reading)
     kept = missing.keep(run.values, run.time)
     _check_present(run, kept)
     run = replace(run, values={role: run.values[role] for role in kept.roles})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -21,8 +21,9 @@ from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.scales import Scale, known, same, unit_of_time
-from focgen.logs.table import LogTable, in_seconds, read_table, stem
-from focgen.logs.units import time_unit_named, unit_of
+from focgen.logs.stacked import check_one_row_a_moment
+from focgen.logs.table import LogTable, read_table, stem
+from focgen.logs.units import in_unit, time_unit_named, unit_of
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
@@ -67,6 +68,7 @@ def read_logs(
     first: float | None = None,
     last: float | None = None,
     limits: Limits | None = None,
+    ranged: Collection[str] = (),
 ) -> tuple[Experiment, ...]:
     """Read the experiments of one session, in the order of their time stamps, or as given where those
     overlap.
@@ -76,7 +78,8 @@ def read_logs(
 
     ``sample_time`` (s) is the rig's: what is not uniformly sampled is resampled to it. ``first`` and ``last``
     cut each experiment (s since its first sample). ``limits`` are each role's (low, high) in its unit, which
-    reveal a wrong unit. Raises LogError naming file, column, line and remedy.
+    reveal a wrong unit; roles that are ``ranged`` have one that is not asked for here. Raises LogError naming
+    file, column, line and remedy.
     """
     logs = each_of(paths)
     read = [log for log in logs if isinstance(log, Experiment)]
@@ -85,9 +88,34 @@ def read_logs(
     tables = tables_of(logs)
     if not tables:
         raise LogError("logs", "none is given", "name at least one log")
+    _check_zones(tables, signals.time)
+    for table in tables:
+        _check_marks(table, signals, {*(limits or {}), *ranged})
     found = [part for table in tables for part in _experiments(table, signals, sample_time, (first, last))]
     _check_limits(found, dict(limits or {}), signals.columns())
     return _with_twins(in_session_order(_with_own_names(found)))
+
+
+def _check_zones(tables: Sequence[LogTable], name: str) -> None:
+    """Raise LogError where some logs have dates with a zone and some without: hours may lie between them."""
+    zones = {table.path: table.has_zone(name) for table in tables}
+    bare = next((path for path, zone in zones.items() if zone is False), None)
+    if bare is not None and True in zones.values():
+        what = "has dates without a zone, beside a log with one"
+        raise LogError(f"{bare} [{name}]", what, "write the zone in all logs of a session, or in none")
+
+
+def _check_marks(table: LogTable, signals: Roles, ranged: Collection[str]) -> None:
+    """Raise LogError where the columns of all roles show numbers like 1.200 only, which may be thousands: the
+    rig tells by the range of one of them, or by its scale."""
+    unsure = {role: name for role, name in signals.columns().items() if table.is_unsure(name)}
+    if not unsure or unsure.keys() & {*ranged, *signals.scales}:
+        return
+    role, name = next(iter(unsure.items()))
+    what = "has nothing but numbers like 1.200, whose point may stand between thousands"
+    scaled = f"write {role} = {{ column = {name!r}, scale = 1 }} in the rig's [signals]"
+    remedy = f"write one of them as 1.2 or 1200, or, where the point is a decimal one, {scaled}"
+    raise LogError(f"{table.path} [{name}]", what, remedy)
 
 
 def each_of(logs: Logs) -> list[Log]:
@@ -120,12 +148,15 @@ def _experiments(
     """Yield (path, experiment) for each run of a log, or part of one."""
     columns, notes = _present(table, signals)
     time, said = _time(table, signals)
-    reading = _reading(table, signals)
+    reading, column = _reading(table, signals), signals.time if signals.time in table else None
     notes = (*table.notes, *said, *notes)
     for name, rows in _runs(table, signals.run):
-        run = Raw(name, table.path, "", time, columns, table.line, notes, reading).part(rows)
+        run = Raw(name, table.path, "", time, columns, table.line, notes, reading, column).part(rows)
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
         run = replace(run, where=where, stamps=f"{where} [{signals.time}]")
+        check_one_row_a_moment(table, run, rows, _taken(signals))
+        if column is not None and (table.is_dated(column) or run.time[0] > _DATED):
+            run = run.carried_on()
         for experiment in experiments_of(run, sample_time, window):
             yield table.path, experiment
 
@@ -143,7 +174,7 @@ def _time(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
             _check_one_clock(table, signals.time, found)
         return found, said
     if table.clock is None:
-        raise table.missing("time", signals.time, {signals.run or "", *signals.columns().values()})
+        raise table.missing("time", signals.time, _taken(signals) - {signals.time})
     step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
     return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
 
@@ -158,7 +189,7 @@ def _check_one_clock(table: LogTable, name: str, time: Array) -> None:
         if own > 0.0 and not abs(step / own - 1.0) <= _ONE_CLOCK:
             what = f"has {step:g} s between samples where the log's own clock has {own:g} s"
     if what:
-        remedy = f"log all channels by one clock, or, where the column is right, {in_seconds(name)}"
+        remedy = f"log all channels by one clock, or, where the column is right, {in_unit(name)}"
         raise LogError(f"{table.path} [{name}]", what, remedy)
 
 
@@ -169,6 +200,8 @@ def _reading(table: LogTable, signals: Roles) -> clock.Reading:
         return clock.Reading.TOLD
     if table.is_dated(name):
         return clock.Reading.STAMPS
+    if table.is_unsure(name):
+        return clock.Reading.UNSURE
     said = unit_of_time(table.unit(name) or time_unit_named(name) or "")
     return clock.Reading.TOLD if said is not None else clock.Reading.NUMBERS
 
@@ -189,8 +222,13 @@ def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
         return ()
     if scale is not None:
         return (f"the log gives {name!r} in {given}, time is taken as {taken}",)
-    remedy = f"write time = {{ column = {name!r}, unit = {own[0]!r} }} in the rig's [signals]"
-    raise LogError(f"{table.path} [{name}]", f"is in {given}, and the rig takes it for seconds", remedy)
+    what = f"is in {given}, and the rig takes it for seconds"
+    raise LogError(f"{table.path} [{name}]", what, in_unit(name, own[0]))
+
+
+def _taken(signals: Roles) -> set[str]:
+    """The columns that have a role."""
+    return {signals.time, signals.run or "", *signals.columns().values()}
 
 
 def _scaled(table: LogTable, role: str, values: Array, signals: Roles) -> Array:
@@ -209,7 +247,7 @@ def _scaled(table: LogTable, role: str, values: Array, signals: Roles) -> Array:
 def _present(table: LogTable, signals: Roles) -> tuple[dict[str, Array], tuple[str, ...]]:
     """The signals that are there, by role, and notes on those that are not, or in another unit."""
     wanted = signals.columns()
-    taken = {signals.time, signals.run or "", *wanted.values()}
+    taken = _taken(signals)
     inputs = [role for role in ("command", "pressure") if role in wanted]
     there = [role for role, name in wanted.items() if name in table]
     for role in ["output", *inputs[: 0 if any(role in there for role in inputs) else 1]]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from focgen.children import environment, python
 from focgen.errors import FocgenError, LogError, MissingExtra
-from focgen.logs.cells import doubtful
+from focgen.logs.cells import marks
 from focgen.logs.table import LogTable
 
 SECONDS = 300.0  # until a reader must have answered
@@ -68,7 +68,8 @@ def _table(path: Path, head: dict[str, Any], body: bytes) -> LogTable:
         at += count if texts is None else 0
     clock = numbers[at:].copy() if head["clock"] else None
     known = {key: head[key] for key in ("units", "aliases", "runs", "differing")}
-    return LogTable(str(path), columns, clock=clock, grouped=doubtful(columns), **known)
+    grouped, unsure = marks(columns)
+    return LogTable(str(path), columns, clock=clock, grouped=grouped, unsure=unsure, **known)
 
 
 def _fault(kind: str, *parts: Any) -> FocgenError | OSError:

@@ -17,6 +17,7 @@ from focgen.errors import LogError
 from focgen.logs import stamps
 from focgen.logs.cells import Levels, parsed
 from focgen.logs.dialect import grouped, is_stamp
+from focgen.logs.units import in_unit
 from focgen.textfile import check_regular
 
 # The reader of each kind of file: a module of this room with ``read(path) -> LogTable``.
@@ -49,7 +50,7 @@ class LogTable:
     ``clock`` (m,): the time in s that a file gives without a column for it. ``runs`` (m,): the name of the
     run of each row, where the file has them apart. ``notes``: how the file was read. ``differing``: its
     columns have clocks of their own that differ, so there is none. ``grouped``: columns whose points may
-    stand between thousands.
+    stand between thousands; ``unsure``: those that show nothing else but numbers like "1.200".
     """
 
     path: str
@@ -63,6 +64,7 @@ class LogTable:
     notes: tuple[str, ...] = ()
     differing: bool = False
     grouped: frozenset[str] = frozenset()
+    unsure: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -93,6 +95,11 @@ class LogTable:
             return self.without_clock()
         near = self.closest(name, taken)
         there = ", ".join(self.columns)
+        holder = next((n for n, c in self.columns.items() if n not in taken and _holds(c, name)), None)
+        if holder is not None:
+            what = f"has no column {name!r} ({role}), but rows that {holder!r} names so".replace(";", ",")
+            remedy = "give each sensor a column of its own, and each time stamp one row"
+            return LogError(self.path, what, remedy)
         hint = (
             f"write {role} = {near!r} in the rig's [signals]"
             if near
@@ -123,32 +130,35 @@ class LogTable:
         cell that is none of these, and where it may be read otherwise, unless the rig has ``told`` its unit.
         """
         column = self.column(name)
-        if not isinstance(column, np.ndarray) and _is_dated(column):
+        dated = self.is_dated(name)
+        if not isinstance(column, np.ndarray) and dated:
             try:
                 found = stamps.seconds(column)
             except ValueError as reason:
                 what = f"has a time that cannot be read ({reason})"
                 remedy = "write it as 2026-01-31T12:00:00.000, or in seconds"
                 raise LogError(f"{self.path} [{name}]", what, remedy) from None
-            if not told and stamps.skips_seconds(found):
-                what = "lacks the same seconds of every minute: it may be mm:ss and frames, read as hh:mm:ss"
-                raise self.two_readings(name, what, "write it as 12:00:59.98")
-            return found
-        values = self.numbers(name)
-        if not told and stamps.is_packed(values):
-            what = "counts to 59 and goes on at 100: it may be a time of day as hhmmss"
-            raise self.two_readings(name, what, "write it as 12:00:59.98")
-        return values
-
-    def two_readings(self, name: str, what: str, otherwise: str) -> LogError:
-        """The error for a column of time that may be seconds or something else: the rig can tell which."""
-        remedy = f"{otherwise}, or, where it is no such thing, {in_seconds(name)}"
-        return LogError(f"{self.path} [{name}]", what, remedy)
+        else:
+            found = self.numbers(name)
+        other = None if told else stamps.other_reading(found, dated)
+        if other is not None:
+            remedy = f"{other[1]}, or, where it is no such thing, {in_unit(name)}"
+            raise LogError(f"{self.path} [{name}]", other[0], remedy)
+        return found
 
     def is_dated(self, name: str) -> bool:
         """Whether a column is one of dates or times of day, in text."""
         column = self.column(name)
         return not isinstance(column, np.ndarray) and _is_dated(column)
+
+    def has_zone(self, name: str) -> bool | None:
+        """Whether the dates of a column have a zone; None of one that holds no dates, or is not there."""
+        column = self.column(name) if name in self else []
+        return None if isinstance(column, np.ndarray) or not _is_dated(column) else stamps.has_zone(column)
+
+    def is_unsure(self, name: str) -> bool:
+        """Whether nothing in the file tells 1.200 from 1200 in a column."""
+        return (name if name in self.columns else self.aliases.get(name, name)) in self.unsure
 
     def numbers(self, name: str) -> Array:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no
@@ -185,11 +195,6 @@ class LogTable:
         return LogError(
             f"{self.path} [{name}]", f"holds {cell!r} in {self.line(row)}, which is no number", remedy
         )
-
-
-def in_seconds(name: str) -> str:
-    """What to write where a column of time is in seconds, and does not say so."""
-    return f"write time = {{ column = {name!r}, unit = 's' }} in the rig's [signals]"
 
 
 def check_units(path: Path, units: Sequence[Mapping[str, str]]) -> None:
@@ -239,6 +244,10 @@ def stem(path: str | Path) -> str:
     """The file's name without folder and ending."""
     name = Path(path).name
     return Path(name[: -len(".gz")] if name.lower().endswith(".gz") else name).stem
+
+
+def _holds(column: Column, word: str) -> bool:
+    return not isinstance(column, np.ndarray) and word in column[:_LOOK]
 
 
 def _plain(column: Column) -> list[Any]:

@@ -17,7 +17,7 @@ from itertools import islice
 from pathlib import Path
 
 from focgen.errors import LogError
-from focgen.logs.cells import Gathered, Lines
+from focgen.logs.cells import Gathered, Lines, marks_of
 from focgen.logs.dialect import SAMPLE, Comments, Dialect, is_number, lines_of, rows_of, sniffed
 from focgen.logs.table import LogTable
 from focgen.textfile import log_parts, open_log
@@ -58,8 +58,8 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
     except csv.Error as reason:
         raise LogError(str(path), f"is not CSV ({reason})", "save it as comma-separated text") from None
     cells = gathered.columns()
-    told = dialect.delimiter == "," or any(points.decimal for points in gathered.pointed)
-    doubtful = {name for name, points in zip(header, gathered.pointed) if points.doubtful and not told}
+    seen = dict(zip(header, gathered.pointed))
+    grouped, unsure = marks_of(seen, told=dialect.delimiter == ",")
     units, aliases = _without_units(header, _units(ahead, dialect, header))
     return LogTable(
         str(path),
@@ -68,8 +68,9 @@ def table_of(path: Path, lines: Callable[[], Iterator[str]], guessed: str = "") 
         decimal=dialect.decimal,
         units=units,
         aliases=aliases,
-        grouped=frozenset(doubtful),
         notes=(*_taken(ahead, dialect, guessed), *_left_out(comments)),
+        grouped=grouped,
+        unsure=unsure,
     )
 
 

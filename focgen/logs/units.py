@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -74,6 +75,22 @@ def time_unit_named(column: str) -> str | None:
     if last in _TIMES:
         return last if len(words) > 1 or last not in _ALONE else None
     return "ms" if last.endswith("ms") and last[:-2] in TIME_WORDS else None
+
+
+def in_unit(column: str, unit: str = "s") -> str:
+    r"""What to write where a ``column`` of time is in a ``unit`` that nothing else tells.
+
+    >>> in_unit("t")
+    "write time = { column = 't', unit = 's' } in the rig's [signals]"
+    >>> in_unit("it's", "min")
+    'write time = { column = "it\'s", unit = \'min\' } in the rig\'s [signals]'
+    """
+    name = (
+        f"'{column}'"
+        if "'" not in column and column.isprintable()
+        else json.dumps(column, ensure_ascii=False)
+    )
+    return f"write time = {{ column = {name}, unit = '{unit}' }} in the rig's [signals]"
 
 
 def unit_named(column: str | None) -> str:

@@ -113,7 +113,8 @@ def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:
         raise given.fail("unit", "is given beside 'scale' or 'offset'", "give the unit, or the numbers")
     if scale.scale == 0.0:
         raise given.fail("scale", "is 0", "give what the column is multiplied by")
-    return name, None if scale == Scale() else scale
+    told = scale != Scale() or "scale" in given  # of 1: the numbers are what they look like
+    return name, scale if told else None
 
 
 def _units(table: Table | None) -> dict[str, str]:

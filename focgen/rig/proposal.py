@@ -95,7 +95,8 @@ def init(
     by_name = {c.name: c for c in columns}
     roles = {role: by_name[guess.column] for role, guess in guesses.items()}
     said = [f"left out: {name!r} {why}" for name, why in left.items() if name not in (time.column, run)]
-    doubts = (*time.doubts, *_doubts(guesses, roles, [c.name for c in columns]), *said)
+    marks = _marks(tables, [guess.column for guess in guesses.values()])
+    doubts = (*time.doubts, *_doubts(guesses, roles, [c.name for c in columns]), *marks, *said)
     label = name or (stem(tables[0].path) if isinstance(given[0], str | Path) else "rig")
     files = [str(log) for log in given if isinstance(log, str | Path)]
     told = _next(files, roles, out)
@@ -104,6 +105,11 @@ def init(
     if out is not None:
         write_file(out, text, given)
     return Proposal(rig, text, doubts, told)
+
+
+def _marks(tables: Sequence[LogTable], names: Sequence[str]) -> list[str]:
+    what = "holds nothing but numbers like 1.200, whose point is taken for a decimal one"
+    return [f"{name!r} {what}" for name in names if any(table.is_unsure(name) for table in tables)]
 
 
 def _check(table: LogTable, guesses: Mapping[str, Guess], left: Mapping[str, str]) -> None:

@@ -46,4 +46,5 @@ def read_logs(
     Raises RigError, and LogError naming file, column, line and remedy.
     """
     given = rig_of(rig)
-    return read.read_logs(logs, given.signals, given.sample_time, from_, to)
+    ranged = given.ranges.stated()
+    return read.read_logs(logs, given.signals, given.sample_time, from_, to, ranged=ranged)

@@ -92,7 +92,9 @@ def experiments(
 ) -> tuple[Experiment, ...]:
     """The logs read, cut to ``first`` … ``last`` s, and at one rate. Raises RigError for a rig that cannot
     be run on them, LogError where a measured signal stands still throughout."""
-    found = at_one_rate(read_logs(logs, rig.signals, rig.sample_time, first, last))
+    found = at_one_rate(
+        read_logs(logs, rig.signals, rig.sample_time, first, last, ranged=rig.ranges.stated())
+    )
     check_moving(found)
     check_bounded(rig, longest(found))
     return found

@@ -133,6 +133,10 @@ class Ranges:
     pressure: tuple[float, float] | None = None
     output: tuple[float, float] | None = None
 
+    def stated(self) -> dict[str, tuple[float, float]]:
+        """Those that are, by role."""
+        return {role: span for role, span in vars(self).items() if span is not None}
+
 
 @dataclass(frozen=True)
 class Rig:

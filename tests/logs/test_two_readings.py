@@ -138,6 +138,30 @@ def test_a_clock_that_fits_the_rig_otherwise_is_no_seconds_until_the_rig_says_so
     assert len(found) == COUNT and "kept so" in found.notes[-1]
 
 
+@pytest.mark.parametrize(
+    "times, unit",
+    [
+        (range(COUNT), "s"),
+        ([f"{1000 * t + 0.5:.1f}" for t in SECONDS], "ms"),
+        ([f"{1e6 * t + 0.5:.1f}" for t in SECONDS], "us"),
+        ([f"{t / 86400 + 46053.5:.10f}" for t in SECONDS], "day"),
+    ],
+)
+def test_what_to_write_is_written_with_the_columns_own_name(tmp_path, times, unit):
+    """`column = …` is nothing that one can copy, and 'ms' is wrong of a spreadsheet's days."""
+    path = log(tmp_path, times, "Zeit,p,y")
+    with pytest.raises(LogError) as caught:
+        read_logs(path, Signals("Zeit", "y", None, "p"), 0.05)
+    assert f"write time = {{ column = 'Zeit', unit = '{unit}' }} in the rig's [signals]" in str(caught.value)
+
+
+def test_a_clock_without_a_column_has_no_column_to_write():
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"p": SECONDS, "y": SECONDS}, index=pandas.to_timedelta(SECONDS, unit="ms"))
+    with pytest.raises(LogError, match="; correct sample_time$"):
+        read_logs(frame, PLAIN, 0.05)
+
+
 def test_whole_seconds_pass_at_the_rate_of_the_rig_and_where_the_file_says_so(tmp_path):
     path = log(tmp_path, range(COUNT))
     assert read_logs(path, PLAIN, 1.0)[0].sample_time == 1.0
