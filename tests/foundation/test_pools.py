@@ -53,14 +53,16 @@ def begun(request, tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     end = time.monotonic() + 60.0
-    while len(sleeping()) < 2 and time.monotonic() < end:
-        time.sleep(0.05)
-    assert len(sleeping()) == 2, "they had not begun"
-    yield process
-    process.kill()
-    process.communicate()
-    for number in sleeping():
-        os.kill(number, signal.SIGKILL)
+    try:
+        while len(sleeping()) < 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        assert len(sleeping()) == 2, "they had not begun"
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+        for number in sleeping():
+            os.kill(number, signal.SIGKILL)
 
 
 def sleeping() -> list[int]:
