@@ -9,7 +9,7 @@ from typing import Any
 
 from focgen.errors import InputError
 from focgen.output import check_apart, check_writable, new_folder, write_file, write_files
-from focgen.replaced import check_own
+from focgen.replaced import check_own, check_page
 from focgen.report.interactive import library
 from focgen.report.page import Page
 
@@ -36,7 +36,7 @@ def check_report(path: str | None, inputs: Iterable[Any], out: str | None = None
     if is_page(path):
         library()
         check_apart([path], inputs)
-        check_own([path])
+        check_page(path)
     check_writable(Path(path), folder=not is_page(path))
 
 

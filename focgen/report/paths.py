@@ -23,7 +23,7 @@ from focgen.logs.experiment import Experiment
 from focgen.loop.design import Design
 from focgen.loop.simulate import simulate
 from focgen.output import check_apart, write_file
-from focgen.replaced import check_own
+from focgen.replaced import check_page
 from focgen.report.interactive import library
 from focgen.report.page import Page, Section
 from focgen.report.pages.chain import (
@@ -98,7 +98,7 @@ def report(paths: Part | Sequence[Part], out: str | Path) -> Path:
     places = [part for part in parts if isinstance(part, Path)]
     library()  # before anything takes time
     check_apart([out], [path for given in places for path in _files(given)])
-    check_own([out])
+    check_page(out)
     write_file(out, page_of(parts).self_contained(), [path for path in places if path.is_file()])
     return Path(out)
 
