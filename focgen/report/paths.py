@@ -42,6 +42,7 @@ from focgen.rig.files import read_rig
 from focgen.rig.proposal import Proposal
 from focgen.rig.replay import experiments, replay
 from focgen.rig.rig import Actuator, Rig
+from focgen.scratch import real
 from focgen.studies.kept import FILE as CURVES
 from focgen.studies.kept import read_study
 from focgen.textfile import LARGEST_SETTING, read_regular
@@ -196,7 +197,7 @@ def _diagnosis(folder: Path) -> Page:
     found = read_diagnosis(folder / "diagnosis.json")
     drawn = read_drawn(folder / SIGNALS) if (folder / SIGNALS).exists() else None
     refitted = folder / Path(found.refitted_rig).name
-    name = read_rig(refitted).name if refitted.is_file() else folder.resolve().name
+    name = read_rig(refitted).name if refitted.is_file() else real(folder).name
     return diagnosis_page(found, drawn, name)
 
 

@@ -25,8 +25,9 @@ from focgen.children import environment, python
 from focgen.errors import InputError
 from focgen.output import replace_folder
 from focgen.progress import say, track
-from focgen.scratch import temporary_folder
+from focgen.scratch import real, temporary_folder
 from focgen.textfile import LARGEST_LOG
+from focgen.trials.belongs import case_digest, is_of, mark
 from focgen.trials.facts import facts_of, outcome_in
 
 _ONE_THREAD = dict.fromkeys(
@@ -71,7 +72,7 @@ def run(
     for place, n in cases:
         if not (place / "cases" / n).is_dir():
             raise InputError(str(place), f"lacks case {n}", "make the cases anew")
-    waiting = [(place, n) for place, n in cases if not ran(place / "runs" / n)]
+    waiting = [(place, n) for place, n in cases if not _stands(place, n)]
     begun = time.monotonic()
 
     def one(place: Path, number: str) -> bool:
@@ -114,6 +115,21 @@ def _in_turn(rows: Sequence[Sequence[Any]]) -> list[Any]:
     return [row[i] for i in range(max(map(len, rows), default=0)) for row in rows if i < len(row)]
 
 
+def _stands(trial: Path, number: str) -> bool:
+    """Whether a case has been diagnosed as it is; what stands in the place of that result is said to go."""
+    if not ran(trial / "runs" / number):
+        return False
+    if stands := is_its_own(trial, "runs", number):
+        return stands
+    say(f"trial run: {trial / 'runs' / number} is not the result of the case as it is, so it is made anew")
+    return False
+
+
+def is_its_own(trial: Path, kind: str, number: str, *told: str) -> bool:
+    """Whether the result in TRIAL/KIND/NUMBER is of the case of that number as it is, and as it was kept."""
+    return is_of(trial / kind / number, case_digest(trial / "cases" / number, *told))
+
+
 def ran(folder: Path) -> bool:
     """Whether a case has been diagnosed, successfully or not."""
     return (folder / "outcome.json").exists()
@@ -142,7 +158,9 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
         except OSError as reason:
             what = f"cannot be copied ({_first(reason)})"
             raise InputError(str(case), what, "make the cases anew") from None
+        given = case_digest(blind, *effects)
         blind_diagnosis(blind, out, limit, effects)
+        mark(out, given)
         replace_folder(out, target, trial)
 
 
@@ -160,7 +178,7 @@ def _check_plain(case: Path, trial: Path) -> None:
 
 
 def _is_in(path: Path, trial: Path) -> bool:
-    return path.resolve().is_relative_to(trial.resolve())
+    return real(path).is_relative_to(real(trial))
 
 
 def blind_diagnosis(blind: Path, out: Path, limit: float, effects: tuple[str, ...] = ()) -> None:
