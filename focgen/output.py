@@ -268,6 +268,13 @@ def replace_folder(made: Path, target: Path, within: Path) -> None:
                 journal.put_folder(scratch, target)
         shutil.rmtree(made, ignore_errors=True)
     except (OSError, shutil.Error) as reason:
-        raise InputError(
-            str(target), f"cannot be written ({reason.strerror or reason})", "move it away"
-        ) from None
+        what, remedy = f"cannot be written ({first_of(reason)})", "make room, or move it away"
+        raise InputError(str(target), what, remedy) from None
+
+
+def first_of(reason: OSError) -> str:
+    """Why it failed, in a few words: what copies a folder collects a list of what failed."""
+    failed = reason.args[0] if isinstance(reason, shutil.Error) and reason.args else None
+    if isinstance(failed, list) and failed:
+        return str(failed[0][-1]).partition(": ")[0]
+    return reason.strerror or str(reason)

@@ -29,7 +29,7 @@ def check_own(places: Iterable[str | Path]) -> None:
 
 
 def check_page(place: str | Path) -> None:
-    """The same where a page is written, under whatever name: a study that is called so is none of its kind."""
+    """The same where a page is written, under whatever name: a study of that name is no page."""
     _check(Path(place), _is_page)
 
 

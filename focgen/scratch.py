@@ -233,7 +233,7 @@ def own(path: Path) -> bool:
 
 
 def real(path: str | Path) -> Path:
-    """Where a path leads, as far as its links lead anywhere: of those that lead round in a circle it is the path
+    """Where a path leads, as far as its links lead anywhere. Where they lead round in a circle it is the path
     itself, and whoever opens that is told."""
     return Path(os.path.realpath(path))
 

@@ -23,12 +23,13 @@ from typing import Any
 
 from focgen.children import environment, python
 from focgen.errors import InputError
-from focgen.output import replace_folder
+from focgen.output import first_of, replace_folder
 from focgen.progress import say, track
 from focgen.scratch import real, temporary_folder
 from focgen.textfile import LARGEST_LOG
 from focgen.trials.belongs import case_digest, is_of, mark
 from focgen.trials.facts import facts_of, outcome_in
+from focgen.trials.worker import NO_ROOM
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
@@ -156,8 +157,9 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
         try:
             shutil.copytree(case, blind)
         except OSError as reason:
-            what = f"cannot be copied ({_first(reason)})"
-            raise InputError(str(case), what, "make the cases anew") from None
+            what = f"cannot be copied ({first_of(reason)})"
+            remedy = "make room in the temporary folder (TMPDIR), or make the cases anew"
+            raise InputError(str(case), what, remedy) from None
         given = case_digest(blind, *effects)
         blind_diagnosis(blind, out, limit, effects)
         mark(out, given)
@@ -183,17 +185,12 @@ def _is_in(path: Path, trial: Path) -> bool:
 
 def blind_diagnosis(blind: Path, out: Path, limit: float, effects: tuple[str, ...] = ()) -> None:
     """Diagnose the case in the folder ``blind`` in a process of its own; ``out`` holds what came of it, even
-    where the process died or took longer than ``limit`` s."""
+    where the process died or took longer than ``limit`` s. Raises InputError where the disk was full."""
     fault = _process(blind, out, limit, effects)
     out.mkdir(parents=True, exist_ok=True)
     if not (out / "outcome.json").exists():
         word = {"status": "failed", "seconds": None, "fault": fault}
         (out / "outcome.json").write_text(json.dumps(word) + "\n", encoding="utf-8")
-
-
-def _first(reason: OSError) -> str:
-    """Why copying failed, in one line; it collects a list of what failed."""
-    return reason.strerror or " ".join(str(reason).split())[:120]
 
 
 def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> str:
@@ -214,4 +211,7 @@ def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> 
         child.kill()
     if _ended.is_set():
         raise Ended
+    if in_time and child.returncode == NO_ROOM:
+        what = "had no room for a diagnosis, which says nothing of its case"
+        raise InputError(str(out.parent), what, "make room there (TMPDIR says where), and run it again")
     return f"the process ended with status {child.returncode}" if in_time else f"took longer than {limit:g} s"

@@ -30,8 +30,8 @@ def sealed(salt: str, label: dict[str, Any]) -> str:
 
 
 def unseal(path: Path, committed: str, unseen: Path, case: Path) -> dict[str, Any]:
-    """The label, if it, the unseen logs and what the ``case`` gives are what was committed to. Raises InputError
-    where not."""
+    """The label, if it, the unseen logs and what the ``case`` gives are what was committed to. Raises
+    InputError where not."""
     salt, label = sealed_label(path)
     if commitment(salt, label) != committed:
         raise InputError(str(path), "is not the label that was committed to", "make the cases anew")

@@ -1,18 +1,21 @@
 """A kept result is of the case that it lies beside, as that case is.
 
-Red when the result of another case, or of one that was changed, is scored as this one's, when what was kept is used
-though it was edited, or when scoring writes outside of its trial.
+Red when the result of another case, or of one that was changed, is scored as this one's, when what was kept
+is used though it was edited, or when scoring writes outside of its trial.
 """
 
+import errno
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
 import focgen
 from focgen.cli.main import main
-from focgen.trials import achieved
+from focgen.errors import InputError
+from focgen.trials import achieved, worker
 from focgen.trials import run as running
 from focgen.trials import score as scoring
 from focgen.trials.facts import achieved_in, kept_achieved
@@ -174,3 +177,40 @@ def test_no_case_is_made_outside_of_the_trial(tmp_path, capsys):
     (tmp_path / "t" / "begun.json").write_text(json.dumps({**facts, "cases": 1}))
     assert main(make) == 2
     assert "leads out of" in capsys.readouterr().err and not list((tmp_path / "elsewhere").iterdir())
+
+
+@pytest.mark.parametrize("where", ["diagnosis", "result"])
+def test_a_full_disk_is_no_fault_of_a_case(ran, tmp_path, where, capsys, monkeypatch):
+    """It counted as a miss in every row of the scores, for good: the next run passed it over."""
+
+    def full(*_: object, **__: object) -> None:
+        try:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        except OSError as reason:  # as the writers of results tell it
+            told = InputError("out", f"cannot be written ({reason.strerror})", "choose another")
+            raise (told if where == "result" else reason) from None
+
+    trial = Path(shutil.copytree(ran, tmp_path / "t"))
+    shutil.rmtree(trial / "runs")
+    monkeypatch.setattr(focgen, "diagnose", full)
+    status = worker._status_of(trial / "cases/0001", tmp_path / "out", ())
+    assert status == worker.NO_ROOM and not (tmp_path / "out" / "outcome.json").exists()
+    program = ("-c", f"raise SystemExit({status})")
+    monkeypatch.setattr(running, "python", lambda *_: [sys.executable, *program])
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 2
+    assert "had no room for a diagnosis" in capsys.readouterr().err and not list(trial.glob("runs/*/*"))
+
+
+def test_a_fault_of_a_case_is_one(tmp_path, monkeypatch):
+    for fault in (OSError(errno.ENOENT, "gone"), ValueError("no"), InputError("a", "b", "c")):
+        monkeypatch.setattr(focgen, "diagnose", raising(fault))
+        (tmp_path / "logs").mkdir(exist_ok=True)
+        assert worker._status_of(tmp_path, tmp_path / "out", ()) == 0
+        assert json.loads((tmp_path / "out" / "outcome.json").read_text())["status"] == "failed"
+
+
+def raising(fault: Exception):
+    def call(*_: object, **__: object) -> None:
+        raise fault
+
+    return call
