@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.diagnosis.model import VERDICT
 from focgen.errors import InputError
 from focgen.jsontext import fits, read_json
 from focgen.trials.patterns import SUITES
@@ -34,7 +35,7 @@ _OUTCOME = {
     "sha256?": str,
 }
 _DIAGNOSIS = {
-    "verdict": str,
+    "verdict": VERDICT,
     "where?": ({"stage?": (str, None)}, None),
     "causes?": ([{"candidates": [{"effect": str, "confidence": float}]}], None),
     "next_experiment?": ({"what?": str, "why?": str}, None),
@@ -107,7 +108,9 @@ def diagnosis_in(run: Path) -> dict[str, Any] | None:
     """The diagnosis of a run; None where there is none, or none that can be judged."""
     found = _found(run / "diagnosis.json", _DIAGNOSIS)
     interval = (found or {}).get("shrink_interval")
-    return None if interval is not None and len(interval) != 2 else found
+    stated = [c["confidence"] for one in (found or {}).get("causes") or () for c in one["candidates"]]
+    sound = (interval is None or len(interval) == 2) and all(0.0 <= one <= 1.0 for one in stated)
+    return found if sound else None
 
 
 def _found(path: Path, shape: Any) -> Any:

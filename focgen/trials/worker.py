@@ -31,7 +31,7 @@ def oracle_possible() -> bool:
 
 
 def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
-    """Diagnose and note what happened. Raises only where the machine had no room for it (:func:`lacks_room`)."""
+    """Diagnose and note what happened. Raises only where there was no room for it (:func:`lacks_room`)."""
     started = time.perf_counter()
     fault = None
     try:
