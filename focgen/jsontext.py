@@ -61,7 +61,7 @@ _OF = "of"
 
 
 def tied(text: str, told: str) -> str:
-    """The JSON object ``text`` with the SHA-256 of ``told``, the file that it lies beside and is a part of."""
+    """The JSON object ``text`` with the SHA-256 of ``told``, the file beside which it lies."""
     begun, rest = f'{{"{_OF}":"{hashlib.sha256(told.encode()).hexdigest()}"', text.lstrip()[1:]
     return f"{begun}{'' if rest.lstrip().startswith('}') else ','}{rest}"
 

@@ -1,9 +1,9 @@
 """Which case a kept result is of: a diagnosis is of the rig and the logs that it was given, and of no other.
 
 ``outcome.json`` of a run carries a hash of the case as it was copied, of what else the diagnosis was told,
-and of what came out. So the result of another case, of one that was changed since, or one that was
-edited is told from its own. It is a record, not a seal: whoever edits both may write what he likes. A result of an earlier
-version carries none, and is taken for its place's.
+and of what came out. So the result of another case, of one that was changed since, or one that was edited is
+told from its own. It is a record, not a seal: whoever edits both may write what he likes. A result of an
+earlier version carries none, and is taken for its place's.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What figures draw is of the result that it lies beside.
 
-Red when the curves of one study or diagnosis are drawn beside the verdict of another, or a verdict that is none.
+Red when the curves of one study or diagnosis are drawn beside the verdict of another.
 """
 
 import json
