@@ -102,13 +102,16 @@ def threads(count: int) -> Iterator[ThreadPoolExecutor]:
     """Threads that wait for diagnoses. Where the block ends by an exception, an interrupt also, none is begun
     any more, and those that run are ended without a result."""
     _ended.clear()
-    with ThreadPoolExecutor(count) as pool:
-        try:
-            yield pool
-        except BaseException:
-            _ended.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    try:
+        with ThreadPoolExecutor(count) as pool:
+            try:
+                yield pool
+            except BaseException:
+                _ended.set()
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    finally:
+        _ended.clear()  # what is diagnosed alone, afterwards, is not to end
 
 
 def _in_turn(rows: Sequence[Sequence[Any]]) -> list[Any]:
