@@ -15,6 +15,7 @@ from typing import Any
 import tomlkit
 
 from focgen.errors import InputError
+from focgen.scratch import real
 from focgen.textfile import LARGEST_SETTING, check_regular, read_regular
 from focgen.tomlfile import parsed
 
@@ -54,7 +55,7 @@ def sha256_within(path: str | Path, most: int) -> str | None:
 def identified_from(inputs: Iterable[Any], out: str | Path, options: Mapping[str, Any]) -> str:
     """The table of a rig written to ``out``, as TOML: every input that is a file, and the options that were
     given. Inputs in memory leave no mark."""
-    base = Path(out).resolve().parent
+    base = real(out).parent
     files = [one for one in inputs if isinstance(one, (str, Path)) and Path(one).is_file()]
     named = [{"file": _beside(Path(one), base), "sha256": sha256_of(one)} for one in files]
     given = {key: value for key, value in options.items() if value is not None}
@@ -64,7 +65,7 @@ def identified_from(inputs: Iterable[Any], out: str | Path, options: Mapping[str
 
 def _beside(path: Path, base: Path) -> str:
     try:
-        return Path(os.path.relpath(path.resolve(), base)).as_posix()
+        return Path(os.path.relpath(real(path), base)).as_posix()
     except ValueError:  # another drive
         return path.name
 
@@ -91,9 +92,7 @@ def followed(controller: Path, near: Path) -> Iterator[str]:
 
 def _above(folder: Path) -> tuple[Path, ...]:
     """The two folders above one, of whatever name: ``.`` has some, too."""
-    return tuple(
-        (folder if folder.is_absolute() and ".." not in folder.parts else folder.resolve()).parents[:2]
-    )
+    return tuple((folder if folder.is_absolute() and ".." not in folder.parts else real(folder)).parents[:2])
 
 
 def _inputs(rig: Path, files: list[Any]) -> Iterator[str]:

@@ -203,7 +203,7 @@ def _blind(folder: Path) -> tuple[Diagnosis, tuple[str, ...]]:
     case, seal = folder / "cases" / number, folder / "sealed" / number
     with led_by("     the signals from "):
         found = diagnose(case / "rig.toml", sorted((case / "logs").glob("*.csv")), out=folder / "found")
-    label = unseal(seal / "label.json", committed, seal / "unseen")
+    label = unseal(seal / "label.json", committed, seal / "unseen", case)
     return found, tuple(effect["effect"] for effect in label["truth"])
 
 

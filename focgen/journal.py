@@ -29,7 +29,7 @@ from typing import Any
 from focgen.custody import sha256_of
 from focgen.errors import InputError
 from focgen.jsontext import fits, read_json
-from focgen.scratch import as_before, lock, own, synced, unlock, waited_for
+from focgen.scratch import as_before, lock, own, real, synced, unlock, waited_for
 
 FILES, NEW, OLD = "files", "new", "old"
 _BEFORE = "before"
@@ -290,7 +290,7 @@ def _exchange(whole: Path, place: Path) -> None:
 
 def _within(path: Path, folder: Path) -> bool:
     """Whether a path stays in a folder whatever links there are."""
-    return path.parent.resolve().is_relative_to(folder.resolve()) and not path.is_dir()
+    return real(path.parent).is_relative_to(real(folder)) and not path.is_dir()
 
 
 def _digest(path: Path) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import math
 import re
@@ -54,6 +55,27 @@ def read_json(path: Path, remedy: str) -> Any:
         raise InputError(str(path), f"cannot be read ({reason.strerror})", remedy) from None
     except (ValueError, RecursionError):  # no UTF-8, no JSON, endless digits, brackets without end
         raise InputError(str(path), "is no JSON", remedy) from None
+
+
+_OF = "of"
+
+
+def tied(text: str, told: str) -> str:
+    """The JSON object ``text`` with the SHA-256 of ``told``, the file beside which it lies."""
+    begun, rest = f'{{"{_OF}":"{hashlib.sha256(told.encode()).hexdigest()}"', text.lstrip()[1:]
+    return f"{begun}{'' if rest.lstrip().startswith('}') else ','}{rest}"
+
+
+def check_tied(value: Any, path: Path, told: Path, remedy: str) -> None:
+    """Raise InputError where ``value``, read from ``path``, is a part of another file than ``told`` as it
+    stands. What an earlier version wrote does not say."""
+    found = value.get(_OF) if isinstance(value, dict) else None
+    try:
+        same = found is None or found == hashlib.sha256(read_regular(told, LARGEST_JSON)).hexdigest()
+    except OSError:
+        same = False
+    if not same:
+        raise InputError(str(path), f"is not of {told.name} beside it, or that was edited since", remedy)
 
 
 ANY = "*"

@@ -13,7 +13,7 @@ from typing import Any
 
 from focgen import journal
 from focgen.errors import InputError
-from focgen.scratch import as_before, scratch_file, scratch_folder, synced
+from focgen.scratch import as_before, real, scratch_file, scratch_folder, synced
 from focgen.textfile import LARGEST_JSON, holds
 
 Old = Callable[[], Iterable[Path]]
@@ -113,7 +113,7 @@ def _move(scratch: Path, target: Path, inputs: tuple[Any, ...], old: Old) -> Non
         with journal.alone(target):
             _check_places(made, target, files, inputs)
             going = tuple(old())
-            _check_within(target, [*(target / name for name in files), *going])
+            check_within(target, [*(target / name for name in files), *going])
             for path in (*(target / name for name in files), *going):
                 _check_size(path)
             journal.put(scratch, target, files, going)
@@ -134,11 +134,11 @@ def _check_places(made: Path, target: Path, files: list[Path], inputs: tuple[Any
                 raise InputError(str(target / parent), "is a file where a folder belongs", "move it away")
 
 
-def _check_within(target: Path, places: Iterable[Path]) -> None:
+def check_within(target: Path, places: Iterable[Path]) -> None:
     """Raise InputError where a link among a folder's own subfolders leads out of it: no file is written or
     removed elsewhere, and none is left out without a word."""
     for parent in dict.fromkeys(path.parent for path in places):
-        if not parent.resolve().is_relative_to(target.resolve()):
+        if not real(parent).is_relative_to(real(target)):
             what = f"leads out of {target}, where its files would be missing"
             raise InputError(
                 str(parent), what, "put a folder in the place of the link, or choose another --out"
@@ -253,7 +253,7 @@ def replace_folder(made: Path, target: Path, within: Path) -> None:
     ``target`` must lie in ``within`` as the file system has it, not by its name only: raises InputError
     where links lead out, or where it cannot be written. Nothing outside ``within`` is ever removed.
     """
-    root, place = within.resolve(), target.parent.resolve()
+    root, place = real(within), real(target.parent)
     if target.is_symlink() or not place.is_relative_to(root) or target.name in ("", ".", ".."):
         raise InputError(str(target), f"leads out of {within}", "put a folder in the place of the link")
     try:
@@ -268,6 +268,13 @@ def replace_folder(made: Path, target: Path, within: Path) -> None:
                 journal.put_folder(scratch, target)
         shutil.rmtree(made, ignore_errors=True)
     except (OSError, shutil.Error) as reason:
-        raise InputError(
-            str(target), f"cannot be written ({reason.strerror or reason})", "move it away"
-        ) from None
+        what, remedy = f"cannot be written ({first_of(reason)})", "make room, or move it away"
+        raise InputError(str(target), what, remedy) from None
+
+
+def first_of(reason: OSError) -> str:
+    """Why it failed, in a few words: what copies a folder collects a list of what failed."""
+    failed = reason.args[0] if isinstance(reason, shutil.Error) and reason.args else None
+    if isinstance(failed, list) and failed:
+        return str(failed[0][-1]).partition(": ")[0]
+    return reason.strerror or str(reason)

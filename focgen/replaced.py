@@ -25,14 +25,23 @@ def check_own(places: Iterable[str | Path]) -> None:
     """Raise InputError where a result would take the place of a file that is none of its kind. An empty file
     is nobody's."""
     for place in map(Path, places):
-        if place.is_file() and place.stat().st_size and not _is_own(place):
-            what = "is nothing that focgen has written there, and would be lost"
-            raise InputError(str(place), what, "name another place, or move it away")
+        _check(place, _OF_NAME.get(place.name, _OF_ENDING.get(place.suffix.lower(), _is_page)))
 
 
-def _is_own(path: Path) -> bool:
+def check_page(place: str | Path) -> None:
+    """The same where a page is written, under whatever name: a study of that name is no page."""
+    _check(Path(place), _is_page)
+
+
+def _check(place: Path, is_own: Callable[[Path], bool]) -> None:
+    if place.is_file() and place.stat().st_size and not _holds(place, is_own):
+        what = "is nothing that focgen has written there, and would be lost"
+        raise InputError(str(place), what, "name another place, or move it away")
+
+
+def _holds(path: Path, is_own: Callable[[Path], bool]) -> bool:
     with suppress(OSError, InputError):
-        return _OF_NAME.get(path.name, _OF_ENDING.get(path.suffix.lower(), _is_page))(path)
+        return is_own(path)
     return False  # what cannot be read is not ours to replace
 
 
@@ -82,4 +91,5 @@ _OF_NAME: Mapping[str, Callable[[Path], bool]] = {
     "study.json": _has("subject", "rows", "pareto"),
     "curves.json": _has("controller", "rows", "ideal"),
     "scores.md": _begins(b"### Suite `"),
+    "scores.json": _has("scores", "cases"),
 }

@@ -235,6 +235,12 @@ def own(path: Path) -> bool:
     return not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
 
 
+def real(path: str | Path) -> Path:
+    """Where a path leads, as far as its links lead anywhere. Where they lead round in a circle it is the path
+    itself, and whoever opens that is told."""
+    return Path(os.path.realpath(path))
+
+
 def unlock(handle: int | None) -> None:
     """Let a lock go."""
     if handle is not None:

@@ -9,9 +9,10 @@ from typing import Any
 
 from focgen.errors import InputError
 from focgen.output import check_apart, check_writable, new_folder, write_file, write_files
-from focgen.replaced import check_own
+from focgen.replaced import check_own, check_page
 from focgen.report.interactive import library
 from focgen.report.page import Page
+from focgen.scratch import real
 
 
 def add_report(parser: ArgumentParser) -> None:
@@ -31,12 +32,12 @@ def check_report(path: str | None, inputs: Iterable[Any], out: str | None = None
     written."""
     if path is None:
         return
-    if out is not None and Path(path).resolve() == Path(out).resolve():
+    if out is not None and real(path) == real(out):
         raise InputError(path, "is --out as well, and one would be lost", "give --report another name")
     if is_page(path):
         library()
         check_apart([path], inputs)
-        check_own([path])
+        check_page(path)
     check_writable(Path(path), folder=not is_page(path))
 
 
@@ -73,7 +74,7 @@ def write_with_report(
         write_file(out, text, inputs)
         return told
     _check_pictures(Path(path), what, inputs)
-    if Path(out).resolve() in {(Path(path) / name).resolve() for name in what}:
+    if real(out) in {real(Path(path) / name) for name in what}:
         raise InputError(out, "is a picture's name as well, and one would be lost", "give it another name")
     with new_folder(path, inputs) as folder:
         for name, picture in what.items():

@@ -12,7 +12,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.errors import InputError
-from focgen.jsontext import UNWRITTEN, fits, plain, read_json
+from focgen.jsontext import UNWRITTEN, check_tied, fits, plain, read_json
 
 _SWEEPING = 20  # of 50 places in its range: an input that visits fewer only steps
 FILE = "signals.json"
@@ -149,11 +149,13 @@ _SHAPE: dict[str, Any] = {
 
 
 def read_drawn(path: Path) -> Drawn:
-    """The file read back. Raises InputError where it is none of ours."""
+    """The file read back. Raises InputError where it is none of ours, or of another diagnosis than the one
+    beside it."""
     remedy = "diagnose again: `focgen diagnose` writes it"
     value = read_json(path, remedy)
     if not fits(value, _SHAPE) or len(value["worst"]) != 2 or not _equally_long(value):
         raise InputError(str(path), f"is no {FILE} of a diagnosis", remedy)
+    check_tied(value, path, path.with_name("diagnosis.json"), remedy)
     value["units"] = {role: str(value["units"].get(role, "")) for role in LOGGED}
     value["worst"] = tuple(value["worst"])
     for key, kind in (("traces", Trace), ("segments", SegmentError), ("means", Mean), ("rivals", Rivals)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +12,10 @@ from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
 Interval = tuple[float, float]
+
+
+VERDICT = re.compile("named|set|unknown|parameters|none")
+"""What a diagnosis may end in."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from focgen.diagnosis.drawn import FILE, drawn_text
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.proposals.menu import Choice
 from focgen.diagnosis.proposals.next_experiment import NEXT
-from focgen.jsontext import to_json
+from focgen.jsontext import tied, to_json
 from focgen.output import former, write_files
 from focgen.rig.files import rig_table
 from focgen.shown import files_of
@@ -35,9 +35,10 @@ def write(
     """
     drawn, refitted, augmented = diagnosis.drawn, diagnosis.refitted, diagnosis.augmented
     assert drawn and refitted and augmented  # None only where it was read from a file
+    told = to_json(diagnosis)
     files: dict[str, str | bytes] = {
-        "diagnosis.json": to_json(diagnosis),
-        FILE: drawn_text(drawn),
+        "diagnosis.json": told,
+        FILE: tied(drawn_text(drawn), told),
         diagnosis.refitted_rig: tomlkit.dumps(rig_table(refitted)),
         diagnosis.augmented_rig: tomlkit.dumps(rig_table(augmented)),
     }

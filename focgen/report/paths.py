@@ -23,7 +23,7 @@ from focgen.logs.experiment import Experiment
 from focgen.loop.design import Design
 from focgen.loop.simulate import simulate
 from focgen.output import check_apart, write_file
-from focgen.replaced import check_own
+from focgen.replaced import check_page
 from focgen.report.interactive import library
 from focgen.report.page import Page, Section
 from focgen.report.pages.chain import (
@@ -42,6 +42,7 @@ from focgen.rig.files import read_rig
 from focgen.rig.proposal import Proposal
 from focgen.rig.replay import experiments, replay
 from focgen.rig.rig import Actuator, Rig
+from focgen.scratch import real
 from focgen.studies.kept import FILE as CURVES
 from focgen.studies.kept import read_study
 from focgen.textfile import LARGEST_SETTING, read_regular
@@ -98,7 +99,7 @@ def report(paths: Part | Sequence[Part], out: str | Path) -> Path:
     places = [part for part in parts if isinstance(part, Path)]
     library()  # before anything takes time
     check_apart([out], [path for given in places for path in _files(given)])
-    check_own([out])
+    check_page(out)
     write_file(out, page_of(parts).self_contained(), [path for path in places if path.is_file()])
     return Path(out)
 
@@ -196,7 +197,7 @@ def _diagnosis(folder: Path) -> Page:
     found = read_diagnosis(folder / "diagnosis.json")
     drawn = read_drawn(folder / SIGNALS) if (folder / SIGNALS).exists() else None
     refitted = folder / Path(found.refitted_rig).name
-    name = read_rig(refitted).name if refitted.is_file() else folder.resolve().name
+    name = read_rig(refitted).name if refitted.is_file() else real(folder).name
     return diagnosis_page(found, drawn, name)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from focgen.control.files import controller_of, controller_table
 from focgen.errors import ControllerError, InputError
-from focgen.jsontext import fits, plain, read_json, shape_of
+from focgen.jsontext import check_tied, fits, plain, read_json, shape_of
 from focgen.logs.thinning import thinned
 from focgen.present import present
 from focgen.studies.jobs import read_ideal, read_plant, read_row
@@ -77,9 +77,11 @@ def read_study(folder: Path) -> Study:
     try:
         if not (fits(told, _TOLD) and fits(kept, _KEPT) and _one_study(told, kept)):
             raise ValueError
-        return _study(told, kept, str(folder / FILE))
+        found = _study(told, kept, str(folder / FILE))
     except (TypeError, KeyError, ValueError, IndexError, AttributeError, ControllerError):
         raise InputError(str(folder), "holds no study that can be read", _REMEDY) from None
+    check_tied(kept, folder / FILE, folder / "study.json", _REMEDY)
+    return found
 
 
 def _one_study(told: dict[str, Any], kept: dict[str, Any]) -> bool:

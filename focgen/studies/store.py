@@ -9,7 +9,7 @@ from typing import Any
 
 from focgen.errors import InputError
 from focgen.jsontext import fits, read_json
-from focgen.output import write_file
+from focgen.output import check_within, write_file
 from focgen.progress import say
 from focgen.studies.jobs import Job
 
@@ -44,6 +44,7 @@ class Store:
     def keep(self, job: Job, found: dict[str, Any]) -> dict[str, Any]:
         """Write an answer, whole or not at all, and return it as it will be read."""
         made: dict[str, Any] = json.loads(_text(found))
+        check_within(self.folder.parent, [self._place(job)])
         write_file(self._place(job), _text({"sha256": _seal(job, made), "answer": made}) + "\n")
         return made
 

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from focgen.jsontext import tied
 from focgen.output import former, write_files
 from focgen.present import present
 from focgen.shown import files_of
@@ -23,9 +24,10 @@ def write(study: Study, folder: Path, inputs: Iterable[Any] = ()) -> None:
     """Write all of it, or none. Pictures and page where matplotlib is installed. Raises InputError where one
     of ``inputs`` would be written over.
     """
+    told = json.dumps(payload(study), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     files: dict[str, str | bytes] = {
-        "study.json": json.dumps(payload(study), indent=2, ensure_ascii=False, allow_nan=False) + "\n",
-        FILE: curves_text(study),
+        "study.json": told,
+        FILE: tied(curves_text(study), told),
     }
     files |= files_of(study)
     write_files(folder, files, inputs, former(folder, "study.json", DRAWN, files))

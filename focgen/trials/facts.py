@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from focgen.diagnosis.model import VERDICT
 from focgen.errors import InputError
 from focgen.jsontext import fits, read_json
 from focgen.trials.patterns import SUITES
@@ -15,17 +18,24 @@ SIGNALS = ("C", "B", "A")
 _NUMBER = re.compile(r"[0-9]{4,9}")
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 _LOG = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")  # a file's name, never a path
+_GIVEN = re.compile(rf"rig\.toml|controller\.toml|logs/{_LOG.pattern}")
 _WORD = re.compile(r"\w+")
 _ANEW = "make the cases anew"
 
 _FACTS = {"suite": str, "signals": str, "seed": int, "commitments": dict}
 _KINDS = {"kinds?": [str]}
 _TRUTH = {"effect": _WORD, "stage": str, "visible": bool, "severity": str, "form": str}
-_LABEL = {"kind": str, "suite": str, "truth": [_TRUTH], "floor": float, "unseen": dict}
+_LABEL = {"kind": str, "suite": str, "truth": [_TRUTH], "floor": float, "unseen": dict, "given?": dict}
 _DESIGN = {"tied?": [str], "resolves?": [str]}
-_OUTCOME = {"status": re.compile("done|failed"), "seconds": (float, None), "fault": (str, None)}
+_ACHIEVED = {"achieved": (float, None), "sha256": str}
+_OUTCOME = {
+    "status": re.compile("done|failed"),
+    "seconds": (float, None),
+    "fault": (str, None),
+    "sha256?": str,
+}
 _DIAGNOSIS = {
-    "verdict": str,
+    "verdict": VERDICT,
     "where?": ({"stage?": (str, None)}, None),
     "causes?": ([{"candidates": [{"effect": str, "confidence": float}]}], None),
     "next_experiment?": ({"what?": str, "why?": str}, None),
@@ -82,6 +92,9 @@ def sealed_label(path: Path) -> tuple[str, dict[str, Any]]:
     for name, digest in label["unseen"].items():
         if not fits(name, _LOG) or not fits(digest, _DIGEST):
             raise InputError(str(path), f"names {name!r}, which is no unseen log of the case", _ANEW)
+    for name, digest in label.get("given", {}).items():
+        if not fits(name, _GIVEN) or not fits(digest, _DIGEST):
+            raise InputError(str(path), f"names {name!r}, which is no file of the case", _ANEW)
     return found["salt"], label
 
 
@@ -95,7 +108,9 @@ def diagnosis_in(run: Path) -> dict[str, Any] | None:
     """The diagnosis of a run; None where there is none, or none that can be judged."""
     found = _found(run / "diagnosis.json", _DIAGNOSIS)
     interval = (found or {}).get("shrink_interval")
-    return None if interval is not None and len(interval) != 2 else found
+    stated = [c["confidence"] for one in (found or {}).get("causes") or () for c in one["candidates"]]
+    sound = (interval is None or len(interval) == 2) and all(0.0 <= one <= 1.0 for one in stated)
+    return found if sound else None
 
 
 def _found(path: Path, shape: Any) -> Any:
@@ -106,10 +121,15 @@ def _found(path: Path, shape: Any) -> Any:
     return found if fits(found, shape) else None
 
 
-def achieved_in(run: Path) -> tuple[float | None] | None:
-    """The achieved shrink that was kept beside a run, which may be None; no tuple where nothing was kept."""
-    try:
-        found = read_json(run / "achieved.json", _ANEW)
-    except InputError:
-        return None
-    return (found,) if fits(found, (float, None)) else None
+def achieved_in(run: Path, of: str) -> tuple[float | None] | None:
+    """The achieved shrink that was kept beside a run, which may be None; no tuple where none was kept that is
+    ``of`` this result and these logs, as it was kept."""
+    found = _found(run / "achieved.json", _ACHIEVED)
+    value = None if found is None else found["achieved"]
+    return (value,) if found is not None and found == kept_achieved(value, of) else None
+
+
+def kept_achieved(value: float | None, of: str) -> dict[str, Any]:
+    """What is kept beside a run of the shrink that it achieved."""
+    seal = hashlib.sha256(f"{of}\n{json.dumps(value)}".encode()).hexdigest()
+    return {"achieved": value, "sha256": seal}

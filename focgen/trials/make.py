@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -28,7 +29,7 @@ from focgen.control.files import controller_text
 from focgen.errors import InputError
 from focgen.journal import alone
 from focgen.jsontext import read_json
-from focgen.output import write_file, write_files
+from focgen.output import check_within, write_file, write_files
 from focgen.progress import track
 from focgen.rig.files import rig_table
 from focgen.trials.cases import Case, make_case
@@ -192,22 +193,25 @@ def _salt(rng: np.random.Generator) -> str:
 
 def _write(folder: Path, number: str, case: Case, salt: str) -> str:
     logs, unseen = _files(case, case.logs), _files(case, case.unseen)
-    digests = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in unseen.items()}
-    label = json.loads(json.dumps({**case.label, "unseen": digests}))
-    committed = commitment(salt, label)
     given = {
         "rig.toml": tomlkit.dumps(rig_table(case.rig)),
-        "commitment.txt": committed + "\n",
         **{f"logs/{name}": text for name, text in logs.items()},
     }
     if case.controller:
         given["controller.toml"] = controller_text(case.controller)
-    write_files(folder / "cases" / number, given)
+    label = json.loads(json.dumps({**case.label, "unseen": _digests(unseen), "given": _digests(given)}))
+    committed = commitment(salt, label)
+    check_within(folder, [folder / part / number / "file" for part in ("cases", "sealed")])
+    write_files(folder / "cases" / number, {**given, "commitment.txt": committed + "\n"})
     write_files(
         folder / "sealed" / number,
         {"label.json": sealed(salt, label), **{f"unseen/{name}": text for name, text in unseen.items()}},
     )
     return committed
+
+
+def _digests(texts: Mapping[str, str]) -> dict[str, str]:
+    return {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
 
 
 def _files(case: Case, experiments: list[tuple[str, dict[str, Array]]]) -> dict[str, str]:

@@ -32,6 +32,7 @@ from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
 from focgen.scratch import temporary_folder
 from focgen.textfile import LARGEST_LOG, read_regular
+from focgen.trials.belongs import case_digest, is_of, mark, result_digest
 from focgen.trials.cases import Case
 from focgen.trials.facts import Facts, diagnosis_in, outcome_in
 from focgen.trials.judging import PROPOSED, judge
@@ -58,7 +59,7 @@ class _Asked:
 def ask(folder: Path, facts: Facts, labels: dict[str, dict[str, Any]], jobs: int) -> None:
     """Have every case that ended in a set make its proposal and the menu, those not made yet. Raises
     InputError where a case is not what its seed gives."""
-    waiting = [n for n in labels if _ends_in_set(folder, n) and not (folder / "asked" / n).exists()]
+    waiting = [n for n in labels if _ends_in_set(folder, n) and not _answered(folder, n)]
     with threads(jobs) as pool:
         asked = [pool.submit(_ask_case, folder, facts, n, labels[n]) for n in waiting]
         for one in track(asked, "proposals"):
@@ -70,10 +71,21 @@ def resolved(folder: Path, number: str, label: dict[str, Any]) -> dict[str, bool
     found = {}
     for run in sorted((folder / "asked" / number).glob("*")):
         outcome = outcome_in(run)
-        if outcome is not None:
+        if outcome is not None and is_of(run, _asked_of(folder, number, run.name)):
             judged = judge(number, label, outcome, diagnosis_in(run))
             found[run.name] = judged.verdict == "named" and judged.found and not judged.wrongly_named
     return found
+
+
+def _answered(folder: Path, number: str) -> bool:
+    """Whether the experiments have been made for the case and its result as they are."""
+    found = [run for run in (folder / "asked" / number).glob("*") if run.is_dir()]
+    return bool(found) and all(is_of(run, _asked_of(folder, number, run.name)) for run in found)
+
+
+def _asked_of(folder: Path, number: str, which: str) -> str:
+    """What an experiment that was asked for is of: the case, what a run proposes for it, and its name."""
+    return case_digest(folder / "cases" / number, result_digest(folder / "runs" / number), which)
 
 
 def _ends_in_set(folder: Path, number: str) -> bool:
@@ -95,13 +107,14 @@ def _ask_case(folder: Path, facts: Facts, number: str, label: dict[str, Any]) ->
             blind = scratch / asked.which
             _lay_out(folder / "cases" / number, blind, case, asked, columns)
             blind_diagnosis(blind, found / asked.which, _LIMIT)
+            mark(found / asked.which, _asked_of(folder, number, asked.which))
         replace_folder(found, folder / "asked" / number, folder)
 
 
 def _remade(folder: Path, facts: Facts, number: str, label: dict[str, Any]) -> Case:
     kinds = facts.kinds or DEFAULT_KINDS[facts.suite]
     case, _ = Drawing(len(facts.commitments), facts.seed, facts.signals, facts.suite, kinds).case(int(number))
-    sealed = {key: value for key, value in label.items() if key != "unseen"}
+    sealed = {key: value for key, value in label.items() if key not in ("unseen", "given")}
     if json.loads(json.dumps(case.label)) != sealed:
         raise InputError(str(folder / "cases" / number), "is not what its seed gives", "make the cases anew")
     return case

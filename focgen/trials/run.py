@@ -23,11 +23,13 @@ from typing import Any
 
 from focgen.children import environment, python
 from focgen.errors import InputError
-from focgen.output import replace_folder
+from focgen.output import first_of, replace_folder
 from focgen.progress import say, track
-from focgen.scratch import temporary_folder
+from focgen.scratch import real, temporary_folder
 from focgen.textfile import LARGEST_LOG
+from focgen.trials.belongs import case_digest, is_of, mark
 from focgen.trials.facts import facts_of, outcome_in
+from focgen.trials.worker import NO_ROOM
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
@@ -71,7 +73,7 @@ def run(
     for place, n in cases:
         if not (place / "cases" / n).is_dir():
             raise InputError(str(place), f"lacks case {n}", "make the cases anew")
-    waiting = [(place, n) for place, n in cases if not ran(place / "runs" / n)]
+    waiting = [(place, n) for place, n in cases if not _stands(place, n)]
     begun = time.monotonic()
 
     def one(place: Path, number: str) -> bool:
@@ -100,18 +102,36 @@ def threads(count: int) -> Iterator[ThreadPoolExecutor]:
     """Threads that wait for diagnoses. Where the block ends by an exception, an interrupt also, none is begun
     any more, and those that run are ended without a result."""
     _ended.clear()
-    with ThreadPoolExecutor(count) as pool:
-        try:
-            yield pool
-        except BaseException:
-            _ended.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    try:
+        with ThreadPoolExecutor(count) as pool:
+            try:
+                yield pool
+            except BaseException:
+                _ended.set()
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    finally:
+        _ended.clear()  # what is diagnosed alone, afterwards, is not to end
 
 
 def _in_turn(rows: Sequence[Sequence[Any]]) -> list[Any]:
     """The first of each row, then the second of each …"""
     return [row[i] for i in range(max(map(len, rows), default=0)) for row in rows if i < len(row)]
+
+
+def _stands(trial: Path, number: str) -> bool:
+    """Whether a case has been diagnosed as it is; what stands in the place of that result is said to go."""
+    if not ran(trial / "runs" / number):
+        return False
+    if stands := is_its_own(trial, "runs", number):
+        return stands
+    say(f"trial run: {trial / 'runs' / number} is not the result of the case as it is, so it is made anew")
+    return False
+
+
+def is_its_own(trial: Path, kind: str, number: str, *told: str) -> bool:
+    """Whether the result in TRIAL/KIND/NUMBER is of the case of that number as it is, and as it was kept."""
+    return is_of(trial / kind / number, case_digest(trial / "cases" / number, *told))
 
 
 def ran(folder: Path) -> bool:
@@ -140,9 +160,12 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
         try:
             shutil.copytree(case, blind)
         except OSError as reason:
-            what = f"cannot be copied ({_first(reason)})"
-            raise InputError(str(case), what, "make the cases anew") from None
+            what = f"cannot be copied ({first_of(reason)})"
+            remedy = "make room in the temporary folder (TMPDIR), or make the cases anew"
+            raise InputError(str(case), what, remedy) from None
+        given = case_digest(blind, *effects)
         blind_diagnosis(blind, out, limit, effects)
+        mark(out, given)
         replace_folder(out, target, trial)
 
 
@@ -160,22 +183,17 @@ def _check_plain(case: Path, trial: Path) -> None:
 
 
 def _is_in(path: Path, trial: Path) -> bool:
-    return path.resolve().is_relative_to(trial.resolve())
+    return real(path).is_relative_to(real(trial))
 
 
 def blind_diagnosis(blind: Path, out: Path, limit: float, effects: tuple[str, ...] = ()) -> None:
     """Diagnose the case in the folder ``blind`` in a process of its own; ``out`` holds what came of it, even
-    where the process died or took longer than ``limit`` s."""
+    where the process died or took longer than ``limit`` s. Raises InputError where the disk was full."""
     fault = _process(blind, out, limit, effects)
     out.mkdir(parents=True, exist_ok=True)
     if not (out / "outcome.json").exists():
         word = {"status": "failed", "seconds": None, "fault": fault}
         (out / "outcome.json").write_text(json.dumps(word) + "\n", encoding="utf-8")
-
-
-def _first(reason: OSError) -> str:
-    """Why copying failed, in one line; it collects a list of what failed."""
-    return reason.strerror or " ".join(str(reason).split())[:120]
 
 
 def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> str:
@@ -196,4 +214,7 @@ def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> 
         child.kill()
     if _ended.is_set():
         raise Ended
+    if in_time and child.returncode == NO_ROOM:
+        what = "had no room for a diagnosis, which says nothing of its case"
+        raise InputError(str(out.parent), what, "make room there (TMPDIR says where), and run it again")
     return f"the process ended with status {child.returncode}" if in_time else f"took longer than {limit:g} s"

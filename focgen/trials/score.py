@@ -13,17 +13,19 @@ from pathlib import Path
 from typing import Any
 
 from focgen.errors import FocgenError, InputError
-from focgen.output import write_file
+from focgen.output import check_within, check_writable, write_file
 from focgen.pools import pool
 from focgen.progress import say, track
+from focgen.replaced import check_own
 from focgen.shown import Shown
 from focgen.textfile import LARGEST_SETTING, read_regular
 from focgen.trials import achieved, baselines
-from focgen.trials.facts import achieved_in, diagnosis_in, facts_of
+from focgen.trials.belongs import result_digest
+from focgen.trials.facts import Facts, achieved_in, diagnosis_in, facts_of, kept_achieved, outcome_in
 from focgen.trials.judging import Judged, forgone, judge
 from focgen.trials.proposed import ask, resolved
 from focgen.trials.rows import Row, rows, stated_in
-from focgen.trials.run import diagnose_case, outcome_of, processes, ran, threads
+from focgen.trials.run import diagnose_case, is_its_own, outcome_of, processes, ran, threads
 from focgen.trials.sealing import unseal
 from focgen.trials.worker import oracle_possible
 
@@ -91,6 +93,9 @@ def score(
 
 def _scored(folder: Path, asked: tuple[bool, bool], baseline: bool, partial: bool, jobs: int) -> Scores:
     facts = facts_of(folder)
+    check_own([folder / "scores.json"])
+    check_writable(folder / "scores.json")
+    _check_results(folder, facts)
     labels = {
         number: _unsealed(folder, number, committed)
         for number, committed in facts.commitments.items()
@@ -123,13 +128,24 @@ def _scored(folder: Path, asked: tuple[bool, bool], baseline: bool, partial: boo
     return scores
 
 
+def _check_results(folder: Path, facts: Facts) -> None:
+    """Raise InputError where a result is another case's, or of this one before it was changed, or was edited:
+    it would be scored as if this case had it; and where links lead out of the trial."""
+    for number in facts.commitments:
+        run = folder / "runs" / number
+        check_within(folder, [run / "outcome.json"])
+        if outcome_in(run) is not None and not is_its_own(folder, "runs", number):
+            what = f"is not the result of case {number} as it is, or was edited"
+            raise InputError(str(run), what, f"run `focgen trial run {folder}` again")
+
+
 def _unsealed(folder: Path, number: str, committed: str) -> dict[str, Any]:
     if _carried(folder / "cases" / number / "commitment.txt") != committed:
         raise InputError(
             str(folder / "cases" / number), "carries another commitment than the trial", "make the cases anew"
         )
     sealed = folder / "sealed" / number
-    return unseal(sealed / "label.json", committed, sealed / "unseen")
+    return unseal(sealed / "label.json", committed, sealed / "unseen", folder / "cases" / number)
 
 
 def _carried(path: Path) -> str:
@@ -149,7 +165,7 @@ def _ask_oracle(folder: Path, labels: dict[str, dict[str, Any]], jobs: int) -> N
         for n, label in labels.items()
         if label["kind"] in ("single", "pair", "linear")
         and label["truth"]
-        and not (folder / "oracle" / n / "outcome.json").exists()
+        and not is_its_own(folder, "oracle", n, *_effects(label))
     ]
     with threads(jobs) as pool:
         asked = [
@@ -159,7 +175,7 @@ def _ask_oracle(folder: Path, labels: dict[str, dict[str, Any]], jobs: int) -> N
                 "oracle",
                 n,
                 900.0,
-                tuple(t["effect"] for t in labels[n]["truth"]),
+                _effects(labels[n]),
             )
             for n in wanted
         ]
@@ -167,9 +183,14 @@ def _ask_oracle(folder: Path, labels: dict[str, dict[str, Any]], jobs: int) -> N
             one.result()
 
 
+def _effects(label: dict[str, Any]) -> tuple[str, ...]:
+    return tuple(t["effect"] for t in label["truth"])
+
+
 def _judged(folder: Path, number: str, label: dict[str, Any], baseline: bool) -> Judged:
     run, told = folder / "runs" / number, folder / "oracle" / number
     outcome, diagnosis = outcome_of(run), _diagnosis_of(run)
+    known = is_its_own(folder, "oracle", number, *_effects(label))
     single = label["kind"] == "single" and label["suite"] not in ("closed", "loops")
     return judge(
         number,
@@ -179,9 +200,9 @@ def _judged(folder: Path, number: str, label: dict[str, Any], baseline: bool) ->
         achieved=_kept(folder, run, number, label)
         if diagnosis and diagnosis.get("shrink") is not None
         else None,
-        oracle=_kept(folder, told, number, label),
+        oracle=_kept(folder, told, number, label) if known else None,
         resolved=resolved(folder, number, label),
-        forgone=forgone(diagnosis, _diagnosis_of(told)),
+        forgone=forgone(diagnosis, _diagnosis_of(told) if known else None),
         baseline=baselines.guess(folder / "cases" / number) if baseline and single else None,
         best_fit=_best_fit(diagnosis),
     )
@@ -193,18 +214,21 @@ def _diagnosis_of(run: Path) -> dict[str, Any] | None:
 
 def _kept(folder: Path, run: Path, number: str, label: dict[str, Any]) -> float | None:
     """The achieved shrink of a run, replayed once and kept beside it; None where there is none to measure."""
-    kept = achieved_in(run)
-    if kept is not None:
-        return kept[0]
     if not (run / "augmented.toml").exists():
         return None
+    unseen = label["unseen"]
+    of = result_digest(run, *unseen.values(), repr(label["floor"]))
+    kept = achieved_in(run, of)
+    if kept is not None:
+        return kept[0]
     try:
-        value = achieved.shrink(
-            run, sorted((folder / "sealed" / number / "unseen").iterdir()), label["floor"]
-        )
+        # what was committed to, and nothing that somebody has laid beside it
+        logs = [folder / "sealed" / number / "unseen" / name for name in sorted(unseen)]
+        value = achieved.shrink(run, logs, label["floor"])
     except FocgenError:
         return None
-    write_file(run / "achieved.json", json.dumps(value))
+    check_within(folder, [run / "achieved.json"])
+    write_file(run / "achieved.json", json.dumps(kept_achieved(value, of)))
     return value
 
 

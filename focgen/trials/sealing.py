@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,17 +29,34 @@ def sealed(salt: str, label: dict[str, Any]) -> str:
     return json.dumps({"salt": salt, "label": label}, indent=1, sort_keys=True) + "\n"
 
 
-def unseal(path: Path, committed: str, unseen: Path) -> dict[str, Any]:
-    """The label, if it and the unseen logs are what was committed to. Raises InputError where not."""
+def unseal(path: Path, committed: str, unseen: Path, case: Path) -> dict[str, Any]:
+    """The label, if it, the unseen logs and what the ``case`` gives are what was committed to. Raises
+    InputError where not."""
     salt, label = sealed_label(path)
     if commitment(salt, label) != committed:
         raise InputError(str(path), "is not the label that was committed to", "make the cases anew")
-    for name, digest in label["unseen"].items():
-        if file_hash(unseen / name) != digest:
-            raise InputError(
-                str(unseen / name), "is not the log that was committed to", "make the cases anew"
-            )
+    _check_committed(unseen, label["unseen"])
+    given = label.get("given")  # earlier versions committed to the label and the unseen logs alone
+    if given is not None:
+        _check_committed(case, given)
+        _check_no_more(case, given)
     return label
+
+
+def _check_committed(folder: Path, digests: Mapping[str, str]) -> None:
+    for name, digest in digests.items():
+        if file_hash(folder / name) != digest:
+            raise InputError(
+                str(folder / name), "is not the file that was committed to", "make the cases anew"
+            )
+
+
+def _check_no_more(case: Path, given: Mapping[str, str]) -> None:
+    """Raise InputError where a case has a log or a controller that it was not made with."""
+    there = [*sorted((case / "logs").iterdir()), *case.glob("controller.toml")]
+    for path in there:
+        if path.relative_to(case).as_posix() not in given:
+            raise InputError(str(path), "is no part of the case as it was made", "move it away")
 
 
 def file_hash(path: Path) -> str:

@@ -6,6 +6,7 @@ oracle). What happened goes to OUT/outcome.json: ``status`` (done or failed), ``
 
 from __future__ import annotations
 
+import errno
 import inspect
 import json
 import os
@@ -18,7 +19,10 @@ from typing import Any
 
 import focgen
 
+NO_ROOM = 75
+"""The status of a process that the machine had no room or no files for: that is no fault of its case."""
 _GRACE = 5.0  # s to end in order
+_LACKING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE)
 
 
 def oracle_possible() -> bool:
@@ -27,7 +31,7 @@ def oracle_possible() -> bool:
 
 
 def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
-    """Diagnose and note what happened; never raises."""
+    """Diagnose and note what happened. Raises only where there was no room for it (:func:`lacks_room`)."""
     started = time.perf_counter()
     fault = None
     try:
@@ -35,7 +39,9 @@ def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
         if (case / "controller.toml").exists():
             extra["controller"] = case / "controller.toml"
         focgen.diagnose(case / "rig.toml", sorted((case / "logs").iterdir()), out=out, **extra)
-    except Exception as error:  # noqa: BLE001 - every failure is a miss, whatever it is
+    except Exception as error:
+        if lacks_room(error):
+            raise
         fault = f"{type(error).__name__}: {error}"
     outcome = {
         "status": "failed" if fault else "done",
@@ -44,6 +50,23 @@ def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
     }
     out.mkdir(parents=True, exist_ok=True)
     (out / "outcome.json").write_text(json.dumps(outcome) + "\n", encoding="utf-8")
+
+
+def lacks_room(error: BaseException | None) -> bool:
+    """Whether an error comes of a full disk, or of files that cannot be opened any more."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _LACKING:
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _status_of(case: Path, out: Path, effects: tuple[str, ...]) -> int:
+    try:
+        main(case, out, effects)
+    except Exception as error:  # noqa: BLE001 - the status is all that is heard of it
+        return NO_ROOM if lacks_room(error) else 1
+    return 0
 
 
 def _end_with(parent: int) -> None:
@@ -64,4 +87,4 @@ def _end(number: int, _: object) -> None:
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
-    main(Path(sys.argv[1]), Path(sys.argv[2]), tuple(sys.argv[3:]))
+    sys.exit(_status_of(Path(sys.argv[1]), Path(sys.argv[2]), tuple(sys.argv[3:])))

@@ -145,6 +145,19 @@ def test_a_report_takes_the_place_of_no_log(results, capsys):
     spared(results, "report", "other.csv", capsys)
 
 
+def test_a_page_takes_the_place_of_no_result_of_another_kind(results, capsys):
+    """A study's own file, a diagnosis's rig and its pictures are focgen's, and no pages."""
+    found = replace(diagnosis(), drawn=signals(), refitted=paper_rig(), augmented=paper_rig())
+    write(results / "f", found, None, pictures=False)
+    with figure() as (fig, _):
+        (results / "f" / "loops.png").write_bytes(png(fig))
+    for name in ("diagnosis.json", "signals.json", "refitted.toml", "loops.png"):
+        before = (results / "f" / name).read_bytes()
+        assert main(["report", "c.toml", "--out", f"f/{name}"]) == 2
+        assert "and would be lost" in capsys.readouterr().err
+        assert (results / "f" / name).read_bytes() == before
+
+
 @pytest.mark.parametrize(("command", "names"), [
     ("diagnose", (*DIAGNOSED, NEXT, *PICTURES)),
     ("study", STUDIED),

@@ -291,7 +291,7 @@ def trial() -> list[bytes]:
         "label.json": {"salt": "00", "label": label},
         "outcome.json": {"status": "done", "seconds": 1.0, "fault": None},
         "diagnosis.json": diagnosis,
-        "achieved.json": 0.5,
+        "achieved.json": {"achieved": 0.5, "sha256": "0" * 64},
     }
     return [json.dumps(whole).encode()]
 

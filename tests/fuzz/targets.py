@@ -170,7 +170,7 @@ def _trial(data: bytes, place: Path) -> None:
     for name in ("trial.json", "label.json", "outcome.json", "diagnosis.json", "achieved.json"):
         there = isinstance(parts, dict) and name in parts
         seeds.path_of(place, name, json.dumps(parts[name]).encode("utf-8", "replace") if there else data)
-    facts.outcome_in(place), facts.diagnosis_in(place), facts.achieved_in(place)
+    facts.outcome_in(place), facts.diagnosis_in(place), facts.achieved_in(place, "")
     try:
         facts.sealed_label(place / "label.json")
     except FocgenError as error:

@@ -212,7 +212,7 @@ def test_no_mutation_is_a_traceback(trial, file, capsys):
 
 RUN = {
     "outcome.json": {"status": "done", "seconds": 1.0, "fault": None},
-    "achieved.json": 0.5,
+    "achieved.json": {"achieved": 0.5, "sha256": "0" * 64},
     "diagnosis.json": {
         "verdict": "named",
         "where": {"stage": "actuator"},
@@ -232,7 +232,7 @@ def test_no_mutation_of_a_result_is_a_traceback(trial, file, capsys):
     run.mkdir(parents=True)
     for name, content in RUN.items():
         (run / name).write_text(json.dumps(content))
-    whole = json.dumps(RUN[file] if file != "achieved.json" else {"a": RUN[file]})
+    whole = json.dumps(RUN[file])
     for _ in range(12):
         (run / file).write_bytes(mutated(whole, rng))
         status = main(["trial", "score", str(trial), "--partial", "--no-baseline", "--json", "--jobs", "1"])

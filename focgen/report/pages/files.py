@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from focgen.diagnosis.model import (
+    VERDICT,
     Candidate,
     Diagnosis,
     Estimate,
@@ -34,7 +35,7 @@ _GAP = dict.fromkeys(("as_given", "refitted", "explained", "floor"), float) | {
     "gof": {"as given": float, "refitted": float, "explained": float, "possible": float},
 }
 _DIAGNOSIS: dict[str, Any] = {
-    "verdict": str,
+    "verdict": VERDICT,
     "where": {"stage": (str, None), "inferred": bool, "share": dict, "regimes": dict},
     "causes": [_FOUND],
     "gap": _GAP,
@@ -78,6 +79,7 @@ def _sound(value: dict[str, Any]) -> bool:
     estimates = [estimate for one in candidates for estimate in one["parameters"].values()]
     return (
         all(span is None or len(span) == 2 for span in spans)
+        and all(0.0 <= candidate["confidence"] <= 1.0 for candidate in candidates)
         and all(cause["candidates"] for cause in value["causes"])
         and all(fits(share, (float, None)) for share in value["where"]["share"].values())
         and all(fits(estimate, _ESTIMATE) and len(estimate["ci95"]) == 2 for estimate in estimates)

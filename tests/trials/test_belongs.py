@@ -1,0 +1,216 @@
+"""A kept result is of the case that it lies beside, as that case is.
+
+Red when the result of another case, or of one that was changed, is scored as this one's, when what was kept
+is used though it was edited, or when scoring writes outside of its trial.
+"""
+
+import errno
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+import focgen
+from focgen.cli.main import main
+from focgen.errors import InputError
+from focgen.trials import achieved, worker
+from focgen.trials import run as running
+from focgen.trials import score as scoring
+from focgen.trials.facts import achieved_in, kept_achieved
+from tests.trials.test_untrusted import RUN
+
+NUMBERS = ("0001", "0002", "0003")
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory) -> Path:
+    """A trial whose diagnoses were made up, each with its number."""
+    folder = tmp_path_factory.mktemp("trial") / "t"
+    focgen.trial("make", folder, cases=3, seed=5, suite="short", kinds=("single", "none"), signals="A")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(running, "_process", made_up)
+        assert focgen.trial("run", folder, jobs=1).now == 3
+    return folder
+
+
+def made_up(blind: Path, out: Path, *_: object) -> str:
+    out.mkdir()
+    said = {**RUN["diagnosis.json"], "notes": [(blind / "commitment.txt").read_text()]}
+    (out / "diagnosis.json").write_text(json.dumps(said))
+    (out / "outcome.json").write_text(json.dumps(RUN["outcome.json"]))
+    for name in ("refitted.toml", "augmented.toml"):
+        shutil.copy(blind / "rig.toml", out / name)
+    return ""
+
+
+@pytest.fixture
+def trial(ran, tmp_path, monkeypatch) -> Path:
+    monkeypatch.setattr(running, "_process", made_up)
+    monkeypatch.setattr(achieved, "shrink", lambda *_: 0.5)  # replays take time
+    return Path(shutil.copytree(ran, tmp_path / "t"))
+
+
+def scored(trial: Path) -> int:
+    return main(["trial", "score", str(trial), "--no-baseline", "--jobs", "1", "--json"])
+
+
+def cut(path: Path) -> None:
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[: len(lines) // 2]))
+
+
+def another_case(trial: Path) -> None:
+    shutil.rmtree(trial / "runs/0001")
+    shutil.copytree(trial / "runs/0002", trial / "runs/0001")
+
+
+def another_verdict(trial: Path) -> None:
+    shutil.copy(trial / "runs/0002/diagnosis.json", trial / "runs/0001")
+
+
+def an_edited_word(trial: Path) -> None:
+    place = trial / "runs/0001/outcome.json"
+    place.write_text(place.read_text().replace("1.0", "0.1"))
+
+
+def an_added_rig(trial: Path) -> None:
+    (trial / "runs/0001/augmented.toml").write_text("sample_time = 1.0")
+
+
+@pytest.mark.parametrize("how", [another_case, another_verdict, an_edited_word, an_added_rig])
+def test_a_result_that_is_not_of_its_case_is_refused_and_made_anew(trial, how, capsys):
+    assert scored(trial) in (0, 1)
+    how(trial)
+    capsys.readouterr()
+    assert scored(trial) == 2
+    assert "runs/0001: is not the result of case 0001 as it is" in capsys.readouterr().err
+    assert main(["trial", "run", str(trial), "--jobs", "1", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["now"] == 1 and "so it is made anew" in err
+    assert scored(trial) in (0, 1)
+
+
+def test_a_case_that_was_changed_is_not_scored(trial, capsys):
+    """Its results are not of it, and it is not what was committed to, though the seal is whole."""
+    logs = next((trial / "cases/0001/logs").iterdir())
+    cut(logs)
+    assert scored(trial) == 2
+    assert "is not the result of case 0001" in capsys.readouterr().err
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 0
+    capsys.readouterr()
+    assert scored(trial) == 2
+    assert f"logs/{logs.name}: is not the file that was committed to" in capsys.readouterr().err
+
+
+def test_a_log_that_was_added_to_a_case_is_told(trial, capsys):
+    shutil.copy(next((trial / "cases/0003/logs").iterdir()), trial / "cases/0001/logs/more.csv")
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 0
+    capsys.readouterr()
+    assert scored(trial) == 2
+    assert "more.csv: is no part of the case as it was made" in capsys.readouterr().err
+
+
+def test_what_is_laid_beside_the_unseen_logs_takes_no_part(trial, monkeypatch):
+    asked = []
+    monkeypatch.setattr(achieved, "shrink", lambda run, logs, floor: asked.extend(logs))
+    unseen = trial / "sealed/0003/unseen"
+    committed = sorted(unseen.iterdir())
+    (unseen / "00.csv").write_text("t,u,y\n0,1,2\n")
+    label = json.loads((trial / "sealed/0003/label.json").read_text())["label"]
+    scoring._kept(trial, trial / "runs/0003", "0003", label)
+    assert asked == committed
+
+
+def test_a_kept_shrink_that_was_edited_or_copied_is_reckoned_anew(trial):
+    assert scored(trial) in (0, 1)
+    place = trial / "runs/0003/achieved.json"
+    kept = place.read_text()
+    for other in ("0.999", json.dumps(json.loads(kept) | {"achieved": 0.999})):
+        place.write_text(other)
+        assert scored(trial) in (0, 1)
+        assert place.read_text() == kept
+    place.write_text(json.dumps(kept_achieved(0.5, "a")))
+    assert achieved_in(place.parent, "a") == (0.5,) and achieved_in(place.parent, "b") is None
+
+
+def test_results_of_an_earlier_version_are_taken_for_their_places(trial):
+    for number in NUMBERS:
+        (trial / "runs" / number / "outcome.json").write_text(json.dumps(RUN["outcome.json"]))
+    assert scored(trial) in (0, 1)
+    assert focgen.trial("run", trial, jobs=1).now == 0
+
+
+@pytest.mark.parametrize("linked", ["runs", "runs/0001"])
+def test_scoring_writes_nothing_outside_of_the_trial(trial, tmp_path, linked, capsys):
+    shutil.move(trial / linked, tmp_path / "elsewhere")
+    (trial / linked).symlink_to(tmp_path / "elsewhere")
+    before = sorted((tmp_path / "elsewhere").rglob("*"))
+    assert scored(trial) == 2
+    assert "leads out of" in capsys.readouterr().err
+    assert sorted((tmp_path / "elsewhere").rglob("*")) == before
+
+
+@pytest.mark.parametrize("loop", ["runs", "runs/0001"])
+def test_links_that_lead_round_in_a_circle_are_told(trial, loop, capsys):
+    shutil.rmtree(trial / loop)
+    (trial / loop).symlink_to(trial / loop)
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"focgen: error: {trial}/runs")
+
+
+def test_scores_take_the_place_of_scores_only(trial, capsys):
+    (trial / "scores.json").write_text("what I found out in March\n")
+    assert scored(trial) == 2
+    assert "and would be lost" in capsys.readouterr().err
+    assert (trial / "scores.json").read_text() == "what I found out in March\n"
+
+
+def test_no_case_is_made_outside_of_the_trial(tmp_path, capsys):
+    """A stranger's folder that says it is this very trial's, whose cases lie elsewhere."""
+    make = ["trial", "make", str(tmp_path / "t"), "--cases", "1", "--suite", "short", "--kinds", "none"]
+    facts = {"focgen": focgen.__version__, "suite": "short", "signals": "C", "seed": 0, "kinds": ["none"]}
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "t").mkdir()
+    (tmp_path / "t" / "cases").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "t" / "begun.json").write_text(json.dumps({**facts, "cases": 1}))
+    assert main(make) == 2
+    assert "leads out of" in capsys.readouterr().err and not list((tmp_path / "elsewhere").iterdir())
+
+
+@pytest.mark.parametrize("where", ["diagnosis", "result"])
+def test_a_full_disk_is_no_fault_of_a_case(ran, tmp_path, where, capsys, monkeypatch):
+    """It counted as a miss in every row of the scores, for good: the next run passed it over."""
+
+    def full(*_: object, **__: object) -> None:
+        try:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        except OSError as reason:  # as the writers of results tell it
+            told = InputError("out", f"cannot be written ({reason.strerror})", "choose another")
+            raise (told if where == "result" else reason) from None
+
+    trial = Path(shutil.copytree(ran, tmp_path / "t"))
+    shutil.rmtree(trial / "runs")
+    monkeypatch.setattr(focgen, "diagnose", full)
+    status = worker._status_of(trial / "cases/0001", tmp_path / "out", ())
+    assert status == worker.NO_ROOM and not (tmp_path / "out" / "outcome.json").exists()
+    program = ("-c", f"raise SystemExit({status})")
+    monkeypatch.setattr(running, "python", lambda *_: [sys.executable, *program])
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 2
+    assert "had no room for a diagnosis" in capsys.readouterr().err and not list(trial.glob("runs/*/*"))
+
+
+def test_a_fault_of_a_case_is_one(tmp_path, monkeypatch):
+    for fault in (OSError(errno.ENOENT, "gone"), ValueError("no"), InputError("a", "b", "c")):
+        monkeypatch.setattr(focgen, "diagnose", raising(fault))
+        (tmp_path / "logs").mkdir(exist_ok=True)
+        assert worker._status_of(tmp_path, tmp_path / "out", ()) == 0
+        assert json.loads((tmp_path / "out" / "outcome.json").read_text())["status"] == "failed"
+
+
+def raising(fault: Exception):
+    def call(*_: object, **__: object) -> None:
+        raise fault
+
+    return call
