@@ -86,7 +86,7 @@ def _paced(problem: Problem) -> Problem:
     if column is None:
         return problem
     segment = replace(problem.segment, loose=np.column_stack([problem.segment.loose, column]))
-    return replace(problem, segment=segment, paced=1, memory={})
+    return replace(problem, segment=segment, memory={})
 
 
 def _gauged(problem: Problem) -> Problem:

@@ -73,7 +73,6 @@ class Problem:
     slack: float = 1.0
     gauge: float = 0.0
     uneven: bool = False
-    paced: int = 0
     weight: float = 1.0
 
     def __post_init__(self) -> None:
@@ -83,9 +82,9 @@ class Problem:
         self.nuisances = 1 + len(self.gauges) + self.ways + self.zeros
 
     def prior_penalty(self, vector: np.ndarray) -> float:
-        """Nats against nominal parameters this far from those given, and a pace of other levels."""
-        last = self.head - self.zeros
-        off = vector[last - self.paced : last]
+        """Nats against nominal parameters this far from those given, and inputs, begins and zeros this far
+        off."""
+        off = vector[self.head - self.zeros - self.ways : self.head]
         return self.nominals.prior_penalty(vector) + 0.5 * float(off @ off)
 
     @property
@@ -148,8 +147,8 @@ class Problem:
     def known(self) -> tuple[np.ndarray, np.ndarray]:
         """What every entry is expected to be beforehand, and how well that is known: 1/variance."""
         own, aligned = self.weight * self.nominals.precision, (self.slack * _ALIGNED) ** -2.0
-        free, effects = self.nuisances - 1 - self.zeros - self.paced, sum(len(c.form.parameters) for c in self.candidates)
-        precision = np.r_[own, aligned, np.zeros(free), np.ones(self.paced + self.zeros), np.zeros(effects)]
+        off, effects = self.ways + self.zeros, sum(len(c.form.parameters) for c in self.candidates)
+        precision = np.r_[own, aligned, np.zeros(len(self.gauges)), np.ones(off), np.zeros(effects)]
         return np.pad(self.nominal_start, (0, len(precision) - len(own))), precision
 
     def unlikely(self, vector: np.ndarray) -> float:

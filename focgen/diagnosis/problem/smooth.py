@@ -17,13 +17,19 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import Segment
 
 
+def is_explained(left: float, noise: bool) -> bool:
+    """Whether a signal is taken as simulated: inputs predict little of the residual, the share ``left``, and
+    it is nothing but ``noise``."""
+    return noise and left <= NUMBERS.left
+
+
 def freed(segment: Segment, simulated: np.ndarray, left: float, noise: bool) -> np.ndarray:
     """The segment's output: as simulated, plus the residual less its quickest noise.
 
     ``left``: the share of the residual that inputs predict. Where it is small, and the residual is nothing
     but ``noise`` (no hum, no bursts), the simulation alone.
     """
-    if _is_explained(left, noise):
+    if is_explained(left, noise):
         return simulated
     made: np.ndarray = simulated + _smoothed(segment.parts(segment.y - simulated))
     return made
@@ -47,7 +53,7 @@ def strays(segment: Segment, simulated: np.ndarray, response: float, left: float
     """
     backwards = [part[::-1] for part in segment.parts(segment.y - simulated)]
     none = np.zeros(len(segment.y))
-    if not _is_explained(left, noise):
+    if not is_explained(left, noise):
         return Strays(np.sqrt(max(1.0 - left, 0.0)) * _smoothed(backwards), none)
     return Strays(none, _slow(segment, backwards, response, left))
 
@@ -58,10 +64,6 @@ def _slow(segment: Segment, backwards: Sequence[np.ndarray], response: float, le
     most = left * sum(float(part @ part) for part in backwards)
     made: np.ndarray = slow * np.sqrt(max(most, 0.0) / max(float(slow @ slow), 1e-300))
     return made
-
-
-def _is_explained(left: float, noise: bool) -> bool:
-    return noise and left <= NUMBERS.left
 
 
 def _smoothed(parts: Sequence[np.ndarray]) -> np.ndarray:
