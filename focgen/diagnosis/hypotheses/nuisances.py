@@ -80,13 +80,13 @@ def _zeroed(problem: Problem) -> Problem:
 
 
 def _paced(problem: Problem) -> Problem:
-    """The problem with a pace that depends on the level, as much as the pace itself may be off: no rig has
-    one time at every level. Where errors add up there is no pace."""
+    """The problem with a pace that depends on the level, as much as the pace itself may be off, where that is
+    all there is. Where errors add up there is no pace."""
     column = None if problem.segment.pace else level_pace(problem.nominals.rig, problem.segment)
     if column is None:
         return problem
     segment = replace(problem.segment, loose=np.column_stack([problem.segment.loose, column]))
-    return replace(problem, segment=segment, memory={})
+    return _where_all(problem, replace(problem, segment=segment, memory={}))
 
 
 def _gauged(problem: Problem) -> Problem:
