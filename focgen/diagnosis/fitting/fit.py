@@ -39,7 +39,7 @@ class Fit:
     @cached_property
     def prior_penalty(self) -> float:
         """Nats against its nominal parameters, for being far from those given."""
-        return self.problem.prior_penalty(self.vector)
+        return self.problem.nominals.prior_penalty(self.vector)
 
     @cached_property
     def cost(self) -> float:

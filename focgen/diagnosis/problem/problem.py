@@ -81,12 +81,6 @@ class Problem:
         self.gauges = [*zero, self.gauge] if self.gauge else zero
         self.nuisances = 1 + len(self.gauges) + self.ways + self.zeros
 
-    def prior_penalty(self, vector: np.ndarray) -> float:
-        """Nats against nominal parameters this far from those given, and inputs, begins and zeros this far
-        off."""
-        off = vector[self.head - self.zeros - self.ways : self.head]
-        return self.nominals.prior_penalty(vector) + 0.5 * float(off @ off)
-
     @property
     def ways(self) -> int:
         """In how many ways input and begins may be off."""
@@ -147,8 +141,8 @@ class Problem:
     def known(self) -> tuple[np.ndarray, np.ndarray]:
         """What every entry is expected to be beforehand, and how well that is known: 1/variance."""
         own, aligned = self.weight * self.nominals.precision, (self.slack * _ALIGNED) ** -2.0
-        off, effects = self.ways + self.zeros, sum(len(c.form.parameters) for c in self.candidates)
-        precision = np.r_[own, aligned, np.zeros(len(self.gauges)), np.ones(off), np.zeros(effects)]
+        free, effects = self.nuisances - 1 - self.zeros, sum(len(c.form.parameters) for c in self.candidates)
+        precision = np.r_[own, aligned, np.zeros(free), np.ones(self.zeros), np.zeros(effects)]
         return np.pad(self.nominal_start, (0, len(precision) - len(own))), precision
 
     def unlikely(self, vector: np.ndarray) -> float:
