@@ -12,6 +12,7 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.control.files import ControllerLike, controller_from
 from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
+from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.hypotheses.explain import Explanation, candidates_for, explain
 from focgen.diagnosis.hypotheses.initial import begun_session, begun_with, loosened
@@ -151,7 +152,14 @@ def explain_all(
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
         left = e.predictability.share
         x = freed(segment, made, left, not unknown)
-        ways = input_covariance(e) if exit != roles[-1] and is_explained(left, not unknown) else None
+        ways = _ways(e, segment.y - made) if exit != roles[-1] and is_explained(left, not unknown) else None
         unsure = strays(segment, made, response, left, not unknown)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)
+
+
+def _ways(e: Explanation, left: np.ndarray) -> np.ndarray:
+    """Ways (n, k) in which what a segment is simulated to give may be off: what its parameters leave open,
+    and what inputs still predict of what it has ``left`` (n,)."""
+    response = e.best.problem.references.clocks["response"]
+    return np.column_stack([input_covariance(e), predicted(e.segment, left, response)])

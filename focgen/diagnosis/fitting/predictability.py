@@ -93,6 +93,17 @@ def predictability(segment: Segment, residual: np.ndarray, response: float) -> P
     return Predictability(regression.most, depends)
 
 
+def predicted(segment: Segment, residual: np.ndarray, response: float) -> np.ndarray:
+    """What the segment's input predicts of ``residual`` (n,), in its unit: by all but what rings, fitted to
+    every sample by its trust."""
+    columns = np.hstack([np.ones((len(residual), 1)), *_groups(segment, response).values()])
+    columns /= np.sqrt(np.mean(columns**2, axis=0)) + 1e-12
+    weighed = columns * segment.trust[:, None]
+    normal = weighed.T @ weighed + _RIDGES[0] * len(residual) * np.eye(columns.shape[1])
+    made: np.ndarray = columns @ np.linalg.solve(normal, weighed.T @ (segment.trust * residual))
+    return made
+
+
 @dataclass(frozen=True, eq=False)
 class _Regression:
     """``groups`` of regressors (n, k), those that are ``ringing`` (n, k), the residual ``target`` (n,), all
