@@ -151,15 +151,9 @@ def explain_all(
         problem, unknown = e.best.problem, is_unknown(e)
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
         left = e.predictability.share
-        x = freed(segment, made, left, not unknown)
-        ways = _ways(e, segment.y - made) if exit != roles[-1] and is_explained(left, not unknown) else None
+        foretold = predicted(e.segment, segment.y - made, response, left)
+        x = freed(segment, made, foretold, left, not unknown)
+        ways = input_covariance(e) if exit != roles[-1] and is_explained(left, not unknown) else None
         unsure = strays(segment, made, response, left, not unknown)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)
-
-
-def _ways(e: Explanation, left: np.ndarray) -> np.ndarray:
-    """Ways (n, k) in which what a segment is simulated to give may be off: what its parameters leave open,
-    and what inputs still predict of what it has ``left`` (n,)."""
-    response = e.best.problem.references.clocks["response"]
-    return np.column_stack([input_covariance(e), predicted(e.segment, left, response)])

@@ -1,7 +1,8 @@
 """A measured signal freed of its noise, to be the next stage's input.
 
 Noise in an input looks like a lag of the stage behind it. What the stage before is simulated to give is free
-of noise; what it lacks is added back, smoothed a little. How much noise stays is known as well.
+of noise; what it lacks is added back: what inputs foretell of that, or where they foretell much the whole,
+smoothed a little. How much noise stays is known as well.
 """
 
 from __future__ import annotations
@@ -23,14 +24,16 @@ def is_explained(left: float, noise: bool) -> bool:
     return noise and left <= NUMBERS.left
 
 
-def freed(segment: Segment, simulated: np.ndarray, left: float, noise: bool) -> np.ndarray:
+def freed(
+    segment: Segment, simulated: np.ndarray, foretold: np.ndarray, left: float, noise: bool
+) -> np.ndarray:
     """The segment's output: as simulated, plus the residual less its quickest noise.
 
     ``left``: the share of the residual that inputs predict. Where it is small, and the residual is nothing
-    but ``noise`` (no hum, no bursts), the simulation alone.
+    but ``noise`` (no hum, no bursts), the simulation and what is ``foretold`` (n,) of the residual.
     """
     if is_explained(left, noise):
-        return simulated
+        return simulated + foretold
     made: np.ndarray = simulated + _smoothed(segment.parts(segment.y - simulated))
     return made
 
