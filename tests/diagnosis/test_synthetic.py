@@ -88,6 +88,17 @@ def test_a_pressure_taken_as_measured_is_not_off_as_a_simulated_one_is():
     assert measured.input_modes.shape[1] == 0 and np.ptp(measured.x - np.concatenate(pumped)) < 0.02
 
 
+def test_what_an_explanation_lacks_of_a_pressure_is_a_way_in_which_that_is_off():
+    """It goes on into the stage behind, and is no effect of that."""
+    (log,) = session(1)[:1]
+    bent = log["pressure"] * (1.0 - log["pressure"] / 0.18)  # what no number of a regulator makes
+    given = replace(log, signals={**log.signals, "pressure": log["pressure"] + 0.011 * bent})
+    first, second, *_ = explain_all(RIG, [given], NUMBERS.nats, ["transport_delay"])
+    told, left = first.predictability.share, given["pressure"] - second.segment.x
+    assert told > NUMBERS.chance
+    assert max(np.corrcoef(way, left)[0, 1] ** 2 for way in second.segment.input_modes.T) > told
+
+
 def test_a_fault_of_the_sensor_behind_a_noisy_camera_is_found():
     found = diagnose(RIG, session(1, camera=5.0, noise=0.003, bend=20.0))
     assert named(found) == [["sensor_nonlinearity"]] and found.shrink > 0.8
