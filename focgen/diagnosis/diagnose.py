@@ -12,6 +12,7 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.control.files import ControllerLike, controller_from
 from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
+from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.hypotheses.explain import Explanation, candidates_for, explain
 from focgen.diagnosis.hypotheses.initial import begun_session, begun_with, loosened
@@ -20,7 +21,7 @@ from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.decimate import decimated
 from focgen.diagnosis.problem.segments import cuts, make
-from focgen.diagnosis.problem.smooth import freed, strays
+from focgen.diagnosis.problem.smooth import freed, is_explained, strays
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.conclude import conclude
@@ -136,9 +137,9 @@ def explain_all(
     sessions simulated for the threshold of each; where it comes out higher than ``threshold``, the segment
     is explained anew."""
     found: list[Explanation] = []
-    roles, x, unsure = cuts(logs), None, None
+    roles, x, ways, unsure = cuts(logs), None, None, None
     for entry, exit in pairwise(roles):
-        segment = loosened(rig, make(logs, entry, exit, x, input_covariance(found[-1]) if found else None))
+        segment = loosened(rig, make(logs, entry, exit, x, ways))
         step(f"{entry} to {exit}")
         e = explain(rig, segment, logs, threshold, only, unsure)
         if draws > 1 and e.causes and only is None:
@@ -150,7 +151,9 @@ def explain_all(
         problem, unknown = e.best.problem, is_unknown(e)
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
         left = e.predictability.share
-        x = freed(segment, made, left, not unknown)
+        foretold = predicted(e.segment, segment.y - made, response, left)
+        x = freed(segment, made, foretold, left, not unknown)
+        ways = input_covariance(e) if exit != roles[-1] and is_explained(left, not unknown) else None
         unsure = strays(segment, made, response, left, not unknown)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)

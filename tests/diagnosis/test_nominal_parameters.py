@@ -118,6 +118,23 @@ def test_the_note_tells_a_coefficient_far_from_what_was_given():
     assert ["num" in n for n in notes(1.61, 1.0, 0.39)] == [True, False]
 
 
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_gain_or_a_time_off_as_a_whole_counts_once_whatever_the_order(order):
+    """A coefficient of s^k has the time in it k times: a third order's counted six times over."""
+    dynamics = TransferFunction([(2.0, 0.0)], [(0.3**k, float(k)) for k in range(order, -1, -1)])
+    given = replace(RIG, actuator=LinearActuator(dynamics, 0.0, 0.0))
+    nominals = NominalParameters(given, ("actuator",), "actuator", 1.0, 1.0)
+    orders = np.arange(order, 0, -1.0)
+    time, gain = np.r_[0.0, 0.2 * orders, 0.0], np.r_[0.2, np.zeros(order + 1)]
+    once = np.log(2.0)  # of Cauchy's tails, one usual deviation off
+    assert nominals.prior_penalty(nominals.start() + time) == pytest.approx(once)
+    assert nominals.prior_penalty(nominals.start() + gain) == pytest.approx(once)
+    assert nominals.prior_penalty(nominals.start() + time + gain) == pytest.approx(2.0 * once)
+    if order > 1:
+        one = np.r_[0.0, 0.4 * order, np.zeros(order)]
+        assert nominals.prior_penalty(nominals.start() + one) > 2.0 * once
+
+
 def test_a_refit_never_leaves_the_output_worse():
     """The pressure's gauge reads 4 % low: the regulator's refit follows it, and alone would spoil the output
     of the chain, which was right."""

@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.fitting.predictability import predictable_share
+from focgen.diagnosis.fitting.predictability import predictable_share, predicted
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.rivals import Cause
@@ -74,6 +74,18 @@ def test_ringing_is_predictable_and_noise_is_not():
     rung *= 0.5 / np.sqrt(np.mean(rung**2))
     assert predictable_share(segment, noise, 2.0) < 0.01
     assert predictable_share(segment, noise + rung, 2.0) > 0.6 * 0.2
+
+
+@pytest.mark.parametrize("size", [0.0, 0.3, 1.0])
+def test_what_inputs_predict_of_a_residual_is_given_without_its_noise(size):
+    """What a level has bent, as far as it holds elsewhere; of noise alone nothing."""
+    segment = make(session(3), "command", "output")
+    bent = size * segment.asked * (1.0 - segment.asked)
+    left = bent + np.random.default_rng(5).standard_normal(len(bent))
+    share = predictable_share(segment, left, 2.0)
+    made = predicted(segment, left, 2.0, share)
+    assert np.mean((made - bent) ** 2) <= min(30.0 / len(bent), np.mean(bent**2))
+    assert share > 0.0 or not np.any(made)
 
 
 def test_a_slow_swing_is_seen():

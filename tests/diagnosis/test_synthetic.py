@@ -76,6 +76,29 @@ def test_a_noisy_camera_makes_no_fault_of_the_sensor_behind_it(camera):
     assert not any(e.causes for e in found) and found[-1].predictability.share < 0.01
 
 
+def test_a_pressure_taken_as_measured_is_not_off_as_a_simulated_one_is():
+    """What a regulator's refit leaves open is left open of the pressure that it is simulated to give."""
+    logs = session(1)[:1]
+    pumped = [log["pressure"] + 0.02 * np.sin(2.0 * np.pi * 0.7 * H * np.arange(len(log))) for log in logs]
+    hum = [replace(log, signals={**log.signals, "pressure": p}) for log, p in zip(logs, pumped)]
+    simulated, measured = (
+        explain_all(RIG, given, NUMBERS.nats, ["transport_delay"])[1].segment for given in (logs, hum)
+    )
+    assert simulated.input_modes.shape[1] > 0 and np.ptp(simulated.x - np.concatenate(pumped)) > 0.03
+    assert measured.input_modes.shape[1] == 0 and np.ptp(measured.x - np.concatenate(pumped)) < 0.02
+
+
+def test_what_inputs_still_tell_of_a_pressure_goes_on_into_the_stage_behind():
+    """What an explanation lacks of it is no effect of that stage."""
+    (log,) = session(1)[:1]
+    bent = log["pressure"] * (1.0 - log["pressure"] / 0.18)  # what no number of a regulator makes
+    given = replace(log, signals={**log.signals, "pressure": log["pressure"] + 0.011 * bent})
+    first, second, *_ = explain_all(RIG, [given], NUMBERS.nats, ["transport_delay"])
+    told, simulated = first.predictability.share, first.best.problem.simulate(first.best.vector)
+    before, after = (np.mean((given["pressure"] - x) ** 2) for x in (simulated, second.segment.x))
+    assert NUMBERS.chance < told < NUMBERS.left and after < (1.0 - 0.9 * told) * before
+
+
 def test_a_fault_of_the_sensor_behind_a_noisy_camera_is_found():
     found = diagnose(RIG, session(1, camera=5.0, noise=0.003, bend=20.0))
     assert named(found) == [["sensor_nonlinearity"]] and found.shrink > 0.8

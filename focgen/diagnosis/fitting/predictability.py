@@ -93,6 +93,20 @@ def predictability(segment: Segment, residual: np.ndarray, response: float) -> P
     return Predictability(regression.most, depends)
 
 
+def predicted(segment: Segment, residual: np.ndarray, response: float, share: float) -> np.ndarray:
+    """What the segment's input predicts of ``residual`` (n,), in its unit: by all but what rings, fitted to
+    every sample by its trust, as far as it holds on stretches not fitted, to a ``share`` of the mean square.
+    """
+    columns = np.hstack([np.ones((len(residual), 1)), *_groups(segment, response).values()])
+    columns /= np.sqrt(np.mean(columns**2, axis=0)) + 1e-12
+    weighed, target = columns * segment.trust[:, None], segment.trust * residual
+    normal = weighed.T @ weighed + _RIDGES[0] * len(residual) * np.eye(columns.shape[1])
+    numbers = np.linalg.solve(normal, weighed.T @ target)
+    fitted = 1.0 - float(np.mean((target - weighed @ numbers) ** 2)) / max(float(np.mean(target**2)), 1e-300)
+    made: np.ndarray = columns @ numbers * np.clip(share / max(fitted, 1e-300), 0.0, 1.0)
+    return made
+
+
 @dataclass(frozen=True, eq=False)
 class _Regression:
     """``groups`` of regressors (n, k), those that are ``ringing`` (n, k), the residual ``target`` (n,), all

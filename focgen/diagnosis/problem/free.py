@@ -90,9 +90,7 @@ class Free:
             order = WITHIN * known.alpha * start[1]
             moves = [time, (-order, order), *[(-off, off)] * (len(start) - 3)]
         else:
-            linear = present(a)
-            last, parts = linear.dynamics.den[-1].order, (linear.dynamics.num, linear.dynamics.den[:-1])
-            orders = [t.order for t in parts[0]], [t.order - last for t in parts[1]]
+            linear, orders = present(a), self._orders()
             drive = [(-np.inf, np.inf)] * linear.integrates  # its zero
             moves = [*(gain + k * time for k in orders[0]), *(k * time for k in orders[1]), *drive]
         ends = np.array([*moves, (-np.inf, np.inf)]).T
@@ -114,19 +112,30 @@ class Free:
     def prior_penalty(self, vector: np.ndarray) -> float:
         """Nats against nominal parameters this far from those given. The owner identified them once: a tenth
         off is usual, a factor is not. The tails are heavy (Cauchy's), for a rig may well have been given at a
-        guess; an offset and a bias are free.
+        guess; an offset and a bias are free. Of a transfer function the gain and the times as a whole are one
+        number each, and what its coefficients are off beside these.
         """
         start = self.start()
         if not len(start):
             return 0.0
-        away, scale = vector - start, np.full(len(start), _USUAL)
-        if self.stage == "actuator":
-            free = 2 if getattr(self.rig.actuator, "integrates", False) else 1
-            away, scale = away[:-free], scale[:-free]
+        away = vector - start
         if self.stage == "actuator" and isinstance(self.rig.actuator, Actuator):
             gains = np.abs(start[2:-1])
-            scale[1], scale[2:] = 0.5 * _USUAL * start[1], _USUAL * (gains + 0.1 * gains.sum() + 1e-12)
-        return float(np.sum(np.log1p((away / scale) ** 2)))
+            scale = _USUAL * np.r_[1.0, 0.5 * start[1], gains + 0.1 * gains.sum() + 1e-12]
+            return _surprise(away[:-1] / scale)
+        orders = np.concatenate(self._orders())
+        ways = np.stack([np.arange(len(orders)) < len(self._orders()[0]), orders], axis=1)
+        times = np.maximum(np.abs(orders), 1.0)  # of the uncertainty of one time
+        off = away[: len(orders)] / times
+        whole = np.linalg.lstsq(ways / times[:, None], off, rcond=None)[0]
+        return _surprise(np.r_[whole, off - ways @ whole / times] / _USUAL)
+
+    def _orders(self) -> tuple[np.ndarray, np.ndarray]:
+        """How often the time is in each coefficient of the numerator, and in each but the last of the
+        denominator."""
+        found = self._transfer_of()
+        last = found.den[-1].order
+        return np.array([t.order for t in found.num]), np.array([t.order - last for t in found.den[:-1]])
 
     def put(self, rig: Rig, vector: np.ndarray) -> Rig:
         """``rig`` with these parameters taken from ``vector``."""
@@ -166,6 +175,11 @@ class Free:
         num = [(float(c), t.order) for c, t in zip(moved, transfer.num)]
         den = [(float(c), t.order) for c, t in zip(moved[count:], transfer.den)]
         return TransferFunction(num, [*den, (transfer.den[-1].coefficient, transfer.den[-1].order)])
+
+
+def _surprise(off: np.ndarray) -> float:
+    """Nats against numbers that are so many times off what is usual."""
+    return float(np.sum(np.log1p(off**2)))
 
 
 def factor_ends(known: float) -> np.ndarray:

@@ -1,7 +1,8 @@
 """A measured signal freed of its noise, to be the next stage's input.
 
 Noise in an input looks like a lag of the stage behind it. What the stage before is simulated to give is free
-of noise; what it lacks is added back, smoothed a little. How much noise stays is known as well.
+of noise; what it lacks is added back: what inputs foretell of that, or where they foretell much the whole,
+smoothed a little. How much noise stays is known as well.
 """
 
 from __future__ import annotations
@@ -17,14 +18,22 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import Segment
 
 
-def freed(segment: Segment, simulated: np.ndarray, left: float, noise: bool) -> np.ndarray:
+def is_explained(left: float, noise: bool) -> bool:
+    """Whether a signal is taken as simulated: inputs predict little of the residual, the share ``left``, and
+    it is nothing but ``noise``."""
+    return noise and left <= NUMBERS.left
+
+
+def freed(
+    segment: Segment, simulated: np.ndarray, foretold: np.ndarray, left: float, noise: bool
+) -> np.ndarray:
     """The segment's output: as simulated, plus the residual less its quickest noise.
 
     ``left``: the share of the residual that inputs predict. Where it is small, and the residual is nothing
-    but ``noise`` (no hum, no bursts), the simulation alone.
+    but ``noise`` (no hum, no bursts), the simulation and what is ``foretold`` (n,) of the residual.
     """
-    if _is_explained(left, noise):
-        return simulated
+    if is_explained(left, noise):
+        return simulated + foretold
     made: np.ndarray = simulated + _smoothed(segment.parts(segment.y - simulated))
     return made
 
@@ -47,7 +56,7 @@ def strays(segment: Segment, simulated: np.ndarray, response: float, left: float
     """
     backwards = [part[::-1] for part in segment.parts(segment.y - simulated)]
     none = np.zeros(len(segment.y))
-    if not _is_explained(left, noise):
+    if not is_explained(left, noise):
         return Strays(np.sqrt(max(1.0 - left, 0.0)) * _smoothed(backwards), none)
     return Strays(none, _slow(segment, backwards, response, left))
 
@@ -58,10 +67,6 @@ def _slow(segment: Segment, backwards: Sequence[np.ndarray], response: float, le
     most = left * sum(float(part @ part) for part in backwards)
     made: np.ndarray = slow * np.sqrt(max(most, 0.0) / max(float(slow @ slow), 1e-300))
     return made
-
-
-def _is_explained(left: float, noise: bool) -> bool:
-    return noise and left <= NUMBERS.left
 
 
 def _smoothed(parts: Sequence[np.ndarray]) -> np.ndarray:
