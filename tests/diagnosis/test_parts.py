@@ -180,7 +180,7 @@ def test_a_signal_is_freed_of_its_noise_where_its_model_holds():
     made = found.problem.simulate(found.vector)
     noisy = np.sqrt(np.mean((problem.segment.y - clean) ** 2))
     for left, noise, part in ((0.0, True, 0.5), (0.0, False, 0.9), (0.2, True, 1.0)):
-        got = freed(problem.segment, made, left, noise)
+        got = freed(problem.segment, made, np.zeros(len(made)), left, noise)
         assert np.sqrt(np.mean((got - clean) ** 2)) < part * noisy
 
 
@@ -190,7 +190,7 @@ def test_what_a_freed_signal_may_be_off_by_is_as_large_as_what_stays_in_it():
     segment, none = problem.segment, np.zeros(len(clean))
     for left in (0.2, 0.5):
         unsure = strays(segment, clean, 1.0, left, True)
-        off = np.std(freed(segment, clean, left, True) - clean)
+        off = np.std(freed(segment, clean, none, left, True) - clean)
         assert np.std(unsure.noise) == pytest.approx(np.sqrt(1.0 - left) * off, rel=1e-6)
         assert np.array_equal(unsure.lost, none)
     unsure = strays(segment, clean, 1.0, 0.04, True)
@@ -204,7 +204,7 @@ def test_a_hum_is_no_noise_to_be_freed_of():
     hum = 0.02 * problem.segment.level_out * np.sin(2.0 * np.pi * t)
     made = problem.segment.y
     humming = replace(problem.segment, y=made + hum)
-    kept, lost = (np.std(freed(humming, made, 0.0, noise) - made) for noise in (False, True))
+    kept, lost = (np.std(freed(humming, made, 0.0 * hum, 0.0, noise) - made) for noise in (False, True))
     assert kept > 0.9 * np.std(hum) and lost < 0.1 * np.std(hum)
 
 

@@ -175,14 +175,15 @@ def _at_odds(summary: _Summary) -> list[Explanation]:
     """The segments with effects, where what was found leaves the output further off than no effect.
 
     Then a signal logged in between fits neither what is ahead of it nor what is behind, as of a gauge that is
-    at fault: either segments make up for one another, or without any effect there is no gap at all. Where
-    errors add up, one may stand for another."""
+    at fault: either segments make up for one another, or without any effect there is no gap at all. A path
+    that one wanders is not foretold, so that only the latter tells then. Where errors add up, one may stand
+    for another."""
     explained = list(dict.fromkeys(e for e, _ in summary.causes))
-    if not explained or any(is_rounded(e) or e.segment.pace or paths(e) for e in explained):
+    if not explained or any(is_rounded(e) or e.segment.pace for e in explained):
         return []
     found, *others = (float(np.mean(summary.squares[k])) for k in ("explained", "as given", "refitted"))
     without = min(others)
-    if len(explained) > 1:
+    if len(explained) > 1 and not any(map(paths, explained)):
         return explained if found > without else []
     no_gap, above = summary.floor > NUMBERS.above**2 * without, without < NUMBERS.above**2 * found
     return explained if no_gap and above else []
