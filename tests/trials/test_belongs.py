@@ -249,7 +249,7 @@ def test_a_case_that_is_read_only_is_copied_without_its_rights(trial, tmp_path):
 
 
 def test_what_cannot_be_read_is_no_miss_and_no_other_case(trial, capsys, monkeypatch):
-    """A table of misses, where whoever scores has not the rights to the results; of a case, that it changed."""
+    """A table of misses, where whoever scores has no rights to the results; of a case, that it changed."""
     with monkeypatch.context() as patched:
         patched.setattr("os.access", lambda *_: False)
         assert scored(trial) == 2
