@@ -47,7 +47,10 @@ def files_of_case(case: Path) -> list[Path]:
 
 
 def logs_of_case(case: Path) -> list[Path]:
-    """The logs of a case, in the order of their names; none has a name that begins with a point."""
+    """The logs of a case, in the order of their names; none has a name that begins with a point. A case that
+    is gone has none. Raises InputError where they cannot be listed."""
+    if not (case / "logs").exists():
+        return []
     try:
         return sorted(path for path in (case / "logs").iterdir() if not path.name.startswith("."))
     except OSError as reason:
