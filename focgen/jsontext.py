@@ -71,11 +71,16 @@ def check_tied(value: Any, path: Path, told: Path, remedy: str) -> None:
     stands. What an earlier version wrote does not say."""
     found = value.get(_OF) if isinstance(value, dict) else None
     try:
-        same = found is None or found == hashlib.sha256(read_regular(told, LARGEST_JSON)).hexdigest()
+        same = found is None or found == hashlib.sha256(_as_written(told)).hexdigest()
     except OSError:
         same = False
     if not same:
         raise InputError(str(path), f"is not of {told.name} beside it, or that was edited since", remedy)
+
+
+def _as_written(path: Path) -> bytes:
+    """A file's bytes with the ends of lines that it was written with: a checkout may have others."""
+    return read_regular(path, LARGEST_JSON).replace(b"\r\n", b"\n")
 
 
 ANY = "*"

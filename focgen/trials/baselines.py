@@ -18,6 +18,7 @@ import focgen
 from focgen.arrays import Array
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import UNITY, Rig
+from focgen.trials.belongs import logs_of_case
 from focgen.trials.severity import Trial, moved_rigs, rms
 
 _STEP = 0.01
@@ -59,7 +60,7 @@ def guess(case: Path) -> str | None:
     rig = focgen.read_rig(case / "rig.toml")
     if rig.sample_time < _STEP or rig.sample_time > 0.2:
         return None
-    logs = focgen.read_logs(rig, sorted((case / "logs").iterdir()))
+    logs = focgen.read_logs(rig, logs_of_case(case))
     best, found = -1.0, None
     inputs = "command"
     waiting: list[str] = []

@@ -10,28 +10,61 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-from collections.abc import Iterator
+import shutil
 from pathlib import Path
 from typing import Any
 
 from focgen.custody import sha256_within
+from focgen.errors import InputError
 from focgen.textfile import LARGEST_JSON, LARGEST_LOG
 from focgen.trials.facts import outcome_in
 
 _JUDGED = ("diagnosis.json", "refitted.toml", "augmented.toml", "next_experiment.csv")
 _SEAL = "sha256"
+_ALONE = ("commitment.txt", "controller.toml", "rig.toml")
 
 
 def case_digest(case: Path, *told: str) -> str:
-    """SHA-256 of a case's files and of what the diagnosis is ``told`` beside them."""
-    return _digest([[[name, sha256_within(case / name, LARGEST_LOG)] for name in _names(case)], told])
+    """SHA-256 of a case's files and of what the diagnosis is ``told`` beside them. Raises InputError where
+    one cannot be read: nothing can be said of its results then."""
+    files = [(path.relative_to(case).as_posix(), _digest_of(path)) for path in files_of_case(case)]
+    return _digest([sorted(files), told])
 
 
-def _names(folder: Path) -> Iterator[str]:
-    """Yield the files of a folder and of those in it, in one order everywhere."""
-    found = (Path(at, name) for at, _, names in os.walk(folder) for name in names)
-    yield from sorted(path.relative_to(folder).as_posix() for path in found)
+def _digest_of(path: Path) -> str:
+    found = sha256_within(path, LARGEST_LOG)
+    if found is None:
+        what = "cannot be read as a file of a case"
+        raise InputError(str(path), what, "check its rights, or make the cases anew")
+    return found
+
+
+def files_of_case(case: Path) -> list[Path]:
+    """What a case consists of, and nothing else that lies in its folder: a system leaves its own things where
+    somebody looks (``.DS_Store``), and people their notes. Raises InputError where its logs cannot be
+    listed."""
+    return [*(case / name for name in _ALONE if (case / name).exists()), *logs_of_case(case)]
+
+
+def logs_of_case(case: Path) -> list[Path]:
+    """The logs of a case, in the order of their names; none has a name that begins with a point. A case that
+    is gone has none. Raises InputError where they cannot be listed."""
+    if not (case / "logs").exists():
+        return []
+    try:
+        return sorted(path for path in (case / "logs").iterdir() if not path.name.startswith("."))
+    except OSError as reason:
+        what = f"cannot be read ({reason.strerror})"
+        raise InputError(str(case / "logs"), what, "check its rights, or make the cases anew") from None
+
+
+def copy_case(case: Path, to: Path) -> None:
+    """The files of a case in a new folder, without their rights: what is read only is written beside and
+    removed there. Raises OSError where they cannot be copied."""
+    for path in files_of_case(case):
+        place = to / path.relative_to(case)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, place)
 
 
 def mark(run: Path, case: str) -> None:

@@ -32,7 +32,7 @@ from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
 from focgen.scratch import temporary_folder
 from focgen.textfile import LARGEST_LOG, read_regular
-from focgen.trials.belongs import case_digest, is_of, mark, result_digest
+from focgen.trials.belongs import case_digest, copy_case, is_of, logs_of_case, mark, result_digest
 from focgen.trials.cases import Case
 from focgen.trials.facts import Facts, diagnosis_in, outcome_in
 from focgen.trials.judging import PROPOSED, judge
@@ -125,7 +125,7 @@ def _experiments(folder: Path, number: str) -> Iterator[_Asked]:
     case, run = folder / "cases" / number, folder / "runs" / number
     yield _proposed(run)
     rig = read_rig(case / "rig.toml")
-    logs = experiments(rig, sorted((case / "logs").iterdir()))
+    logs = experiments(rig, logs_of_case(case))
     for i, choice in enumerate(menu(limits_of(rig, logs, cuts(logs)[0]).faster)):
         yield _Asked(f"menu{i}", np.repeat(choice.input, choice.limits.coarse))
 
@@ -149,7 +149,7 @@ def _proposed(run: Path) -> _Asked:
 
 def _lay_out(given: Path, blind: Path, case: Case, asked: _Asked, columns: dict[str, Any]) -> None:
     """The case as it was, with the log of one more experiment; or that one alone, with a further column."""
-    shutil.copytree(given, blind)
+    copy_case(given, blind)
     rig = read_rig(blind / "rig.toml")
     if asked.also:
         shutil.rmtree(blind / "logs")

@@ -6,10 +6,9 @@ has failed.
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
-import shutil
+import signal
 import stat
 import subprocess
 import threading
@@ -27,15 +26,16 @@ from focgen.output import first_of, replace_folder
 from focgen.progress import say, track
 from focgen.scratch import real, temporary_folder
 from focgen.textfile import LARGEST_LOG
-from focgen.trials.belongs import case_digest, is_of, mark
+from focgen.trials.belongs import case_digest, copy_case, files_of_case, is_of, mark
 from focgen.trials.facts import facts_of, outcome_in
-from focgen.trials.worker import NO_ROOM
+from focgen.trials.worker import ENDED, NO_ROOM
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 _LOOK = 0.2  # s between looks whether the run is to end
 _GRACE = 5.0  # s that a diagnosis may take to end in order
+_OUTSIDE = ("SIGTERM", "SIGINT", "SIGHUP", "SIGKILL")  # a system that has no memory left sends the last one
 _ended = threading.Event()
 
 
@@ -158,7 +158,7 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
         blind, out = scratch / "case", scratch / "out"
         _check_plain(case, trial)
         try:
-            shutil.copytree(case, blind)
+            copy_case(case, blind)
         except OSError as reason:
             what = f"cannot be copied ({first_of(reason)})"
             remedy = "make room in the temporary folder (TMPDIR), or make the cases anew"
@@ -171,14 +171,14 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
 
 def _check_plain(case: Path, trial: Path) -> None:
     """Raise InputError where copying a case would lead out of its trial, or would never end."""
-    found = [case, *(Path(at, name) for at, *names in os.walk(case) for name in itertools.chain(*names))]
     left = LARGEST_LOG
-    for path in found:
+    for path in (case, case / "logs", *files_of_case(case)):
         mode, left = path.lstat().st_mode, left - path.lstat().st_size
         if left < 0:  # on the disk it may be nothing: a copy of it is not
             what = f"makes the case larger than {LARGEST_LOG >> 20} MiB"
             raise InputError(str(path), what, "make the cases anew")
-        if not (stat.S_ISDIR(mode) or stat.S_ISREG(mode)) or not _is_in(path, trial):
+        folder = path in (case, case / "logs")
+        if not (stat.S_ISDIR(mode) if folder else stat.S_ISREG(mode)) or not _is_in(path, trial):
             raise InputError(str(path), "is neither a file nor a folder of the trial", "make the cases anew")
 
 
@@ -188,7 +188,8 @@ def _is_in(path: Path, trial: Path) -> bool:
 
 def blind_diagnosis(blind: Path, out: Path, limit: float, effects: tuple[str, ...] = ()) -> None:
     """Diagnose the case in the folder ``blind`` in a process of its own; ``out`` holds what came of it, even
-    where the process died or took longer than ``limit`` s. Raises InputError where the disk was full."""
+    where the process died or took longer than ``limit`` s. Raises InputError where the disk was full, and
+    where the process was ended from outside."""
     fault = _process(blind, out, limit, effects)
     out.mkdir(parents=True, exist_ok=True)
     if not (out / "outcome.json").exists():
@@ -217,4 +218,12 @@ def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> 
     if in_time and child.returncode == NO_ROOM:
         what = "had no room for a diagnosis, which says nothing of its case"
         raise InputError(str(out.parent), what, "make room there (TMPDIR says where), and run it again")
+    if in_time and _from_outside(child.returncode):
+        what = "a diagnosis was ended from outside, or for want of memory, which says nothing of its case"
+        raise InputError("trial", what, "run it again, with fewer --jobs where memory is short")
     return f"the process ended with status {child.returncode}" if in_time else f"took longer than {limit:g} s"
+
+
+def _from_outside(status: int) -> bool:
+    """Whether it was not the diagnosis that ended its process."""
+    return status == ENDED or -status in (getattr(signal, name, None) for name in _OUTSIDE)

@@ -8,6 +8,7 @@ over cases. A case without a diagnosis counts as a miss in every row; one not ye
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -134,9 +135,21 @@ def _check_results(folder: Path, facts: Facts) -> None:
     for number in facts.commitments:
         run = folder / "runs" / number
         check_within(folder, [run / "outcome.json"])
-        if outcome_in(run) is not None and not is_its_own(folder, "runs", number):
+        if not ran(run):
+            continue
+        _check_readable(run)
+        if outcome_in(run) is None:
+            say(f"trial score: {run} is damaged, so it counts as a miss; `focgen trial run` makes it anew")
+        elif not is_its_own(folder, "runs", number):
             what = f"is not the result of case {number} as it is, or was edited"
             raise InputError(str(run), what, f"run `focgen trial run {folder}` again")
+
+
+def _check_readable(run: Path) -> None:
+    """Raise InputError where a result is there and its file cannot be opened: that is no miss of its case."""
+    for path in (run / "outcome.json", run / "diagnosis.json"):
+        if path.exists() and not os.access(path, os.R_OK):
+            raise InputError(str(path), "cannot be read (Permission denied)", "check its rights")
 
 
 def _unsealed(folder: Path, number: str, committed: str) -> dict[str, Any]:

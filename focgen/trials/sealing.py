@@ -11,6 +11,7 @@ from typing import Any
 from focgen.custody import sha256_within
 from focgen.errors import InputError
 from focgen.textfile import LARGEST_LOG
+from focgen.trials.belongs import logs_of_case
 from focgen.trials.facts import sealed_label
 
 
@@ -53,7 +54,7 @@ def _check_committed(folder: Path, digests: Mapping[str, str]) -> None:
 
 def _check_no_more(case: Path, given: Mapping[str, str]) -> None:
     """Raise InputError where a case has a log or a controller that it was not made with."""
-    there = [*sorted((case / "logs").iterdir()), *case.glob("controller.toml")]
+    there = [*logs_of_case(case), *case.glob("controller.toml")]
     for path in there:
         if path.relative_to(case).as_posix() not in given:
             raise InputError(str(path), "is no part of the case as it was made", "move it away")

@@ -18,9 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import focgen
+from focgen.trials.belongs import logs_of_case
 
 NO_ROOM = 75
 """The status of a process that the machine had no room or no files for: that is no fault of its case."""
+ENDED = 76
+"""The status of a process that was asked to end: that is no fault of its case either."""
 _GRACE = 5.0  # s to end in order
 _LACKING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE)
 
@@ -38,7 +41,7 @@ def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
         extra: dict[str, Any] = {"pictures": False} | ({"only": effects} if effects else {})
         if (case / "controller.toml").exists():
             extra["controller"] = case / "controller.toml"
-        focgen.diagnose(case / "rig.toml", sorted((case / "logs").iterdir()), out=out, **extra)
+        focgen.diagnose(case / "rig.toml", logs_of_case(case), out=out, **extra)
     except Exception as error:
         if lacks_room(error):
             raise
@@ -53,8 +56,11 @@ def main(case: Path, out: Path, effects: tuple[str, ...]) -> None:
 
 
 def lacks_room(error: BaseException | None) -> bool:
-    """Whether an error comes of a full disk, or of files that cannot be opened any more."""
+    """Whether an error comes of a full disk, of memory that there is none of, or of files that cannot be
+    opened any more."""
     while error is not None:
+        if isinstance(error, MemoryError):
+            return True
         if isinstance(error, OSError) and error.errno in _LACKING:
             return True
         error = error.__cause__ or error.__context__
@@ -81,7 +87,7 @@ def _end_with(parent: int) -> None:
 def _end(number: int, _: object) -> None:
     """In order: a compiler that has been begun ends, scratch goes."""
     signal.signal(number, signal.SIG_IGN)
-    sys.exit(1)
+    sys.exit(ENDED)
 
 
 if __name__ == "__main__":

@@ -58,6 +58,14 @@ def test_what_no_diagnosis_says_is_none(two, before, after):
         read_diagnosis(place)
 
 
+def test_a_checkout_with_other_ends_of_lines_is_the_same_result(tmp_path):
+    """Under Windows git may write them: each figure was one of another result."""
+    told = tmp_path / "study.json"
+    told.write_bytes(b'{\r\n "x": 1\r\n}\r\n')
+    value = json.loads(tied("{}", '{\n "x": 1\n}\n'))
+    check_tied(value, tmp_path / "curves.json", told, "again")
+
+
 def test_a_part_knows_what_it_is_of(tmp_path):
     told = tmp_path / "study.json"
     told.write_text('{"x": 1}\n')

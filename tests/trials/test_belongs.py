@@ -7,6 +7,7 @@ is used though it was edited, or when scoring writes outside of its trial.
 import errno
 import json
 import shutil
+import signal
 import sys
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import pytest
 import focgen
 from focgen.cli.main import main
 from focgen.errors import InputError
-from focgen.trials import achieved, worker
+from focgen.trials import achieved, belongs, worker
 from focgen.trials import run as running
 from focgen.trials import score as scoring
 from focgen.trials.facts import achieved_in, kept_achieved
@@ -199,6 +200,69 @@ def test_a_full_disk_is_no_fault_of_a_case(ran, tmp_path, where, capsys, monkeyp
     monkeypatch.setattr(running, "python", lambda *_: [sys.executable, *program])
     assert main(["trial", "run", str(trial), "--jobs", "1"]) == 2
     assert "had no room for a diagnosis" in capsys.readouterr().err and not list(trial.glob("runs/*/*"))
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL", "asked"])
+def test_a_diagnosis_that_is_ended_from_outside_is_no_fault_of_its_case(
+    ran, tmp_path, name, capsys, monkeypatch
+):
+    """By whoever shuts a machine down, or for want of memory: a miss, for good."""
+    trial = Path(shutil.copytree(ran, tmp_path / "t"))
+    shutil.rmtree(trial / "runs")
+    end = f"import os, signal; os.kill(os.getpid(), signal.{name})"
+    asked = f"import signal; from focgen.trials.worker import _end; _end({signal.SIGTERM.value}, None)"
+    program = ("-c", asked if name == "asked" else end)
+    monkeypatch.setattr(running, "python", lambda *_: [sys.executable, *program])
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 2
+    assert "was ended from outside" in capsys.readouterr().err and not list(trial.glob("runs/*/*"))
+
+
+def test_memory_that_there_is_none_of_is_no_fault_of_a_case(tmp_path, monkeypatch):
+    monkeypatch.setattr(focgen, "diagnose", raising(MemoryError()))
+    (tmp_path / "logs").mkdir()
+    assert worker._status_of(tmp_path, tmp_path / "out", ()) == worker.NO_ROOM
+
+
+def test_what_a_system_or_somebody_leaves_beside_a_case_is_no_part_of_it(trial, capsys):
+    """It was: the finder of a Mac, looking in, made every result one of another case, or a case a miss."""
+    for name in (".DS_Store", "notes.txt", "rig.toml~", "logs/.DS_Store"):
+        (trial / "cases/0001" / name).write_text("nothing")
+    (trial / "cases/0002/elsewhere").symlink_to("/")
+    assert scored(trial) in (0, 1)
+    assert focgen.trial("run", trial, jobs=1).now == 0
+    blind = trial.parent / "blind"
+    belongs.copy_case(trial / "cases/0001", blind)
+    found = {path.relative_to(blind).as_posix() for path in blind.rglob("*") if path.is_file()}
+    given = json.loads((trial / "sealed/0001/label.json").read_text())["label"]["given"]
+    assert found == {"commitment.txt", *given}
+
+
+def test_a_case_that_is_read_only_is_copied_without_its_rights(trial, tmp_path):
+    """Its copies could not be removed, nor written beside: each run left one, and proposals were refused."""
+    case = trial / "cases/0001"
+    for path in (*case.rglob("*"), case):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    belongs.copy_case(case, tmp_path / "blind")
+    for path in (*case.rglob("*"), case):
+        path.chmod(0o755 if path.is_dir() else 0o644)
+    assert all(path.stat().st_mode & 0o200 for path in (tmp_path / "blind").rglob("*"))
+
+
+def test_what_cannot_be_read_is_no_miss_and_no_other_case(trial, capsys, monkeypatch):
+    """A table of misses, where whoever scores has no rights to the results; of a case, that it changed."""
+    with monkeypatch.context() as patched:
+        patched.setattr("os.access", lambda *_: False)
+        assert scored(trial) == 2
+    assert "runs/0001/outcome.json: cannot be read" in capsys.readouterr().err
+    monkeypatch.setattr(belongs, "sha256_within", lambda *_: None)
+    assert scored(trial) == 2
+    assert "cases/0001/commitment.txt: cannot be read" in capsys.readouterr().err
+
+
+def test_a_damaged_word_of_a_run_is_told(trial, capsys):
+    (trial / "runs/0001/outcome.json").write_text("")
+    assert scored(trial) in (0, 1)
+    assert "runs/0001 is damaged, so it counts as a miss" in capsys.readouterr().err
 
 
 def test_a_fault_of_a_case_is_one(tmp_path, monkeypatch):
