@@ -42,21 +42,31 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     times = {str(key): _zone(frame[key]) for key in _keys(frame) if _holds_times(frame[key])}
     index = getattr(frame, "index", None)
     clock: Array | None = None
+    zone: bool | None = None
     if index is not None and not callable(index) and str(index.name) not in columns:
         values = _column(index, name, "index")
         named = {} if index.name is None else {str(index.name): values}
         columns = named | columns
         if isinstance(values, np.ndarray) and is_time(np.asarray(index)):
-            clock = values
+            clock, zone = values, _zone(index)
             units |= dict.fromkeys(named, "s")
-            times |= dict.fromkeys(named, _zone(index))
+            times |= dict.fromkeys(named, zone)
     if len({len(values) for values in columns.values()}) > 1:
         sizes = ", ".join(f"{key} {len(values)}" for key, values in columns.items())
         raise LogError(name, f"holds columns of different lengths ({sizes})", "give one value a sample")
     if not columns or not len(next(iter(columns.values()))):
         raise LogError(name, "holds no samples", "give one row a sample")
     grouped, unsure = marks(columns)
-    return LogTable(name, columns, units=units, clock=clock, grouped=grouped, unsure=unsure, times=times)
+    return LogTable(
+        name,
+        columns,
+        units=units,
+        clock=clock,
+        grouped=grouped,
+        unsure=unsure,
+        times=times,
+        clock_zone=zone,
+    )
 
 
 def _zone(values: Any) -> bool | None:

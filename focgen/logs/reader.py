@@ -91,7 +91,7 @@ def _columns(table: LogTable) -> tuple[dict[str, Any], list[Array]]:
         "runs": table.runs,
         "times": dict(table.times),
     }
-    clocks = {"differing": table.differing, "clock": table.clock is not None}
+    clocks = {"differing": table.differing, "clock_zone": table.clock_zone, "clock": table.clock is not None}
     return {"columns": head, **known, **clocks}, numbers
 
 

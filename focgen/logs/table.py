@@ -55,6 +55,7 @@ class LogTable:
     columns have clocks of their own that differ, so there is none. ``grouped``: columns whose points may
     stand between thousands; ``unsure``: those that show nothing else but numbers like "1.200". ``times``:
     columns that held instants or spans and are in s by nature, and whether they have a zone, None of spans.
+    ``clock_zone``: the same of the ``clock``, None as well of one that does not count from 1970.
     """
 
     path: str
@@ -70,6 +71,7 @@ class LogTable:
     grouped: frozenset[str] = frozenset()
     unsure: frozenset[str] = frozenset()
     times: Mapping[str, bool | None] = field(default_factory=dict)
+    clock_zone: bool | None = None
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -160,10 +162,13 @@ class LogTable:
         return self._own(name) in self.times or self.is_dated(name)
 
     def has_zone(self, name: str) -> bool | None:
-        """Whether the dates of a column have a zone; None of one that holds no dates, or is not there."""
+        """Whether the dates of a column have a zone; None of one that holds no dates. Where it is
+        not there, the same of the log's own clock."""
         if self._own(name) in self.times:
             return self.times[self._own(name)]
-        column = self.column(name) if name in self else []
+        if name not in self:
+            return self.clock_zone
+        column = self.column(name)
         return None if isinstance(column, np.ndarray) or not _is_dated(column) else stamps.has_zone(column)
 
     def is_unsure(self, name: str) -> bool:

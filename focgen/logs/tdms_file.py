@@ -26,7 +26,8 @@ from focgen.logs.units import TIME_WORDS
 @dataclass(frozen=True, eq=False)
 class _Group:
     """``channels`` (m,) by name, their ``units``, and the time in s that their waveforms have, or None;
-    ``differing``: it is another one of each. ``times``: the channels of instants."""
+    ``differing``: it is another one of each. ``times``: the channels of instants. ``dated``: True where the
+    waveforms begin at an instant, of UTC as all are, else None."""
 
     name: str
     channels: Mapping[str, Array]
@@ -34,6 +35,7 @@ class _Group:
     clock: Array | None
     differing: bool
     times: frozenset[str]
+    dated: bool | None
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
@@ -76,7 +78,9 @@ def _group(path: Path, group: Any) -> _Group:
     clocks = [_clock(c.properties, len(values)) for c, values in found.values() if len(values)]
     clock = _common(clocks)
     differing = clock is None and any(c is not None for c in clocks)
-    return _Group(group.name, channels, {n: u for n, u in units.items() if u}, clock, differing, times)
+    dated = True if any("wf_start_time" in c.properties for c, _ in found.values()) else None
+    units = {name: unit for name, unit in units.items() if unit}
+    return _Group(group.name, channels, units, clock, differing, times, dated)
 
 
 def _common(clocks: Sequence[Array | None]) -> Array | None:
@@ -124,6 +128,7 @@ def _one_after_the_other(path: Path, groups: Sequence[_Group]) -> LogTable:
         runs=[g.name for g in groups for _ in range(len(g))],
         differing=any(g.differing for g in groups),
         times=dict.fromkeys(groups[0].times, True),  # the format's are of UTC
+        clock_zone=groups[0].dated,
     )
 
 
@@ -157,5 +162,12 @@ def _side_by_side(path: Path, groups: Sequence[_Group]) -> LogTable:
     differing = any(g.differing for g in groups) or (bool(clocks) and clock is None)
     _check_one_time(path, groups)
     return LogTable(
-        str(path), columns, units=units, aliases=aliases, clock=clock, differing=differing, times=times
+        str(path),
+        columns,
+        units=units,
+        aliases=aliases,
+        clock=clock,
+        differing=differing,
+        times=times,
+        clock_zone=next((g.dated for g in groups if g.clock is not None), None),
     )

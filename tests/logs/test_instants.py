@@ -123,6 +123,22 @@ def test_others_are(logs):
     assert len(read_logs(logs, PLAIN, STEP)) == 2
 
 
+def test_the_clocks_of_an_index_and_of_waveforms_are_of_a_zone_or_none(tmp_path):
+    """A waveform of LabVIEW begins at an instant of UTC, a text beside it may be local."""
+    bare = frame(INSTANTS).set_index("t").rename_axis(None)
+    with pytest.raises(LogError, match="has dates without a zone, beside a log with one"):
+        read_logs([bare, frame(ZONED)], PLAIN, STEP)
+    nptdms = pytest.importorskip("nptdms")
+    began = {"wf_increment": STEP, "wf_start_time": np.datetime64("2026-01-31T09:00"), "wf_start_offset": 0.0}
+    waves = [nptdms.ChannelObject("g", name, values, began) for name, values in READINGS.items()]
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        writer.write_segment(waves)
+    assert tdms_file.read(tmp_path / "log.tdms").clock_zone is True
+    with pytest.raises(LogError, match="has dates without a zone, beside a log with one"):
+        read_logs([tmp_path / "log.tdms", frame(INSTANTS)], PLAIN, STEP)
+    assert len(read_logs([bare, frame(LATER)], PLAIN, STEP)) == 2
+
+
 def test_a_zone_comes_through_the_reader_of_its_own(tmp_path):
     assert read_table(as_parquet(tmp_path, ZONED)).has_zone("t") is True
 
