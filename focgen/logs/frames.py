@@ -26,7 +26,7 @@ class Frame(Protocol):
 
 def is_frame(log: object) -> bool:
     """Whether a log is in memory: a dictionary, or what has columns."""
-    return isinstance(log, Mapping) or hasattr(log, "columns")
+    return isinstance(log, Mapping) or hasattr(type(log), "columns") or hasattr(log, "columns")
 
 
 def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
@@ -35,24 +35,47 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     An index that has a name, or holds times, is a column, too. Raises LogError where columns are no vectors
     of one length.
     """
+    if callable(getattr(frame, "collect", None)):
+        raise LogError(name, "is a query of polars that has not been run", "give what its collect() returns")
     columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
     units = {str(key): unit for key in _keys(frame) if (unit := _unit(frame[key]))}
+    times = {str(key): _zone(frame[key]) for key in _keys(frame) if _holds_times(frame[key])}
     index = getattr(frame, "index", None)
     clock: Array | None = None
+    zone: bool | None = None
     if index is not None and not callable(index) and str(index.name) not in columns:
         values = _column(index, name, "index")
         named = {} if index.name is None else {str(index.name): values}
         columns = named | columns
         if isinstance(values, np.ndarray) and is_time(np.asarray(index)):
-            clock = values
+            clock, zone = values, _zone(index)
             units |= dict.fromkeys(named, "s")
+            times |= dict.fromkeys(named, zone)
     if len({len(values) for values in columns.values()}) > 1:
         sizes = ", ".join(f"{key} {len(values)}" for key, values in columns.items())
         raise LogError(name, f"holds columns of different lengths ({sizes})", "give one value a sample")
     if not columns or not len(next(iter(columns.values()))):
         raise LogError(name, "holds no samples", "give one row a sample")
     grouped, unsure = marks(columns)
-    return LogTable(name, columns, units=units, clock=clock, grouped=grouped, unsure=unsure)
+    return LogTable(
+        name,
+        columns,
+        units=units,
+        clock=clock,
+        grouped=grouped,
+        unsure=unsure,
+        times=times,
+        clock_zone=zone,
+    )
+
+
+def _zone(values: Any) -> bool | None:
+    """Whether a column of instants has a zone, None of spans. Pandas and polars say so by their types, each
+    in its way; arrays of numpy never have one."""
+    if np.asarray(values).dtype.kind == "m":
+        return None
+    kind = getattr(values, "dtype", None)
+    return any(getattr(kind, way, None) is not None for way in ("tz", "time_zone"))
 
 
 def _keys(frame: Frame | Mapping[Any, Any]) -> list[Any]:
@@ -86,7 +109,12 @@ def _unit(values: Any) -> str | None:
     """The unit of a column that has one of its own: of times, and of quantities."""
     if hasattr(values, "magnitude") and hasattr(values, "units"):
         return f"{values.units:~}" or None
-    return "s" if is_time(np.asarray(values)) else None
+    return "s" if _holds_times(values) else None
+
+
+def _holds_times(values: Any) -> bool:
+    """Whether a column holds instants or spans of numpy; of a quantity its unit tells."""
+    return not hasattr(values, "magnitude") and is_time(np.asarray(values))
 
 
 def _cells(cells: list[Any]) -> Array | list[str]:

@@ -21,6 +21,7 @@ from focgen.errors import LogError, MissingExtra
 from focgen.logs.table import LogTable
 
 _REMEDY = "save one vector a column"
+_ALONE = "save the signals of one experiment alone, as in save('log.mat', 't', 'u', 'y')"
 _WIDEST = 64  # columns: a wider matrix is no log
 
 
@@ -41,9 +42,7 @@ def read(path: Path) -> LogTable:
         raise LogError(str(path), "holds no vectors", _REMEDY)
     if len(lengths) > 1:
         sizes = ", ".join(f"{name} {len(column)}" for name, column in columns.items())
-        raise LogError(
-            str(path), f"holds vectors of different lengths ({sizes})", "save one experiment a file"
-        )
+        raise LogError(str(path), f"holds vectors of different lengths ({sizes})", _ALONE)
     return LogTable(str(path), columns, aliases=aliases)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from focgen.arrays import Array, Ints
+from focgen.logs.clipped import end_of_range
 from focgen.logs.clock import HELD, between
 from focgen.logs.notes import Note
 from focgen.logs.outliers import barred_by, outliers, stand_in, straightened
@@ -48,6 +49,7 @@ def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Arra
             notes.append(Note(what, int(wrong.sum()), f"at {time[rows][np.argmax(wrong)]:g} s"))
             y = _with(y, rows, straightened(time[rows], y[rows], wrong))
         notes += _stand_in_note(role, y[rows], time[rows])
+        notes += _clipped_note(role, y[rows], time[rows])
     if gone.any():
         how = "held" if role in HELD else "bridged by straight lines"
         notes.append(
@@ -66,6 +68,18 @@ def _stand_in_note(role: str, y: Array, time: Array) -> list[str]:
         f"{role} is {value:.6g} again and again, far off the readings on both sides: leave such cells empty"
     )
     return [Note(f"{what} if nothing was read", 1, f"at {time[first]:g} s")]
+
+
+def _clipped_note(role: str, y: Array, time: Array) -> list[str]:
+    """A word on readings that end at one number: a diagnosis takes it for a property of the rig."""
+    found = end_of_range(y)
+    if found is None:
+        return []
+    value, count, first = found
+    what = (
+        f"{role} ends at {value:.6g}, as where the range of a gauge or of the logger ends: what is beyond is"
+    )
+    return [Note(f"{what} not in the log", count, f"at {time[first]:g} s")]
 
 
 def _with(y: Array, rows: Ints | slice, straight: Array) -> Array:

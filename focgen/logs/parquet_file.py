@@ -27,7 +27,14 @@ def read(path: Path) -> LogTable:
         raise LogError(str(path), "is not a whole Parquet file", "write it again") from None
     columns = {name: table.column(name).to_numpy() for name in table.column_names}
     units = {name: "s" for name, values in columns.items() if is_time(values)}
-    return LogTable(str(path), {name: _column(values) for name, values in columns.items()}, units=units)
+    times = {name: _zone(table.schema.field(name).type) for name in units}
+    read = {name: _column(values) for name, values in columns.items()}
+    return LogTable(str(path), read, units=units, times=times)
+
+
+def _zone(kind: Any) -> bool | None:
+    """Whether a type of instants has a zone; None of a type of spans."""
+    return None if "duration" in str(kind) else getattr(kind, "tz", None) is not None
 
 
 def _column(column: Array) -> Array | list[Any]:

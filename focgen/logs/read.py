@@ -167,7 +167,7 @@ def _time(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
         said = _time_unit_note(table, signals)
         scale = signals.scales.get("time")
         found = table.seconds(signals.time, told=scale is not None)
-        if table.is_dated(signals.time) and scale is not None and scale.unit is not None:
+        if table.is_in_seconds(signals.time) and scale is not None and scale.unit is not None:
             return found, said  # a date is what it is, in whatever unit other logs count
         found = _scaled(table, "time", found, signals)
         if scale is None:
@@ -210,12 +210,13 @@ def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
     """What the file or the column's name says of the unit of time, where the rig names another. Raises
     LogError where the rig names none and it is no second: minutes pass for a log of another rate."""
     name, scale = signals.time, signals.scales.get("time")
-    given = table.unit(name) or time_unit_named(name) or "s"
+    given = table.unit(name) or time_unit_named(name)
     taken = (scale.unit or "") if scale else "s"
-    if table.is_dated(name):
-        what = f"{name!r} holds dates or times of day, which are not in {taken}, as the rig has it"
+    if table.is_in_seconds(name):
+        kind = "spans" if table.times.get(name, False) is None else "dates or times of day"
+        what = f"{name!r} holds {kind}, which are not in {taken}, as the rig has it"
         return () if taken in ("", "s") else (what,)
-    if given == taken or not taken:
+    if given is None or given == taken or not taken:
         return ()
     own, other = unit_of_time(given), unit_of_time(taken)
     if own is None or other is None or own[1] == other[1]:

@@ -85,8 +85,13 @@ def _columns(table: LogTable) -> tuple[dict[str, Any], list[Array]]:
             head.append([str(name), [_cell(cell) for cell in cells], len(cells)])
     if table.clock is not None:
         numbers.append(np.ascontiguousarray(table.clock, dtype=np.float64))
-    known = {"units": dict(table.units), "aliases": dict(table.aliases), "runs": table.runs}
-    clocks = {"differing": table.differing, "clock": table.clock is not None}
+    known = {
+        "units": dict(table.units),
+        "aliases": dict(table.aliases),
+        "runs": table.runs,
+        "times": dict(table.times),
+    }
+    clocks = {"differing": table.differing, "clock_zone": table.clock_zone, "clock": table.clock is not None}
     return {"columns": head, **known, **clocks}, numbers
 
 

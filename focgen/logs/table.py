@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -38,6 +39,8 @@ LARGEST = 1e30
 Column = Sequence[str] | Array
 """Texts as they stand in a file, or numbers; (m,)."""
 _UNGROUPED = "write numbers without a mark between thousands, and a decimal one as 1.2"
+_ISO = "write it as 2026-01-31T12:00:00.000, or in seconds"
+_DATE_OR_TIME = re.compile(r"\d:\d|\d{4}[-/_.T]\d{2}|\d[-/._]([a-zA-Z]{3}|\d{1,2})[-/._]\d{2}|^\d+ days?\b")
 _LOOK = 100  # cells: by then a column of dates shows that it is one
 
 
@@ -50,7 +53,9 @@ class LogTable:
     ``clock`` (m,): the time in s that a file gives without a column for it. ``runs`` (m,): the name of the
     run of each row, where the file has them apart. ``notes``: how the file was read. ``differing``: its
     columns have clocks of their own that differ, so there is none. ``grouped``: columns whose points may
-    stand between thousands; ``unsure``: those that show nothing else but numbers like "1.200".
+    stand between thousands; ``unsure``: those that show nothing else but numbers like "1.200". ``times``:
+    columns that held instants or spans and are in s by nature, and whether they have a zone, None of spans.
+    ``clock_zone``: the same of the ``clock``, None as well of one that does not count from 1970.
     """
 
     path: str
@@ -65,6 +70,8 @@ class LogTable:
     differing: bool = False
     grouped: frozenset[str] = frozenset()
     unsure: frozenset[str] = frozenset()
+    times: Mapping[str, bool | None] = field(default_factory=dict)
+    clock_zone: bool | None = None
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -78,7 +85,7 @@ class LogTable:
 
     def unit(self, name: str) -> str | None:
         """The unit that the file gives for a column."""
-        return self.units.get(name if name in self.columns else self.aliases.get(name, name))
+        return self.units.get(self._own(name))
 
     def closest(self, name: str, taken: Collection[str] = ()) -> str | None:
         """The column, not one of those ``taken``, whose name is nearest to ``name``, or None where none is
@@ -136,8 +143,7 @@ class LogTable:
                 found = stamps.seconds(column)
             except ValueError as reason:
                 what = f"has a time that cannot be read ({reason})"
-                remedy = "write it as 2026-01-31T12:00:00.000, or in seconds"
-                raise LogError(f"{self.path} [{name}]", what, remedy) from None
+                raise LogError(f"{self.path} [{name}]", what, _ISO) from None
         else:
             found = self.numbers(name)
         other = None if told else stamps.other_reading(found, dated)
@@ -151,14 +157,26 @@ class LogTable:
         column = self.column(name)
         return not isinstance(column, np.ndarray) and _is_dated(column)
 
+    def is_in_seconds(self, name: str) -> bool:
+        """Whether a column of time is in s, whatever the rig has for other logs: of dates and spans."""
+        return self._own(name) in self.times or self.is_dated(name)
+
     def has_zone(self, name: str) -> bool | None:
-        """Whether the dates of a column have a zone; None of one that holds no dates, or is not there."""
-        column = self.column(name) if name in self else []
+        """Whether the dates of a column have a zone; None of one that holds no dates. Where it is
+        not there, the same of the log's own clock."""
+        if self._own(name) in self.times:
+            return self.times[self._own(name)]
+        if name not in self:
+            return self.clock_zone
+        column = self.column(name)
         return None if isinstance(column, np.ndarray) or not _is_dated(column) else stamps.has_zone(column)
 
     def is_unsure(self, name: str) -> bool:
         """Whether nothing in the file tells 1.200 from 1200 in a column."""
-        return (name if name in self.columns else self.aliases.get(name, name)) in self.unsure
+        return self._own(name) in self.unsure
+
+    def _own(self, name: str) -> str:
+        return name if name in self.columns else self.aliases.get(name, name)
 
     def numbers(self, name: str) -> Array:
         """A column as float64; empty cells become NaN. Raises LogError for anything else that is no
@@ -189,6 +207,9 @@ class LogTable:
             whole = str(cell).replace(mark, "")
             what = f"holds {cell!r} in {self.line(row)}, which may be {whole} or have a decimal {mark!r}"
             return LogError(f"{self.path} [{name}]", what, _UNGROUPED)
+        if _DATE_OR_TIME.search(str(cell)):
+            what = f"holds {cell!r} in {self.line(row)}, which is no time that can be read"
+            return LogError(f"{self.path} [{name}]", what, _ISO)
         remedy = (
             "write decimals with a point" if "," in str(cell) else "leave the cell empty or give a number"
         )

@@ -18,7 +18,7 @@ from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
 from focgen.logs.columns import is_time_named
 from focgen.logs.scales import unit_of_time
-from focgen.logs.stamps import of_numpy
+from focgen.logs.stamps import is_time, of_numpy
 from focgen.logs.table import LARGEST, LogTable, check_units
 from focgen.logs.units import TIME_WORDS
 
@@ -26,13 +26,16 @@ from focgen.logs.units import TIME_WORDS
 @dataclass(frozen=True, eq=False)
 class _Group:
     """``channels`` (m,) by name, their ``units``, and the time in s that their waveforms have, or None;
-    ``differing``: it is another one of each."""
+    ``differing``: it is another one of each. ``times``: the channels of instants. ``dated``: True where the
+    waveforms begin at an instant, of UTC as all are, else None."""
 
     name: str
     channels: Mapping[str, Array]
     units: Mapping[str, str]
     clock: Array | None
     differing: bool
+    times: frozenset[str]
+    dated: bool | None
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
@@ -67,13 +70,17 @@ def read(path: Path) -> LogTable:
 def _group(path: Path, group: Any) -> _Group:
     for channel in group.channels():
         _check_over_time(path, channel.properties)
-    found = {c.name: (c, of_numpy(np.asarray(c[:]))) for c in group.channels()}
+    raw = {c.name: (c, np.asarray(c[:])) for c in group.channels()}
+    found = {name: (c, of_numpy(values)) for name, (c, values) in raw.items()}
+    times = frozenset(name for name, (_, values) in raw.items() if is_time(values))
     channels = {name: values for name, (_, values) in found.items() if len(values)}
     units = {name: str(c.properties.get("unit_string", "")) for name, (c, _) in found.items()}
     clocks = [_clock(c.properties, len(values)) for c, values in found.values() if len(values)]
     clock = _common(clocks)
     differing = clock is None and any(c is not None for c in clocks)
-    return _Group(group.name, channels, {n: u for n, u in units.items() if u}, clock, differing)
+    dated = True if any("wf_start_time" in c.properties for c, _ in found.values()) else None
+    units = {name: unit for name, unit in units.items() if unit}
+    return _Group(group.name, channels, units, clock, differing, times, dated)
 
 
 def _common(clocks: Sequence[Array | None]) -> Array | None:
@@ -120,6 +127,8 @@ def _one_after_the_other(path: Path, groups: Sequence[_Group]) -> LogTable:
         clock=np.concatenate(clocks) if len(clocks) == len(groups) else None,
         runs=[g.name for g in groups for _ in range(len(g))],
         differing=any(g.differing for g in groups),
+        times=dict.fromkeys(groups[0].times, True),  # the format's are of UTC
+        clock_zone=groups[0].dated,
     )
 
 
@@ -138,6 +147,7 @@ def _side_by_side(path: Path, groups: Sequence[_Group]) -> LogTable:
     columns: dict[str, Array] = {}
     units: dict[str, str] = {}
     aliases: dict[str, str] = {}
+    times: dict[str, bool | None] = {}
     for g in groups:
         for channel, values in g.channels.items():
             whole = f"{g.name}/{channel}"
@@ -145,9 +155,19 @@ def _side_by_side(path: Path, groups: Sequence[_Group]) -> LogTable:
             columns[name] = values
             units |= {name: g.units[channel]} if channel in g.units else {}
             aliases |= {whole: name} if name != whole else {}
+            times |= {name: True} if channel in g.times else {}
     _check_lengths(path, columns)
     clocks = [g.clock for g in groups if g.clock is not None]
     clock = _common(clocks)
     differing = any(g.differing for g in groups) or (bool(clocks) and clock is None)
     _check_one_time(path, groups)
-    return LogTable(str(path), columns, units=units, aliases=aliases, clock=clock, differing=differing)
+    return LogTable(
+        str(path),
+        columns,
+        units=units,
+        aliases=aliases,
+        clock=clock,
+        differing=differing,
+        times=times,
+        clock_zone=next((g.dated for g in groups if g.clock is not None), None),
+    )

@@ -165,7 +165,9 @@ def _header(path: Path, rows: list[list[str]], dialect: Dialect) -> list[str]:
     """The cells that name the columns, "" where one does not. Raises LogError where there are none."""
     if dialect.header is None or all(is_number(name, dialect.decimal) for name in rows[dialect.header]):
         raise LogError(
-            str(path), "starts with numbers instead of a header", "put the columns' names in line 1"
+            str(path),
+            "starts with numbers instead of a header",
+            "put the columns' names in line 1, without # or % ahead",
         )
     names = list(rows[dialect.header])
     if len(names) > MOST_COLUMNS:

@@ -10,6 +10,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.logs import plausibility
+from focgen.logs.ahead import is_answered_ahead
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.plausibility import Link, Signals
@@ -40,7 +41,7 @@ def doubts(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
     response = partial(links, rig, experiments)
     found = plausibility.doubts(experiments, limits, _units(rig), response)
-    return found or _exchanged(rig, experiments)
+    return found or _exchanged(rig, experiments) or _late(experiments)
 
 
 def links(
@@ -154,6 +155,15 @@ def _exchanged(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     if exchanged > _EXCHANGED * as_it_is:
         return ()
     return ("curvature lags behind output; the columns of curvature and output exchanged?",)
+
+
+def _late(experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """The command is logged late where what is measured first answers it before it comes."""
+    signals = _signals(experiments)
+    first = next((role for role in _ROLES[1:] if role in signals), None)
+    if "command" not in signals or first is None or not is_answered_ahead(experiments, first):
+        return ()
+    return (f"{first} answers the command before it comes; the command logged late, or {first} early?",)
 
 
 def _misfit(expected: list[Array], measured: list[Array]) -> float:
