@@ -52,7 +52,7 @@ class Numbers:
         "1 fewer right first, 1 fewer in the set",
     )
     other: float = _number(
-        0.006,
+        0.03,
         "by what noise and nominal chain are other than assumed",
         "of the noise's mean square",
         "fitted",
@@ -103,7 +103,7 @@ class Numbers:
         0.01, "what a regression predicts of noise by chance", "of the mean square", "noise simulated"
     )
     left: float = _number(
-        0.07,
+        0.1,
         "predicted by inputs, and more than a little wrong",
         "of the mean square",
         "healthy rigs: at most 0.014",
