@@ -26,7 +26,7 @@ from focgen.diagnosis.proposals.next_experiment import NEXT, propose
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
-from focgen.diagnosis.verdict.unexplained import is_unknown
+from focgen.diagnosis.verdict.unexplained import is_noise
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import Logs, each_of
@@ -148,12 +148,12 @@ def explain_all(
             if min(c.gain for c in e.causes) < asked:
                 e = explain(rig, segment, logs, asked, only, unsure)
         found.append(e)
-        problem, unknown = e.best.problem, is_unknown(e)
+        problem, noise = e.best.problem, is_noise(e)
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
         left = e.predictability.share
         foretold = predicted(e.segment, segment.y - made, response, left)
-        x = freed(segment, made, foretold, left, not unknown)
-        ways = input_covariance(e) if exit != roles[-1] and is_explained(left, not unknown) else None
-        unsure = strays(segment, made, response, left, not unknown)
+        x = freed(segment, made, foretold, left, noise)
+        ways = input_covariance(e) if exit != roles[-1] and is_explained(left, noise) else None
+        unsure = strays(segment, made, response, left, noise)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)

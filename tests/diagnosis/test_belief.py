@@ -23,6 +23,7 @@ from focgen.diagnosis.problem.segments import make
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Actuator, Rig, Signals
+from focgen.trials.severity import VISIBLE
 
 _COUNT, H = 10_000, 0.05
 
@@ -147,17 +148,24 @@ def test_free_values_that_the_experiments_cannot_show_are_not_counted():
     assert ground.odds(rich, 1) == pytest.approx(ground.odds(simple))
 
 
-@pytest.mark.parametrize("around", [{"hidden": 0.05}, {"carried": 0.05}])
+def test_what_an_identified_chain_is_off_by_is_no_effect_and_what_the_trials_call_visible_is():
+    """Curves that were fitted to healthy rigs leave a sixth of the noise, root mean square, and more."""
+    tried = _fit(1.0, ["leak"])
+    for square, there in ((0.03, False), (VISIBLE**2, True)):
+        assert (likeliest(_ground(_fit(1.0 + square), [tried]), [tried])[1] > 0.0) == there
+
+
+@pytest.mark.parametrize("around", [{"hidden": 0.2}, {"carried": 0.2}])
 def test_an_uneven_converter_and_an_input_that_lost_something_hide_small_effects(around):
-    base, better = _fit(1.03), _fit(1.0, ["leak"])
+    base, better = _fit(1.1), _fit(1.0, ["leak"])
     assert likeliest(_ground(base, [better]), [better])[1] > 0.0
     assert likeliest(_ground(base, [better], **around), [better])[1] < 0.0
 
 
 def test_to_leave_less_for_being_deaf_to_noise_of_the_input_is_no_merit(monkeypatch):
-    """Noise of 0.03 in the output comes from the input: one form keeps it out, one mends as much of a gap."""
-    base, deaf, better = _fit(1.03), _fit(1.0, ["sensor_lag"]), _fit(1.0, ["leak"])
-    answers = {base: 0.03, deaf: 0.0, better: 0.03}
+    """Noise of 0.1 in the output comes from the input: one form keeps it out, one mends as much of a gap."""
+    base, deaf, better = _fit(1.1), _fit(1.0, ["sensor_lag"]), _fit(1.0, ["leak"])
+    answers = {base: 0.1, deaf: 0.0, better: 0.1}
     monkeypatch.setattr(further, "answer", lambda of, *_: _COUNT * answers[of])
     ground = replace(_ground(base, [deaf, better]), noise=np.zeros(_COUNT))
     assert likeliest(ground, [better])[1] > 0.0 > likeliest(ground, [deaf])[1]

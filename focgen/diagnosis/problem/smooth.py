@@ -21,7 +21,7 @@ from focgen.diagnosis.problem.segments import Segment
 def is_explained(left: float, noise: bool) -> bool:
     """Whether a signal is taken as simulated: inputs predict little of the residual, the share ``left``, and
     it is nothing but ``noise``."""
-    return noise and left <= NUMBERS.left
+    return noise and left <= NUMBERS.much
 
 
 def freed(

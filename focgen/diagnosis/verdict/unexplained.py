@@ -38,6 +38,13 @@ def disturbed(e: Explanation) -> Disturbance:
     return disturbance(e.segment.parts(e.best.weighed), e.segment.run.h, response)
 
 
+def is_noise(e: Explanation) -> bool:
+    """Whether what a segment leaves is noise, but for a little that its input predicts."""
+    left = disturbed(e)
+    quiet = not (left.bursts or left.low_frequency or left.tonal or left.pushed)
+    return not is_unknown(e) or (quiet and e.predictability.share <= NUMBERS.much)
+
+
 def is_rounded(e: Explanation) -> bool:
     """Whether a rounding is among the effects found."""
     return any(library()[c.rivals[0].effect].rounds for c in e.causes)
