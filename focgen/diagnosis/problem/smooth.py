@@ -32,9 +32,8 @@ def freed(
     ``left``: the share of the residual that inputs predict. Where it is small, and the residual is nothing
     but ``noise`` (no hum, no bursts), the simulation and what is ``foretold`` (n,) of the residual.
     """
-    if is_explained(left, noise):
-        return simulated + foretold
-    made: np.ndarray = simulated + _smoothed(segment.parts(segment.y - simulated))
+    added = foretold if is_explained(left, noise) else _smoothed(segment.parts(segment.y - simulated))
+    made: np.ndarray = simulated + added
     return made
 
 
