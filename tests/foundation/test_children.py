@@ -40,7 +40,8 @@ def test_the_folder_is_hostile(hostile):
 
 def test_a_case_of_a_trial_is_diagnosed_by_this_package(hostile):
     run.blind_diagnosis(hostile / "case", hostile / "out", 60.0)
-    assert "rig.toml: cannot be read" in (hostile / "out" / "outcome.json").read_text()  # the worker's own word
+    word = (hostile / "out" / "outcome.json").read_text()  # the worker's own
+    assert "rig.toml: cannot be read" in word
     assert not (hostile / "mark").exists()
 
 
