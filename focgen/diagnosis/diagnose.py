@@ -148,12 +148,14 @@ def explain_all(
             if min(c.gain for c in e.causes) < asked:
                 e = explain(rig, segment, logs, asked, only, unsure)
         found.append(e)
+        if exit == roles[-1]:
+            break
         problem, noise = e.best.problem, is_noise(e)
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
         left = e.predictability.share
         foretold = predicted(e.segment, segment.y - made, response, left)
         x = freed(segment, made, foretold, left, noise)
-        ways = input_covariance(e) if exit != roles[-1] and is_explained(left, noise) else None
+        ways = input_covariance(e) if is_explained(left, noise) else None
         unsure = strays(segment, made, response, left, noise)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)

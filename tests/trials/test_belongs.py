@@ -209,7 +209,9 @@ def test_a_diagnosis_that_is_ended_from_outside_is_no_fault_of_its_case(
     """By whoever shuts a machine down, or for want of memory: a miss, for good."""
     trial = Path(shutil.copytree(ran, tmp_path / "t"))
     shutil.rmtree(trial / "runs")
-    end = f"import os, signal; os.kill(os.getpid(), signal.{name})"
+    # as usual, not as under nohup
+    usual = "" if name == "SIGKILL" else f"signal.signal(signal.{name}, signal.SIG_DFL); "
+    end = f"import os, signal; {usual}os.kill(os.getpid(), signal.{name})"
     asked = f"import signal; from focgen.trials.worker import _end; _end({signal.SIGTERM.value}, None)"
     program = ("-c", asked if name == "asked" else end)
     monkeypatch.setattr(running, "python", lambda *_: [sys.executable, *program])
