@@ -59,6 +59,14 @@ class Numbers:
         "at 0.02: 1 healthy rig of other physics above 0.9",
         "at 0.09: 4 of 18 effects of the trials unknown",
     )
+    bent: float = _number(
+        0.5,
+        "by what a nominal curve is off as likely as an effect bends it; the odds fall with the fourth power",
+        "of the noise's root mean square",
+        "identified rigs of other physics: 0.3 in the median, 0.6 at most",
+        "not measured",
+        "not measured",
+    )
     uneven: float = _number(
         0.5,
         "by what the steps of a coarse converter are uneven or sluggish, at most",

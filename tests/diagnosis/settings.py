@@ -52,7 +52,7 @@ CONSTANTS = {
         "_MOST",
         "_REST",
     ],
-    "verdict/conclude.py": ["_NEAR"],
+    "verdict/cautions.py": ["_NEAR"],
 }
 
 COMPARED = {

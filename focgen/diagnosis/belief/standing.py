@@ -22,11 +22,22 @@ def behind(odds: float, best: float) -> float:
     return float(np.copysign(np.sqrt(2.0 * abs(best - odds)), best - odds))
 
 
-def probabilities(odds: Sequence[float]) -> np.ndarray:
+def nominal_bent(change: float) -> float:
+    """Log odds that a nominal curve is off by itself, over an effect of that which changes the output by
+    ``change``, as a share of the noise's root mean square.
+
+    The curve of a rig was fitted to its logs until what was left could not be seen. So it may be off by part
+    of the noise, and many samples show that clearly though nothing is wrong with the rig.
+    """
+    return 4.0 * float(np.log(NUMBERS.bent) - np.log(max(change, 1e-12)))
+
+
+def probabilities(odds: Sequence[float], instead: Sequence[float] = ()) -> np.ndarray:
     """Of every family (k,), from their log odds over the effect not being there at all; they sum to less than
-    one, for it may not be, or be none of them."""
+    one, for it may not be, or be none of them, or be what has the log odds ``instead`` (k,) over each."""
     nats = np.clip(odds, -_SURE, _SURE)
-    none = np.logaddexp.reduce([0.0, *nats])
+    other = np.max(nats + instead) if len(instead) else -np.inf
+    none = np.logaddexp.reduce([0.0, other, *nats])
     made: np.ndarray = (1.0 - NUMBERS.elsewhere) * np.exp(nats - none)
     return made
 

@@ -10,7 +10,7 @@ import numpy as np
 from focgen.diagnosis.belief.choice import prior
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.standing import behind
-from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
+from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 
@@ -21,7 +21,8 @@ _MENDED = 3  # rivals that get a second form where the best has one
 @dataclass(frozen=True)
 class Rival:
     """A family that may be the cause instead: its ``odds``, nats, over there being no such cause,
-    ``separation`` from the best in standard deviations, ``gain`` in nats of the noise."""
+    ``separation`` from the best in standard deviations, ``gain`` in nats of the noise, ``change`` of the
+    output as a share of the noise's root mean square."""
 
     effect: str
     stage: str
@@ -29,6 +30,7 @@ class Rival:
     gain: float
     fit: Fit
     odds: float = np.inf
+    change: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,14 +90,23 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     fits = [best, *(f for _, f in others)]
     ground = Ground.of(beside.nominal, without, fits, beside.weighing, beside.surroundings)
     odds, gain = ground.odds(best) + prior(name, without), evidence(best, without)
-    rivals = [Rival(name, own[0].stage, 0.0, gain, best, odds)]
+    rivals = [Rival(name, own[0].stage, 0.0, gain, best, odds, _change(best, without))]
     for other, again in others:
         most = best.size - without.size if best.problem.lacks(other) else None
         theirs = ground.odds(again, most) + prior(other, without)
         stage = again.problem.candidates[-1].stage
-        rivals.append(Rival(other, stage, behind(theirs, odds), evidence(again, without), again, theirs))
+        away, more = behind(theirs, odds), evidence(again, without)
+        rivals.append(Rival(other, stage, away, more, again, theirs, _change(again, without)))
     share = share_of(beside.nominal, without, best)
     return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), gain, share)
+
+
+def _change(of: Fit, without: Fit) -> float:
+    """The root mean square of what a fit's output is another by than ``without``, over that of what it
+    leaves."""
+    left = problem_residual(of)
+    change = left - problem_residual(without)
+    return float(np.sqrt(np.mean(change**2) / max(np.mean(left**2), 1e-300)))
 
 
 def _ranking(name: str, without: Fit, beside: Beside) -> Ranking:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -16,12 +16,13 @@ from focgen.diagnosis.hypotheses.search import evidence as nats
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
+from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
-from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once
+from focgen.diagnosis.verdict.moments import another, changed_at_once
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.sizes import estimates
@@ -31,8 +32,6 @@ from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
 from focgen.rig.replay import goodness
 from focgen.rig.rig import Rig
-
-_NEAR = 0.95  # of the error without any effect: with more a family is not near
 
 
 def conclude(
@@ -72,49 +71,16 @@ def conclude(
         augmented_rig="augmented.toml",
         next_experiment=None,
         unexplained=_description(unknown) | _departing(controller),
-        notes=(*notes_of(logs), *_cautions(rig, summary, unknown), *_gauges(at_odds), *_another(controller)),
+        notes=(
+            *notes_of(logs),
+            *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
+            *cautions(summary.causes, unknown),
+            *gauges(at_odds),
+            *another_command(controller),
+        ),
         fits=_plain_fits(explanations),
     )
     return summary.rigs, diagnosis, Evidence(made, tuple(explanations))
-
-
-def _cautions(rig: Rig, summary: _Summary, unknown: Sequence[Explanation]) -> Iterator[str]:
-    """What a refit moved far, what cannot be predicted, and what is unexplained beside what is named."""
-    yield from far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted)
-    for candidate in (candidate for e, _ in summary.causes for candidate in paths(e)):
-        yield (
-            f"the {candidate.effect} wanders: followed through this session, its next turn cannot be "
-            "predicted, and nothing of it is promised"
-        )
-    for e in unknown:
-        if changed := another(e):
-            yield f"{e.segment.entry} to {e.segment.exit}: not slowly, but at once it {_at_once(changed)}"
-    for e in dict.fromkeys(e for e, _ in summary.causes):
-        if (changed := changed_at_once(e)) and changed.sure > 1.0 - NUMBERS.held:
-            named = " and ".join(sorted(changed.instead))
-            yield (
-                f"{e.segment.entry} to {e.segment.exit}: instead of {named} it may be ({changed.sure:.0%}) "
-                f"that at once it {_at_once(changed)}"
-            )
-    for e in unknown if summary.causes else ():
-        yield f"{e.segment.entry} to {e.segment.exit}: no effect explains what is left there{_nearest(e)}"
-
-
-def _at_once(changed: Changed) -> str:
-    """When it became another, by how much, and what to do about it."""
-    said = (
-        f"{m.within:.4g} s into {m.experiment} by {m.rms:.3g} (root mean square; on average {m.mean:+.3g})"
-        for m in changed.moments
-    )
-    return f"becomes another: {', '.join(said)}; diagnose the parts by themselves"
-
-
-def _nearest(e: Explanation) -> str:
-    """The family that would close most of a segment's gap, where one closes any."""
-    if min(e.errors.values(), default=1.0) > _NEAR:
-        return ""
-    name = min(e.errors, key=lambda k: e.errors[k])
-    return f"; nearest is {name}, with which its error is {e.errors[name]:.2g} of what it is without"
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,17 +155,6 @@ def _at_odds(summary: _Summary) -> list[Explanation]:
     return explained if no_gap and above else []
 
 
-def _gauges(at_odds: Sequence[Explanation]) -> Iterator[str]:
-    """What to look at where a signal in between fits neither side."""
-    between = dict.fromkeys(r for e in at_odds for r in (e.segment.entry, e.segment.exit))
-    gauges = [role for role in between if role not in ("command", "output")]
-    if gauges:
-        yield (
-            f"with the effects that {' and '.join(gauges)} as logged would ask for, the output is further "
-            "off than without any: check that gauge, its range and its column"
-        )
-
-
 def _no_closer(rigs: compose.Rigs, logs: Sequence[Experiment], last: Explanation) -> list[Explanation]:
     """The last segment, where its effects fit its measured input but bring the whole chain's output no
     closer: what they mend is that input. A rounding leaves more, by nature."""
@@ -228,16 +183,6 @@ def _departed(tied: Sequence[Departure]) -> Found:
     interval = (max(share - 0.1, 0.0), min(share + 0.1, 1.0))
     sure = [NUMBERS.held * 2.0**-k / sum(2.0**-i for i in range(len(tied))) for k in range(len(tied))]
     return Found("controller", tuple(_suspected(d, p) for d, p in zip(tied, sure)), share, interval)
-
-
-def _another(controller: ControllerCheck | None) -> Iterator[str]:
-    """What to look at where the command is not the file's, and nothing known makes it so."""
-    if controller is not None and controller.unexplained:
-        by = f"{controller.departure:.3g} (root mean square)"
-        yield (
-            f"the command departs from the controller's file by {by}, which no memory, arithmetic or limit "
-            "explains; check that this file and these gains ran, and that no column is late"
-        )
 
 
 def _departing(controller: ControllerCheck | None) -> dict[str, object]:

@@ -59,6 +59,7 @@ EFFECT = Effect(
     reveals="levels on both sides of the obstacle, fast and slow: a knee at a fixed curvature",
     confused_with=("gain_nonlinearity", "sensor_saturation", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
+    static=True,
     forms=[
         Form(
             "knee",

@@ -39,6 +39,7 @@ EFFECT = Effect(
     confused_with=("gain_nonlinearity", "hysteresis", "valve_stiction"),
     needs=lambda e: None if e.lowest < 0.35 else "no level below a third of the range was visited",
     also=("regulator",),
+    static=True,
     forms=[
         Form("hard", "load", (_LEVEL,), _hard),
         Form(

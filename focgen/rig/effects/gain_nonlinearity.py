@@ -66,6 +66,7 @@ EFFECT = Effect(
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
     also=("regulator",),
     bends=True,
+    static=True,
     forms=[
         Form(
             "cubic",

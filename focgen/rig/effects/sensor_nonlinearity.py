@@ -42,6 +42,7 @@ EFFECT = Effect(
     confused_with=("gain_nonlinearity", "contact", "sensor_saturation"),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
     bends=True,
+    static=True,
     forms=[
         Form("quadratic", "strain", (_bend("bend", -1, 0.1),), _quadratic),
         Form("exponential", "strain", (_bend("bend", -1, 0.1, -0.3),), _exponential),

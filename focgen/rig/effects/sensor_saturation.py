@@ -28,6 +28,7 @@ EFFECT = Effect(
     reveals="levels on both sides of the limit with the curvature logged: a flat top",
     confused_with=("contact", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
+    static=True,
     forms=[
         Form("hard", "reading", (_LIMIT,), _hard),
         # a converter ends on both sides of its zero

@@ -28,6 +28,7 @@ EFFECT = Effect(
     reveals="levels above and below the ceiling, with the pressure logged: a flat top",
     confused_with=("gain_nonlinearity", "leak", "contact", "sensor_saturation"),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
+    static=True,
     forms=[
         Form("hard", "supply", (_CEILING,), _hard),
         # an amplifier clips what goes either way

@@ -1,0 +1,91 @@
+"""What is said beside a verdict: what may be otherwise, what cannot be told, and what to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from focgen.diagnosis.controller.check import ControllerCheck
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.rivals import Cause
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.verdict.confidence import curve_instead
+from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once
+from focgen.diagnosis.verdict.predicted_improvement import paths
+
+_NEAR = 0.95  # of the error without any effect: with more a family is not near
+
+
+def cautions(causes: Sequence[tuple[Explanation, Cause]], unknown: Sequence[Explanation]) -> Iterator[str]:
+    """What cannot be predicted, what may be there instead, and what is unexplained beside what is named."""
+    for candidate in (candidate for e, _ in causes for candidate in paths(e)):
+        yield (
+            f"the {candidate.effect} wanders: followed through this session, its next turn cannot be "
+            "predicted, and nothing of it is promised"
+        )
+    for e in unknown:
+        if changed := another(e):
+            yield f"{_within(e)}: not slowly, but at once it {_at_once(changed)}"
+    for e in dict.fromkeys(e for e, _ in causes):
+        if (changed := changed_at_once(e)) and changed.sure > 1.0 - NUMBERS.held:
+            named = " and ".join(sorted(changed.instead))
+            yield (
+                f"{_within(e)}: instead of {named} it may be ({changed.sure:.0%}) that at once it "
+                f"{_at_once(changed)}"
+            )
+    yield from _curves(causes)
+    for e in unknown if causes else ():
+        yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
+
+
+def _within(e: Explanation) -> str:
+    return f"{e.segment.entry} to {e.segment.exit}"
+
+
+def _curves(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
+    """Where the nominal curve may be off by itself instead of an effect, and how to tell."""
+    for e, cause in causes:
+        first = cause.rivals[0]
+        if (instead := curve_instead(first)) > 1.0 - NUMBERS.held:
+            yield (
+                f"{_within(e)}: the {first.effect} changes the {e.segment.exit} by {first.change:.2g} of its "
+                f"noise, and the curve of a nominal rig may be off by as much ({instead:.0%}): to tell, "
+                "identify the rig from logs of it as it should be, and diagnose with that"
+            )
+
+
+def _at_once(changed: Changed) -> str:
+    """When it became another, by how much, and what to do about it."""
+    said = (
+        f"{m.within:.4g} s into {m.experiment} by {m.rms:.3g} (root mean square; on average {m.mean:+.3g})"
+        for m in changed.moments
+    )
+    return f"becomes another: {', '.join(said)}; diagnose the parts by themselves"
+
+
+def _nearest(e: Explanation) -> str:
+    """The family that would close most of a segment's gap, where one closes any."""
+    if min(e.errors.values(), default=1.0) > _NEAR:
+        return ""
+    name = min(e.errors, key=lambda k: e.errors[k])
+    return f"; nearest is {name}, with which its error is {e.errors[name]:.2g} of what it is without"
+
+
+def gauges(at_odds: Sequence[Explanation]) -> Iterator[str]:
+    """What to look at where a signal in between fits neither side."""
+    between = dict.fromkeys(r for e in at_odds for r in (e.segment.entry, e.segment.exit))
+    gauges = [role for role in between if role not in ("command", "output")]
+    if gauges:
+        yield (
+            f"with the effects that {' and '.join(gauges)} as logged would ask for, the output is further "
+            "off than without any: check that gauge, its range and its column"
+        )
+
+
+def another_command(controller: ControllerCheck | None) -> Iterator[str]:
+    """What to look at where the command is not the file's, and nothing known makes it so."""
+    if controller is not None and controller.unexplained:
+        by = f"{controller.departure:.3g} (root mean square)"
+        yield (
+            f"the command departs from the controller's file by {by}, which no memory, arithmetic or limit "
+            "explains; check that this file and these gains ran, and that no column is late"
+        )
