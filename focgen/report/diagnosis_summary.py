@@ -9,6 +9,7 @@ from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found
 
 _SHOWN = 3  # parameters of an effect
 _SURE = 1.0  # of a value: an interval that is wider says nothing of its size
+_LIKELY = 0.5  # confidence of a cause: with less it is not the likeliest
 _MEANS = (
     "A confidence is a probability, measured on the simulated rigs of docs/diagnosis.md: of names "
     "given at 90 % "
@@ -57,6 +58,8 @@ def _cause(cause: Found) -> str:
     whole = "its departure from the described controller" if cause.stage == "controller" else "the gap"
     size = _size(best)
     rivals = f"; it may as well be {_listed(others)}" if others else ""
+    if sum(c.confidence for c in cause.candidates) < _LIKELY:
+        rivals += "; likelier it is something else, as the notes say"
     return (
         f"{best.effect} in the {cause.stage}{size}, {best.confidence:.0%} confident, "
         f"{cause.shrink:.0%} of {whole}{rivals}."

@@ -32,6 +32,11 @@ def nominal_bent(change: float) -> float:
     return 4.0 * float(np.log(NUMBERS.bent) - np.log(max(change, 1e-12)))
 
 
+def holds(odds: float) -> bool:
+    """Whether what has these log odds over all else holds, by itself, what a set is to hold."""
+    return odds > float(np.log(NUMBERS.held) - np.log1p(-NUMBERS.held))
+
+
 def probabilities(odds: Sequence[float], instead: Sequence[float] = ()) -> np.ndarray:
     """Of every family (k,), from their log odds over the effect not being there at all; they sum to less than
     one, for it may not be, or be none of them, or be what has the log odds ``instead`` (k,) over each."""

@@ -9,10 +9,11 @@ import numpy as np
 
 from focgen.diagnosis.belief.choice import prior
 from focgen.diagnosis.belief.further import Ground, Surroundings
-from focgen.diagnosis.belief.standing import behind
+from focgen.diagnosis.belief.standing import behind, holds, nominal_bent
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.rig.effects import library
 
 _SWAPS = 3
 _MENDED = 3  # rivals that get a second form where the best has one
@@ -31,6 +32,11 @@ class Rival:
     fit: Fit
     odds: float = np.inf
     change: float = np.inf
+
+    @property
+    def bent(self) -> float:
+        """Log odds that the nominal curve is off by itself instead; where this is no curve there are none."""
+        return nominal_bent(self.change) if library()[self.effect].static else -np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +66,7 @@ class Beside:
 def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
     """Every effect held against its rivals beside the others; where one of them does better, it takes the
     place, and where none is likelier than that nothing more is there, as what came later may make it, all
-    leave it."""
+    leave it. So they do where the nominal curve is as good as sure to be off by itself."""
     for _ in range(_SWAPS):
         causes = _causes(best, beside)
         first = [c.rivals[0] for c in causes]
@@ -68,11 +74,17 @@ def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
         if usurper is not None and usurper.separation < 0:
             best = usurper.fit
             continue
-        needless = min(first, key=lambda r: r.odds, default=None)
-        if needless is None or needless.odds >= 0.0 or beside.granted:
+        needless = min(first, key=_needed, default=None)
+        if needless is None or _needed(needless) >= 0.0 or beside.granted:
             return best, causes
         best = without_family(best, needless.effect, beside.weighing)
     return best, _causes(best, beside)
+
+
+def _needed(rival: Rival) -> float:
+    """Log odds of an effect over nothing being there; none are left where the nominal curve holds all that
+    a set has to."""
+    return -np.inf if holds(rival.bent) else rival.odds
 
 
 def _causes(best: Fit, beside: Beside) -> tuple[Cause, ...]:

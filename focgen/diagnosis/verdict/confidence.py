@@ -6,23 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.belief.standing import least_set, nominal_bent, probabilities
+from focgen.diagnosis.belief.standing import least_set, probabilities
 from focgen.diagnosis.hypotheses.rivals import Rival
-from focgen.rig.effects import library
 
 
 def tied(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], np.ndarray]:
     """The least set of rivals that holds the cause, the likeliest first, and their probabilities."""
-    sure = probabilities([r.odds for r in rivals], [_bent(r) for r in rivals])
+    sure = probabilities([r.odds for r in rivals], [r.bent for r in rivals])
     places = least_set(sure)
     return tuple(rivals[i] for i in places), sure[places]
 
 
 def curve_instead(rival: Rival) -> float:
     """How likely the nominal curve is off by itself, and there is no such effect as ``rival``."""
-    return float(1.0 / (1.0 + np.exp(-_bent(rival))))
-
-
-def _bent(rival: Rival) -> float:
-    """Log odds that the nominal curve is off by itself over a static effect; of others there are none."""
-    return nominal_bent(rival.change) if library()[rival.effect].static else -np.inf
+    return float(1.0 / (1.0 + np.exp(-rival.bent)))
