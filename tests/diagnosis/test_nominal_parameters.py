@@ -271,3 +271,12 @@ def test_a_gauge_far_off_beside_an_effect_is_said_and_left_to_no_effect():
     assert [[c.effect for c in f.candidates] for f in found.causes] == [["sensor_lag"]]
     assert any("sensor's gain by -" in note for note in found.notes)
     assert found.shrink > 0.9
+
+
+@pytest.mark.parametrize("bend, sure, said", [(10.0, (0.5, 0.9), True), (16.0, (0.9, 1.0), False)])
+def test_a_bend_of_less_than_the_noise_may_be_the_nominal_curves_own(bend, sure, said):
+    """Both are seen clearly in these samples; the smaller is as much as an identified curve may be off by."""
+    found = diagnose(RIG, session(3, bend=bend))
+    first = found.causes[0].candidates[0]
+    assert first.effect == "sensor_nonlinearity" and sure[0] < first.confidence < sure[1]
+    assert any("identify the rig from logs of it as it should be" in note for note in found.notes) == said

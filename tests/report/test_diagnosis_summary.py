@@ -75,3 +75,9 @@ def test_the_next_experiment_is_said_with_the_file_that_makes_it():
     text = diagnosis_text(replace(FOUND, next_experiment=asked), UNITS, "gap")
     assert f"Next: record {what} (its input: a.csv), for telling leak from contact." in text
     assert "check the promise" not in text
+
+
+def test_a_cause_that_is_not_likely_is_said_not_to_be():
+    faint = replace(FOUND.causes[0], candidates=(replace(CEILING, confidence=0.4),))
+    texts = [diagnosis_text(replace(FOUND, causes=c), UNITS, "gap") for c in ((faint,), FOUND.causes)]
+    assert ["likelier it is something else, as the notes say" in text for text in texts] == [True, False]

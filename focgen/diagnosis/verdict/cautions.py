@@ -47,9 +47,8 @@ def _curves(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
         first = cause.rivals[0]
         if (instead := curve_instead(first)) > 1.0 - NUMBERS.held:
             yield (
-                f"{_within(e)}: the {first.effect} changes the {e.segment.exit} by {first.change:.2g} of its "
-                f"noise, and the curve of a nominal rig may be off by as much ({instead:.0%}): to tell, "
-                "identify the rig from logs of it as it should be, and diagnose with that"
+                f"{_within(e)}: a nominal curve may be off ({instead:.0%}) by what the {first.effect} changes, "
+                f"{first.change:.2g} of the noise; to tell, identify the rig from logs of it as it should be"
             )
 
 
