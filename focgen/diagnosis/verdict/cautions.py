@@ -47,8 +47,9 @@ def _curves(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
         first = cause.rivals[0]
         if (instead := curve_instead(first)) > 1.0 - NUMBERS.held:
             yield (
-                f"{_within(e)}: a nominal curve may be off ({instead:.0%}) by what the {first.effect} changes, "
-                f"{first.change:.2g} of the noise; to tell, identify the rig from logs of it as it should be"
+                f"{_within(e)}: a nominal curve may be off ({instead:.0%}) by what the {first.effect} "
+                f"changes, {first.change:.2g} of the noise; to tell, identify the rig from logs of it as it "
+                "should be"
             )
 
 
