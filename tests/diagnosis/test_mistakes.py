@@ -173,3 +173,25 @@ def test_a_softening_of_few_runs_is_one(monkeypatch, soften):
     found = diagnose(RIG, few_runs(monkeypatch, 0, soften=soften), pictures=False, only=CURVES)
     assert found.causes[0].candidates[0].effect == "softening"
     assert found.causes[0].candidates[0].confidence > 0.8
+
+
+def later(logs, samples):
+    """The command so many samples late in its column."""
+    for log in logs:
+        u = np.asarray(log["command"], float)
+        moved = np.r_[np.full(samples, u[0]), u][: len(u)]
+        yield replace(log, signals=dict(log.signals) | {"command": moved})
+
+
+def test_a_command_that_is_logged_late_is_no_resonance():
+    """The answer comes three samples early in 20 Hz, which no effect of a rig does; a mode would follow it."""
+    found = diagnose(RIG, list(later(session(1, roles=()), 3)))
+    assert found.verdict == "unknown"
+    assert any("the command may be" in note and "0.15 s late (3 samples)" in note for note in found.notes)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", [{"regulator": (1.0, 0.4)}, {"zone": 0.03}])
+def test_what_answers_late_or_less_is_not_taken_for_it(case):
+    found = diagnose(RIG, session(1, roles=(), **case))
+    assert found.verdict in ("named", "set") and not any("late (" in note for note in found.notes)

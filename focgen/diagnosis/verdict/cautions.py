@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from focgen.diagnosis.controller.check import ControllerCheck
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.confidence import curve_instead
+from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths
 
@@ -32,6 +33,7 @@ def cautions(causes: Sequence[tuple[Explanation, Cause]], unknown: Sequence[Expl
                 f"{_within(e)}: instead of {named} it may be ({changed.sure:.0%}) that at once it "
                 f"{_at_once(changed)}"
             )
+    yield from _late(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
     yield from _curves(causes)
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
@@ -39,6 +41,17 @@ def cautions(causes: Sequence[tuple[Explanation, Cause]], unknown: Sequence[Expl
 
 def _within(e: Explanation) -> str:
     return f"{e.segment.entry} to {e.segment.exit}"
+
+
+def _late(explanations: Iterable[Explanation]) -> Iterator[str]:
+    """Where the command may have been logged late instead of an effect."""
+    for e in explanations:
+        if (late := logged_late(e)) and late.sure > 1.0 - NUMBERS.held:
+            yield (
+                f"{_within(e)}: instead of {' and '.join(sorted(late.instead))} the command may be "
+                f"({late.sure:.0%}) logged {late.seconds:.3g} s late ({late.samples} samples); see to it "
+                "that each row has what was sent as the readings were taken"
+            )
 
 
 def _curves(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:

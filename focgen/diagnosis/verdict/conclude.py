@@ -22,6 +22,7 @@ from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
+from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import another, changed_at_once
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
@@ -245,10 +246,11 @@ def _found(
 
 
 def _lasting(e: Explanation, cause: Cause) -> float:
-    """How likely a cause was there all along, and the rig did not become another at once instead."""
-    changed = changed_at_once(e)
-    instead = changed is not None and cause.rivals[0].effect in changed.instead
-    return 1.0 - changed.sure if changed is not None and instead else 1.0
+    """How likely a cause was there all along, and neither did the rig become another at once instead, nor was
+    the command logged late."""
+    found = [f for f in (changed_at_once(e), logged_late(e)) if f is not None]
+    first = cause.rivals[0].effect
+    return float(np.prod([1.0 - f.sure for f in found if first in f.instead]))
 
 
 def _beside(e: Explanation, cause: Cause) -> float:

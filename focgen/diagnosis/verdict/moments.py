@@ -70,7 +70,7 @@ def changed_at_once(e: Explanation) -> Changed | None:
         return None
     weighing = Weighing(e.ar)
     before, after = (square_by(f, weighing) for f in (e.nominal, e.best))
-    found = [_judged(e, before, after, cut) for fit in _bases(e) for cut in pieces(fit, weighing)]
+    found = [_judged(e, before, after, cut) for fit in bases(e) for cut in pieces(fit, weighing)]
     odds, best = max(found, key=lambda f: f[0], default=(0.0, None))
     if best is None:
         return None
@@ -78,7 +78,7 @@ def changed_at_once(e: Explanation) -> Changed | None:
     return Changed(best, instead, odds)
 
 
-def _bases(e: Explanation) -> Iterator[Fit]:
+def bases(e: Explanation) -> Iterator[Fit]:
     """The fits that may become others: without any effect, and without each of several."""
     yield e.nominal
     candidates = e.best.problem.candidates
@@ -101,12 +101,12 @@ def _judged(e: Explanation, before: float, after: float, cut: Pieces) -> tuple[f
     count = len(e.segment.y)
     families = len(e.best.problem.families)
     others = len(cut.of_fit.problem.families) + cut.things
-    found = _log_odds(before, after, floor, count, e.best.size, families)
-    at_once = _log_odds(before, square, floor, count, cut.of_fit.size + cut.free, others)
+    found = log_odds(before, after, floor, count, e.best.size, families)
+    at_once = log_odds(before, square, floor, count, cut.of_fit.size + cut.free, others)
     return at_once - found, cut
 
 
-def _log_odds(before: float, left: float, floor: float, count: int, free: int, things: int) -> float:
+def log_odds(before: float, left: float, floor: float, count: int, free: int, things: int) -> float:
     """Of ``things`` found, each as rare as any, that leave the sum of squares ``left`` of ``before``."""
     unit = 0.5 * count / floor
     misfit, gained = max(left - floor, 0.0) * unit, max(before - left, 0.0) * unit
