@@ -184,7 +184,7 @@ def later(logs, samples):
 
 
 def test_a_command_that_is_logged_late_is_no_resonance():
-    """The answer comes three samples early in 20 Hz, which no effect of a rig does; a mode would follow it."""
+    """The answer comes three samples early, which no effect of a rig does; a mode would follow it."""
     found = diagnose(RIG, list(later(session(1, roles=()), 3)))
     assert found.verdict == "unknown"
     assert any("the command may be" in note and "0.15 s late (3 samples)" in note for note in found.notes)
