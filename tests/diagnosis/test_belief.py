@@ -230,7 +230,7 @@ def test_an_effect_that_bends_a_curve_by_less_than_the_noise_is_not_sure_however
 
 def test_it_is_as_likely_as_the_curve_it_would_be_and_no_more():
     """Where an effect with memory is much the likelier, a rival's curve takes nothing from it."""
-    rivals = [_rival("hysteresis", 40.0, 0.3), _rival("gain_nonlinearity", 20.0, 0.3)]
+    rivals = [_rival("hysteresis", 40.0, 0.3), _rival("gain_nonlinearity", 20.0, 0.4)]
     assert tied(rivals)[1] == pytest.approx([1.0 - NUMBERS.elsewhere])
     alike = [_rival("hysteresis", 40.0, 0.5), _rival("contact", 40.0, NUMBERS.bent)]
     assert tied(alike)[1] == pytest.approx([(1.0 - NUMBERS.elsewhere) / 3] * 2)
