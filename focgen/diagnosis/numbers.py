@@ -61,7 +61,8 @@ class Numbers:
     )
     bent: float = _number(
         0.7,
-        "by what a nominal curve is off as likely as an effect bends it; the odds fall with the fourth power",
+        "by what a nominal curve is off as likely as an effect bends it, in other ways by a third; "
+        "the odds fall with the fourth power",
         "of the noise's root mean square",
         "identified rigs of other physics, healthy: 0.3 in the median, 1.4 at most",
         "at 0.5: 3 healthy rigs of 20 of other physics wrong above 0.9",

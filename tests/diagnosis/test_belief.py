@@ -14,14 +14,14 @@ from focgen.diagnosis.belief import further
 from focgen.diagnosis.belief.choice import likeliest
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
-from focgen.diagnosis.belief.standing import behind, least_set, nominal_bent, probabilities, tied_within
+from focgen.diagnosis.belief.standing import behind, least_set, nominal_off, probabilities, tied_within
 from focgen.diagnosis.belief.unknown import is_none
 from focgen.diagnosis.fitting.fit import WHITE, fit
 from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.hypotheses.rivals import Rival, _needed
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
-from focgen.diagnosis.verdict.confidence import curve_instead, tied
+from focgen.diagnosis.verdict.confidence import nominal_instead, tied
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Actuator, Rig, Signals
@@ -220,26 +220,29 @@ def _rival(effect, odds, change):
     return Rival(effect, "actuator", 0.0, 0.0, None, odds, change)
 
 
-def test_an_effect_that_bends_a_curve_by_less_than_the_noise_is_not_sure_however_clear_it_is():
-    """The nominal curve may be off by as much; it is not slower than given, though, nor does it remember."""
-    for change, sure in ((0.5 * NUMBERS.bent, 1 / 17), (NUMBERS.bent, 1 / 2), (2 * NUMBERS.bent, 16 / 17)):
-        found = [tied([_rival(name, 300.0, change)])[1][0] for name in ("gain_nonlinearity", "hysteresis")]
-        assert found[0] == pytest.approx(sure * (1.0 - NUMBERS.elsewhere))
-        assert found[1] == pytest.approx(1.0 - NUMBERS.elsewhere)
+def test_an_effect_that_changes_less_than_the_noise_is_not_sure_however_clear_it_is():
+    """The nominal chain may be off by as much: its curve, and by a third of that in other ways."""
+    bent, whole = NUMBERS.bent, 1.0 - NUMBERS.elsewhere
+    for part, sure in ((0.5, 1 / 17), (1.0, 1 / 2), (2.0, 16 / 17)):
+        for name, alike in (("gain_nonlinearity", bent), ("hysteresis", bent / 3)):
+            assert tied([_rival(name, 300.0, part * alike)])[1] == pytest.approx([sure * whole])
+    assert tied([_rival("hysteresis", 300.0, 2 * bent)])[1] > 0.999 * whole
+    assert tied([_rival("sensor_quantization", 300.0, 0.1)])[1] == pytest.approx([whole])
 
 
-def test_it_is_as_likely_as_the_curve_it_would_be_and_no_more():
+def test_the_chain_is_as_likely_as_the_effect_it_would_be_and_no_more():
     """Where an effect with memory is much the likelier, a rival's curve takes nothing from it."""
-    rivals = [_rival("hysteresis", 40.0, 0.3), _rival("gain_nonlinearity", 20.0, 0.4)]
+    rivals = [_rival("hysteresis", 40.0, 20.0), _rival("gain_nonlinearity", 20.0, 0.4)]
     assert tied(rivals)[1] == pytest.approx([1.0 - NUMBERS.elsewhere])
-    alike = [_rival("hysteresis", 40.0, 0.5), _rival("contact", 40.0, NUMBERS.bent)]
+    alike = [_rival("hysteresis", 40.0, 20.0), _rival("contact", 40.0, NUMBERS.bent)]
     assert tied(alike)[1] == pytest.approx([(1.0 - NUMBERS.elsewhere) / 3] * 2)
 
 
-def test_what_the_nominal_curve_as_good_as_surely_is_leaves_the_effects():
-    """At a quarter of what is as likely the curve holds all that a set is to hold."""
+def test_what_the_nominal_chain_as_good_as_surely_is_leaves_the_effects():
+    """At a quarter of what is as likely the chain holds all that a set is to hold."""
     faint, clear = 0.25 * NUMBERS.bent, 0.6 * NUMBERS.bent
-    assert _needed(_rival("contact", 300.0, faint)) == -np.inf
+    assert _needed(_rival("contact", 300.0, faint)) == _needed(_rival("creep", 300.0, faint / 3)) == -np.inf
     assert _needed(_rival("contact", 300.0, clear)) == _needed(_rival("creep", 300.0, faint)) == 300.0
-    assert curve_instead(_rival("contact", 300.0, NUMBERS.bent)) == pytest.approx(0.5)
-    assert curve_instead(_rival("creep", 300.0, faint)) == 0.0 and nominal_bent(np.inf) == -np.inf
+    assert nominal_instead(_rival("contact", 300.0, NUMBERS.bent)) == pytest.approx(0.5)
+    assert nominal_instead(_rival("sensor_quantization", 300.0, faint)) == 0.0
+    assert nominal_off(np.inf, True) == -np.inf

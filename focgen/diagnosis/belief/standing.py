@@ -22,14 +22,16 @@ def behind(odds: float, best: float) -> float:
     return float(np.copysign(np.sqrt(2.0 * abs(best - odds)), best - odds))
 
 
-def nominal_bent(change: float) -> float:
-    """Log odds that a nominal curve is off by itself, over an effect of that which changes the output by
-    ``change``, as a share of the noise's root mean square.
+def nominal_off(change: float, static: bool) -> float:
+    """Log odds that a nominal chain is off by itself, over an effect that changes the output by ``change``,
+    as a share of the noise's root mean square; ``static``: a curve.
 
-    The curve of a rig was fitted to its logs until what was left could not be seen. So it may be off by part
-    of the noise, and many samples show that clearly though nothing is wrong with the rig.
+    The chain of a rig was fitted to its logs until what was left could not be seen. So it may be off by part
+    of the noise, and many samples show that clearly though nothing is wrong with the rig. That is mostly the
+    curve: in other ways it is off by a third as much.
     """
-    return 4.0 * float(np.log(NUMBERS.bent) - np.log(max(change, 1e-12)))
+    alike = NUMBERS.bent if static else NUMBERS.bent / 3.0
+    return 4.0 * float(np.log(alike) - np.log(max(change, 1e-12)))
 
 
 def holds(odds: float) -> bool:

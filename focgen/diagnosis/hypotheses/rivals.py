@@ -9,7 +9,7 @@ import numpy as np
 
 from focgen.diagnosis.belief.choice import prior
 from focgen.diagnosis.belief.further import Ground, Surroundings
-from focgen.diagnosis.belief.standing import behind, holds, nominal_bent
+from focgen.diagnosis.belief.standing import behind, holds, nominal_off
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
@@ -34,9 +34,11 @@ class Rival:
     change: float = np.inf
 
     @property
-    def bent(self) -> float:
-        """Log odds that the nominal curve is off by itself instead; where this is no curve there are none."""
-        return nominal_bent(self.change) if library()[self.effect].static else -np.inf
+    def off(self) -> float:
+        """Log odds that the nominal chain is off by itself instead; none where this is a rounding, whose steps
+        are no part of it."""
+        family = library()[self.effect]
+        return -np.inf if family.rounds else nominal_off(self.change, family.static)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ class Beside:
 def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
     """Every effect held against its rivals beside the others; where one of them does better, it takes the
     place, and where none is likelier than that nothing more is there, as what came later may make it, all
-    leave it. So they do where the nominal curve is as good as sure to be off by itself."""
+    leave it. So they do where the nominal chain is as good as sure to be off by itself."""
     for _ in range(_SWAPS):
         causes = _causes(best, beside)
         first = [c.rivals[0] for c in causes]
@@ -82,9 +84,9 @@ def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
 
 
 def _needed(rival: Rival) -> float:
-    """Log odds of an effect over nothing being there; none are left where the nominal curve holds all that
-    a set has to."""
-    return -np.inf if holds(rival.bent) else rival.odds
+    """Log odds of an effect over nothing being there; none are left where the nominal chain, off by
+    itself, holds all that a set has to."""
+    return -np.inf if holds(rival.off) else rival.odds
 
 
 def _causes(best: Fit, beside: Beside) -> tuple[Cause, ...]:

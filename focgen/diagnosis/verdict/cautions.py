@@ -8,7 +8,7 @@ from focgen.diagnosis.controller.check import ControllerCheck
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.verdict.confidence import curve_instead
+from focgen.diagnosis.verdict.confidence import nominal_instead
 from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths
@@ -34,7 +34,7 @@ def cautions(causes: Sequence[tuple[Explanation, Cause]], unknown: Sequence[Expl
                 f"{_at_once(changed)}"
             )
     yield from _late(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
-    yield from _curves(causes)
+    yield from _nominal(causes)
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
 
@@ -54,15 +54,15 @@ def _late(explanations: Iterable[Explanation]) -> Iterator[str]:
             )
 
 
-def _curves(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
-    """Where the nominal curve may be off by itself instead of an effect, and how to tell."""
+def _nominal(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
+    """Where the nominal chain may be off by itself instead of an effect, and how to tell."""
     for e, cause in causes:
         first = cause.rivals[0]
-        if (instead := curve_instead(first)) > 1.0 - NUMBERS.held:
+        if (instead := nominal_instead(first)) > 1.0 - NUMBERS.held:
             yield (
-                f"{_within(e)}: a nominal curve may be off ({instead:.0%}) by what the {first.effect} "
-                f"changes, {first.change:.2g} of the noise; to tell, identify the rig from logs of it as it "
-                "should be"
+                f"{_within(e)}: the nominal rig may be off by itself ({instead:.0%}) by what the "
+                f"{first.effect} changes, {first.change:.2g} of the noise; to tell, identify the rig from "
+                "logs of it as it should be"
             )
 
 

@@ -12,11 +12,11 @@ from focgen.diagnosis.hypotheses.rivals import Rival
 
 def tied(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], np.ndarray]:
     """The least set of rivals that holds the cause, the likeliest first, and their probabilities."""
-    sure = probabilities([r.odds for r in rivals], [r.bent for r in rivals])
+    sure = probabilities([r.odds for r in rivals], [r.off for r in rivals])
     places = least_set(sure)
     return tuple(rivals[i] for i in places), sure[places]
 
 
-def curve_instead(rival: Rival) -> float:
-    """How likely the nominal curve is off by itself, and there is no such effect as ``rival``."""
-    return float(1.0 / (1.0 + np.exp(-rival.bent)))
+def nominal_instead(rival: Rival) -> float:
+    """How likely the nominal chain is off by itself, and there is no such effect as ``rival``."""
+    return float(1.0 / (1.0 + np.exp(-rival.off)))
