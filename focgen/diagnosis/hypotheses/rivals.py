@@ -35,8 +35,8 @@ class Rival:
 
     @property
     def off(self) -> float:
-        """Log odds that the nominal chain is off by itself instead; none where this is a rounding, whose steps
-        are no part of it."""
+        """Log odds that the nominal chain is off by itself instead; none where this is a rounding: steps are
+        no part of a chain."""
         family = library()[self.effect]
         return -np.inf if family.rounds else nominal_off(self.change, family.static)
 
