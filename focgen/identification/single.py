@@ -56,8 +56,8 @@ def fit_each(
 def _has_numbers(fit: FractionalFit) -> bool:
     """Whether the log bounds K, T and α at all. A search may also end far out, where only K/T is seen, with
     an interval without a bound."""
-    found = {"gain": fit.gain, "T": fit.T, "alpha": fit.alpha}
-    return all(np.all(fit.half[name] <= HARDLY * np.abs(value)) for name, value in found.items())
+    found = (("gain", fit.gain), ("T", fit.T), ("alpha", fit.alpha))
+    return all(np.all(fit.half[name] <= HARDLY * np.abs(np.asarray(value))) for name, value in found)
 
 
 def is_step(x: Excitation) -> bool:
