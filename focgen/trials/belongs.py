@@ -18,6 +18,7 @@ from focgen.custody import sha256_within
 from focgen.diagnosis.drawn import FILE
 from focgen.diagnosis.write import PICTURES
 from focgen.errors import InputError
+from focgen.scratch import real
 from focgen.textfile import LARGEST_JSON, LARGEST_LOG
 from focgen.trials.facts import outcome_in
 
@@ -70,13 +71,15 @@ def copy_case(case: Path, to: Path) -> None:
         shutil.copyfile(path, place)
 
 
-def check_only_results(place: Path, depth: int = 1) -> None:
-    """Raise InputError where the folder that a result takes the place of holds what no run has written: it
-    would go with the former result. What a system leaves there, of a name that begins with a point, may.
+def check_only_results(trial: Path, kind: str, number: str, depth: int = 1) -> None:
+    """Raise InputError where TRIAL/KIND/NUMBER, which a result takes the place of, holds what no run has
+    written: it would go with the former result. What a system leaves there (``.DS_Store``) may.
 
     ``depth``: 1 of a folder of a run, 2 of a folder of such folders.
     """
-    if place.is_symlink() or not place.is_dir():  # told where it is replaced
+    place = trial / kind / number
+    outside = place.is_symlink() or not real(place.parent).is_relative_to(real(trial))
+    if outside or not place.is_dir():  # told where it is replaced
         return
     for path in sorted(place.rglob("*")):
         parts = path.relative_to(place).parts

@@ -107,7 +107,7 @@ def _ask_case(folder: Path, facts: Facts, number: str, label: dict[str, Any]) ->
     case = _remade(folder, facts, number, label)
     if case.bench is None:
         return
-    check_only_results(folder / "asked" / number, depth=2)
+    check_only_results(folder, "asked", number, depth=2)
     rng = np.random.default_rng([facts.seed, int(number), 1])
     with temporary_folder("asked") as scratch:
         found = scratch / "found"

@@ -76,7 +76,7 @@ def run(
             raise InputError(str(place), f"lacks case {n}", "make the cases anew")
     waiting = [(place, n) for place, n in cases if not _stands(place, n)]
     for place, n in waiting:
-        check_only_results(place / "runs" / n)
+        check_only_results(place, "runs", n)
     begun = time.monotonic()
 
     def one(place: Path, number: str) -> bool:
@@ -158,7 +158,7 @@ def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tu
     what is no result.
     """
     case, target = trial / "cases" / number, trial / kind / number
-    check_only_results(target)
+    check_only_results(trial, kind, number)
     with temporary_folder("trial") as scratch:
         blind, out = scratch / "case", scratch / "out"
         _check_plain(case, trial)

@@ -259,10 +259,10 @@ def test_nor_beside_experiments_that_were_asked_for(tmp_path):
     place = tmp_path / "asked/0001"
     (place / "proposed").mkdir(parents=True)
     (place / "proposed/outcome.json").write_text("{}")
-    belongs.check_only_results(place, depth=2)
+    belongs.check_only_results(tmp_path, "asked", "0001", depth=2)
     (place / "proposed/notes.txt").write_text("mine")
     with pytest.raises(InputError, match="notes.txt: is no part of a result"):
-        belongs.check_only_results(place, depth=2)
+        belongs.check_only_results(tmp_path, "asked", "0001", depth=2)
 
 
 def test_a_case_that_is_read_only_is_copied_without_its_rights(trial, tmp_path):
