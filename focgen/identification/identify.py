@@ -262,16 +262,19 @@ def _compared(
         models[f"iom_{shape.name}"] = {f.name: f.integer[i].simulated for f in fits}
         counts[f"iom_{shape.name}"] = shape.parameters
     models["rig"] = joint.simulated
-    quality = {m: _with_mean({n: gof(measured[n], y) for n, y in runs.items()}) for m, runs in models.items()}
+    shown = [f.name for f in fits]  # a mean is of the rows above it
+    quality = {
+        m: _with_mean({n: gof(measured[n], y) for n, y in runs.items()}, shown) for m, runs in models.items()
+    }
     effective = {f.name: effective_samples(f.measured - f.simulated) for f in fits}
     criterion = {
         model: _with_mean(
-            {n: bic(measured[n], models[model][n], counts[model] + 1, effective[n]) for n in effective}
+            {n: bic(measured[n], models[model][n], counts[model] + 1, effective[n]) for n in effective}, shown
         )
         for model in counts
     }
     return quality, criterion
 
 
-def _with_mean(values: dict[str, float]) -> dict[str, float]:
-    return {**values, "mean": float(np.mean(list(values.values())))} if values else {}
+def _with_mean(values: dict[str, float], shown: Sequence[str]) -> dict[str, float]:
+    return {**values, "mean": float(np.mean([values[name] for name in shown]))}

@@ -14,6 +14,7 @@ from focgen.identification.identification import ExperimentFit
 from focgen.identification.integer import IntegerFit, fit_integer_models
 from focgen.identification.past import Past
 from focgen.identification.quality import gof
+from focgen.identification.sure import HARDLY
 from focgen.pools import pool
 from focgen.progress import track
 
@@ -29,20 +30,34 @@ def fit_each(
 ) -> tuple[list[ExperimentFit], list[str]]:
     """Fit each experiment; also the names of those that do not determine K, T and α by themselves.
 
-    ``pasts`` and ``delay`` (s) as found from all together; ``integer``: integer-order models, too.
+    ``pasts`` and ``delay`` (s) as found from all together; ``integer``: integer-order models, too. Raises
+    FitError where none of them does.
     """
     fits: list[FractionalFit | None] = []
     failed: list[str] = []
     singles = [x.with_powers(1) for x in excitations]
     for x, past in track(list(zip(singles, pasts)), "fitting experiment"):
         try:
-            fits.append(fit_fractional([x], delay, [past]))
+            fit = fit_fractional([x], delay, [past])
         except FitError:
-            fits.append(None)
+            fit = None
+        found = fit if fit is not None and _has_numbers(fit) else None
+        fits.append(found)
+        if found is None:
             failed.append(x.name)
+    if len(failed) == len(fits):
+        what = "none of them determines K, T and alpha by itself"
+        raise FitError(", ".join(failed), what, "hold steps longer, or lower the noise")
     done = [(x, fit) for x, fit in zip(singles, fits) if fit is not None]
     models = _integer_models(done) if integer else [()] * len(done)
     return [_experiment_fit(x, fit, more) for (x, fit), more in zip(done, models)], failed
+
+
+def _has_numbers(fit: FractionalFit) -> bool:
+    """Whether the log bounds K, T and α at all. A search may also end far out, where only K/T is seen, with
+    an interval without a bound."""
+    found = (("gain", fit.gain), ("T", fit.T), ("alpha", fit.alpha))
+    return all(np.all(fit.half[name] <= HARDLY * np.abs(np.asarray(value))) for name, value in found)
 
 
 def is_step(x: Excitation) -> bool:

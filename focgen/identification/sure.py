@@ -14,13 +14,13 @@ from focgen.identification.stages import StageFit
 from focgen.logs.between import noise_level
 from focgen.rig.rig import Relative, Uncertainty
 
+HARDLY = 10.0  # times a parameter: an interval wider than this has no number
 _NOTHING = 1.0  # of a parameter: half an interval that says nothing
 _LEAST = 0.01  # of a parameter: no rig is known better from one session
 _DIGITS = 3
 _MISFIT = 3.0  # times the noise of the readings: what is left is more than noise
 _LEFT = 0.05  # of the spread: what is left below is of no concern
 _OUTWEIGHS = 2.0  # times the noise: three quarters of what is left are the model's own misfit
-_HARDLY = 10.0  # times a parameter: an interval wider than this has no number
 
 _RECORD = {
     "T": "hold a step, and its release, for ten times the response time",
@@ -35,7 +35,7 @@ def check_determined(excitations: Sequence[Excitation], fit: FractionalFit) -> N
     if not worst[1] < _NOTHING:
         names = ", ".join(x.name for x in excitations)
         what = f"these logs determine {worst[0]} to ±{worst[1]:.0%} only"
-        what = what if worst[1] < _HARDLY else f"these logs do not determine {worst[0]}"
+        what = what if worst[1] < HARDLY else f"these logs do not determine {worst[0]}"
         remedy = "leave --delay out, or " if fit.half["delay"] else ""
         if misfit := misfit_of(excitations, fit):
             what += f", and the best model leaves {times_text(misfit)} the noise of the readings"

@@ -142,7 +142,7 @@ def run_of(table: LogTable) -> str | None:
     for name in table.columns:
         words = set(Column(name, "", np.empty(0)).words)
         labels = np.array(table.texts(name)) if words & _RUN else np.empty(0)
-        if len(labels) and np.mean(labels[1:] == labels[:-1]) > 0.9 and "" not in labels:
+        if len(labels) > 1 and np.mean(labels[1:] == labels[:-1]) > 0.9 and "" not in labels:
             return name
     return None
 

@@ -124,11 +124,11 @@ def _noise(off: Array, at: Ints) -> Array:
 
 def _least_noise(y: Array) -> float:
     """Half a step of a quantised signal, or a little of the span: the median of steps that mostly stay away
-    is 0."""
-    steps = np.abs(np.diff(y))
-    finest = float(np.min(steps, where=steps > 1e-9 * np.ptp(y), initial=np.inf))
+    is 0. The span is that of the medians of three, so a reading of 10⁹ makes no step a rounding error."""
     middles = [np.median(sliding_window_view(part, 3), axis=1) for _, part in _parts(y, 3)]
     span = max(float(m.max()) for m in middles) - min(float(m.min()) for m in middles)
+    steps = np.abs(np.diff(y))
+    finest = float(np.min(steps, where=steps > 1e-9 * span, initial=np.inf))
     return max(0.5 * finest, _FINE * span)
 
 

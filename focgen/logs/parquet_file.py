@@ -20,7 +20,8 @@ def read(path: Path) -> LogTable:
         raise MissingExtra.of("pyarrow", "parquet", str(path)) from None
     path.open("rb").close()  # a missing file is reported as one
     try:
-        table = pyarrow.parquet.read_table(path)
+        # checksums of pages are not asked after by default, where a file has them
+        table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
     except MemoryError:  # Arrow's, too
         raise
     except (pyarrow.ArrowException, OSError):

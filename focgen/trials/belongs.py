@@ -15,11 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from focgen.custody import sha256_within
+from focgen.diagnosis.drawn import FILE
+from focgen.diagnosis.write import PICTURES
 from focgen.errors import InputError
+from focgen.scratch import real
 from focgen.textfile import LARGEST_JSON, LARGEST_LOG
 from focgen.trials.facts import outcome_in
 
 _JUDGED = ("diagnosis.json", "refitted.toml", "augmented.toml", "next_experiment.csv")
+_KEPT = (*_JUDGED, FILE, *PICTURES, "outcome.json", "achieved.json")
 _SEAL = "sha256"
 _ALONE = ("commitment.txt", "controller.toml", "rig.toml")
 
@@ -65,6 +69,24 @@ def copy_case(case: Path, to: Path) -> None:
         place = to / path.relative_to(case)
         place.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, place)
+
+
+def check_only_results(trial: Path, kind: str, number: str, depth: int = 1) -> None:
+    """Raise InputError where TRIAL/KIND/NUMBER, which a result takes the place of, holds what no run has
+    written: it would go with the former result. What a system leaves there (``.DS_Store``) may.
+
+    ``depth``: 1 of a folder of a run, 2 of a folder of such folders.
+    """
+    place = trial / kind / number
+    outside = place.is_symlink() or not real(place.parent).is_relative_to(real(trial))
+    if outside or not place.is_dir():  # told where it is replaced
+        return
+    for path in sorted(place.rglob("*")):
+        parts = path.relative_to(place).parts
+        own = path.name in _KEPT if len(parts) == depth else len(parts) < depth and path.is_dir()
+        if not own and not any(part.startswith(".") for part in parts):
+            what = "is no part of a result, and would go with it where the case is diagnosed anew"
+            raise InputError(str(path), what, "move it away")
 
 
 def mark(run: Path, case: str) -> None:

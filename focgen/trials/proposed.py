@@ -32,7 +32,15 @@ from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
 from focgen.scratch import temporary_folder
 from focgen.textfile import LARGEST_LOG, read_regular
-from focgen.trials.belongs import case_digest, copy_case, is_of, logs_of_case, mark, result_digest
+from focgen.trials.belongs import (
+    case_digest,
+    check_only_results,
+    copy_case,
+    is_of,
+    logs_of_case,
+    mark,
+    result_digest,
+)
 from focgen.trials.cases import Case
 from focgen.trials.facts import Facts, diagnosis_in, outcome_in
 from focgen.trials.judging import PROPOSED, judge
@@ -99,6 +107,7 @@ def _ask_case(folder: Path, facts: Facts, number: str, label: dict[str, Any]) ->
     case = _remade(folder, facts, number, label)
     if case.bench is None:
         return
+    check_only_results(folder, "asked", number, depth=2)
     rng = np.random.default_rng([facts.seed, int(number), 1])
     with temporary_folder("asked") as scratch:
         found = scratch / "found"

@@ -26,7 +26,7 @@ from focgen.output import first_of, replace_folder
 from focgen.progress import say, track
 from focgen.scratch import real, temporary_folder
 from focgen.textfile import LARGEST_LOG
-from focgen.trials.belongs import case_digest, copy_case, files_of_case, is_of, mark
+from focgen.trials.belongs import case_digest, check_only_results, copy_case, files_of_case, is_of, mark
 from focgen.trials.facts import facts_of, outcome_in
 from focgen.trials.worker import ENDED, NO_ROOM
 
@@ -65,7 +65,8 @@ def run(
     """Diagnose every case that has not been, of several trials in turn; ``jobs`` at a time (default:
     the cores), ``limit`` s for each; after ``minutes`` none is begun any more.
 
-    Raises InputError where a folder holds no trial, and for less than one process.
+    Raises InputError where a folder holds no trial, where something else lies in the place of a result, and
+    for less than one process.
     """
     at_once = processes(jobs)
     places = [Path(folder) for folder in folders]
@@ -74,6 +75,8 @@ def run(
         if not (place / "cases" / n).is_dir():
             raise InputError(str(place), f"lacks case {n}", "make the cases anew")
     waiting = [(place, n) for place, n in cases if not _stands(place, n)]
+    for place, n in waiting:
+        check_only_results(place, "runs", n)
     begun = time.monotonic()
 
     def one(place: Path, number: str) -> bool:
@@ -151,9 +154,11 @@ def outcome_of(folder: Path) -> dict[str, Any]:
 def diagnose_case(trial: Path, kind: str, number: str, limit: float, effects: tuple[str, ...] = ()) -> None:
     """Diagnose a case of a trial away from everything else, then bring the results to TRIAL/KIND/NUMBER.
 
-    Raises InputError where the case cannot be read, or the results' place lies outside the trial.
+    Raises InputError where the case cannot be read, or the results' place lies outside the trial or holds
+    what is no result.
     """
     case, target = trial / "cases" / number, trial / kind / number
+    check_only_results(trial, kind, number)
     with temporary_folder("trial") as scratch:
         blind, out = scratch / "case", scratch / "out"
         _check_plain(case, trial)

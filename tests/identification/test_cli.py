@@ -4,6 +4,7 @@ Red when the command prints, writes or draws another thing than it has found, or
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -222,3 +223,36 @@ def test_a_stage_of_no_size_is_refused(tmp_path, capsys):
     (tmp_path / "out").mkdir()
     line = refused(["identify", str(STEPS), "--rig", str(rig), "--to", "8"], tmp_path / "out", capsys)
     assert "[sensor] [den]: has a term of order 0.001; give orders of 0, or of 0.01 to 20" in line
+
+
+def _with_intervals(monkeypatch, wide: dict[str, float]) -> None:
+    """Have the single fits of some experiments, by name, end with T known to so many times itself."""
+    from focgen.identification import single
+
+    fit_fractional = single.fit_fractional
+
+    def fitted(excitations, *more):
+        fit = fit_fractional(excitations, *more)
+        times = wide.get(excitations[0].name)
+        return fit if times is None else replace(fit, half={**fit.half, "T": times * fit.T})
+
+    monkeypatch.setattr(single, "fit_fractional", fitted)
+
+
+@pytest.mark.parametrize("times", [np.inf, 1e6])
+def test_a_fit_without_a_bound_is_no_row_of_table_one(times, monkeypatch, tmp_path):
+    _with_intervals(monkeypatch, {"0.075": times})
+    options = ["--rig", str(RIG), "--out", str(tmp_path / "new.toml"), "--to", "3", "--no-integer", "--json"]
+    payload, _ = run_captured(["identify", str(STEPS), *options])
+    shown = [e["name"] for e in payload["experiments"]]
+    assert shown == [f"{level:.3f}" for level in LEVELS[1:]]
+    assert any("0.075: K, T and alpha not determined by itself" in said for said in payload["warnings"])
+    for values in payload["gof"].values():
+        assert values["mean"] == pytest.approx(np.mean([values[name] for name in shown]))
+
+
+def test_where_no_experiment_has_a_bound_there_is_no_table_one(monkeypatch, tmp_path, capsys):
+    _with_intervals(monkeypatch, dict.fromkeys((f"{level:.3f}" for level in LEVELS), np.inf))
+    options = ["--rig", str(RIG), "--out", str(tmp_path / "new.toml"), "--to", "3", "--no-integer"]
+    assert main(["identify", str(STEPS), *options]) == 2
+    assert "none of them determines K, T and alpha by itself" in capsys.readouterr().err

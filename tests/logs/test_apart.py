@@ -184,6 +184,20 @@ def test_texts_gaps_and_times_arrive_as_they_stood(tmp_path):
         assert np.array_equal(here.numbers(name), there.numbers(name), equal_nan=True), name
 
 
+def test_a_page_of_parquet_against_its_checksum_is_refused(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path, reading = tmp_path / "log.parquet", np.linspace(0.1, 0.2, 100)
+    written = pyarrow.table({"t": 0.01 * np.arange(100), "p": reading})
+    parquet.write_table(written, path, write_page_checksum=True, compression="none", use_dictionary=False)
+    raw = path.read_bytes()
+    at = raw.index(reading[40:42].tobytes())
+    path.write_bytes(raw[: at + 6] + bytes([raw[at + 6] ^ 1]) + raw[at + 7 :])
+    with pytest.raises(LogError, match="is not a whole Parquet file"):
+        read_table(path)
+
+
 def test_damaged_files_never_reach_the_caller(tmp_path):
     """Mutations of sound files: each is read, or an error of one line."""
     rng, read, refused = random.Random(5), 0, 0

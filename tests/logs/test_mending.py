@@ -271,6 +271,14 @@ def test_outliers_at_rest_of_the_signal_are_found(kind, width):
     assert found >= (56 if width == 1 else 45) and wrong == 0
 
 
+@pytest.mark.parametrize("size", (1.0, 1e4, 1e9, -1e15, 1e30))
+def test_however_far_off_a_reading_is_it_is_an_outlier(size):
+    """A bit of an exponent: so far off, every other step was once a rounding error of the span."""
+    y = 0.004 * np.linspace(0.0, 1.0, 400) + 5e-5 * np.random.default_rng(3).standard_normal(400)
+    y[300] = size
+    assert list(np.flatnonzero(outliers(y))) == [300]
+
+
 def test_pulses_that_come_often_are_the_signal():
     rng = np.random.default_rng(8)
     pulses = np.zeros(2000)

@@ -244,6 +244,12 @@ def test_on_a_terminal_it_asks(tmp_path, monkeypatch, capsys):
     assert (signals.command, signals.output) == ("c", "b")
 
 
+def test_a_log_of_one_row_is_refused_in_a_line_and_no_warning_beside(tmp_path):
+    (tmp_path / "log.csv").write_text("run,t_s,u_V,y\na,0.0,1.0,0.5\n")
+    with pytest.raises(LogError, match="no column that increases with time"):
+        focgen.init(tmp_path / "log.csv")
+
+
 @pytest.mark.parametrize(
     "name, roles",
     [

@@ -239,6 +239,32 @@ def test_what_a_system_or_somebody_leaves_beside_a_case_is_no_part_of_it(trial, 
     assert found == {"commitment.txt", *given}
 
 
+@pytest.mark.parametrize("name", ["notes.txt", "mine/diagnosis.json"])
+def test_what_somebody_keeps_beside_a_result_is_not_removed_with_it(trial, name, capsys):
+    """The whole folder once went, without a word, where its case was diagnosed anew."""
+    path, left = trial / "runs/0001" / name, trial / "runs/0001/.DS_Store"
+    path.parent.mkdir(exist_ok=True)
+    for place in (path, left):
+        place.write_text("mine")
+    (trial / "runs/0001/outcome.json").unlink()
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 2
+    assert f"/{name.split('/')[0]}: is no part of a result" in capsys.readouterr().err
+    assert path.read_text() == "mine"
+    shutil.move(path, trial / "elsewhere.txt")
+    shutil.rmtree(trial / "runs/0001/mine", ignore_errors=True)
+    assert main(["trial", "run", str(trial), "--jobs", "1"]) == 0
+
+
+def test_nor_beside_experiments_that_were_asked_for(tmp_path):
+    place = tmp_path / "asked/0001"
+    (place / "proposed").mkdir(parents=True)
+    (place / "proposed/outcome.json").write_text("{}")
+    belongs.check_only_results(tmp_path, "asked", "0001", depth=2)
+    (place / "proposed/notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="notes.txt: is no part of a result"):
+        belongs.check_only_results(tmp_path, "asked", "0001", depth=2)
+
+
 def test_a_case_that_is_read_only_is_copied_without_its_rights(trial, tmp_path):
     """Its copies could not be removed, nor written beside: each run left one, and proposals were refused."""
     case = trial / "cases/0001"
