@@ -24,6 +24,8 @@ from focgen.trials.facts import outcome_in
 
 _JUDGED = ("diagnosis.json", "refitted.toml", "augmented.toml", "next_experiment.csv")
 _KEPT = (*_JUDGED, FILE, *PICTURES, "outcome.json", "achieved.json")
+_OF_SYSTEMS = (".DS_Store", "Thumbs.db", "desktop.ini", ".directory")  # left where somebody looks
+_BEGINS = (".focgen-", "._", ".nfs", ".fuse_hidden")  # scratch of ours, forks of a Mac, files still open
 _SEAL = "sha256"
 _ALONE = ("commitment.txt", "controller.toml", "rig.toml")
 
@@ -73,7 +75,8 @@ def copy_case(case: Path, to: Path) -> None:
 
 def check_only_results(trial: Path, kind: str, number: str, depth: int = 1) -> None:
     """Raise InputError where TRIAL/KIND/NUMBER, which a result takes the place of, holds what no run has
-    written: it would go with the former result. What a system leaves there (``.DS_Store``) may.
+    written: it would go with the former result. What a system leaves there (``.DS_Store``) may; what somebody
+    hid by a point may not.
 
     ``depth``: 1 of a folder of a run, 2 of a folder of such folders.
     """
@@ -84,7 +87,7 @@ def check_only_results(trial: Path, kind: str, number: str, depth: int = 1) -> N
     for path in sorted(place.rglob("*")):
         parts = path.relative_to(place).parts
         own = path.name in _KEPT if len(parts) == depth else len(parts) < depth and path.is_dir()
-        if not own and not any(part.startswith(".") for part in parts):
+        if not own and not any(part in _OF_SYSTEMS or part.startswith(_BEGINS) for part in parts):
             what = "is no part of a result, and would go with it where the case is diagnosed anew"
             raise InputError(str(path), what, "move it away")
 

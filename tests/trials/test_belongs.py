@@ -239,7 +239,7 @@ def test_what_a_system_or_somebody_leaves_beside_a_case_is_no_part_of_it(trial, 
     assert found == {"commitment.txt", *given}
 
 
-@pytest.mark.parametrize("name", ["notes.txt", "mine/diagnosis.json"])
+@pytest.mark.parametrize("name", ["notes.txt", ".notes.md", "mine/diagnosis.json"])
 def test_what_somebody_keeps_beside_a_result_is_not_removed_with_it(trial, name, capsys):
     """The whole folder once went, without a word, where its case was diagnosed anew."""
     path, left = trial / "runs/0001" / name, trial / "runs/0001/.DS_Store"
