@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.special import expit
 
 from focgen.diagnosis.numbers import NUMBERS
 
@@ -32,6 +33,11 @@ def nominal_off(change: float, static: bool) -> float:
     """
     alike = NUMBERS.bent if static else NUMBERS.bent / 3.0
     return 4.0 * float(np.log(alike) - np.log(max(change, 1e-12)))
+
+
+def sureness(odds: float) -> float:
+    """The probability that these log odds are."""
+    return float(expit(odds))
 
 
 def holds(odds: float) -> bool:

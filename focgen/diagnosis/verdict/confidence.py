@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.belief.standing import least_set, probabilities
+from focgen.diagnosis.belief.standing import least_set, probabilities, sureness
 from focgen.diagnosis.hypotheses.rivals import Rival
 
 
@@ -19,4 +19,4 @@ def tied(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], np.ndarray]:
 
 def nominal_instead(rival: Rival) -> float:
     """How likely the nominal chain is off by itself, and there is no such effect as ``rival``."""
-    return float(1.0 / (1.0 + np.exp(-rival.off)))
+    return sureness(rival.off)

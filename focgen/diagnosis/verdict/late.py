@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from focgen.diagnosis.belief.standing import sureness
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, square_by
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.problem.segments import Segment
@@ -36,7 +37,7 @@ class Late:
     @property
     def sure(self) -> float:
         """How likely it is, if it is that or what was found."""
-        return float(1.0 / (1.0 + np.exp(-np.clip(self.odds, -50.0, 50.0))))
+        return sureness(self.odds)
 
 
 @lru_cache(maxsize=16)

@@ -17,6 +17,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
+from focgen.diagnosis.belief.standing import sureness
 from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import left_out
@@ -58,7 +59,7 @@ class Changed:
     @property
     def sure(self) -> float:
         """How likely it is, if it is that or what was found."""
-        return float(1.0 / (1.0 + np.exp(-np.clip(self.odds, -50.0, 50.0))))
+        return sureness(self.odds)
 
 
 @lru_cache(maxsize=16)
