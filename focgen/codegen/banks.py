@@ -124,7 +124,7 @@ def _rows(plan: Plan, bank: Bank) -> list[str]:
 
 def _past(plan: Plan, table: Sum, lag: int) -> str:
     ring, size = ("error", "ERRORS") if table.history == "error" else ("filtered", "FILTERED")
-    return f"s->{ring}[foc_ring_slot(s->{ring}_now, {plan.name}_{size}, {lag})]"
+    return f"s->{ring}[foc_ring_slot(s->{ring}_now, {plan.name.upper()}_{size}, {lag})]"
 
 
 def inputs(plan: Plan, table: Sum) -> list[str]:

@@ -106,7 +106,7 @@ def _ring(table: Sum) -> tuple[str, str]:
 
 def _call(plan: Plan, table: Sum, blocks: list[Block], weights: str, prefix: str) -> str:
     ring, size = _ring(table)
-    history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
+    history = f"s->{ring}, {plan.name.upper()}_{size}, s->{ring}_now"
     if len(blocks) > 1:
         return (
             f"{prefix}_sum_{runtime(plan.arithmetic)}({weights}, {weights}_blocks, {len(blocks)}, {history})"
@@ -122,7 +122,7 @@ def _ahead_text(plan: Plan, table: Sum, name: str, about: list[str], ahead: Look
     ring, size = _ring(table)
     far = f"{member}, {name}_far, {name}_runs, {name}_slices, s->{ring}, {plan.name}_{size}"
     near = ahead.near
-    history = f"s->{ring}, {plan.name}_{size}, s->{ring}_now"
+    history = f"s->{ring}, {plan.name.upper()}_{size}, s->{ring}_now"
     nearer = (
         [_weights(plan, list(near.blocks), f"{name}_near", ["The lags nearer than those."])] if near else []
     )

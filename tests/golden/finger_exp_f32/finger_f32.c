@@ -150,8 +150,8 @@ static const FOC_ROM float finger_f32_slopes[2] = {
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
 static float finger_f32_numerator_sum(finger_f32_state *s)
 {
-    const float past = s->error[foc_ring_slot(s->error_now, finger_f32_ERRORS, 1)];
-    float sum = foc_dot_f32(finger_f32_numerator, 2, s->error, finger_f32_ERRORS, s->error_now, 1);
+    const float past = s->error[foc_ring_slot(s->error_now, FINGER_F32_ERRORS, 1)];
+    float sum = foc_dot_f32(finger_f32_numerator, 2, s->error, FINGER_F32_ERRORS, s->error_now, 1);
 
     sum += foc_modes_f32(finger_f32_numerator_modes, s->numerator_means, 3, past);
     sum += foc_slow_modes_f32(finger_f32_numerator_slow_modes, s->numerator_slow_means,
@@ -162,8 +162,8 @@ static float finger_f32_numerator_sum(finger_f32_state *s)
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
 static float finger_f32_integrand_sum(finger_f32_state *s)
 {
-    const float past = s->error[foc_ring_slot(s->error_now, finger_f32_ERRORS, 1)];
-    float sum = foc_dot_f32(finger_f32_integrand, 2, s->error, finger_f32_ERRORS, s->error_now, 1);
+    const float past = s->error[foc_ring_slot(s->error_now, FINGER_F32_ERRORS, 1)];
+    float sum = foc_dot_f32(finger_f32_integrand, 2, s->error, FINGER_F32_ERRORS, s->error_now, 1);
 
     sum += foc_modes_f32(finger_f32_integrand_modes, s->integrand_means, 3, past);
     sum += foc_slow_modes_f32(finger_f32_integrand_slow_modes, s->integrand_slow_means,
@@ -174,8 +174,8 @@ static float finger_f32_integrand_sum(finger_f32_state *s)
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
 static float finger_f32_denominator_sum(finger_f32_state *s)
 {
-    const float past = s->filtered[foc_ring_slot(s->filtered_now, finger_f32_FILTERED, 1)];
-    float sum = foc_dot_f32(finger_f32_denominator, 1, s->filtered, finger_f32_FILTERED,
+    const float past = s->filtered[foc_ring_slot(s->filtered_now, FINGER_F32_FILTERED, 1)];
+    float sum = foc_dot_f32(finger_f32_denominator, 1, s->filtered, FINGER_F32_FILTERED,
                             s->filtered_now, 1);
 
     sum += foc_modes_f32(finger_f32_denominator_modes, s->denominator_means, 4, past);

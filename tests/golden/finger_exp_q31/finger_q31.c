@@ -156,9 +156,9 @@ static const FOC_ROM uint8_t finger_q31_shifts[2] = {
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
 static int64_t finger_q31_numerator_sum(finger_q31_state *s)
 {
-    const int32_t past = s->error[foc_ring_slot(s->error_now, finger_q31_ERRORS, 1)];
+    const int32_t past = s->error[foc_ring_slot(s->error_now, FINGER_Q31_ERRORS, 1)];
     int64_t sum = foc_sum_q31(finger_q31_numerator, finger_q31_numerator_blocks, 2, s->error,
-                              finger_q31_ERRORS, s->error_now);
+                              FINGER_Q31_ERRORS, s->error_now);
 
     /* |sum of the modes| <= 4051207700309035188 < 2^63 */
     sum += foc_shift64(foc_modes_q31(finger_q31_numerator_modes, s->numerator_means, 11, past, 30, 31,
@@ -169,9 +169,9 @@ static int64_t finger_q31_numerator_sum(finger_q31_state *s)
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
 static int64_t finger_q31_integrand_sum(finger_q31_state *s)
 {
-    const int32_t past = s->error[foc_ring_slot(s->error_now, finger_q31_ERRORS, 1)];
+    const int32_t past = s->error[foc_ring_slot(s->error_now, FINGER_Q31_ERRORS, 1)];
     int64_t sum = foc_sum_q31(finger_q31_integrand, finger_q31_integrand_blocks, 2, s->error,
-                              finger_q31_ERRORS, s->error_now);
+                              FINGER_Q31_ERRORS, s->error_now);
 
     /* |sum of the modes| <= 6481932318020555136 < 2^63 */
     sum += foc_shift64(foc_modes_q31(finger_q31_integrand_modes, s->integrand_means, 11, past, 30, 31,
@@ -182,8 +182,8 @@ static int64_t finger_q31_integrand_sum(finger_q31_state *s)
 /* The taps, and what the modes remember; their means then take up the sample before this one. */
 static int64_t finger_q31_denominator_sum(finger_q31_state *s)
 {
-    const int32_t past = s->filtered[foc_ring_slot(s->filtered_now, finger_q31_FILTERED, 1)];
-    int64_t sum = foc_dot_q31(finger_q31_denominator, 1, s->filtered, finger_q31_FILTERED,
+    const int32_t past = s->filtered[foc_ring_slot(s->filtered_now, FINGER_Q31_FILTERED, 1)];
+    int64_t sum = foc_dot_q31(finger_q31_denominator, 1, s->filtered, FINGER_Q31_FILTERED,
                               s->filtered_now, 1);
 
     /* |sum of the modes| <= 5599102851903650621 < 2^63 */

@@ -104,17 +104,17 @@ static const FOC_ROM float finger_f32_slopes[2] = {
 
 static float finger_f32_numerator_sum(const finger_f32_state *s)
 {
-    return foc_dot_f32(finger_f32_numerator, 41, s->error, finger_f32_ERRORS, s->error_now, 40);
+    return foc_dot_f32(finger_f32_numerator, 41, s->error, FINGER_F32_ERRORS, s->error_now, 40);
 }
 
 static float finger_f32_integrand_sum(const finger_f32_state *s)
 {
-    return foc_dot_f32(finger_f32_integrand, 41, s->error, finger_f32_ERRORS, s->error_now, 40);
+    return foc_dot_f32(finger_f32_integrand, 41, s->error, FINGER_F32_ERRORS, s->error_now, 40);
 }
 
 static float finger_f32_denominator_sum(const finger_f32_state *s)
 {
-    return foc_dot_f32(finger_f32_denominator, 40, s->filtered, finger_f32_FILTERED, s->filtered_now,
+    return foc_dot_f32(finger_f32_denominator, 40, s->filtered, FINGER_F32_FILTERED, s->filtered_now,
                        40);
 }
 

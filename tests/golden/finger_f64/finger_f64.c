@@ -100,17 +100,17 @@ static const FOC_ROM double finger_f64_slopes[2] = {
 
 static double finger_f64_numerator_sum(const finger_f64_state *s)
 {
-    return foc_dot_f64(finger_f64_numerator, 41, s->error, finger_f64_ERRORS, s->error_now, 40);
+    return foc_dot_f64(finger_f64_numerator, 41, s->error, FINGER_F64_ERRORS, s->error_now, 40);
 }
 
 static double finger_f64_integrand_sum(const finger_f64_state *s)
 {
-    return foc_dot_f64(finger_f64_integrand, 41, s->error, finger_f64_ERRORS, s->error_now, 40);
+    return foc_dot_f64(finger_f64_integrand, 41, s->error, FINGER_F64_ERRORS, s->error_now, 40);
 }
 
 static double finger_f64_denominator_sum(const finger_f64_state *s)
 {
-    return foc_dot_f64(finger_f64_denominator, 40, s->filtered, finger_f64_FILTERED, s->filtered_now,
+    return foc_dot_f64(finger_f64_denominator, 40, s->filtered, FINGER_F64_FILTERED, s->filtered_now,
                        40);
 }
 

@@ -207,7 +207,7 @@ static int32_t finger_m4_numerator_sum(const finger_m4_state *s)
     /* |sum| <= 19743310 < 2^31, counts of 2^-28 */
     const FOC_ROM int16_t *w = finger_m4_numerator_near;
     int16_t copy[16];
-    const int16_t *x = foc_latest_q15(copy, 16, s->error, finger_m4_ERRORS, s->error_now);
+    const int16_t *x = foc_latest_q15(copy, 16, s->error, FINGER_M4_ERRORS, s->error_now);
     int32_t sum = s->numerator_ahead[s->error_now & 3u];
 
     sum += foc_shift32((int32_t)w[0] * x[0] + (int32_t)w[1] * x[1] + (int32_t)w[2] * x[2]
@@ -226,7 +226,7 @@ static int32_t finger_m4_integrand_sum(const finger_m4_state *s)
     /* |sum| <= 928172392 < 2^31, counts of 2^-41 */
     const FOC_ROM int16_t *w = finger_m4_integrand_near;
     int16_t copy[16];
-    const int16_t *x = foc_latest_q15(copy, 16, s->error, finger_m4_ERRORS, s->error_now);
+    const int16_t *x = foc_latest_q15(copy, 16, s->error, FINGER_M4_ERRORS, s->error_now);
     int32_t sum = s->integrand_ahead[s->error_now & 3u];
 
     sum += foc_shift32((int32_t)w[0] * x[0] + (int32_t)w[1] * x[1] + (int32_t)w[2] * x[2]
@@ -245,7 +245,7 @@ static int32_t finger_m4_denominator_sum(const finger_m4_state *s)
     /* |sum| <= 813275776 < 2^31, counts of 2^-28 */
     const FOC_ROM int16_t *w = finger_m4_denominator_near;
     int16_t copy[16];
-    const int16_t *x = foc_latest_q15(copy, 16, s->filtered, finger_m4_FILTERED, s->filtered_now);
+    const int16_t *x = foc_latest_q15(copy, 16, s->filtered, FINGER_M4_FILTERED, s->filtered_now);
     int32_t sum = s->denominator_ahead[s->filtered_now & 3u];
 
     sum += foc_shift32((int32_t)w[0] * x[0] + (int32_t)w[1] * x[1] + (int32_t)w[2] * x[2]

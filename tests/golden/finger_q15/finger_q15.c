@@ -149,21 +149,21 @@ static int32_t finger_q15_numerator_sum(const finger_q15_state *s)
 {
     /* |sum| <= 19644721 < 2^31, counts of 2^-28 */
     return foc_sum_q15(finger_q15_numerator, finger_q15_numerator_blocks, 7, s->error,
-                       finger_q15_ERRORS, s->error_now);
+                       FINGER_Q15_ERRORS, s->error_now);
 }
 
 static int32_t finger_q15_integrand_sum(const finger_q15_state *s)
 {
     /* |sum| <= 923125016 < 2^31, counts of 2^-41 */
     return foc_sum_q15(finger_q15_integrand, finger_q15_integrand_blocks, 7, s->error,
-                       finger_q15_ERRORS, s->error_now);
+                       FINGER_Q15_ERRORS, s->error_now);
 }
 
 static int32_t finger_q15_denominator_sum(const finger_q15_state *s)
 {
     /* |sum| <= 812209248 < 2^31, counts of 2^-28 */
     return foc_sum_q15(finger_q15_denominator, finger_q15_denominator_blocks, 6, s->filtered,
-                       finger_q15_FILTERED, s->filtered_now);
+                       FINGER_Q15_FILTERED, s->filtered_now);
 }
 
 /* Take the error of one more sample; return the filtered error v, counts of 2^-13. */

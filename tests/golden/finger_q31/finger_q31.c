@@ -149,21 +149,21 @@ static int64_t finger_q31_numerator_sum(const finger_q31_state *s)
 {
     /* |sum| <= 84371486439132197 < 2^63, counts of 2^-60 */
     return foc_sum_q31(finger_q31_numerator, finger_q31_numerator_blocks, 7, s->error,
-                       finger_q31_ERRORS, s->error_now);
+                       FINGER_Q31_ERRORS, s->error_now);
 }
 
 static int64_t finger_q31_integrand_sum(const finger_q31_state *s)
 {
     /* |sum| <= 3871708892624219 < 2^63, counts of 2^-63 */
     return foc_sum_q31(finger_q31_integrand, finger_q31_integrand_blocks, 7, s->error,
-                       finger_q31_ERRORS, s->error_now);
+                       FINGER_Q31_ERRORS, s->error_now);
 }
 
 static int64_t finger_q31_denominator_sum(const finger_q31_state *s)
 {
     /* |sum| <= 3488424466133811200 < 2^63, counts of 2^-60 */
     return foc_sum_q31(finger_q31_denominator, finger_q31_denominator_blocks, 6, s->filtered,
-                       finger_q31_FILTERED, s->filtered_now);
+                       FINGER_Q31_FILTERED, s->filtered_now);
 }
 
 /* Take the error of one more sample; return the filtered error v, counts of 2^-29. */
