@@ -120,7 +120,7 @@ def _ahead_text(plan: Plan, table: Sum, name: str, about: list[str], ahead: Look
     """Far tables, the runs over them, and the near sum with tables of its own."""
     member = f"s->{name.removeprefix(plan.name + '_')}_ahead"
     ring, size = _ring(table)
-    far = f"{member}, {name}_far, {name}_runs, {name}_slices, s->{ring}, {plan.name}_{size}"
+    far = f"{member}, {name}_far, {name}_runs, {name}_slices, s->{ring}, {plan.name.upper()}_{size}"
     near = ahead.near
     history = f"s->{ring}, {plan.name.upper()}_{size}, s->{ring}_now"
     nearer = (
