@@ -63,6 +63,16 @@ def test_levels_are_seen_through_noise_and_only_levels():
     )  # it passes between its rests
 
 
+@pytest.mark.parametrize("noises", (9.5, 11.0))
+def test_levels_are_seen_where_noise_hardly_reaches_half_way_to_the_next(noises):
+    """Steps of nine noises look like a staircase to anybody, and passed for noise of the output."""
+    rng, step = np.random.default_rng(11), 0.09
+    swept = np.interp(np.arange(3500.0), [0, 800, 1300, 1650, 2050, 3500], [0, 1, 0.3, 0.75, 0.15, 1])
+    reading = step * np.round(swept / step) + step / noises * rng.normal(size=3500)
+    found, phase = SEEN(reading)
+    assert abs(found - step) < 0.01 * step and abs(phase) < 0.03 * step
+
+
 def test_rests_of_a_rig_that_answers_within_a_sample_are_no_steps():
     quick = TransferFunction([(1.9, 0.0)], [(0.005, 1.0), (1.0, 0.0)])
     rig, rng = replace(HEATER, actuator=LinearActuator(quick)), np.random.default_rng(4)

@@ -11,8 +11,8 @@ _COVERED_BY_TWO = 0.999  # the same of two levels, which may be rests of a finer
 # of the noise of a reading whose levels are blurred
 _OF_NOISE = 0.954  # what half of all steps between neighbours are below, where both are noise
 _BIN = 1.5  # a bin of the histogram
-_APART = 12.0  # two levels, at least
-_WIDE = 6.0  # a level, either way
+_APART = 9.0  # two levels, at least: readings of one then hardly reach half way to the next
+_WIDE = 4.5  # a level, either way
 _FEW, _SELDOM = 4, 5e-4  # samples, of all, in a bin that is no passage
 _LEVELS = 3  # at least: two may be the rests of a rig
 _PASSES = 2  # samples between two levels, for each change of level: what resampling leaves there
