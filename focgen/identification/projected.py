@@ -102,7 +102,7 @@ class Solved:
 
         A record may have a row more on one side of a dead time of 0 than on the other; what is lacking is 0.
         """
-        made = []
+        made: list[Array] = []
         for weights, (own, shared) in zip(self.own, rows):
             count = min(len(weights), len(own))
             made.append(weights[:count] @ own[:count] + self.shared @ shared)
