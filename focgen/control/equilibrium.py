@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from focgen.control.units import read_alike, unit_of_role
+from focgen.control.units import read_alike
 from focgen.errors import DesignError
 from focgen.present import present
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Ranges, Rig
@@ -74,7 +74,7 @@ def counted_alike(rig: Rig) -> str:
     signals, ranges = rig.signals, rig.ranges
     if rig.regulator != UNITY or signals.command is None or signals.pressure is None:
         return ""
-    units = unit_of_role(signals, "command"), unit_of_role(signals, "pressure")
+    units = signals.unit_of("command"), signals.unit_of("pressure")
     tops = [max(map(abs, span)) for span in (ranges.command, ranges.pressure) if span is not None]
     if (units[0] == units[1] or not all(units)) and (len(tops) < 2 or max(tops) <= _APART * min(tops)):
         return ""

@@ -6,14 +6,12 @@ from __future__ import annotations
 from focgen.control.controller import Controller, Units
 from focgen.errors import ControllerError
 from focgen.logs.scales import known, same
-from focgen.logs.units import unit_named
 from focgen.rig.rig import UNITY, Rig, Signals
 
 
 def unit_of_role(signals: Signals, role: str) -> str:
-    """The unit of a role's signal: the rig's own, else as its column's name tells it, "" where neither
-    does."""
-    return signals.units.get(role) or ("" if role in signals.scales else unit_named(getattr(signals, role)))
+    """The unit of a role's signal, "" where it is not told."""
+    return signals.unit_of(role)
 
 
 def units_of_rig(rig: Rig) -> dict[str, str]:
@@ -23,7 +21,7 @@ def units_of_rig(rig: Rig) -> dict[str, str]:
     a curvature without one is in the output's unit.
     """
     signals = rig.signals
-    units = {role: unit_of_role(signals, role) for role in ("command", "pressure", "curvature", "output")}
+    units = {role: signals.unit_of(role) for role in ("command", "pressure", "curvature", "output")}
     if not units["pressure"] and signals.pressure is None and rig.regulator == UNITY:
         units["pressure"] = units["command"]
     if not units["curvature"] and signals.curvature is None and rig.sensor.dc_gain == 1.0:
@@ -36,7 +34,7 @@ def units_of(rig: Rig, scheduled: bool) -> Units:
     signals = rig.signals
     command = "command" if signals.command else "pressure"
     roles = "output", command, "pressure"
-    output, command, pressure = (unit_of_role(signals, role) for role in roles)
+    output, command, pressure = (signals.unit_of(role) for role in roles)
     return Units(output, command, pressure if scheduled else "")
 
 
@@ -57,7 +55,7 @@ def read_alike(rig: Rig) -> str:
     units; "" for any other rig."""
     if rig.sensor != UNITY or rig.signals.curvature is None:
         return ""
-    one, other = (unit_of_role(rig.signals, role) for role in ("curvature", "output"))
+    one, other = (rig.signals.unit_of(role) for role in ("curvature", "output"))
     if not (one and other and known(one) and known(other)) or same(one, other):
         return ""
     return f"the rig has no [sensor], so a curvature in {one} counts as an output in {other}"

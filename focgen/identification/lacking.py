@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.control.units import unit_of_role
 from focgen.errors import FitError
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
@@ -38,7 +37,7 @@ def check_alike(experiments: Sequence[Experiment], rig: Rig) -> None:
 
 def _differ(experiments: Sequence[Experiment], rig: Rig, one: str, other: str) -> bool:
     """Whether two signals are not the same quantity: by their units, or by their sizes in logs of both."""
-    units = [unit_of_role(rig.signals, role) for role in (one, other)]
+    units = [rig.signals.unit_of(role) for role in (one, other)]
     if all(unit and known(unit) for unit in units):
         return not same(*units)
     both = [e for e in experiments if one in e and other in e] or experiments

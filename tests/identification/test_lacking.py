@@ -76,8 +76,8 @@ def test_a_command_that_is_the_pressure_stands_for_it():
 
 
 def test_a_gain_without_a_dead_time_has_a_derivative_by_one():
-    """A sensor that is a mere gain was a fault of the program: behind a dead time of 0 a record has a row less
-    than ahead of it."""
+    """A sensor that is a mere gain was a fault of the program: at a dead time of 0 a record has a row less
+    than behind it."""
     drive = np.cumsum(np.random.default_rng(1).standard_normal(200))
     noise = 1e-3 * np.random.default_rng(2).standard_normal(200)
     problem = Problem(Shape(0, 0, True), [Record("one", drive, 300.0 * drive + noise, "linear", moves=True)])
