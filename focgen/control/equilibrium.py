@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from focgen.control.units import unit_of_role
+from focgen.control.units import read_alike
 from focgen.errors import DesignError
 from focgen.present import present
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Ranges, Rig
@@ -19,6 +19,7 @@ _GRID = 2001
 _APART = 2.0  # times: command and pressure whose ranges differ by more are not the same quantity
 _WITHIN = "give set points, or [ranges] output, within the rig's reach"
 _REGULATOR = "`focgen identify LOG --stages regulator,actuator` fits one"
+_SENSOR = "`focgen identify LOG --stages sensor,actuator` fits one"
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ def derived_ranges(rig: Rig) -> tuple[Ranges, tuple[str, ...]]:
     given, notes = rig.ranges, []
     if counts := counted_alike(rig):
         notes.append(f"{counts}; {_REGULATOR}")
+    if read := read_alike(rig):
+        notes.append(f"{read}; {_SENSOR}")
     command = given.command
     if command is None:
         merged = rig.regulator == UNITY and rig.signals.command is None
@@ -71,7 +74,7 @@ def counted_alike(rig: Rig) -> str:
     signals, ranges = rig.signals, rig.ranges
     if rig.regulator != UNITY or signals.command is None or signals.pressure is None:
         return ""
-    units = unit_of_role(signals, "command"), unit_of_role(signals, "pressure")
+    units = signals.unit_of("command"), signals.unit_of("pressure")
     tops = [max(map(abs, span)) for span in (ranges.command, ranges.pressure) if span is not None]
     if (units[0] == units[1] or not all(units)) and (len(tops) < 2 or max(tops) <= _APART * min(tops)):
         return ""

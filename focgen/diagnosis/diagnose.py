@@ -11,6 +11,7 @@ import numpy as np
 
 from focgen.arguments import checked
 from focgen.control.files import ControllerLike, controller_from
+from focgen.control.units import check_one_unit
 from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
 from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
@@ -73,8 +74,11 @@ def diagnose(
     if out is not None:
         _check_place(Path(out), given)
     nominal = rig_of(rig)
+    which = None if controller is None else controller_from(controller)
+    if which is not None:
+        check_one_unit(nominal, which)
     session = _usable(experiments(nominal, each, from_, to))
-    ran = check_controller(controller_from(controller), session) if controller is not None else None
+    ran = None if which is None else check_controller(which, session)
     nominal, session = decimated(nominal, session)
     session = begun_session(nominal, session)
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)

@@ -19,6 +19,7 @@ from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
 from focgen.identification.identification import ExperimentFit, Identification, Joint, Unseen
 from focgen.identification.known_actuator import answer_from_its_past
+from focgen.identification.lacking import check_alike
 from focgen.identification.past import worth_it
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.ranges import seen_ranges
@@ -145,6 +146,7 @@ def _actuator(
     """The identification of the actuator; ``rig`` has the regulator and the sensor it is seen through."""
     if rig.delays.actuator and not delay:
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
+    check_alike(experiments, rig)
     driven = [e for e in experiments if is_driven(e)]
     excitations = _prepared(driven or experiments, rig, degree + 1)
     degree, lowered = feasible_degree(excitations, degree)

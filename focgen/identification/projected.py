@@ -98,8 +98,15 @@ class Solved:
     rows: list[tuple[Array, Array]]
 
     def models(self, rows: list[tuple[Array, Array]]) -> list[Array]:
-        """These weights times ``rows``: the model of every record."""
-        return [w @ own + self.shared @ shared for w, (own, shared) in zip(self.own, rows)]
+        """These weights times ``rows``: the model of every record.
+
+        A record may have a row more on one side of a dead time of 0 than on the other; what is lacking is 0.
+        """
+        made: list[Array] = []
+        for weights, (own, shared) in zip(self.own, rows):
+            count = min(len(weights), len(own))
+            made.append(weights[:count] @ own[:count] + self.shared @ shared)
+        return made
 
 
 def mean_square(problem: Problem, solved: Solved) -> float:

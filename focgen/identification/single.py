@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
@@ -15,11 +16,16 @@ from focgen.identification.integer import IntegerFit, fit_integer_models
 from focgen.identification.past import Past
 from focgen.identification.quality import gof
 from focgen.identification.sure import HARDLY
+from focgen.logs.between import noise_level
 from focgen.pools import pool
 from focgen.progress import track
 
 _STEADY = 0.1  # of the step: nearer to its level than this, the input is at it
 _STAY = 0.15  # of the experiment: a step's input stays at its level at least so long
+_OTHER = 0.2  # of the step: so far from both ends of it, the input is held at another level …
+_HELD = 0.05  # … if for so much of the experiment …
+_MOVES = 0.02  # … it moves by less than this part of the step,
+_NOISE = 6.0  # or than so many standard deviations of its noise
 _CLEAR = 1.5  # half 95 % intervals, beyond which an offset is there (one in 300 by chance)
 _NO_OFFSET = 1e-3  # of the measured reach: an offset below this is none
 _WORTH_PROCESSES = 20_000  # samples of all experiments: fewer are done before processes have started
@@ -47,7 +53,8 @@ def fit_each(
             failed.append(x.name)
     if len(failed) == len(fits):
         what = "none of them determines K, T and alpha by itself"
-        raise FitError(", ".join(failed), what, "hold steps longer, or lower the noise")
+        remedy = "hold steps longer, lower the noise, or log each step as a run of its own"
+        raise FitError(", ".join(failed), what, remedy)
     done = [(x, fit) for x, fit in zip(singles, fits) if fit is not None]
     models = _integer_models(done) if integer else [()] * len(done)
     return [_experiment_fit(x, fit, more) for (x, fit), more in zip(done, models)], failed
@@ -61,10 +68,23 @@ def _has_numbers(fit: FractionalFit) -> bool:
 
 
 def is_step(x: Excitation) -> bool:
-    """Whether the input stays at its level for a good part of the time without a break."""
+    """Whether the input stays at its level for a good part of the time without a break, and is held at no
+    other one but the one before: a staircase is no step."""
     there = np.abs(x.pressure - x.level) <= _STEADY * abs(x.level - x.before)
     ends = np.flatnonzero(~np.concatenate([[False], there, [False]]))
-    return bool(np.diff(ends).max() - 1 >= _STAY * len(x))
+    return bool(np.diff(ends).max() - 1 >= _STAY * len(x)) and not _has_other_level(x)
+
+
+def _has_other_level(x: Excitation) -> bool:
+    """Whether the input is held anywhere else than at both ends of its step."""
+    span, half = abs(x.level - x.before), max(int(0.5 * _HELD * len(x)), 2)
+    still = max(_MOVES * span, _NOISE * noise_level(x.pressure))
+    away = np.minimum(np.abs(x.pressure - x.level), np.abs(x.pressure - x.before)) > _OTHER * span
+    if still > 0.5 * _OTHER * span or not away.any():
+        return False
+    size = 2 * half + 1
+    moved = maximum_filter1d(x.pressure, size) - minimum_filter1d(x.pressure, size)
+    return bool(np.any(away[half:-half] & (moved[half:-half] <= still)))
 
 
 def _number(fit: FractionalFit, name: str) -> float:

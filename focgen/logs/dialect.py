@@ -154,7 +154,17 @@ def _delimiter(sample: str) -> str:
         return ","
     found = _detected(tail)
     likely = [found, *_DELIMITERS] if found in _DELIMITERS else list(_DELIMITERS)
+    if _is_between_tabs(tail):
+        likely = [delimiter for delimiter in likely if delimiter != " "]
     return max(likely, key=lambda delimiter: _readable(tail, delimiter))  # the first of the best
+
+
+def _is_between_tabs(text: str) -> bool:
+    """Whether tabs separate the columns for sure, so that a blank stands within a date or a name: any run of
+    white space would be a blank otherwise, and count the two parts of a date as two readings."""
+    rows = [row for row in _rows(text, "\t") if row]
+    whole = len({len(row) for row in rows}) == 1 and len(rows[0]) > 1
+    return whole and not any(_are_numbers(cell) for row in rows for cell in row)
 
 
 def _detected(text: str) -> str | None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
+from decimal import Decimal
 from typing import Any, Protocol
 
 import numpy as np
@@ -37,6 +39,7 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     """
     if callable(getattr(frame, "collect", None)):
         raise LogError(name, "is a query of polars that has not been run", "give what its collect() returns")
+    _check_keys(frame, name)
     columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
     units = {str(key): unit for key in _keys(frame) if (unit := _unit(frame[key]))}
     times = {str(key): _zone(frame[key]) for key in _keys(frame) if _holds_times(frame[key])}
@@ -67,6 +70,16 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
         times=times,
         clock_zone=zone,
     )
+
+
+def _check_keys(frame: Frame | Mapping[Any, Any], name: str) -> None:
+    """Raise LogError for a frame of another kind, and for two columns of one name, such as 1 and "1"."""
+    if hasattr(frame, "column_names"):
+        raise LogError(name, "is a table of pyarrow", "give what its to_pandas() returns")
+    twice = [key for key, count in Counter(map(str, dict.fromkeys(_keys(frame)))).items() if count > 1]
+    if twice:
+        what = f"has two columns called {twice[0]}, one by a text and one by a number"
+        raise LogError(name, what.replace(";", ","), "give each column a name of its own")
 
 
 def _zone(values: Any) -> bool | None:
@@ -121,7 +134,7 @@ def _cells(cells: list[Any]) -> Array | list[str]:
     """Numbers as float64, NaN where one is missing; else all as texts, "" where one is missing."""
     missing = [_is_missing(cell) for cell in cells]
     known = [cell for cell, none in zip(cells, missing) if not none]
-    if known and all(isinstance(cell, float | int) for cell in known):
+    if known and all(isinstance(cell, float | int | Decimal) for cell in known):
         return np.array([np.nan if none else cell for cell, none in zip(cells, missing)], dtype=float)
     return ["" if none else str(cell) for cell, none in zip(cells, missing)]
 

@@ -91,8 +91,12 @@ def experiments_of(run: Raw, sample_time: float, window: Window) -> Iterator[Exp
 
 
 def _long_enough(sittings: list[slice], run: Raw) -> tuple[list[slice], tuple[Note, ...]]:
-    """The parts between two beginnings of the clock that are experiments, and what to say of them."""
-    kept = [rows for rows in sittings if rows.stop - rows.start >= FEWEST]
+    """The parts between two beginnings of the clock that are experiments, and what to say of them. Rows that
+    repeat the one before are no samples: arrays are made too long ahead, and end in zeros."""
+    kept = [rows for rows in sittings if np.sum(~_repeats(run.part(rows))) >= FEWEST]
+    if not kept and len(sittings) == 1:
+        what = f"has fewer than {FEWEST} samples, the other rows repeat them"
+        raise LogError(run.stamps, what, "log the time of each sample")
     if not kept:
         what = "has a clock that starts anew every few samples"
         raise LogError(run.where, what, "sort the rows, or name the column that tells the runs apart as run")

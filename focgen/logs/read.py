@@ -7,27 +7,28 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
-from focgen.logs import clock
 from focgen.logs.cells import Levels
 from focgen.logs.dialect import MISSING
 from focgen.logs.experiment import Experiment
 from focgen.logs.frames import Frame, is_frame, table_of
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
-from focgen.logs.scales import Scale, known, same, unit_of_time
+from focgen.logs.roles import Roles, columns_named, scaled, taken_columns, without_unit
+from focgen.logs.scales import known
 from focgen.logs.stacked import check_one_row_a_moment
 from focgen.logs.table import LogTable, read_table, stem
-from focgen.logs.units import in_unit, time_unit_named, unit_of
+from focgen.logs.timed import reading_of, time_of
+from focgen.logs.together import alike, check_one_unit, check_own_columns, check_zones
+from focgen.logs.units import unit_of
 
 _TOO_LARGE = 30.0  # times the range: beyond doubt a wrong unit; of less ``plausibility`` warns
 _TOO_SMALL = 0.002  # of the range, in a whole session
-_ONE_CLOCK = 0.02  # relative: so far apart are the steps of one clock
 _DATED = 1e8  # s: a clock this far on counts from 1970, no other one does
 _MOVED = "placed by its time stamps, not in the order given"
 _GIVE = "give a path, a frame, a dictionary of arrays, or a list of these"
@@ -36,29 +37,6 @@ Limits = Mapping[str, tuple[float, float]]
 Log = str | Path | Mapping[str, Any] | Frame | Experiment
 """A file, a dictionary of arrays (m,) by column, a pandas or polars frame, or what was read before."""
 Logs = Log | Iterable[Log]
-
-
-class Roles(Protocol):
-    """Which column plays which role, and how it becomes its signal (the rig's ``Signals``)."""
-
-    @property
-    def time(self) -> str:
-        """The column of the time."""
-
-    @property
-    def run(self) -> str | None:
-        """The column that splits a file into experiments, or None."""
-
-    @property
-    def scales(self) -> Mapping[str, Scale]:
-        """What turns a column into its signal, by role."""
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """The rig's units, by role."""
-
-    def columns(self) -> dict[str, str]:
-        """Role → column, without time and run."""
 
 
 def read_logs(
@@ -88,21 +66,14 @@ def read_logs(
     tables = tables_of(logs)
     if not tables:
         raise LogError("logs", "none is given", "name at least one log")
-    _check_zones(tables, signals.time)
+    check_zones(tables, signals.time)
+    check_one_unit(tables, without_unit(signals), "name the true one in the rig's [units]")
     for table in tables:
+        check_own_columns(table, columns_named(signals))
         _check_marks(table, signals, {*(limits or {}), *ranged})
     found = [part for table in tables for part in _experiments(table, signals, sample_time, (first, last))]
     _check_limits(found, dict(limits or {}), signals.columns())
     return _with_twins(in_session_order(_with_own_names(found)))
-
-
-def _check_zones(tables: Sequence[LogTable], name: str) -> None:
-    """Raise LogError where some logs have dates with a zone and some without: hours may lie between them."""
-    zones = {table.path: table.has_zone(name) for table in tables}
-    bare = next((path for path, zone in zones.items() if zone is False), None)
-    if bare is not None and True in zones.values():
-        what = "has dates without a zone, beside a log with one"
-        raise LogError(f"{bare} [{name}]", what, "write the zone in all logs of a session, or in none")
 
 
 def _check_marks(table: LogTable, signals: Roles, ranged: Collection[str]) -> None:
@@ -147,114 +118,30 @@ def _experiments(
 ) -> Iterator[tuple[str, Experiment]]:
     """Yield (path, experiment) for each run of a log, or part of one."""
     columns, notes = _present(table, signals)
-    time, said = _time(table, signals)
-    reading, column = _reading(table, signals), signals.time if signals.time in table else None
+    time, said = time_of(table, signals)
+    reading, column = reading_of(table, signals), signals.time if signals.time in table else None
     notes = (*table.notes, *said, *notes)
     for name, rows in _runs(table, signals.run):
         run = Raw(name, table.path, "", time, columns, table.line, notes, reading, column).part(rows)
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
         run = replace(run, where=where, stamps=f"{where} [{signals.time}]")
-        check_one_row_a_moment(table, run, rows, _taken(signals))
+        check_one_row_a_moment(table, run, rows, taken_columns(signals))
         if column is not None and (table.is_dated(column) or run.time[0] > _DATED):
             run = run.carried_on()
         for experiment in experiments_of(run, sample_time, window):
             yield table.path, experiment
 
 
-def _time(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
-    """The time stamps (m,) in s, and a note where no column gives them."""
-    if signals.time in table:
-        said = _time_unit_note(table, signals)
-        scale = signals.scales.get("time")
-        found = table.seconds(signals.time, told=scale is not None)
-        if table.is_in_seconds(signals.time) and scale is not None and scale.unit is not None:
-            return found, said  # a date is what it is, in whatever unit other logs count
-        found = _scaled(table, "time", found, signals)
-        if scale is None:
-            _check_one_clock(table, signals.time, found)
-        return found, said
-    if table.clock is None:
-        raise table.missing("time", signals.time, _taken(signals) - {signals.time})
-    step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
-    return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
-
-
-def _check_one_clock(table: LogTable, name: str, time: Array) -> None:
-    """Raise LogError where a column of time and the clocks that the file gives its channels contradict each
-    other: the rows would be of the one or of the other."""
-    differs = "holds a time beside channels whose clocks differ, so a row is not of one time"
-    what = differs if table.differing else ""
-    if table.clock is not None and len(time) > 1:
-        step, own = (float(np.median(np.diff(t))) for t in (time, table.clock))
-        if own > 0.0 and not abs(step / own - 1.0) <= _ONE_CLOCK:
-            what = f"has {step:g} s between samples where the log's own clock has {own:g} s"
-    if what:
-        remedy = f"log all channels by one clock, or, where the column is right, {in_unit(name)}"
-        raise LogError(f"{table.path} [{name}]", what, remedy)
-
-
-def _reading(table: LogTable, signals: Roles) -> clock.Reading:
-    """What tells that the time is in seconds, or what else it may be."""
-    name = signals.time
-    if name not in table or signals.scales.get("time") is not None:
-        return clock.Reading.TOLD
-    if table.is_dated(name):
-        return clock.Reading.STAMPS
-    if table.is_unsure(name):
-        return clock.Reading.UNSURE
-    said = unit_of_time(table.unit(name) or time_unit_named(name) or "")
-    return clock.Reading.TOLD if said is not None else clock.Reading.NUMBERS
-
-
-def _time_unit_note(table: LogTable, signals: Roles) -> tuple[str, ...]:
-    """What the file or the column's name says of the unit of time, where the rig names another. Raises
-    LogError where the rig names none and it is no second: minutes pass for a log of another rate."""
-    name, scale = signals.time, signals.scales.get("time")
-    given = table.unit(name) or time_unit_named(name)
-    taken = (scale.unit or "") if scale else "s"
-    if table.is_in_seconds(name):
-        kind = "spans" if table.times.get(name, False) is None else "dates or times of day"
-        what = f"{name!r} holds {kind}, which are not in {taken}, as the rig has it"
-        return () if taken in ("", "s") else (what,)
-    if given is None or given == taken or not taken:
-        return ()
-    own, other = unit_of_time(given), unit_of_time(taken)
-    if own is None or other is None or own[1] == other[1]:
-        return ()
-    if scale is not None:
-        return (f"the log gives {name!r} in {given}, time is taken as {taken}",)
-    what = f"is in {given}, and the rig takes it for seconds"
-    raise LogError(f"{table.path} [{name}]", what, in_unit(name, own[0]))
-
-
-def _taken(signals: Roles) -> set[str]:
-    """The columns that have a role."""
-    return {signals.time, signals.run or "", *signals.columns().values()}
-
-
-def _scaled(table: LogTable, role: str, values: Array, signals: Roles) -> Array:
-    """A column's values (m,) as the role's signal. Raises LogError where its unit cannot be converted."""
-    scale = signals.scales.get(role)
-    if scale is None:
-        return values
-    try:
-        return scale.applied(values, "s" if role == "time" else signals.units.get(role))
-    except ValueError as reason:
-        name = signals.time if role == "time" else signals.columns()[role]
-        remedy = f"correct it, or name the unit of {role} in [units]"
-        raise LogError(f"{table.path} [{name}]", f"cannot be converted: {reason}", remedy) from None
-
-
 def _present(table: LogTable, signals: Roles) -> tuple[dict[str, Array], tuple[str, ...]]:
     """The signals that are there, by role, and notes on those that are not, or in another unit."""
     wanted = signals.columns()
-    taken = _taken(signals)
+    taken = taken_columns(signals)
     inputs = [role for role in ("command", "pressure") if role in wanted]
     there = [role for role, name in wanted.items() if name in table]
     for role in ["output", *inputs[: 0 if any(role in there for role in inputs) else 1]]:
         if role not in there:
             raise table.missing(role, wanted[role], taken)
-    columns = {role: _scaled(table, role, table.numbers(wanted[role]), signals) for role in there}
+    columns = {role: scaled(table, role, table.numbers(wanted[role]), signals) for role in there}
     absent = [(role, name) for role, name in wanted.items() if role not in columns and role != "reference"]
     notes = [_absence(table, role, name, taken) for role, name in absent]
     return columns, (*notes, *filter(None, (_unit_note(table, role, signals) for role in columns)))
@@ -266,19 +153,11 @@ def _unit_note(table: LogTable, role: str, signals: Roles) -> str | None:
     given, own, scale = table.unit(column), signals.units.get(role), signals.scales.get(role)
     given = given or (unit_of(column) or (None, None))[1]
     taken = own if scale is None else scale.unit
-    if given is None or taken is None or given == taken or _alike(given, taken):
+    if given is None or taken is None or given == taken or alike(given, taken):
         return None
     spelled = given if known(given) else (unit_of(given) or ("", ""))[1]
     hint = f": is it {{ unit = {spelled!r} }}?" if spelled and known(taken) else ""
     return f"the log gives {column!r} in {given}, {role} is taken as {taken}{hint}"
-
-
-def _alike(given: str, taken: str) -> bool:
-    """Whether two units are the same, however they are spelled; what nobody knows is alike to nothing."""
-    if known(given) and known(taken):
-        return same(given, taken)
-    read = unit_of(given)
-    return read is not None and read == unit_of(taken)
 
 
 def _absence(table: LogTable, role: str, name: str, taken: set[str]) -> str:

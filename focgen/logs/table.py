@@ -85,7 +85,7 @@ class LogTable:
 
     def unit(self, name: str) -> str | None:
         """The unit that the file gives for a column."""
-        return self.units.get(self._own(name))
+        return self.units.get(self.own(name))
 
     def closest(self, name: str, taken: Collection[str] = ()) -> str | None:
         """The column, not one of those ``taken``, whose name is nearest to ``name``, or None where none is
@@ -159,13 +159,13 @@ class LogTable:
 
     def is_in_seconds(self, name: str) -> bool:
         """Whether a column of time is in s, whatever the rig has for other logs: of dates and spans."""
-        return self._own(name) in self.times or self.is_dated(name)
+        return self.own(name) in self.times or self.is_dated(name)
 
     def has_zone(self, name: str) -> bool | None:
         """Whether the dates of a column have a zone; None of one that holds no dates. Where it is
         not there, the same of the log's own clock."""
-        if self._own(name) in self.times:
-            return self.times[self._own(name)]
+        if self.own(name) in self.times:
+            return self.times[self.own(name)]
         if name not in self:
             return self.clock_zone
         column = self.column(name)
@@ -173,9 +173,10 @@ class LogTable:
 
     def is_unsure(self, name: str) -> bool:
         """Whether nothing in the file tells 1.200 from 1200 in a column."""
-        return self._own(name) in self.unsure
+        return self.own(name) in self.unsure
 
-    def _own(self, name: str) -> str:
+    def own(self, name: str) -> str:
+        """The name of a column in :attr:`columns`, of whichever name of it."""
         return name if name in self.columns else self.aliases.get(name, name)
 
     def numbers(self, name: str) -> Array:

@@ -17,6 +17,7 @@ from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, res
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.measures import StepMeasures, measure_step
 from focgen.control.setpoints import default_setpoints
+from focgen.control.units import check_one_unit
 from focgen.custody import sha256_of
 from focgen.errors import ControllerError, DesignError
 from focgen.loop.chain import chain
@@ -145,7 +146,8 @@ def _check_options(duration: float | None, delay: int) -> None:
 
 
 def _check_fit(rig: Rig, controller: Controller) -> None:
-    """Refuse ranges of the same signal that are orders of magnitude apart."""
+    """Refuse a signal in two units, or with ranges that are orders of magnitude apart."""
+    check_one_unit(rig, controller)
     theirs, ours = rig.ranges, controller.ranges
     pairs: list[tuple[str, Span | None, str, Span | None]] = [
         ("output", theirs.output, "measurement", ours.measurement),

@@ -20,6 +20,7 @@ from focgen.logs.columns import SIGNALS, Column, Guess, columns_of, guessed, is_
 from focgen.logs.read import Logs, each_of, tables_of
 from focgen.logs.scales import unit_of_time
 from focgen.logs.table import LogTable, stem
+from focgen.logs.together import check_one_unit
 from focgen.logs.units import time_unit_named
 from focgen.output import check_apart, write_file
 from focgen.rig.files import check_replaces_rig, read_rig
@@ -93,6 +94,7 @@ def init(
     guesses = _asked(guessed(columns), columns, ask)
     _check(tables[0], guesses, left)
     by_name = {c.name: c for c in columns}
+    check_one_unit(tables, [guess.column for guess in guesses.values()], "give those of one unit")
     roles = {role: by_name[guess.column] for role, guess in guesses.items()}
     said = [f"left out: {name!r} {why}" for name, why in left.items() if name not in (time.column, run)]
     marks = _marks(tables, [guess.column for guess in guesses.values()])

@@ -12,6 +12,7 @@ import numpy as np
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.scales import Scale
+from focgen.logs.units import unit_named
 
 UNITY = TransferFunction([(1.0, 0.0)])
 
@@ -40,6 +41,12 @@ class Signals:
         """The logged roles and their columns, without ``time`` and ``run``."""
         roles = ("command", "pressure", "curvature", "output", "reference")
         return {role: getattr(self, role) for role in roles if getattr(self, role) is not None}
+
+    def unit_of(self, role: str) -> str:
+        """The unit of a role's signal: the rig's own, else as its column's name tells it, "" where neither
+        does."""
+        named = "" if role in self.scales else unit_named(getattr(self, role))
+        return self.units.get(role) or named
 
 
 @dataclass(frozen=True)

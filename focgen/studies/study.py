@@ -14,6 +14,7 @@ from focgen.control.controller import Controller
 from focgen.control.equilibrium import derived_ranges, holding, rest
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.setpoints import default_setpoints
+from focgen.control.units import check_one_unit
 from focgen.custody import sha256_within
 from focgen.errors import ControllerError, DesignError, InputError, check_choice
 from focgen.fractional.transfer import TransferFunction
@@ -84,6 +85,8 @@ def study(
         check_choice("--target", target, TARGETS)
     grid = grid_of(which, memory, lengths, tolerances, horizon, arithmetic, sample_times)
     model, notes = _rig(rig, which, controller)
+    if model is not None:
+        check_one_unit(model, which)
     points = _setpoints(which, model, setpoints)
     if model is not None and model.effects:
         notes.append("the rig's effects are left aside: memory is studied in the loop with the nominal chain")

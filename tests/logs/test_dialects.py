@@ -471,3 +471,11 @@ def test_commands_take_a_frame_and_a_rig_as_a_dictionary(tmp_path):
     assert focgen.identify(given, frame, to=20.0, integer=False).joint.T > 0
     with pytest.raises(RigError, match="rig .*actuator"):
         read_rig({**given, "actuator": {"T": -1.0}})
+
+
+def test_the_blank_within_a_date_separates_no_columns(tmp_path):
+    """Split at blanks and tabs alike all rows are of one length, too, but not of the header's."""
+    days = [f"2026-01-31 12:00:{0.05 * k:09.6f}\t{k % 7}\t0.{k:03d}\twarm" for k in range(60)]
+    path = tmp_path / "log.csv"
+    path.write_text("\r".join(["Zeit\tWeg\tDruck\tstate", *days]), encoding="utf-8")
+    assert list(read_table(path).columns) == ["Zeit", "Weg", "Druck", "state"]

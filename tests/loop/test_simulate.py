@@ -12,7 +12,8 @@ import pytest
 
 import focgen
 from focgen.cli.main import main
-from focgen.control.controller import Source
+from focgen.control.controller import Source, Units
+from focgen.control.equilibrium import derived_ranges
 from focgen.control.files import write_controller
 from focgen.errors import ControllerError, DesignError, FocgenError, PlanError
 from focgen.fractional.transfer import TransferFunction
@@ -259,3 +260,24 @@ def test_pictures_are_the_same_every_time(steps):
 def test_a_rig_whose_gain_vanishes_at_rest_still_simulates():
     rig = replace(paper_rig(), actuator=Actuator(1.32, 0.6, (0.0, 0.35)))
     assert simulate(rig, paper_controller(), (0.01,)).setpoints[0].verdict == "settles"
+
+
+def test_a_rig_and_a_controller_in_different_units_are_refused():
+    """Ranges in bar and in psi differ by 14.5, which may be two rigs; by their units they may not."""
+    signals = replace(paper_rig().signals, units={"pressure": "psi", "command": "V", "output": "1/mm"})
+    rig = replace(paper_rig(), signals=signals)
+    units = Units("1/mm", "V", "bar")
+    for function in (simulate, lambda rig, controller: focgen.study("memory", controller, rig=rig)):
+        with pytest.raises(ControllerError, match=r"schedule: is 'bar', the rig has 'psi'"):
+            function(rig, paper_controller(units=units))
+    assert simulate(rig, paper_controller(units=replace(units, schedule="lbf/in**2")), POINTS[:1]).setpoints
+
+
+def test_a_curvature_in_another_unit_than_the_output_is_told_of_without_a_sensor():
+    """The command beside the pressure was told of; this was a controller a thousand times off."""
+    signals = replace(paper_rig().signals, curvature="k", units={"curvature": "1/m", "output": "1/mm"})
+    rig = replace(paper_rig(), signals=signals, sensor=UNITY)
+    said = derived_ranges(rig)[1]
+    assert any("a curvature in 1/m counts as an output in 1/mm" in note for note in said)
+    one = replace(signals, units={"curvature": "1/mm", "output": "1/mm"})
+    assert not any("counts as an output" in note for note in derived_ranges(replace(rig, signals=one))[1])
