@@ -55,9 +55,19 @@ def _foreseen(error: BaseException, command: str) -> FocgenError | None:
         return FocgenError(where, f"cannot be written ({why})", "make room, or write to another disk")
     if error.errno in _SCARCE:
         return FocgenError(where, f"cannot be had ({why})", "end other programs, or raise the limit (ulimit)")
+    if error.errno == errno.ENOENT and error.filename is None and not _stands_somewhere():
+        return FocgenError("the folder one stands in", "is gone", "cd to another one")
     if error.filename is not None:
         return FocgenError(where, f"cannot be used ({why})", "check the path and its rights")
     return None
+
+
+def _stands_somewhere() -> bool:
+    try:
+        os.getcwd()
+    except OSError:
+        return False
+    return True
 
 
 def _unforeseen(error: BaseException, argv: Sequence[str]) -> FocgenError:
