@@ -48,8 +48,10 @@ def _foreseen(error: BaseException, command: str) -> FocgenError | None:
         return FocgenError(command, what, "run it again, with fewer --jobs: what was kept is not done again")
     if isinstance(error, ImportError) and any(words in str(error) for words in _UNLOADED):
         return FocgenError(command, "has no memory for its libraries", "raise the limit (ulimit -v)")
-    if not isinstance(error, OSError):
-        return None
+    return _of_system(error, command) if isinstance(error, OSError) else None
+
+
+def _of_system(error: OSError, command: str) -> FocgenError | None:
     where, why = str(error.filename or command), error.strerror or type(error).__name__
     if error.errno in _FULL:
         return FocgenError(where, f"cannot be written ({why})", "make room, or write to another disk")

@@ -81,7 +81,8 @@ def check_listed(trial: Path, facts: Facts) -> None:
         number = path.parent.name
         if is_number(number) and number not in facts.commitments:
             what = "is of a case that trial.json does not name, and that no score would count"
-            raise InputError(str(path), what, f"put trial.json back, or move cases/{number} and its seal away")
+            remedy = f"put trial.json back, or move cases/{number} and its seal away"
+            raise InputError(str(path), what, remedy)
 
 
 def check_made_for(trial: Path, number: str, label: Mapping[str, Any], facts: Facts) -> None:
