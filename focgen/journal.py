@@ -11,6 +11,8 @@ came out of an archive moves nothing. The folder is known by its number on the d
 may have another one; then a file in it is known by its own number and by when it was made, which no archive
 can set: to the nanosecond, or to the second where the disk keeps no more.
 
+Whoever asks a process to end while files move (an interrupt, a shutdown) is heard once they have moved.
+
 Where a place cannot be written to, the files that have been moved by then go back: what stood there is kept
 in ``before`` until all have their places, and the plan is exchanged for the way back.
 """
@@ -27,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from focgen.custody import sha256_of
+from focgen.endings import undisturbed
 from focgen.errors import InputError
 from focgen.jsontext import fits, read_json
 from focgen.scratch import as_before, lock, own, real, synced, unlock, waited_for
@@ -82,18 +85,22 @@ def put(scratch: Path, target: Path, names: Sequence[Path], old: Iterable[Path] 
     }
     try:
         back = _way_back(scratch, target, plan)
-        whole = _committed(scratch, plan)
-        try:
-            _carry_out(whole, plan, target)
-        except OSError:
-            _write_plan(whole, back, _BACK)
-            os.replace(whole / _BACK, whole / _PLAN)
-            _carry_out(whole, back, target)
-            raise
+        with undisturbed():
+            _there_or_back(_committed(scratch, plan), plan, back, target)
     except OSError:
         for folder in reversed(made):
             with suppress(OSError):
                 folder.rmdir()
+        raise
+
+
+def _there_or_back(whole: Path, plan: dict[str, Any], back: dict[str, Any], target: Path) -> None:
+    try:
+        _carry_out(whole, plan, target)
+    except OSError:
+        _write_plan(whole, back, _BACK)
+        os.replace(whole / _BACK, whole / _PLAN)
+        _carry_out(whole, back, target)
         raise
 
 
@@ -137,14 +144,15 @@ def put_folder(scratch: Path, target: Path) -> None:
     Raises OSError where that cannot be; then what stood there stands there.
     """
     plan = {"source": FILES, "files": {}, "old": {}, "replaced": target.name}
-    whole = _committed(scratch, plan)
-    try:
-        _carry_out(whole, plan, target.parent)
-    except OSError:
-        if (whole / OLD).exists() and not target.exists():
-            os.rename(whole / OLD, target)
-        shutil.rmtree(whole, ignore_errors=True)
-        raise
+    with undisturbed():
+        whole = _committed(scratch, plan)
+        try:
+            _carry_out(whole, plan, target.parent)
+        except OSError:
+            if (whole / OLD).exists() and not target.exists():
+                os.rename(whole / OLD, target)
+            shutil.rmtree(whole, ignore_errors=True)
+            raise
 
 
 def _committed(scratch: Path, plan: dict[str, Any]) -> Path:

@@ -18,6 +18,9 @@ from pathlib import Path
 from focgen.scratch import temporary_folder
 
 _PLACES = ("TMPDIR", "TEMP", "TMP")  # where programs look for the temporary folder
+_LISTS = (  # of folders, in which an empty one stands for the current folder, and a relative one lies in it
+    "CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "LD_LIBRARY_PATH", "LD_RUN_PATH",
+)  # fmt: skip
 _GRACE = 2.0  # s until all of a group that was ended are gone
 
 
@@ -34,7 +37,8 @@ def ran(
     that it began.
     """
     with temporary_folder() as place:
-        own = {**(os.environ if env is None else env), **dict.fromkeys(_PLACES, str(place))}
+        given = os.environ if env is None else env
+        own = {**_elsewhere(given), **dict.fromkeys(_PLACES, str(place))}
         with subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
@@ -53,6 +57,14 @@ def ran(
         if begun.returncode and os.strerror(errno.ENOSPC) in said[1]:  # no fault of what it was given
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), tempfile.gettempdir())
         return subprocess.CompletedProcess(list(command), begun.returncode, *said)
+
+
+def _elsewhere(given: Mapping[str, str]) -> dict[str, str]:
+    """An environment in which no list of folders names the current one: it may be a stranger's, and
+    ``export CPATH=$CPATH:/opt/include`` names it where CPATH was empty."""
+    lists = {name: given[name].split(os.pathsep) for name in _LISTS if name in given}
+    kept = {name: os.pathsep.join(filter(os.path.isabs, folders)) for name, folders in lists.items()}
+    return {name: text for name, text in {**given, **kept}.items() if text or name not in lists}
 
 
 def _end(begun: subprocess.Popen[str]) -> None:

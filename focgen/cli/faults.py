@@ -48,16 +48,28 @@ def _foreseen(error: BaseException, command: str) -> FocgenError | None:
         return FocgenError(command, what, "run it again, with fewer --jobs: what was kept is not done again")
     if isinstance(error, ImportError) and any(words in str(error) for words in _UNLOADED):
         return FocgenError(command, "has no memory for its libraries", "raise the limit (ulimit -v)")
-    if not isinstance(error, OSError):
-        return None
+    return _of_system(error, command) if isinstance(error, OSError) else None
+
+
+def _of_system(error: OSError, command: str) -> FocgenError | None:
     where, why = str(error.filename or command), error.strerror or type(error).__name__
     if error.errno in _FULL:
         return FocgenError(where, f"cannot be written ({why})", "make room, or write to another disk")
     if error.errno in _SCARCE:
         return FocgenError(where, f"cannot be had ({why})", "end other programs, or raise the limit (ulimit)")
+    if error.errno == errno.ENOENT and error.filename is None and not _stands_somewhere():
+        return FocgenError("the folder one stands in", "is gone", "cd to another one")
     if error.filename is not None:
         return FocgenError(where, f"cannot be used ({why})", "check the path and its rights")
     return None
+
+
+def _stands_somewhere() -> bool:
+    try:
+        os.getcwd()
+    except OSError:
+        return False
+    return True
 
 
 def _unforeseen(error: BaseException, argv: Sequence[str]) -> FocgenError:

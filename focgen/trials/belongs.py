@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from focgen.diagnosis.write import PICTURES
 from focgen.errors import InputError
 from focgen.scratch import real
 from focgen.textfile import LARGEST_JSON, LARGEST_LOG
-from focgen.trials.facts import outcome_in
+from focgen.trials.facts import Facts, is_number, outcome_in
 
 _JUDGED = ("diagnosis.json", "refitted.toml", "augmented.toml", "next_experiment.csv")
 _KEPT = (*_JUDGED, FILE, *PICTURES, "outcome.json", "achieved.json")
@@ -71,6 +72,26 @@ def copy_case(case: Path, to: Path) -> None:
         place = to / path.relative_to(case)
         place.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, place)
+
+
+def check_listed(trial: Path, facts: Facts) -> None:
+    """Raise InputError where a sealed case lies in a trial whose list does not name it: a table of the others
+    would pass for one of the trial."""
+    for path in sorted((trial / "sealed").glob("*/label.json")):
+        number = path.parent.name
+        if is_number(number) and number not in facts.commitments:
+            what = "is of a case that trial.json does not name, and that no score would count"
+            remedy = f"put trial.json back, or move cases/{number} and its seal away"
+            raise InputError(str(path), what, remedy)
+
+
+def check_made_for(trial: Path, number: str, label: Mapping[str, Any], facts: Facts) -> None:
+    """Raise InputError where the label of a case says that it was made for another suite, or with other
+    signals, than its trial does: each has rows and targets of its own."""
+    for key, said in (("suite", facts.suite), ("signals", facts.signals)):
+        if label.get(key, said) != said:
+            what = f"says {key} {said!r}, and the label of case {number} says {str(label[key])[:20]!r}"
+            raise InputError(str(trial / "trial.json"), what, "put back the one the cases were made with")
 
 
 def check_only_results(trial: Path, kind: str, number: str, depth: int = 1) -> None:

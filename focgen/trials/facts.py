@@ -81,6 +81,11 @@ def facts_of(folder: Path) -> Facts:
     return facts
 
 
+def is_number(name: str) -> bool:
+    """Whether a case may be called so."""
+    return fits(name, _NUMBER)
+
+
 def sealed_label(path: Path) -> tuple[str, dict[str, Any]]:
     """Salt and label of a sealed case. Raises InputError where the file holds none."""
     found = read_json(path, _ANEW)

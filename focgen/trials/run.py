@@ -28,7 +28,7 @@ from focgen.scratch import real, temporary_folder
 from focgen.textfile import LARGEST_LOG
 from focgen.trials.belongs import case_digest, check_only_results, copy_case, files_of_case, is_of, mark
 from focgen.trials.facts import facts_of, outcome_in
-from focgen.trials.worker import ENDED, NO_ROOM
+from focgen.trials.worker import BEGUN_BY, ENDED, NO_ROOM
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
@@ -205,7 +205,7 @@ def blind_diagnosis(blind: Path, out: Path, limit: float, effects: tuple[str, ..
 def _process(blind: Path, out: Path, limit: float, effects: tuple[str, ...]) -> str:
     command = python("-m", "focgen.trials.worker", str(blind), str(out), *effects)
     until = time.monotonic() + limit
-    null, own = subprocess.DEVNULL, environment(**_ONE_THREAD)
+    null, own = subprocess.DEVNULL, environment(**_ONE_THREAD, **{BEGUN_BY: str(os.getpid())})
     # a session of its own: an interrupt is this process's to tell of, not a fault of the case
     with subprocess.Popen(
         command, stdin=null, stdout=null, stderr=null, env=own, start_new_session=True

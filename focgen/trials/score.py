@@ -21,7 +21,7 @@ from focgen.replaced import check_own
 from focgen.shown import Shown
 from focgen.textfile import LARGEST_SETTING, read_regular
 from focgen.trials import achieved, baselines
-from focgen.trials.belongs import result_digest
+from focgen.trials.belongs import check_listed, check_made_for, result_digest
 from focgen.trials.facts import Facts, achieved_in, diagnosis_in, facts_of, kept_achieved, outcome_in
 from focgen.trials.judging import Judged, forgone, judge
 from focgen.trials.proposed import ask, resolved
@@ -97,9 +97,10 @@ def _scored(folder: Path, asked: tuple[bool, bool], baseline: bool, partial: boo
     check_own([folder / "scores.json"])
     check_writable(folder / "scores.json")
     _check_results(folder, facts)
+    check_listed(folder, facts)
     labels = {
-        number: _unsealed(folder, number, committed)
-        for number, committed in facts.commitments.items()
+        number: _unsealed(folder, number, facts)
+        for number in facts.commitments
         if not partial or ran(folder / "runs" / number)
     }
     oracle, proposals = asked
@@ -152,13 +153,16 @@ def _check_readable(run: Path) -> None:
             raise InputError(str(path), "cannot be read (Permission denied)", "check its rights")
 
 
-def _unsealed(folder: Path, number: str, committed: str) -> dict[str, Any]:
+def _unsealed(folder: Path, number: str, facts: Facts) -> dict[str, Any]:
+    committed = facts.commitments[number]
     if _carried(folder / "cases" / number / "commitment.txt") != committed:
         raise InputError(
             str(folder / "cases" / number), "carries another commitment than the trial", "make the cases anew"
         )
     sealed = folder / "sealed" / number
-    return unseal(sealed / "label.json", committed, sealed / "unseen", folder / "cases" / number)
+    label = unseal(sealed / "label.json", committed, sealed / "unseen", folder / "cases" / number)
+    check_made_for(folder, number, label, facts)
+    return label
 
 
 def _carried(path: Path) -> str:

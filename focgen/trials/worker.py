@@ -24,6 +24,9 @@ NO_ROOM = 75
 """The status of a process that the machine had no room or no files for: that is no fault of its case."""
 ENDED = 76
 """The status of a process that was asked to end: that is no fault of its case either."""
+BEGUN_BY = "FOCGEN_BEGUN_BY"
+"""The variable with the number of the process that waits: asked for by the worker itself, once it has
+imported what it needs, it would be another's where that one is gone by then."""
 _GRACE = 5.0  # s to end in order
 _LACKING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE)
 
@@ -75,6 +78,12 @@ def _status_of(case: Path, out: Path, effects: tuple[str, ...]) -> int:
     return 0
 
 
+def _waiting() -> int:
+    """The number of the process that waits for this one."""
+    said = os.environ.get(BEGUN_BY, "")
+    return int(said) if said.isdecimal() else os.getppid()
+
+
 def _end_with(parent: int) -> None:
     """Not to go on when nobody waits any more."""
     while os.getppid() == parent:
@@ -92,5 +101,5 @@ def _end(number: int, _: object) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, _end)
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_end_with, args=(_waiting(),), daemon=True).start()
     sys.exit(_status_of(Path(sys.argv[1]), Path(sys.argv[2]), tuple(sys.argv[3:])))

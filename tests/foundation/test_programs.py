@@ -6,6 +6,7 @@ Red when an interrupt, a limit of time or a kill leaves a process, or a file in 
 import errno
 import os
 import re
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -154,3 +155,28 @@ def test_there_is_no_other_way_to_run_one_or_to_make_a_folder():
         for call in re.findall(r"subprocess\.(run|Popen|call|check_\w+)\(", text):
             assert ALONE.get(path.name) == call, path
         assert "TemporaryDirectory(" not in text and "mkdtemp(" not in text, path
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="other compilers have other lists of folders")
+@pytest.mark.parametrize("name", ("CPATH", "C_INCLUDE_PATH"))
+@pytest.mark.parametrize("value", (f"{os.pathsep}/opt/include", f"/opt/include{os.pathsep}", ".", "here"))
+def test_a_list_of_folders_does_not_name_the_one_that_one_stands_in(tmp_path, monkeypatch, name, value):
+    """As ``export CPATH=$CPATH:/opt/include`` does: a stranger's header was compiled, and run as verified."""
+    (tmp_path / "here").mkdir()
+    for folder in (tmp_path, tmp_path / "here"):
+        (folder / "stdint.h").write_text("#error a stranger's\n")
+    (tmp_path / "a.c").write_text("#include <stdint.h>\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(name, value)
+    assert programs.ran(["gcc", "-c", str(tmp_path / "a.c"), "-o", str(tmp_path / "a.o")]).returncode == 0
+
+
+def test_programs_of_the_folder_one_stands_in_take_no_part(tmp_path, monkeypatch):
+    """What is named as a whole path stays."""
+    parts = ("", "/opt/a", "b", "/opt/c")
+    for name in programs._LISTS:
+        monkeypatch.setenv(name, os.pathsep.join(parts))
+    monkeypatch.setenv("COMPILER_PATH", ".")
+    said = programs.ran([*python("-c", "import os; print(dict(os.environ))")]).stdout
+    assert said.count(f"/opt/a{os.pathsep}/opt/c'") == len(programs._LISTS) - 1
+    assert "COMPILER_PATH" not in said

@@ -306,3 +306,25 @@ def raising(fault: Exception):
         raise fault
 
     return call
+
+
+@pytest.mark.parametrize("key, other", (("signals", "C"), ("suite", "full")))
+def test_a_trial_that_says_it_is_another_is_not_scored(trial, capsys, key, other):
+    """The table had that one's rows and targets. Every sealed label says what it was made for."""
+    facts = json.loads((trial / "trial.json").read_text())
+    (trial / "trial.json").write_text(json.dumps({**facts, key: other}))
+    assert scored(trial) == 2
+    assert f"says {key} {other!r}, and the label of case 0001 says" in capsys.readouterr().err
+
+
+def test_a_case_that_was_taken_off_the_list_is_told(trial, capsys):
+    """A table of the others passed for one of the trial."""
+    facts = json.loads((trial / "trial.json").read_text())
+    del facts["commitments"]["0002"]
+    (trial / "trial.json").write_text(json.dumps(facts))
+    assert scored(trial) == 2
+    said = capsys.readouterr().err
+    assert "sealed/0002/label.json: is of a case that trial.json does not name" in said
+    for folder in ("sealed", "cases"):
+        shutil.rmtree(trial / folder / "0002")
+    assert scored(trial) in (0, 1)

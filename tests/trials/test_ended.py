@@ -16,6 +16,7 @@ import pytest
 
 import focgen
 from focgen.children import environment, python
+from focgen.trials.worker import BEGUN_BY, ENDED
 
 posix = pytest.mark.skipif(not hasattr(os, "killpg"), reason="the system has no groups of processes")
 
@@ -84,7 +85,17 @@ def test_a_killed_trial_leaves_no_process(made):
     assert of_the_trial(made), "none had begun"
     process.kill()
     process.communicate()
-    end = time.monotonic() + 5.0
+    end = time.monotonic() + 8.0  # it looks once a second, and has 5 s to end in order
     while of_the_trial(made) and time.monotonic() < end:
         time.sleep(0.1)
     assert not of_the_trial(made)
+
+
+@posix
+def test_a_diagnosis_whose_trial_was_gone_before_it_began_ends(made):
+    """It asked who waits for it when nobody did any more, and went on to its end."""
+    gone = subprocess.Popen(["true"])
+    gone.wait()
+    command = python("-m", "focgen.trials.worker", str(made / "t/cases/0001"), str(made / "out"))
+    done = subprocess.run(command, env=environment(**{BEGUN_BY: str(gone.pid)}), timeout=60.0)
+    assert done.returncode == ENDED and not (made / "out").exists()

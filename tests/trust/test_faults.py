@@ -108,6 +108,17 @@ def test_what_a_machine_runs_out_of_is_foreseen(scratch, monkeypatch, capsys, er
     assert said in line(capsys) and not list(scratch.iterdir())
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a folder that one stands in stays")
+def test_a_folder_that_is_gone_is_no_fault(scratch, monkeypatch, capsys, tmp_path):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(FileNotFoundError) as found:
+        Path("x.png").absolute()
+    assert raising(monkeypatch, found.value) == 2
+    assert "the folder one stands in: is gone; cd to another one" in line(capsys)
+
+
 def run(shell: str) -> subprocess.CompletedProcess:
     program = f"{sys.executable} -m focgen generate {EXAMPLES / 'controller.toml'} --length 5 --json --out"
     return subprocess.run(shell.replace("FOCGEN", program), shell=True, capture_output=True, text=True)

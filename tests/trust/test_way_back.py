@@ -5,10 +5,13 @@ Red when a folder is left with files of two results, or when nothing is written 
 
 import errno
 import os
+import signal
+from pathlib import Path
 
 import pytest
 
 from focgen import journal, output
+from focgen.cli.faults import Ended, ending_in_order
 from focgen.errors import InputError
 from tests.trust.test_lost import AFTER, BEFORE, content
 
@@ -93,3 +96,50 @@ def test_a_plan_that_cannot_be_read_back_is_no_success(tmp_path, monkeypatch):
     monkeypatch.setattr(journal, "_plan", lambda whole: None)
     output.write_files(tmp_path, {"a": "1"})
     assert content(tmp_path) == {"a": b"1"}
+
+
+ASKED = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+def moves(folder: Path, number: int, kind: str, times: int = 1) -> Ended | KeyboardInterrupt | None:
+    """Write a new result, and be asked to end as the first file has its place; what that ends with."""
+    steps, real = [], getattr(os, kind)
+
+    def asked(*arguments, **options):
+        done = real(*arguments, **options)
+        if str(arguments[-1]).endswith(("a", ".whole")) and ".part" not in str(arguments[-1]):
+            steps.append(arguments)
+            for _ in range(times if len(steps) == 1 else 0):
+                signal.raise_signal(number)
+        return done
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(os, kind, asked)
+        try:
+            with ending_in_order():
+                output.write_files(folder, {n: t for n, t in AFTER.items() if n != "mine"})
+        except (Ended, KeyboardInterrupt) as ended:
+            return ended
+    return None
+
+
+@pytest.mark.parametrize("kind", ("rename", "replace"))
+@pytest.mark.parametrize("number", ASKED)
+def test_who_is_asked_to_end_as_files_move_ends_behind_that(tmp_path, number, kind):
+    """An interrupt of the terminal, or a shutdown: the folder had files of two results, until a next run."""
+    before = signal.getsignal(number)
+    output.write_files(tmp_path, {n: t for n, t in BEFORE.items() if n != "mine"})
+    assert moves(tmp_path, number, kind) is not None
+    assert {n: t for n, t in content(tmp_path).items() if n in AFTER} == {
+        n: t for n, t in AFTER.items() if n != "mine"
+    }
+    assert not list(tmp_path.glob(".focgen-*")) and signal.getsignal(number) == before
+
+
+def test_who_is_asked_twice_ends_at_once(tmp_path):
+    """A disk may hang. The next run finishes what is left."""
+    output.write_files(tmp_path, {n: t for n, t in BEFORE.items() if n != "mine"})
+    assert moves(tmp_path, signal.SIGINT, "replace", times=2) is not None
+    assert list(tmp_path.glob(".focgen-*.whole"))
+    journal.finish(tmp_path)
+    assert not list(tmp_path.glob(".focgen-*"))
