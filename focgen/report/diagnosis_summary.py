@@ -62,7 +62,7 @@ def _cause(cause: Found) -> str:
         rivals += "; likelier it is something else, as the notes say"
     return (
         f"{best.effect} in the {cause.stage}{size}, {best.confidence:.0%} confident, "
-        f"{cause.shrink:.0%} of {whole}{rivals}."
+        f"{max(cause.shrink, 0.0):.0%} of {whole}{rivals}."
     )
 
 
@@ -120,6 +120,8 @@ def _how_far(found: Diagnosis, units: Mapping[str, str]) -> str:
     if found.shrink is None or found.shrink_interval is None:
         return text
     low, high = found.shrink_interval
+    if found.shrink <= 0.0:
+        return f"{text} On new experiments it brings the output no closer ({low:.0%} to {high:.0%})."
     share = f"{found.shrink:.0%} ({low:.0%} to {high:.0%})"
     return f"{text} For new experiments {share} of what can be explained will go."
 

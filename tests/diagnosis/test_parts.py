@@ -230,6 +230,13 @@ def test_levels_that_are_only_passed_are_not_repeated():
     assert (highest_first.repeats, highest_first.revisits) == (2, 0)
 
 
+def test_a_promise_stands_within_its_interval_however_much_worse_the_output_is():
+    """What was found in a pressure may bring the output no closer; a promise of -104 % stood below -100 %."""
+    found = predict(np.full(5, 1.2), np.full(5, 1.6), np.full(5, 1.7), 1.0)
+    low, high = found.interval
+    assert -1.0 <= low <= found.value <= high < 0.0
+
+
 def test_what_fits_lose_on_parts_they_did_not_see_is_not_promised():
     gap, left = np.full(5, 20.0), np.full(5, 1.1)
     sure, unsure = (predict(gap, left, blind, 1.0) for blind in (left, np.full(5, 3.0)))

@@ -44,6 +44,15 @@ def test_where_which_with_its_size_how_far_and_what_next():
     assert "focgen replay augmented.toml LOG" in text and "note: a note" in text and "nearest" not in text
 
 
+def test_what_brings_the_output_no_closer_is_said_to():
+    cause = replace(FOUND.causes[0], shrink=-0.9)
+    text = diagnosis_text(
+        replace(FOUND, causes=(cause,), shrink=-0.9, shrink_interval=(-1.0, -0.6)), UNITS, "gap"
+    )
+    assert "0% of the gap" in text and "-90%" not in text
+    assert "On new experiments it brings the output no closer (-100% to -60%)." in text
+
+
 def test_what_nothing_explains_is_said_with_the_nearest_family_once():
     left = {
         "command to pressure": {"depends_on": ["level"], "low_frequency": True},

@@ -48,7 +48,8 @@ def predict(
     value -= min(lost, _LOST) + _FITTED * noise
     wide = _FORM + _LOUD * noise + _REST * (1.0 - value) + _DOUBTED * min(lost, _LOST_IN_DOUBT)
     low, high = min(low, value - wide - _AHEAD * drifts), max(high, value + 0.5 * wide)
-    return Improvement(value, (float(max(low, -1.0)), float(min(high, _MOST))))
+    low, value, high = (float(np.clip(v, -1.0, _MOST)) for v in (low, value, high))
+    return Improvement(value, (low, high))
 
 
 def _share(refitted: np.ndarray, explained: np.ndarray, floor: float) -> float:

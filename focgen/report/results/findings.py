@@ -43,7 +43,7 @@ def _diagnosed(found: Diagnosis) -> str:
         for cause in found.causes
     )
     gap, unit = found.gap, f" {found.gap.unit}".rstrip()
-    far = "" if found.shrink is None else f", {found.shrink:.0%} of what can be explained will go"
+    far = "" if found.shrink is None else f", {max(found.shrink, 0.0):.0%} of what can be explained will go"
     where = f" in the {found.where.stage}" if found.where.stage else ""
     told = f"{found.verdict}{where}{': ' if causes else ''}{causes}"
     return f"{told}, off by {gap.as_given:.3g}{unit}{far}"
