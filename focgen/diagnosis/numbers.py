@@ -204,7 +204,8 @@ class Numbers:
     )
     vain: float = _number(
         0.2,
-        "promised part of a gap: effects that close less do not cause it",
+        "promised part of a gap: effects that close less do not cause it; "
+        "noise in a gap that is no noise, though nothing was found",
         "of the gap",
         "tuning cases",
         _SAME,

@@ -279,6 +279,14 @@ def test_of_a_gap_little_above_the_noise_little_can_be_promised(noise, in_vain):
     assert told.in_vain == in_vain
 
 
+@pytest.mark.parametrize("noise, causes, is_there", [(0.4, [], True), (0.5, [], False), (0.4, ["one"], False)])
+def test_a_path_that_is_off_by_far_more_than_noise_is_not_the_rigs_own_numbers(noise, causes, is_there):
+    """Gusts on a rig that integrates are gone from its errors at their pace, and the path keeps them."""
+    squares = {"explained": np.array([1.2, 0.8])}
+    told = conclude._Summary(None, causes, {}, squares, noise**2, None)
+    assert conclude._unaccounted(told) == is_there
+
+
 def test_told_the_effect_it_considers_nothing_else():
     found = diagnose(RIG, session(11, vent=0.8), only=("sensor_lag", "valve_asymmetry"))
     assert {c.effect for f in found.causes for c in f.candidates} <= {"sensor_lag", "valve_asymmetry"}

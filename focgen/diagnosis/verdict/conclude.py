@@ -50,6 +50,8 @@ def conclude(
     if summary.in_vain and not granted and (vain := _in_vain(summary)):
         unknown += vain
         summary = _summary(rig, logs, rigs, explanations, unknown)
+    if not granted and not unknown and _unaccounted(summary):
+        unknown += explanations[-1:]
     at_odds = [] if granted else _at_odds(summary)
     if at_odds:
         unknown += at_odds
@@ -128,6 +130,13 @@ def _summary(
     held = [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
     total = promised(rig, logs, held, squares, floor) if causes else None
     return _Summary(rigs, causes, made, squares, floor, total)
+
+
+def _unaccounted(summary: _Summary) -> bool:
+    """Whether nothing was found, and yet the output is off by far more than noise. Where errors add up, or a
+    signal was measured in between, no segment need show it: gusts in a path are gone from its own errors at
+    their pace."""
+    return not summary.causes and summary.floor < NUMBERS.vain * float(np.mean(summary.squares["explained"]))
 
 
 def _in_vain(summary: _Summary) -> list[Explanation]:
