@@ -250,6 +250,17 @@ def test_what_is_clear_in_one_segment_stands_whatever_is_left_in_another(share, 
     assert named(found) == causes
 
 
+def test_what_was_fitted_beside_an_effect_goes_with_it():
+    """An actuator's numbers beside a zone that is left out brought the output further off than no effect."""
+    logs = [log.between(0.0, 40.0) for log in session(11, vent=0.8, zone=0.045)]
+    found = explain_all(RIG, logs, NUMBERS.nats, ["valve_asymmetry", "dead_zone"])
+    rigs, zoned = compose.compose(RIG, found, logs), found[1]
+    assert [c.rivals[0].effect for c in zoned.causes] == ["dead_zone"]
+    told = conclude._summary(RIG, logs, rigs, found, [zoned])
+    assert told.rigs.fitted.actuator == told.rigs.refitted.actuator != rigs.fitted.actuator
+    assert np.mean(told.squares["explained"]) < np.mean(told.squares["refitted"])
+
+
 def test_effects_close_their_own_gap_on_parts_not_seen():
     logs = [log.between(0.0, 40.0) for log in session(11, vent=0.8)]
     first, *_ = explain_all(RIG, logs, NUMBERS.nats, ["valve_asymmetry"])

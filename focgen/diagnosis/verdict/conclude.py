@@ -46,7 +46,7 @@ def conclude(
     """The rigs that the verdict stands for, the diagnosis without a next experiment, and what it rests on.
     ``granted``: the effects are there, however little they explain."""
     unknown = [e for e in explanations if is_unknown(e)]
-    summary = _summary(rig, logs, rigs, explanations, [*unknown, *_no_closer(rigs, logs, explanations[-1])])
+    summary = _summary(rig, logs, rigs, explanations, [*unknown, *_no_closer(rig, logs, rigs, explanations)])
     if summary.in_vain and not granted and (vain := _in_vain(summary)):
         unknown += vain
         summary = _summary(rig, logs, rigs, explanations, unknown)
@@ -117,9 +117,9 @@ def _summary(
     explanations: Sequence[Explanation],
     left_out: Sequence[Explanation],
 ) -> _Summary:
-    causes = [(e, c) for e in explanations for c in e.causes]
-    rigs = _without(rigs, causes, left_out) if left_out else rigs
-    causes = [(e, c) for e, c in causes if e not in left_out]
+    held = _held(explanations, left_out)
+    rigs = compose.compose(rig, held, logs) if left_out else rigs
+    causes = [(e, c) for e in explanations for c in e.causes if e not in left_out]
     made = {
         "as given": compose.simulated(rig, (), logs),
         "refitted": compose.simulated(rigs.refitted, (), logs),
@@ -127,7 +127,6 @@ def _summary(
     }
     squares = {name: compose.squares(logs, m) for name, m in made.items()}
     floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
-    held = [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
     total = promised(rig, logs, held, squares, floor) if causes else None
     return _Summary(rigs, causes, made, squares, floor, total)
 
@@ -165,15 +164,23 @@ def _at_odds(summary: _Summary) -> list[Explanation]:
     return explained if no_gap and above else []
 
 
-def _no_closer(rigs: compose.Rigs, logs: Sequence[Experiment], last: Explanation) -> list[Explanation]:
+def _no_closer(
+    rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations: Sequence[Explanation]
+) -> list[Explanation]:
     """The last segment, where its effects fit its measured input but bring the whole chain's output no
     closer: what they mend is that input. A rounding leaves more, by nature."""
+    last = explanations[-1]
     if not last.causes or is_rounded(last):
         return []
-    without = _without(rigs, [(last, c) for c in last.causes], [last])
+    without = compose.compose(rig, _held(explanations, [last]), logs)
     both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
     found, bare = (compose.mean_square(logs, made) for made in both)
     return [last] if found > bare else []
+
+
+def _held(explanations: Sequence[Explanation], left_out: Sequence[Explanation]) -> list[Explanation]:
+    """The explanations, those that are left out without their effects and what was fitted beside them."""
+    return [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
 
 
 def _plain_fits(explanations: Sequence[Explanation]) -> tuple[PlainFit, ...]:
@@ -205,14 +212,6 @@ def _departing(controller: ControllerCheck | None) -> dict[str, object]:
 def _suspected(d: Departure, confidence: float) -> Candidate:
     parameters = {d.parameter: Estimate(d.value, (d.value, d.value), d.unit)}
     return Candidate(d.effect, confidence, "running", parameters, 0.0)
-
-
-def _without(
-    rigs: compose.Rigs, causes: Sequence[tuple[Explanation, Cause]], unknown: Sequence[Explanation]
-) -> compose.Rigs:
-    lost = {(c.rivals[0].effect, c.rivals[0].stage) for e, c in causes if e in unknown}
-    kept = tuple(p for p in rigs.placed if (p.effect, p.stage) not in lost)
-    return compose.Rigs(rigs.refitted, rigs.fitted if kept else rigs.refitted, kept)
 
 
 def _word(found: Sequence[Found], unknown: Sequence[Explanation], explanations: Sequence[Explanation]) -> str:
