@@ -205,7 +205,7 @@ class Numbers:
     vain: float = _number(
         0.2,
         "promised part of a gap: effects that close less do not cause it; "
-        "noise in a gap that is no noise, though nothing was found",
+        "noise in the path of a rig that integrates, though nothing was found, that has another cause",
         "of the gap",
         "tuning cases",
         _SAME,

@@ -196,8 +196,9 @@ def test_what_brings_the_whole_output_no_closer_is_not_named():
     (found,) = rigs.placed
     turned = replace(found, values=(-found.values[0], *found.values[1:]))
     assert found.values[0] > 0
-    assert conclude._no_closer(rigs, logs, explanations[-1]) == []
-    assert conclude._no_closer(replace(rigs, placed=(turned,)), logs, explanations[-1]) == [explanations[-1]]
+    assert conclude._no_closer(RIG, logs, rigs, explanations) == []
+    worse = replace(rigs, placed=(turned,))
+    assert conclude._no_closer(RIG, logs, worse, explanations) == [explanations[-1]]
 
 
 def test_noise_that_stays_in_an_input_is_known_behind_a_stage_that_hums(monkeypatch):
@@ -290,7 +291,9 @@ def test_of_a_gap_little_above_the_noise_little_can_be_promised(noise, in_vain):
     assert told.in_vain == in_vain
 
 
-@pytest.mark.parametrize("noise, causes, is_there", [(0.4, [], True), (0.5, [], False), (0.4, ["one"], False)])
+@pytest.mark.parametrize(
+    "noise, causes, is_there", [(0.4, [], True), (0.5, [], False), (0.4, ["one"], False)]
+)
 def test_a_path_that_is_off_by_far_more_than_noise_is_not_the_rigs_own_numbers(noise, causes, is_there):
     """Gusts on a rig that integrates are gone from its errors at their pace, and the path keeps them."""
     squares = {"explained": np.array([1.2, 0.8])}

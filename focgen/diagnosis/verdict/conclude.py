@@ -50,7 +50,7 @@ def conclude(
     if summary.in_vain and not granted and (vain := _in_vain(summary)):
         unknown += vain
         summary = _summary(rig, logs, rigs, explanations, unknown)
-    if not granted and not unknown and _unaccounted(summary):
+    if not granted and not unknown and explanations[-1].segment.pace and _unaccounted(summary):
         unknown += explanations[-1:]
     at_odds = [] if granted else _at_odds(summary)
     if at_odds:
@@ -132,9 +132,8 @@ def _summary(
 
 
 def _unaccounted(summary: _Summary) -> bool:
-    """Whether nothing was found, and yet the output is off by far more than noise. Where errors add up, or a
-    signal was measured in between, no segment need show it: gusts in a path are gone from its own errors at
-    their pace."""
+    """Whether nothing was found, and yet the output is off by far more than noise. Where errors add up, no
+    segment need show it: gusts in a path are gone from its own errors at their pace."""
     return not summary.causes and summary.floor < NUMBERS.vain * float(np.mean(summary.squares["explained"]))
 
 
