@@ -17,6 +17,8 @@ SIZES = {  # what one of each unit is, in the first of its kind
 """The kinds of unit that tell a role, and that are taken for one another."""
 _OTHERS = frozenset("mm cm m um N mN kN Nm s ms Hz rpm K C pct".split())  # these tell no role
 _SPELLED = {"permm": "1/mm", "percm": "1/cm", "perm": "1/m", "1pm": "1/m", "1pmm": "1/mm", "hpa": "mbar"}
+_TURNS = frozenset("rad deg mm cm m um".split())  # a second behind one of these is one below it
+_FORCES = frozenset("mN N kN".split())  # a metre behind one of these is beside it or below it
 _TIMES = frozenset("ns us µs μs ms msec s sec secs seconds min mins minutes h hr hrs hours day days".split())
 _ALONE = frozenset("s h min day".split())  # names of other things as well
 TIME_WORDS = frozenset("t time zeit timestamp stamp clock sec seconds secs ms tiempo temps x".split())
@@ -34,8 +36,12 @@ def unit_of(text: str) -> tuple[str, str] | None:
 
     >>> unit_of("p_kPa"), unit_of("kappa_cam_per_mm"), unit_of("angle"), unit_of("p_A")
     (('pressure', 'kPa'), ('curvature', '1/mm'), None, None)
+    >>> unit_of("stiffness_N_per_mm"), unit_of("N_per_mm")
+    (None, ('curvature', '1/mm'))
     """
     if _is_letter(text):
+        return None
+    if _of_two(text) is not None:
         return None
     words = re.sub(r"_?per_?", "_per", text.replace("1/", "_per")).strip("]) ").split("_")
     last = re.split(r"[\s\[(]+", words[-1])[-1]
@@ -55,6 +61,20 @@ def _is_letter(column: str) -> bool:
     if last == "A" and words:
         return bare.isdisjoint(_CURRENTS)
     return not bare.isdisjoint(_LETTERS.get(last, frozenset()))
+
+
+def _of_two(column: str) -> str | None:
+    """The unit of two that a name ends in, "" where it may be their product as well as their ratio, None
+    where it ends in no two."""
+    *name, over, under = re.sub(r"_per_", "_/", column).split("_") if column.count("_") > 1 else ("", "")
+    known = {unit for sizes in SIZES.values() for unit in sizes} | _OTHERS
+    if not name or over not in known or under.removeprefix("/") not in known:
+        return None
+    if under.startswith("/"):
+        return over + under
+    if under == "s":
+        return f"{over}/s" if over in _TURNS else ""
+    return "" if over in _FORCES and under in _TURNS else None
 
 
 def time_unit_named(column: str) -> str | None:
@@ -98,7 +118,11 @@ def unit_named(column: str | None) -> str:
 
     >>> unit_named("p_kPa"), unit_named("rate_per_s"), unit_named("force_N"), unit_named("N")
     ('kPa', '1/s', 'N', '')
+    >>> unit_named("omega_rad_s"), unit_named("stiffness_N_per_mm"), unit_named("torque_N_m")
+    ('rad/s', 'N/mm', '')
     """
+    if (both := _of_two(column or "")) is not None:
+        return both
     known = unit_of(column or "")
     if known:
         return known[1]

@@ -231,6 +231,22 @@ def test_one_table_names_the_unit_of_any_column():
     assert found == ["kPa", "V", "1/mm", "1/s", "kN", "", "", "", ""]
 
 
+def test_a_name_that_ends_in_two_units_has_both_or_none():
+    """A motor's omega_rad_s was in seconds, in the diagnosis, the pictures and the C."""
+    names = (
+        "omega_rad_s",
+        "omega_rad_per_s",
+        "v_mm_s",
+        "k_N_per_mm",
+        "torque_N_m",
+        "slew_V_s",
+        "kappa_cam_per_mm",
+    )
+    assert [unit_named(n) for n in names] == ["rad/s", "rad/s", "mm/s", "N/mm", "", "", "1/mm"]
+    assert unit_of("k_N_per_mm") is None  # no curvature
+    assert [unit_named(n) for n in ("p_1_bar", "p_A_bar", "m_s")] == ["bar", "bar", "s"]
+
+
 def test_what_is_beyond_doubt_is_refused_with_the_likely_unit(tmp_path):
     with pytest.raises(LogError, match="pressure reaches 150 .*mbar instead of bar"):
         read_columns(tmp_path, table(p_bar=1e3 * table()["p_bar"]), limits=LIMITS)
