@@ -6,11 +6,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from focgen.arrays import Array, Ints
+from focgen.arrays import Array, Bools, Ints
 from focgen.logs.clipped import end_of_range
 from focgen.logs.clock import HELD, between
 from focgen.logs.notes import Note
-from focgen.logs.outliers import barred_by, outliers, stand_in, straightened
+from focgen.logs.outliers import (
+    barred_by,
+    first_stands_out,
+    outliers,
+    stand_in,
+    straightened,
+    turned_by,
+)
 from focgen.logs.repeats import fresh_rows, frozen
 
 _DRIVES = ("command", "pressure")
@@ -42,12 +49,13 @@ def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Arra
         if slow:
             rows = slow[1] if isinstance(there, slice) else there[slow[1]]
             notes.append(_slow_note(role, slow[0] * len(time) / np.sum(~gone), time))
-        barred = None if drive is None else barred_by(drive)[rows]
-        wrong = outliers(y[rows], barred)
+        barred, never = (None if drive is None else by(drive)[rows] for by in (barred_by, turned_by))
+        wrong = outliers(y[rows], barred, never)
         if wrong.any():
             what = f"outliers of {role} replaced by the straight line between their neighbours"
             notes.append(Note(what, int(wrong.sum()), f"at {time[rows][np.argmax(wrong)]:g} s"))
             y = _with(y, rows, straightened(time[rows], y[rows], wrong))
+        notes += _first_note(role, y[rows], time[rows], barred)
         notes += _stand_in_note(role, y[rows], time[rows])
         notes += _clipped_note(role, y[rows], time[rows])
     if gone.any():
@@ -56,6 +64,14 @@ def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Arra
             Note(f"readings of {role} missing, {how}", int(gone.sum()), f"at {time[np.argmax(gone)]:g} s")
         )
     return _filled(role, time, y, rows, there), notes
+
+
+def _first_note(role: str, y: Array, time: Array, barred: Bools | None) -> list[str]:
+    """A word on a first reading that may be left from before, as the buffers of some loggers give it."""
+    if barred is None or not first_stands_out(y, barred):
+        return []
+    what = f"{role} begins with a reading far off those behind it, while the command rests"
+    return [Note(f"{what}: if it is left from before, leave it out with --from", 1, f"at {time[0]:g} s")]
 
 
 def _stand_in_note(role: str, y: Array, time: Array) -> list[str]:

@@ -19,6 +19,8 @@ _BLOCK = 128  # readings over which the noise is taken as even
 _RARE = 0.01  # of the readings: more of them are the signal's own
 _FEWEST = 20  # readings
 _AHEAD, _AFTER = 3, 10  # readings around a jump of the command that are left alone
+_MOVES = 3.0  # times what noise could do: a signal that does no more may have been released as its log begins
+_BEHIND = WIDEST + 2 * _SIDE  # readings of which the command has to rest where there is one side only
 _PART = 1 << 16  # windows that are looked at side by side
 _FINE = 1e-3  # of the span: what noise there is at least
 _FAR_OFF = 0.2  # of the span: so far off both sides is a number that stands for no reading …
@@ -28,34 +30,71 @@ _AGAIN = 5  # stretches of exactly the same number, at least …
 _ALONE = 0.9  # … and of all that are so far off: what swings has two ends
 
 
-def outliers(y: Array, barred: Bools | None = None) -> Bools:
-    """Which readings of ``y`` (n,) are outliers, as a mask (n,); never one where ``barred`` (n,).
+def outliers(y: Array, barred: Bools | None = None, never: Bools | None = None) -> Bools:
+    """Which readings of ``y`` (n,) are outliers, as a mask (n,); where ``barred`` (n,), only those farther
+    off than all that the signal does, and where ``never`` (n,), which is ``barred`` unless given, none.
 
     One to three readings in a row count that lie on one side of the line through three neighbours on either
     side, farther off than noise could (a Hampel test on that distance, with the noise of the place), than the
-    neighbours scatter, and than the two sides differ. So corners, overshoot and edges are none. Where more
-    than one in a hundred would be, the signal is like that, and none is.
+    neighbours scatter, and than the two sides differ. So corners, overshoot and edges are none. At its ends a
+    signal has neighbours on one side only. There, too, it has to be farther off than all that the signal
+    does, which has to be more than to rest, while the command is known to rest. Where more than one in a
+    hundred would be, the signal is like that, and none is.
     """
     found = np.zeros(len(y), bool)
     if len(y) < _FEWEST or np.ptp(y) == 0.0:
         return found
-    barred = found if barred is None else barred
-    least = _least_noise(y)
+    resting = np.zeros(0, bool) if barred is None else ~barred
+    barred = found.copy() if barred is None else barred
+    never = barred if never is None else never
+    least, reach = _least_noise(y), _reach(y)
     for width in range(1, WIDEST + 1):
-        for at in _pulses(y, barred, width, least):
+        for at in _pulses(y, (barred, never), width, least, reach):
             found[at : at + width] = True
+    for way in (slice(None), slice(None, None, -1)):  # views: of the first readings, then of the last ones
+        found[way][: _at_an_end(y[way], resting[way], least, reach)] = True
     return found if found.sum() <= max(WIDEST, _RARE * len(y)) else np.zeros(len(y), bool)
 
 
 def barred_by(command: Array) -> Bools:
     """Where ``command`` (n,) jumps, and shortly after: a signal may move fast there."""
-    jumps = np.abs(np.diff(command)) > 0.05 * (float(np.ptp(command)) or np.inf)
-    count, barred = len(jumps), np.zeros(len(command), bool)
+    return _around(np.abs(np.diff(command)) > _jump_of(command))
+
+
+def turned_by(command: Array) -> Bools:
+    """Where ``command`` (n,) jumps there and back within a few readings, and shortly after: what answers a
+    pulse is as short as an outlier."""
+    steps, least = np.diff(command), _jump_of(command)
+    at = np.flatnonzero(np.abs(steps) > least)
+    turned = (np.diff(at) <= _AFTER) & (np.diff(np.sign(steps[at])) != 0.0)
+    ends = np.zeros(len(steps), bool)
+    ends[at[:-1][turned]] = ends[at[1:][turned]] = True
+    return _around(ends)
+
+
+def _jump_of(command: Array) -> float:
+    """The change from one reading to the next that is a jump."""
+    return 0.05 * (float(np.ptp(command)) or np.inf)
+
+
+def _around(jumps: Bools) -> Bools:
+    """The readings (n,) around changes (n − 1,) from one to the next."""
+    count, found = len(jumps), np.zeros(len(jumps) + 1, bool)
     for late in range(1 - _AHEAD, 2 + _AFTER):  # of a change, after the reading ahead of it
-        first, last = max(-late, 0), min(count, len(command) - late)
+        first, last = max(-late, 0), min(count, count + 1 - late)
         if first < last:
-            barred[first + late : last + late] |= jumps[first:last]
-    return barred
+            found[first + late : last + late] |= jumps[first:last]
+    return found
+
+
+def first_stands_out(y: Array, barred: Bools) -> bool:
+    """Whether the first reading of ``y`` (n,) is far off those behind it, as if left from before: while the
+    command rests, not at rest itself, and farther than any change that lasts."""
+    if len(y) < _FEWEST or barred[:_BEHIND].any():
+        return False
+    off, rough = _ahead_of_line(y, 1)
+    least = _FAR * max(rough, _least_noise(y))
+    return bool(abs(off[0]) > max(least, 2.0 * _jumps(y)) and abs(y[0]) > least)
 
 
 def straightened(time: Array, y: Array, wrong: Bools) -> Array:
@@ -65,15 +104,43 @@ def straightened(time: Array, y: Array, wrong: Bools) -> Array:
     return made
 
 
-def _pulses(y: Array, barred: Bools, width: int, least: float) -> Ints:
-    """Where outliers of ``width`` readings begin."""
+def _at_an_end(y: Array, resting: Bools, least: float, reach: float) -> int:
+    """How many of the first readings are outliers, off the line through those behind by ``reach``."""
+    if not np.all(resting[:_BEHIND]) or not len(resting):
+        return 0
+    for width in range(1, WIDEST + 1):
+        off, rough = _ahead_of_line(y, width)
+        noise = _FAR * max(rough, least)
+        if (
+            abs(np.sign(off).sum()) == width
+            and np.abs(off).min() > max(noise, reach)
+            and reach > _MOVES * noise
+        ):
+            return width
+    return 0
+
+
+def _ahead_of_line(y: Array, width: int) -> tuple[Array, float]:
+    """How far the first ``width`` readings are off the line through six behind them, and how far the worst
+    of these six is."""
+    places = np.arange(width + 2 * _SIDE) - width - _SIDE + 0.5
+    behind, places_behind = y[width : width + 2 * _SIDE], places[width:]
+    slope = behind @ places_behind / np.sum(places_behind**2)
+    off = y[: width + 2 * _SIDE] - behind.mean() - slope * places
+    return off[:width], float(np.abs(off[width:]).max())
+
+
+def _pulses(y: Array, kept: tuple[Bools, Bools], width: int, least: float, reach: float) -> Ints:
+    """Where outliers of ``width`` readings begin, of size ``reach`` in the first of ``kept``, and nowhere in
+    the second."""
     whole = 2 * _SIDE + width
     if len(y) < whole:
         return np.zeros(0, int)
     found, sizes, off = [], [], np.empty(len(y) - whole + 1)
     for begin, part in _parts(y, whole):
         first, size, hit = _standing_out(part, width)
-        hit &= ~sliding_window_view(barred[begin : begin + len(part)], whole).any(axis=1)
+        barred, never = (_touched(where[begin : begin + len(part)], whole) for where in kept)
+        hit[never | (barred & (size <= reach))] = False
         off[begin : begin + len(first)] = first
         found.append(begin + np.flatnonzero(hit))
         sizes.append(size[hit])
@@ -82,6 +149,11 @@ def _pulses(y: Array, barred: Bools, width: int, least: float) -> Ints:
     if width > 1 and far.any():  # pulses as high as the jumps of the signal itself are its own
         far &= size > 2.0 * _jumps(y)
     return at[far] + _SIDE
+
+
+def _touched(where: Bools, width: int) -> Bools:
+    """Whether a window of ``width`` readings has one of those."""
+    return np.asarray(sliding_window_view(where, width).any(axis=1), bool)
 
 
 def _parts(y: Array, width: int) -> Iterator[tuple[int, Array]]:
@@ -125,11 +197,23 @@ def _noise(off: Array, at: Ints) -> Array:
 def _least_noise(y: Array) -> float:
     """Half a step of a quantised signal, or a little of the span: the median of steps that mostly stay away
     is 0. The span is that of the medians of three, so a reading of 10⁹ makes no step a rounding error."""
-    middles = [np.median(sliding_window_view(part, 3), axis=1) for _, part in _parts(y, 3)]
-    span = max(float(m.max()) for m in middles) - min(float(m.min()) for m in middles)
+    low, high = _ends_of_medians(y, 3)
+    span = high - low
     steps = np.abs(np.diff(y))
     finest = float(np.min(steps, where=steps > 1e-9 * span, initial=np.inf))
     return max(0.5 * finest, _FINE * span)
+
+
+def _reach(y: Array) -> float:
+    """The span of all that a signal does for longer than an outlier lasts, 0 among it: there it rests."""
+    low, high = _ends_of_medians(y, 2 * WIDEST + 1)
+    return max(high, 0.0) - min(low, 0.0)
+
+
+def _ends_of_medians(y: Array, width: int) -> tuple[float, float]:
+    """The least and the largest of the medians of ``width`` readings in a row."""
+    middles = [np.median(sliding_window_view(part, width), axis=1) for _, part in _parts(y, width)]
+    return min(float(m.min()) for m in middles), max(float(m.max()) for m in middles)
 
 
 def _jumps(y: Array) -> float:

@@ -126,18 +126,27 @@ def _paired(
 ) -> list[Any]:
     if len(values) != len(curves) or any(set(c) != {f.name for f in fields(Curves)} for c in curves):
         raise ValueError(key)
-    return [read({key: value, "curves": one}) for value, one in zip(values, curves)]
+    return [read({key: value, "curves": _drawn(one)}) for value, one in zip(values, curves)]
+
+
+def _drawn(curves: dict[str, Any]) -> dict[str, Any]:
+    """Curves as they were before JSON, which has no NaN: a point that is null is none."""
+    return {name: _points(v) if isinstance(v, list) else v for name, v in curves.items()}
+
+
+def _points(values: Sequence[float | None]) -> list[float]:
+    return [np.nan if value is None else value for value in values]
 
 
 def _plant(told: dict[str, Any] | None, kept: dict[str, Any] | None) -> Plant | None:
     if told is None:
         return None
     parts = zip(told["rows"], present(kept)["outputs"], strict=True)
-    rows = tuple(read_plant({"plant": row | {"output": output}}) for row, output in parts)
+    rows = tuple(read_plant({"plant": row | {"output": _points(output)}}) for row, output in parts)
     return Plant(
         told["transfer"],
         told["sample_time"],
-        tuple(present(kept)["time"]),
-        tuple(present(kept)["exact"]),
+        tuple(_points(present(kept)["time"])),
+        tuple(_points(present(kept)["exact"])),
         rows,
     )

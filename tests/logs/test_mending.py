@@ -9,7 +9,7 @@ import pytest
 from focgen.errors import LogError
 from focgen.logs import Experiment, notes_of
 from focgen.logs.notes import Note
-from focgen.logs.outliers import barred_by, outliers
+from focgen.logs.outliers import barred_by, outliers, turned_by
 from focgen.logs.read import in_session_order
 from focgen.logs.repeats import fresh_rows, frozen
 from tests.logs.test_read import STEP, read_columns, table
@@ -277,6 +277,52 @@ def test_however_far_off_a_reading_is_it_is_an_outlier(size):
     y = 0.004 * np.linspace(0.0, 1.0, 400) + 5e-5 * np.random.default_rng(3).standard_normal(400)
     y[300] = size
     assert list(np.flatnonzero(outliers(y))) == [300]
+
+
+@pytest.mark.parametrize("late", (0, 1, 4, 9, 12))
+@pytest.mark.parametrize("size", (0.02, -0.02, 1e9))
+def test_behind_a_jump_of_the_command_only_what_the_signal_never_does_is_an_outlier(late, size):
+    """Readings there were left alone, however far off: a spark of 1 bar made T 1.7 of 1.3."""
+    y = 0.004 * (1.0 - np.exp(-np.maximum(np.arange(400) - 200, 0) / 25.0))
+    y += 2e-5 * np.random.default_rng(3).standard_normal(400)
+    command = np.where(np.arange(400) < 200, 0.0, 1.0)
+    y[200 + late] += size
+    seen = outliers(y, barred_by(command), turned_by(command))
+    assert list(np.flatnonzero(seen)) == [200 + late]
+    y[200 + late] = 0.003
+    assert not outliers(y, barred_by(command), turned_by(command)).any(), "within what it does"
+
+
+@pytest.mark.parametrize("width", (1, 2, 3, 8))
+def test_the_answer_to_a_short_pulse_of_the_command_is_no_outlier(width):
+    command = np.zeros(400)
+    command[200 : 200 + width] = 1.0
+    y = np.roll(command, 1) + 1e-3 * np.random.default_rng(3).standard_normal(400)
+    assert outliers(y).any() == (width < 4)
+    assert not outliers(y, barred_by(command), turned_by(command)).any()
+
+
+def first_off(tmp_path, first: float, moves: float = 1.0):
+    """A log of a step in its middle whose first pressure is another."""
+    rng = np.random.default_rng(1)
+    near = np.arange(COUNT) - COUNT // 2
+    command = np.where(near < 0, 0.0, moves)
+    p = 0.1 * moves * (1.0 - np.exp(-np.maximum(near, 0) / 5.0)) + 1e-4 * rng.normal(size=COUNT)
+    p[0] = first
+    y = 0.01 * moves * (1.0 - np.exp(-np.maximum(near, 0) / 60.0)) + 1e-5 * rng.normal(size=COUNT)
+    return read_columns(tmp_path, ramp(u_V=command, p_bar=p, kappa_cam_per_mm=y, kappa_per_mm=y))[0]
+
+
+def test_a_first_reading_that_a_buffer_kept_is_an_outlier_or_told_of(tmp_path):
+    """Of every experiment, as some loggers give it, it made alpha 0.36 of 0.6."""
+    far = first_off(tmp_path, 0.25)
+    assert noted(far, "outliers of pressure", "at 0 s") and abs(far["pressure"][0]) < 1e-3
+    within = first_off(tmp_path, 0.09)
+    assert noted(within, "pressure begins with a reading far off", "--from") and within["pressure"][0] == 0.09
+    for first, moves in ((0.0, 1.0), (3e-4, 1.0)):
+        assert not first_off(tmp_path, first, moves).notes
+    released = first_off(tmp_path, 0.1, 0.0)
+    assert released["pressure"][0] == 0.1, "a release as the log begins, of which it shows nothing else"
 
 
 def test_pulses_that_come_often_are_the_signal():

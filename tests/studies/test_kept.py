@@ -4,6 +4,7 @@ Red when a study whose parts do not fit together is taken, and a page of it ends
 """
 
 import json
+import shutil
 from dataclasses import replace
 
 import pytest
@@ -77,6 +78,21 @@ def test_parts_that_do_not_fit_are_refused(folder, tmp_path, damage):
     (tmp_path / "curves.json").write_text(json.dumps(kept))
     with pytest.raises(InputError, match="no study that can be read"):
         read_study(tmp_path)
+
+
+@pytest.mark.parametrize("part", ("rows", "ideal", "plant"))
+def test_points_that_are_none_are_a_gap_of_their_curve(folder, tmp_path, part):
+    """What JSON has for NaN, in every curve: once a fault of `report`."""
+    shutil.copytree(folder, tmp_path / "study")
+    kept = json.loads((folder / "curves.json").read_text())
+    curves = [kept["plant"]] if part == "plant" else kept[part]
+    for curve in curves:
+        for values in curve.values():
+            for one in values if isinstance(values, list) and isinstance(values[0], list) else [values]:
+                if isinstance(one, list):
+                    one[len(one) // 2] = None
+    (tmp_path / "study" / "curves.json").write_text(json.dumps(kept))
+    assert focgen.report(tmp_path / "study", out=tmp_path / "page.html")
 
 
 def test_a_study_of_nothing_is_refused(tmp_path):
