@@ -89,9 +89,12 @@ def _variance(fit: Fit) -> float:
 
 
 def _separation(b: CandidateRig, views: Sequence[_View], known: np.ndarray) -> float:
-    """Expected standard deviations from ``b`` by all ``views``, its parameters ``known`` so well."""
+    """Expected standard deviations from ``b`` by all ``views``, its parameters ``known`` so well; none where
+    a rig runs away from the experiment: what it would do there is not foretold."""
     difference = np.concatenate([v.difference for v in views])
     jacobian = np.concatenate([v.slopes for v in views])
+    if not (np.all(np.isfinite(difference)) and np.all(np.isfinite(jacobian))):
+        return 0.0
     slope = jacobian.T @ difference
     taken = slope @ np.linalg.pinv(known + jacobian.T @ jacobian) @ slope
     # what tells them apart is not the size but its square over the spread of the likelihood ratio
