@@ -235,6 +235,14 @@ def test_what_is_ahead_of_a_logged_signal_is_not_seen_a_second_time_behind_it(tw
     assert alone(e, [odd, behind], "actuator")[0] > 3.0 * alone(e, [a, behind], "actuator")[0]
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_rig_that_runs_away_from_an_experiment_tells_nothing_of_it(two, value):
+    """A sharp loop in a spring was no number there, and ended the diagnosis in a fault."""
+    e, (a, b) = two
+    wild = replace(b, signals=b.signals | {"output": np.where(b.entering > 0, value, 0.0)})
+    assert alone(e, [a, wild], "actuator")[0] >= 0.0 and in_session(e, [a, wild])[0] == 0.0
+
+
 def test_a_log_by_itself_has_to_tell_also_what_only_the_session_ruled_out(monkeypatch):
     rival = SimpleNamespace(stage="actuator")
     e = SimpleNamespace(segment=SimpleNamespace(stages=("actuator", "sensor")), nominal=None)
