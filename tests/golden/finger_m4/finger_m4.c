@@ -269,9 +269,9 @@ static int16_t finger_m4_filter(finger_m4_state *s, int16_t e)
     s->error_now = foc_ring_next(s->error_now, FINGER_M4_ERRORS);
     s->error[s->error_now] = e;
     foc_ahead_q15(s->numerator_ahead, finger_m4_numerator_far, finger_m4_numerator_runs,
-                  finger_m4_numerator_slices, s->error, finger_m4_ERRORS, s->error_now);
+                  finger_m4_numerator_slices, s->error, FINGER_M4_ERRORS, s->error_now);
     foc_ahead_q15(s->integrand_ahead, finger_m4_integrand_far, finger_m4_integrand_runs,
-                  finger_m4_integrand_slices, s->error, finger_m4_ERRORS, s->error_now);
+                  finger_m4_integrand_slices, s->error, FINGER_M4_ERRORS, s->error_now);
     x = finger_m4_numerator_sum(s);
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
@@ -283,7 +283,7 @@ static int16_t finger_m4_filter(finger_m4_state *s, int16_t e)
 
     s->filtered_now = foc_ring_next(s->filtered_now, FINGER_M4_FILTERED);
     foc_ahead_q15(s->denominator_ahead, finger_m4_denominator_far, finger_m4_denominator_runs,
-                  finger_m4_denominator_slices, s->filtered, finger_m4_FILTERED, s->filtered_now);
+                  finger_m4_denominator_slices, s->filtered, FINGER_M4_FILTERED, s->filtered_now);
     x = x - finger_m4_denominator_sum(s) + s->carry; /* |x| <= 1017606997 < 2^31 */
     rounded = foc_shift32(x, 15);
     s->carry = x - rounded * ((int32_t)1 << 15); /* the next sample takes up what rounding drops */
@@ -328,11 +328,11 @@ static void finger_m4_settle(finger_m4_state *s, int16_t e)
     s->filtered_now = FINGER_M4_FILTERED - 1u;
     s->carry = 0;
     foc_rest_q15(s->numerator_ahead, finger_m4_numerator_far, finger_m4_numerator_runs,
-                 finger_m4_numerator_slices, s->error, finger_m4_ERRORS);
+                 finger_m4_numerator_slices, s->error, FINGER_M4_ERRORS);
     foc_rest_q15(s->integrand_ahead, finger_m4_integrand_far, finger_m4_integrand_runs,
-                 finger_m4_integrand_slices, s->error, finger_m4_ERRORS);
+                 finger_m4_integrand_slices, s->error, FINGER_M4_ERRORS);
     foc_rest_q15(s->denominator_ahead, finger_m4_denominator_far, finger_m4_denominator_runs,
-                 finger_m4_denominator_slices, s->filtered, finger_m4_FILTERED);
+                 finger_m4_denominator_slices, s->filtered, FINGER_M4_FILTERED);
     s->inner = 0;
     s->inner_input = finger_m4_integrand_sum(s);
     s->increment = 0;
