@@ -122,9 +122,15 @@ def _rows(plan: Plan, bank: Bank) -> list[str]:
     return [f"{{{a:>{first}}, {b:>{second}}}}, /* {t} */" for (a, b), t in zip(pairs, times)]
 
 
+def ring_of(plan: Plan, history: str) -> tuple[str, str]:
+    """The member that keeps a history, and the macro of how many samples it holds."""
+    member, size = ("error", "ERRORS") if history == "error" else ("filtered", "FILTERED")
+    return member, f"{plan.name.upper()}_{size}"
+
+
 def _past(plan: Plan, table: Sum, lag: int) -> str:
-    ring, size = ("error", "ERRORS") if table.history == "error" else ("filtered", "FILTERED")
-    return f"s->{ring}[foc_ring_slot(s->{ring}_now, {plan.name.upper()}_{size}, {lag})]"
+    ring, size = ring_of(plan, table.history)
+    return f"s->{ring}[foc_ring_slot(s->{ring}_now, {size}, {lag})]"
 
 
 def inputs(plan: Plan, table: Sum) -> list[str]:

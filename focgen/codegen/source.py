@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import focgen
+from focgen.codegen.banks import ring_of
 from focgen.codegen.expressions import (
     CLAMP,
     LONGEST_SHIFT,
@@ -189,7 +190,7 @@ def source_context(plan: Plan, title: str, sha256: str, kernels: Kernels = PORTA
 
 def _start(plan: Plan, kernels: Kernels, history: str) -> str:
     """The slot of the latest sample after a reset: before a group where there are groups."""
-    size = f"{plan.name.upper()}_{'ERRORS' if history == 'error' else 'FILTERED'}"
+    _, size = ring_of(plan, history)
     return f"{size} - 1u" if kernels.grouped(plan, history) else "0"
 
 

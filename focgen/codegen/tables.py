@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from focgen.codegen.banks import BankText, bank_texts, inputs
+from focgen.codegen.banks import BankText, bank_texts, inputs, ring_of
 from focgen.codegen.expressions import bound, shifted
 from focgen.codegen.literals import exponent, quantity, rows, scale, wrapped
 from focgen.codegen.lookahead import LookAhead, Run
@@ -99,14 +99,9 @@ def _sum_about(table: Sum) -> str:
     return f"{about}, counts of {scale(table.total.lsb)}" if about else ""
 
 
-def _ring(table: Sum) -> tuple[str, str]:
-    """The ring's member and the macro of its size."""
-    return ("error", "ERRORS") if table.history == "error" else ("filtered", "FILTERED")
-
-
 def _call(plan: Plan, table: Sum, blocks: list[Block], weights: str, prefix: str) -> str:
-    ring, size = _ring(table)
-    history = f"s->{ring}, {plan.name.upper()}_{size}, s->{ring}_now"
+    ring, size = ring_of(plan, table.history)
+    history = f"s->{ring}, {size}, s->{ring}_now"
     if len(blocks) > 1:
         return (
             f"{prefix}_sum_{runtime(plan.arithmetic)}({weights}, {weights}_blocks, {len(blocks)}, {history})"
@@ -119,10 +114,10 @@ def _call(plan: Plan, table: Sum, blocks: list[Block], weights: str, prefix: str
 def _ahead_text(plan: Plan, table: Sum, name: str, about: list[str], ahead: LookAhead) -> SumText:
     """Far tables, the runs over them, and the near sum with tables of its own."""
     member = f"s->{name.removeprefix(plan.name + '_')}_ahead"
-    ring, size = _ring(table)
-    far = f"{member}, {name}_far, {name}_runs, {name}_slices, s->{ring}, {plan.name.upper()}_{size}"
+    ring, size = ring_of(plan, table.history)
+    far = f"{member}, {name}_far, {name}_runs, {name}_slices, s->{ring}, {size}"
     near = ahead.near
-    history = f"s->{ring}, {plan.name.upper()}_{size}, s->{ring}_now"
+    history = f"s->{ring}, {size}, s->{ring}_now"
     nearer = (
         [_weights(plan, list(near.blocks), f"{name}_near", ["The lags nearer than those."])] if near else []
     )

@@ -5,13 +5,8 @@ from __future__ import annotations
 
 from focgen.control.controller import Controller, Units
 from focgen.errors import ControllerError
-from focgen.logs.scales import known, same
-from focgen.rig.rig import UNITY, Rig, Signals
-
-
-def unit_of_role(signals: Signals, role: str) -> str:
-    """The unit of a role's signal, "" where it is not told."""
-    return signals.unit_of(role)
+from focgen.logs.scales import differ
+from focgen.rig.rig import UNITY, Rig
 
 
 def units_of_rig(rig: Rig) -> dict[str, str]:
@@ -44,7 +39,7 @@ def check_one_unit(rig: Rig, controller: Controller) -> None:
     theirs, ours = units_of(rig, controller.scheduled), controller.units
     for key, given in vars(theirs).items():
         stated = getattr(ours, key)
-        if given and stated and known(given) and known(stated) and not same(given, stated):
+        if differ(given, stated):
             what = f"is {stated!r}, the rig has {given!r}"
             remedy = "design the controller from this rig, or give both in the same unit"
             raise ControllerError(f"{controller.name} [units] {key}", what, remedy)
@@ -56,6 +51,6 @@ def read_alike(rig: Rig) -> str:
     if rig.sensor != UNITY or rig.signals.curvature is None:
         return ""
     one, other = (rig.signals.unit_of(role) for role in ("curvature", "output"))
-    if not (one and other and known(one) and known(other)) or same(one, other):
+    if not differ(one, other):
         return ""
     return f"the rig has no [sensor], so a curvature in {one} counts as an output in {other}"

@@ -98,6 +98,11 @@ def same(unit: str, other: str) -> bool:
         return False
 
 
+def differ(unit: str, other: str) -> bool:
+    """Whether two units are both told and known, and do not mean the same."""
+    return all(text and known(text) for text in (unit, other)) and not same(unit, other)
+
+
 @cache
 def _registry() -> Any:
     import pint  # takes a moment, and only conversions need it

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.control.units import unit_of_role
 from focgen.identification.identification import ExperimentFit, Identification, Joint
 from focgen.identification.stages import StageFit
 from focgen.present import present
@@ -106,7 +105,7 @@ def _legend_beside(axes: Axes, ends: Any) -> None:
 
 def named(found: Identification, role: str, ahead: str = "") -> str:
     """A signal's name, with ``ahead`` before it, and the unit that its column tells."""
-    return with_unit(ahead + role, unit_of_role(found.rig.signals, role))
+    return with_unit(ahead + role, found.rig.signals.unit_of(role))
 
 
 def _models(found: Identification) -> bytes:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from focgen.control.units import unit_of_role
 from focgen.fractional.terms import terms_of
 from focgen.identification.identification import ExperimentFit, Identification, Joint
 from focgen.identification.stages import StageFit
@@ -131,12 +130,12 @@ def driving_role(found: Identification) -> str:
 
 
 def _driving_unit(found: Identification) -> str:
-    return unit_of_role(found.rig.signals, driving_role(found))
+    return found.rig.signals.unit_of(driving_role(found))
 
 
 def gain_unit(found: Identification) -> str:
     """The unit of K, as far as the columns tell it."""
-    above, below = unit_of_role(found.rig.signals, found.experiments[0].fitted), _driving_unit(found)
+    above, below = found.rig.signals.unit_of(found.experiments[0].fitted), _driving_unit(found)
     if not above or not below:
         return ""
     return f"1/({above[2:]} {below})" if above.startswith("1/") else f"{above}/{below}"

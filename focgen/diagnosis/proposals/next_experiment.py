@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.control.units import unit_of_role
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.model import Found, NextExperiment
@@ -86,7 +85,7 @@ class _Asked:
     def said(self, rig: Rig) -> str:
         """It in words, with the rig's units."""
         limits, made, signals = self.choice.limits, self.choice.input, rig.signals
-        unit = unit_of_role(signals, self.entry)
+        unit = signals.unit_of(self.entry)
         ends = f"from {made.min():.4g} to {made.max():.4g} {unit}".strip()
         parts = [f"{self.choice.what}, on the {self.entry} {ends}"]
         if np.isfinite(self.rate):
@@ -94,7 +93,7 @@ class _Asked:
             parts.append(f"{faster} than {self.rate:.3g} {unit}/s")
         parts.append(f"{self.choice.seconds:.0f} s")
         if limits.integrates:
-            place = f"{self.bounds.stands:.3g} {unit_of_role(signals, 'output')}".strip()
+            place = f"{self.bounds.stands:.3g} {signals.unit_of('output')}".strip()
             left = self.bounds.left
             parts.append(f"from where it stands at {place}" if left else f"brought to {place} first")
         logged = f", with the {_ROLES[self.stage]} logged" if self.stage else ""

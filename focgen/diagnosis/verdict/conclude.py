@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from focgen.control.units import unit_of_role
 from focgen.diagnosis.controller.check import ControllerCheck, Departure
 from focgen.diagnosis.fitting.fit import Weighing, fit
 from focgen.diagnosis.hypotheses.explain import Explanation
@@ -329,7 +328,7 @@ def _gap(
     }
     spread = [np.std(log["output"]) for log in logs]
     gof["possible"] = float(np.mean([1 - np.sqrt(floor) / s for s in spread if s > 0] or [0.0]))
-    unit = unit_of_role(rig.signals, "output") or rig.signals.output
+    unit = rig.signals.unit_of("output") or rig.signals.output
     return Gap(rms["as given"], rms["refitted"], rms["explained"], float(np.sqrt(floor)), unit, gof)
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from focgen.control.controller import Controller
-from focgen.control.units import unit_of_role
 from focgen.logs.experiment import Experiment
 from focgen.report.figures import Axis, Bars, Figure, Line, Panel, Rule, curve
 from focgen.report.page import Section, TableOf
@@ -81,16 +80,12 @@ def _answers(rig: Rig) -> Figure:
         curve(f"to {e.name}", e.time, y, CYCLE[i % len(CYCLE)], width=1.8)
         for i, (e, y) in enumerate(zip(held, made))
     )
-    unit = unit_of_role(rig.signals, "pressure")
+    unit = rig.signals.unit_of("pressure")
     return Figure(
         "How it answers steps of pressure",
         "From rest, by the nominal model without effects. A fractional order rises fast, then creeps.",
         "Curves over time: the output after steps of pressure to five levels.",
-        (
-            Panel(
-                _TIME, Axis(with_unit("output", unit_of_role(rig.signals, "output")), from_zero=True), marks
-            ),
-        ),
+        (Panel(_TIME, Axis(with_unit("output", rig.signals.unit_of("output")), from_zero=True), marks),),
         curves_table(
             "Output after a step", [(f"pressure {with_unit(e.name, unit)}", y) for e, y in zip(held, made)]
         ),
@@ -99,7 +94,7 @@ def _answers(rig: Rig) -> Figure:
 
 def replay_section(rig: Rig, logs: Sequence[Experiment], found: Replay) -> Section:
     """Logs beside what the rig makes of their inputs."""
-    unit = unit_of_role(rig.signals, "output")
+    unit = rig.signals.unit_of("output")
     tops, errors = [], []
     for i, log in enumerate(logs):
         made, colour = found.simulated[log.name]["output"], CYCLE[i % (len(CYCLE) - 1)]

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from focgen.control.units import unit_of_role
 from focgen.identification.identification import Identification
 from focgen.identification.stages import StageFit
 from focgen.present import present
@@ -96,7 +95,7 @@ def _fits(found: Identification) -> Figure:
         Panel(_TIME, Axis(named(found, fitted)), tuple(tops), height=340),
         Panel(
             _TIME,
-            Axis(with_unit("error", unit_of_role(found.rig.signals, fitted))),
+            Axis(with_unit("error", found.rig.signals.unit_of(fitted))),
             (*errors, Rule(0.0)),
             height=190,
         ),
@@ -209,7 +208,7 @@ def _models(found: Identification) -> Figure:
             Panel(_TIME, Axis(named(found, fit.fitted)), tuple(tops)),
             Panel(
                 _TIME,
-                Axis(with_unit("error", unit_of_role(found.rig.signals, fit.fitted))),
+                Axis(with_unit("error", found.rig.signals.unit_of(fit.fitted))),
                 (*errors, Rule(0.0)),
                 height=190,
             ),
@@ -259,6 +258,6 @@ def _stage(found: Identification, fit: StageFit) -> Figure:
         f"The {fit.stage}",
         f"Measured in colour, identified in black: {fit.shape}, with a goodness of fit of {fit.gof:.3f}.",
         f"Curves over time: what leaves the {fit.stage}, measured and as identified.",
-        (Panel(_TIME, Axis(with_unit(leaves, unit_of_role(found.rig.signals, leaves))), tuple(marks)),),
+        (Panel(_TIME, Axis(with_unit(leaves, found.rig.signals.unit_of(leaves))), tuple(marks)),),
         TableOf(("parameter", "value", "95 %"), rows, f"The {fit.stage}: {fit.shape}"),
     )
