@@ -98,7 +98,16 @@ def test_a_plan_that_cannot_be_read_back_is_no_success(tmp_path, monkeypatch):
     assert content(tmp_path) == {"a": b"1"}
 
 
-ASKED = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+HEARD = {"SIGINT": signal.default_int_handler, "SIGTERM": signal.SIG_DFL, "SIGHUP": signal.SIG_DFL}
+ASKED = [getattr(signal, name) for name in HEARD if hasattr(signal, name)]
+
+
+@pytest.fixture
+def number(request):
+    """A signal that is heard here as from a terminal. What runs under ``nohup`` ignores one."""
+    before = signal.signal(request.param, HEARD[signal.Signals(request.param).name])
+    yield request.param
+    signal.signal(request.param, before)
 
 
 def moves(folder: Path, number: int, kind: str, times: int = 1) -> Ended | KeyboardInterrupt | None:
@@ -124,7 +133,7 @@ def moves(folder: Path, number: int, kind: str, times: int = 1) -> Ended | Keybo
 
 
 @pytest.mark.parametrize("kind", ("rename", "replace"))
-@pytest.mark.parametrize("number", ASKED)
+@pytest.mark.parametrize("number", ASKED, indirect=True)
 def test_who_is_asked_to_end_as_files_move_ends_behind_that(tmp_path, number, kind):
     """An interrupt of the terminal, or a shutdown: the folder had files of two results, until a next run."""
     before = signal.getsignal(number)
@@ -134,6 +143,16 @@ def test_who_is_asked_to_end_as_files_move_ends_behind_that(tmp_path, number, ki
         n: t for n, t in AFTER.items() if n != "mine"
     }
     assert not list(tmp_path.glob(".focgen-*")) and signal.getsignal(number) == before
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminal hangs up here")
+@pytest.mark.parametrize("number", [getattr(signal, "SIGHUP", None)], indirect=True)
+def test_what_runs_without_its_terminal_goes_on(tmp_path, number):
+    """Under ``nohup`` the terminal's end is ignored, and stays so."""
+    signal.signal(number, signal.SIG_IGN)
+    output.write_files(tmp_path, {"a": "1"})
+    assert moves(tmp_path, number, "replace") is None
+    assert signal.getsignal(number) == signal.SIG_IGN
 
 
 def test_who_is_asked_twice_ends_at_once(tmp_path):
