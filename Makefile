@@ -28,7 +28,7 @@ demo: $(VENV)/ready            ## the whole chain on the example logs, into buil
 test test-long: export OMP_NUM_THREADS = 1
 
 test: $(VENV)/ready-test       ## what continuous integration runs
-	$(RUN) -m pytest -n $(JOBS) -q $(TESTS)
+	$(RUN) -m pytest -n $(JOBS) --dist worksteal -q $(TESTS)
 
 # PYTHONS may name others, by path too; TESTS what to run of the suite.
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
@@ -42,7 +42,7 @@ test-pythons:                  ## the same by every Python from 3.11 on that is 
 	done
 
 test-long: $(VENV)/ready-dev   ## the suites that take minutes
-	$(RUN) -m pytest -n $(JOBS) -q -m long
+	$(RUN) -m pytest -n $(JOBS) --dist worksteal -q -m long
 
 $(VENV)/ready-dev: $(VENV)/ready-test
 	$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
