@@ -39,6 +39,13 @@ def cautions(causes: Sequence[tuple[Explanation, Cause]], unknown: Sequence[Expl
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
 
 
+def lesser(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
+    """What was found beside a larger part of the gap that nothing explains."""
+    for e, cause in causes:
+        first = cause.rivals[0].effect
+        yield f"{_within(e)}: {first} may be there as well, but more of the gap is what no effect explains"
+
+
 def _within(e: Explanation) -> str:
     return f"{e.segment.entry} to {e.segment.exit}"
 

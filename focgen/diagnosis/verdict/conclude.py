@@ -15,7 +15,7 @@ from focgen.diagnosis.hypotheses.search import evidence as nats
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
-from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges
+from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges, lesser
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
@@ -51,6 +51,10 @@ def conclude(
         summary = _summary(rig, logs, rigs, explanations, unknown)
     if not granted and not unknown and explanations[-1].segment.pace and _unaccounted(summary):
         unknown += explanations[-1:]
+    beside = summary.causes if unknown and not granted and summary.more_is_left else []
+    if beside:
+        unknown += dict.fromkeys(e for e, _ in beside)
+        summary = _summary(rig, logs, rigs, explanations, unknown)
     at_odds = [] if granted else _at_odds(summary)
     if at_odds:
         unknown += at_odds
@@ -77,6 +81,7 @@ def conclude(
             *notes_of(logs),
             *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
             *cautions(summary.causes, unknown),
+            *lesser(beside),
             *gauges(at_odds),
             *another_command(controller),
         ),
@@ -107,6 +112,13 @@ class _Summary:
             and self.floor < NUMBERS.above**2 * float(np.mean(self.squares["refitted"]))
             and not any(is_rounded(e) or paths(e) for e, _ in self.causes)
         )
+
+    @property
+    def more_is_left(self) -> bool:
+        """Whether effects close less of the gap than they leave above the noise. Where nothing explains
+        that, what was found beside it is not what the gap comes from."""
+        refitted, explained = (float(np.mean(self.squares[name])) for name in ("refitted", "explained"))
+        return bool(self.causes) and refitted - explained < explained - self.floor
 
 
 def _summary(
