@@ -22,6 +22,7 @@ from focgen.diagnosis.model import Diagnosis
 from focgen.errors import InputError
 from focgen.identification.identification import Identification
 from focgen.identification.identify import identify
+from focgen.journal import finish
 from focgen.jsontext import ANY, fits, read_json
 from focgen.loop.design import Design, design
 from focgen.loop.simulate import Simulation, simulate
@@ -86,6 +87,7 @@ def demo(out: str | Path, force: bool = False) -> Demo:
     put or edited. MissingExtra: matplotlib is not installed.
     """
     examples, target = shipped("examples"), Path(out)
+    finish(target)  # what a kill has left of an earlier demo is nobody's edit
     if not force:  # before anything takes time
         given = {name: sha256_of(examples / name) for name in _GIVEN}
         _check_unedited(target, {**dict.fromkeys((*_MADE, *_recorded(target)), None), **given})

@@ -41,6 +41,7 @@ _LAST = "manifest.json"  # what tells of the others
 _WHOLE = re.compile(r"\.focgen-[0-9a-f]{16}\.whole")
 _DIGEST = (re.compile(r"[0-9a-f]{64}"), None)
 _MARK = "mark"  # what a folder is known by
+_ABOVE = 3  # folders in which a run may have begun what lies here: a demo's results lie as deep
 _SECOND = 1_000_000_000  # ns
 _SHAPE = {
     "folder": [int],
@@ -63,11 +64,22 @@ def alone(folder: Path) -> Iterator[None]:
         unlock(held)
 
 
-def finish(folder: Path) -> None:
-    """Finish what a killed run has begun in a folder, if it has; nothing happens where nobody may write."""
-    if folder.is_dir() and os.access(folder, os.W_OK) and any(_left(folder)):
-        with alone(folder):
+def finish(folder: Path) -> bool:
+    """Finish what a killed run has begun in a folder, or in one of those above that may hold it with others,
+    if it has; nothing happens where nobody may write. Returns whether there was something."""
+    here = Path(os.path.abspath(folder))
+    found = [one for one in (*reversed(here.parents[:_ABOVE]), here) if _begun(one)]
+    for one in found:
+        with alone(one):
             pass
+    return bool(found)
+
+
+def _begun(folder: Path) -> bool:
+    """Whether a run of this user has left something here that it may finish."""
+    with suppress(FileNotFoundError):  # of one that has just ended
+        return folder.is_dir() and os.access(folder, os.W_OK) and any(map(own, _left(folder)))
+    return False
 
 
 def put(scratch: Path, target: Path, names: Sequence[Path], old: Iterable[Path] = ()) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 from focgen.diagnosis.model import VERDICT
 from focgen.errors import InputError
+from focgen.journal import finish
 from focgen.jsontext import fits, read_json
 from focgen.trials.patterns import SUITES
 
@@ -45,6 +46,8 @@ _DIAGNOSIS = {
     "gap": {"refitted": float, "explained": float, "floor": float},
 }
 
+_RESULTS = ("runs", "oracle", "asked")  # where cases' results are exchanged
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -60,10 +63,11 @@ class Facts:
 
 
 def facts_of(folder: Path) -> Facts:
-    """The content of trial.json. Raises InputError where the folder holds no trial, or one whose trial.json
-    is not as it was written.
+    """The content of trial.json, once what a kill has left in the trial is finished. Raises InputError where
+    the folder holds no trial, or one whose trial.json is not as it was written.
     """
     path = folder / "trial.json"
+    finish_all(folder)
     if not path.is_file():
         raise InputError(str(folder), "holds no trial", "make one by `focgen trial make`")
     found = read_json(path, _ANEW)
@@ -79,6 +83,12 @@ def facts_of(folder: Path) -> Facts:
         if not fits(digest, _DIGEST):
             raise InputError(str(path), f"has no SHA-256 for case {number}", _ANEW)
     return facts
+
+
+def finish_all(folder: Path) -> bool:
+    """Finish what killed commands have begun in a trial; whether there was something."""
+    finished = [finish(part) for part in (folder, *(folder / name for name in _RESULTS))]
+    return any(finished)
 
 
 def is_number(name: str) -> bool:

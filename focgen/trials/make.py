@@ -37,7 +37,7 @@ from focgen.trials.closed_cases import make_closed_case
 from focgen.trials.disturbed import DISTURBED, disturbed
 from focgen.trials.engine.cases import make_engine_case
 from focgen.trials.engine.machine import engine
-from focgen.trials.facts import SIGNALS
+from focgen.trials.facts import SIGNALS, facts_of, finish_all
 from focgen.trials.patterns import STREAMS, SUITES
 from focgen.trials.plan import CLOSED_KINDS, KINDS, Assignment, assignments
 from focgen.trials.plants_cases import make_plants_case
@@ -112,10 +112,12 @@ def make(
     one, and where the physics engine is asked for but not installed.
     """
     folder = Path(folder)
-    _check(folder, cases, seed, signals, suite)
+    _check(cases, seed, signals, suite)
     kinds = tuple(kinds or DEFAULT_KINDS[suite])
     drawn = Drawing(cases, seed, signals, suite, kinds)
     total, facts = len(drawn.plan), _facts(drawn)
+    if finish_all(folder) and (stands := _finished(folder, drawn)):
+        return stands
     _begin(folder, {**facts, "cases": cases})
     commitments = {}
     for index in track(range(1, total + 1), "trial make"):
@@ -124,6 +126,18 @@ def make(
     whole = json.dumps({**facts, "commitments": commitments}, indent=1) + "\n"
     write_files(folder, {"trial.json": whole}, old=lambda: [folder / _BEGUN])
     return Made(str(folder), suite, signals, seed, cases, commitments)
+
+
+def _finished(folder: Path, drawn: Drawing) -> Made | None:
+    """The trial as the killed command would have left it, where it is the one that is asked for."""
+    path, facts = folder / "trial.json", _facts(drawn)
+    if not path.is_file():
+        return None
+    there, found = facts_of(folder), read_json(path, "make the cases anew")
+    same = {key: found.get(key) for key in facts} == facts
+    if not same or len(there.commitments) != len(drawn.plan):
+        return None
+    return Made(str(folder), drawn.suite, drawn.signals, drawn.seed, drawn.cases, dict(there.commitments))
 
 
 def _facts(drawn: Drawing) -> dict[str, Any]:
@@ -153,6 +167,8 @@ def _begin(folder: Path, facts: dict[str, Any]) -> None:
 
 def _check_begun(folder: Path, facts: dict[str, Any]) -> None:
     """Raise InputError where a folder holds cases, and not the first ones of this very trial."""
+    if (folder / "trial.json").exists():
+        raise InputError(str(folder), "already holds a trial", "choose another folder")
     begun, remedy = folder / _BEGUN, "choose another folder, or remove that one"
     holds = [name for name in ("cases", "sealed", "runs") if (folder / name).exists()]
     if begun.is_file() and read_json(begun, remedy) != facts:
@@ -174,9 +190,7 @@ def _made(assignment: Assignment, signals: str, suite: str, rng: np.random.Gener
     return disturbed(case, suite, rng) if suite in DISTURBED else case
 
 
-def _check(folder: Path, cases: int, seed: int, signals: str, suite: str) -> None:
-    if (folder / "trial.json").exists():
-        raise InputError(str(folder), "already holds a trial", "choose another folder")
+def _check(cases: int, seed: int, signals: str, suite: str) -> None:
     if not 1 <= cases <= MOST_CASES or seed < 0:
         raise InputError("trial make", f"cannot make {cases} cases from seed {seed}", _POSITIVE)
     if signals not in SIGNALS:
