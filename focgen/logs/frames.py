@@ -13,7 +13,7 @@ from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs.cells import marks
 from focgen.logs.stamps import is_time, of_numpy
-from focgen.logs.table import LogTable
+from focgen.logs.table import Column, LogTable
 
 
 class Frame(Protocol):
@@ -40,7 +40,8 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     if callable(getattr(frame, "collect", None)):
         raise LogError(name, "is a query of polars that has not been run", "give what its collect() returns")
     _check_keys(frame, name)
-    columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
+    columns: dict[str, Column] = dict(_levels_of_index(frame, name))
+    columns |= {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
     units = {str(key): unit for key in _keys(frame) if (unit := _unit(frame[key]))}
     times = {str(key): _zone(frame[key]) for key in _keys(frame) if _holds_times(frame[key])}
     index = getattr(frame, "index", None)
@@ -48,7 +49,7 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     zone: bool | None = None
     if index is not None and not callable(index) and str(index.name) not in columns:
         values = _column(index, name, "index")
-        named = {} if index.name is None else {str(index.name): values}
+        named: dict[str, Column] = {} if index.name is None else {str(index.name): values}
         columns = named | columns
         if isinstance(values, np.ndarray) and is_time(np.asarray(index)):
             clock, zone = values, _zone(index)
@@ -70,6 +71,16 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
         times=times,
         clock_zone=zone,
     )
+
+
+def _levels_of_index(frame: Frame | Mapping[Any, Any], name: str) -> dict[str, Column]:
+    """The columns (m,) that the levels of an index are, by their names: ``pandas.concat`` names runs so."""
+    index: Any = getattr(frame, "index", None)
+    names = getattr(index, "names", None)
+    if names is None or len(names) < 2:
+        return {}
+    levels = {str(key): k for k, key in enumerate(names) if key is not None}
+    return {key: _column(index.get_level_values(k), name, key) for key, k in levels.items()}
 
 
 def _check_keys(frame: Frame | Mapping[Any, Any], name: str) -> None:

@@ -23,6 +23,7 @@ from focgen.textfile import read_log_bytes
 _END = "***End_of_Header***"
 _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 _TIME, _COMMENT = "X_Value", "Comment"
+_WORDS = {_COMMENT: "holds LabVIEW's words beside its rows"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,7 @@ class _Segment:
     settings: Mapping[str, Sequence[str]]
     names: Sequence[str]
     lines: Sequence[tuple[int, Sequence[str]]]
+    commented: bool
 
 
 def read(path: Path) -> LogTable:
@@ -71,7 +73,8 @@ def _segments(lines: Sequence[str], separator: str) -> Iterator[_Segment]:
     for begin, head, end in zip(begins, heads, [*heads[1:], len(lines)]):
         names = [name for name in cells[begin] if name != _COMMENT]
         body = [(i, cells[i]) for i in range(begin + 1, end) if any(cells[i])]
-        yield _Segment(_keys(lines[head:begin], separator), names, body)
+        commented = _COMMENT in cells[begin]
+        yield _Segment(_keys(lines[head:begin], separator), names, body, commented)
 
 
 def _head(cells: Sequence[Sequence[str]], begin: int) -> int:
@@ -110,6 +113,7 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
         units={name: unit for name, unit in units.items() if unit},
         clock=clock,
         runs=runs,
+        skipped=_WORDS if any(s.commented for s in segments) else {},
     )
 
 
