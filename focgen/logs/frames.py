@@ -110,7 +110,7 @@ def _column(values: Any, name: str, key: str) -> Array | list[str]:
     """Numbers as float64, times in s, everything else as a list."""
     try:
         array = _vector(values)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, ArithmeticError):
         raise LogError(f"{name} [{key}]", "is no vector", "give one number a sample") from None
     if array.ndim != 1:
         raise LogError(f"{name} [{key}]", f"has the shape {array.shape}", "give one number a sample")
@@ -121,12 +121,22 @@ def _column(values: Any, name: str, key: str) -> Array | list[str]:
 def _vector(values: Any) -> Array:
     """As an array of numpy: NaN where a mask is, without the unit that a quantity has."""
     values = getattr(values, "magnitude", values)
-    array = np.asarray(values)
+    array = _array(values)
     if not np.ma.isMaskedArray(values):
         return array
     kind: Any = float if array.dtype.kind in "fiub" else object
     made: Array = np.where(np.ma.getmaskarray(values), np.nan, array.astype(kind))
     return made
+
+
+def _array(values: Any) -> Array:
+    """As numpy has it; whole numbers of 128 bits, which it has not, one by one."""
+    try:
+        return np.asarray(values)
+    except Exception:  # polars has errors of its own
+        if not callable(getattr(values, "to_list", None)):
+            raise
+        return np.array(values.to_list(), dtype=object)
 
 
 def _unit(values: Any) -> str | None:
@@ -138,7 +148,7 @@ def _unit(values: Any) -> str | None:
 
 def _holds_times(values: Any) -> bool:
     """Whether a column holds instants or spans of numpy; of a quantity its unit tells."""
-    return not hasattr(values, "magnitude") and is_time(np.asarray(values))
+    return not hasattr(values, "magnitude") and is_time(_array(values))
 
 
 def _cells(cells: list[Any]) -> Array | list[str]:
@@ -146,13 +156,22 @@ def _cells(cells: list[Any]) -> Array | list[str]:
     missing = [_is_missing(cell) for cell in cells]
     known = [cell for cell, none in zip(cells, missing) if not none]
     if known and all(isinstance(cell, float | int | Decimal) for cell in known):
-        return np.array([np.nan if none else cell for cell, none in zip(cells, missing)], dtype=float)
+        return np.array([np.nan if none else _number(cell) for cell, none in zip(cells, missing)])
     return ["" if none else str(cell) for cell, none in zip(cells, missing)]
 
 
+def _number(cell: float | Decimal) -> float:
+    """As a float: infinite where it is beyond all of them, which is refused by its row."""
+    try:
+        return float(cell)
+    except OverflowError:
+        return np.inf if cell > 0 else -np.inf
+
+
 def _is_missing(cell: Any) -> bool:
-    """Whether it is None, NaN, NaT or what pandas has for them, which cannot be compared."""
+    """Whether it is None, NaN, NaT or what pandas has for them, which cannot be compared, as the signalling
+    NaN of decimals cannot."""
     try:
         return cell is None or bool(cell != cell)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, ArithmeticError):
         return True
