@@ -158,11 +158,13 @@ def parts_of(table: LogTable, name: str) -> int:
 
 def run_instead(table: LogTable, run: str, taken: Collection[str]) -> str | None:
     """The column, not one of those ``taken``, that may be meant by the ``run`` of a rig, where there is no
-    such one: it has its name but for case or a letter, or one for runs, and tells several parts apart."""
+    such one: it has its name but for case or a letter, or one for runs, and tells several parts apart.
+    What has a unit is a reading."""
     near = table.closest(run, taken, _NEAR)
     likely = [near] if near is not None else []
     likely += [name for name in table.columns if name not in taken and _is_of_runs(name)]
-    return next((name for name in likely if parts_of(table, name) > 1), None)
+    bare = (name for name in likely if not (table.unit(name) or unit_named(name)))
+    return next((name for name in bare if parts_of(table, name) > 1), None)
 
 
 def points(column: Column) -> dict[str, float]:

@@ -40,10 +40,10 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     if callable(getattr(frame, "collect", None)):
         raise LogError(name, "is a query of polars that has not been run", "give what its collect() returns")
     _check_keys(frame, name)
-    columns: dict[str, Column] = dict(_levels_of_index(frame, name))
-    columns |= {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
-    units = {str(key): unit for key in _keys(frame) if (unit := _unit(frame[key]))}
-    times = {str(key): _zone(frame[key]) for key in _keys(frame) if _holds_times(frame[key])}
+    given = _levels_of_index(frame) | {str(key): frame[key] for key in _keys(frame)}
+    columns: dict[str, Column] = {key: _column(values, name, key) for key, values in given.items()}
+    units = {key: unit for key, values in given.items() if (unit := _unit(values))}
+    times = {key: _zone(values) for key, values in given.items() if _holds_times(values)}
     index = getattr(frame, "index", None)
     clock: Array | None = None
     zone: bool | None = None
@@ -73,14 +73,13 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     )
 
 
-def _levels_of_index(frame: Frame | Mapping[Any, Any], name: str) -> dict[str, Column]:
-    """The columns (m,) that the levels of an index are, by their names: ``pandas.concat`` names runs so."""
+def _levels_of_index(frame: Frame | Mapping[Any, Any]) -> dict[str, Any]:
+    """What the levels of an index hold (m,), by their names: ``pandas.concat`` names runs so."""
     index: Any = getattr(frame, "index", None)
     names = getattr(index, "names", None)
     if names is None or len(names) < 2:
         return {}
-    levels = {str(key): k for k, key in enumerate(names) if key is not None}
-    return {key: _column(index.get_level_values(k), name, key) for key, k in levels.items()}
+    return {str(key): index.get_level_values(k) for k, key in enumerate(names) if key is not None}
 
 
 def _check_keys(frame: Frame | Mapping[Any, Any], name: str) -> None:

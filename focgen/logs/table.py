@@ -104,7 +104,7 @@ class LogTable:
             return self.without_clock()
         if name in self.skipped:
             what = f"has no column {name!r} ({role}) that can be read: it {self.skipped[name]}"
-            return LogError(self.path, what, "save it as a vector, of one value a sample")
+            return LogError(self.path, what.replace(";", ","), "save it as a vector, of one value a sample")
         near = self.closest(name, taken)
         there = ", ".join(self.columns)
         holder = next((n for n, c in self.columns.items() if n not in taken and _holds(c, name)), None)

@@ -12,6 +12,7 @@ from scipy.io import savemat
 
 from focgen.errors import LogError
 from focgen.logs import read_logs
+from focgen.logs.scales import Scale
 from focgen.rig.rig import Signals
 
 ROLES = Signals("t", "y", None, "p", curvature="cam", run="run")
@@ -97,6 +98,7 @@ ONE_RUN = {
     "one name in all rows": {"Run": ["7"] * (2 * COUNT)},
     "another time": {"runtime": TIME},
     "a count": {"run_s": TIME},
+    "a reading that is held": {"test_voltage_V": [1.0] * COUNT + [2.0] * COUNT},
     "a state": {"status": ["idle"] * COUNT + ["step"] * COUNT},
     "names that are not held": {"Run": ["a", "b"] * COUNT},
     "some without a name": {"Run": [*NAMES[:-1], ""]},
@@ -115,6 +117,10 @@ def test_a_level_of_an_index_of_pandas_is_a_column():
     assert names_and_notes(pandas.concat(runs, names=["run", None])) == (["0.10", "0.20"], [])
     both = frame.assign(run=NAMES).set_index(["run", "t"])
     assert names_and_notes(both)[0] == ["0.10", "0.20"]
+    dated = frame.assign(run=NAMES, t=pandas.Timestamp("2026-01-31") + pandas.to_timedelta(TIME, unit="s"))
+    minutes = Signals("t", "y", None, "p", run="run", scales={"time": Scale(unit="min")})
+    first, second = read_logs(dated.set_index(["run", "t"]), minutes, 0.05)
+    assert second.start - first.start == COUNT * 0.05 and "not in min" in " ".join(first.notes)
 
 
 def test_comments_of_labview_are_told_of_where_the_rig_takes_them_for_runs(tmp_path):
