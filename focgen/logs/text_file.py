@@ -13,7 +13,6 @@ import io
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
@@ -28,6 +27,7 @@ MOST_COLUMNS = 4096
 _LONGEST_LINE = 1 << 18  # characters: of 4096 columns, 64 each
 _MOST_LINES = 1 << 25
 _BARE, _BARE_A_ROW = 1_000_000, 4  # lines without a reading: so many, and so many for each line with one
+_AT_ONCE = 1 << 14  # characters whose lines are counted: the few that are cut do not count
 _LOOKED_AT = 1 << 22  # characters
 _IN_BRACKETS = re.compile(r"(.+?)\s*[\[(]([^\[\]()]*)[\])]")
 
@@ -149,20 +149,19 @@ def _encoding_of(parts: Iterable[bytes], path: Path) -> tuple[str, str]:
     return codec or "utf-8", "Windows-1252" if codec == "cp1252" else ""
 
 
-@dataclass
 class _Counted:
     """Lines so far, and those of them that are bare: empty, comments, or nothing but marks between columns.
     Packed they take next to no room."""
 
-    path: Path
-    lines: int = 0
-    bare: int = 0
+    def __init__(self, path: Path) -> None:
+        self.path, self.lines, self.bare = path, 0, 0
 
     def see(self, text: str) -> None:
         """A part has been read. Raises LogError for more lines, or bare ones, than a log has."""
-        found = text.splitlines()
-        self.lines += len(found)
-        self.bare += sum(is_bare(line) for line in found if not line[:1].isdigit())
+        for at in range(0, len(text), _AT_ONCE):
+            found = text[at : at + _AT_ONCE].splitlines()
+            self.lines += len(found)
+            self.bare += sum(is_bare(line) for line in found if not line[:1].isdigit())
         if self.bare > _BARE + _BARE_A_ROW * (self.lines - self.bare):
             what = f"has {self.bare} lines without a reading among its first {self.lines}"
             raise LogError(str(self.path), what, "leave out empty lines and comments")
