@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import stat
 import zlib
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ LARGEST_CODE = 64 << 20
 LARGEST_JSON = 512 << 20
 """Bytes of a file of JSON: what has been drawn of a diagnosis is the largest."""
 _PART = 1 << 20  # bytes that are read at a time
+_KERNEL = ("/proc", "/sys", "/sys/kernel/debug", "/sys/kernel/tracing")
 
 
 def read_regular(path: str | Path, most: int, error: type[InputError] = InputError) -> bytes:
@@ -46,9 +48,21 @@ def holds(path: str | Path, content: bytes) -> bool:
 
 def check_regular(path: str | Path, error: type[InputError] = InputError) -> None:
     """Raise ``error`` for a pipe or a device, which may never end; OSError where there is nothing."""
-    mode = Path(path).stat().st_mode
-    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # of a folder the system has its own words
+    found = Path(path).stat()
+    regular = stat.S_ISREG(found.st_mode) and not (found.st_size == 0 and _is_of_kernel(found.st_dev))
+    if not regular and not stat.S_ISDIR(found.st_mode):  # of a folder the system has its own words
         raise error(str(path), "is no regular file", "save its content to a file first")
+
+
+def _is_of_kernel(device: int) -> bool:
+    """Whether files of a file system are made by the kernel as they are read: some never end, or wait."""
+    for place in _KERNEL:
+        try:
+            if os.stat(place).st_dev == device:
+                return os.stat("/").st_dev != device
+        except OSError:
+            continue
+    return False
 
 
 def open_log(path: Path) -> BinaryIO:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +42,7 @@ _NAMED, _LETTER, _MAYBE = 3.0, 2.0, 1.6  # points for a word, for a single lette
 _LEAST = 1.5  # points: less is no role's column
 _SURE = 2.0  # points: less is a guess
 _CLOSE = 1.0  # points: a column so little behind might be meant as well
+_NEAR = 0.75  # of a name's letters: "Run" and "runs" are near to "run", "runtime" is not
 _HELD, _LEVELS = 0.8, 60  # share of readings that repeat the last, and levels, of a column set by a program
 
 
@@ -139,12 +140,31 @@ def _rises(table: LogTable, name: str) -> bool:
 
 def run_of(table: LogTable) -> str | None:
     """The column that tells the runs apart: named so, and constant over long parts."""
-    for name in table.columns:
-        words = set(Column(name, "", np.empty(0)).words)
-        labels = np.array(table.texts(name)) if words & _RUN else np.empty(0)
-        if len(labels) > 1 and np.mean(labels[1:] == labels[:-1]) > 0.9 and "" not in labels:
-            return name
-    return None
+    return next((name for name in table.columns if _is_of_runs(name) and parts_of(table, name)), None)
+
+
+def _is_of_runs(name: str) -> bool:
+    return not _RUN.isdisjoint(Column(name, "", np.empty(0)).words)
+
+
+def parts_of(table: LogTable, name: str) -> int:
+    """How many different names a column has that is constant over long parts; 0 of any other one."""
+    column = table.column(name)
+    labels = column if isinstance(column, np.ndarray) else np.array(table.texts(name))
+    named = not np.any(np.isnan(labels) if labels.dtype.kind == "f" else labels == "")
+    long = len(labels) > 1 and named and np.mean(labels[1:] == labels[:-1]) > 0.9
+    return len(np.unique(labels)) if long else 0
+
+
+def run_instead(table: LogTable, run: str, taken: Collection[str]) -> str | None:
+    """The column, not one of those ``taken``, that may be meant by the ``run`` of a rig, where there is no
+    such one: it has its name but for case or a letter, or one for runs, and tells several parts apart.
+    What has a unit is a reading."""
+    near = table.closest(run, taken, _NEAR)
+    likely = [near] if near is not None else []
+    likely += [name for name in table.columns if name not in taken and _is_of_runs(name)]
+    bare = (name for name in likely if not (table.unit(name) or unit_named(name)))
+    return next((name for name in bare if parts_of(table, name) > 1), None)
 
 
 def points(column: Column) -> dict[str, float]:

@@ -17,6 +17,7 @@ _LINE = 2000  # characters of a line that the library looks at: it takes long ov
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
 _COMMENTS = ("#", "%", "//")
+_BETWEEN = "".join(_DELIMITERS) + "\r\n\v\f"
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _POINT_DECIMAL = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
 _GROUPED = {mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}(\{mark}\d{{3}})+") for mark in ",."}
@@ -135,6 +136,16 @@ def _rows(text: str, delimiter: str) -> list[list[str]]:
 
 def _is_comment(line: str) -> bool:
     return line.lstrip().startswith(_COMMENTS) or (line[:4].lower() == "sep=" and len(line.strip()) <= 5)
+
+
+def is_bare(line: str) -> bool:
+    """Whether a line holds no reading: it is empty, a comment, or nothing but marks between columns.
+
+    >>> is_bare(" ; ;"), is_bare("# a word"), is_bare("0;;")
+    (True, True, False)
+    """
+    rest = line.strip(_BETWEEN)
+    return not rest or rest.startswith(_COMMENTS)
 
 
 def sniffed(sample: str) -> Dialect:

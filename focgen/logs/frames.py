@@ -13,7 +13,7 @@ from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs.cells import marks
 from focgen.logs.stamps import is_time, of_numpy
-from focgen.logs.table import LogTable
+from focgen.logs.table import Column, LogTable
 
 
 class Frame(Protocol):
@@ -40,15 +40,16 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
     if callable(getattr(frame, "collect", None)):
         raise LogError(name, "is a query of polars that has not been run", "give what its collect() returns")
     _check_keys(frame, name)
-    columns = {str(key): _column(frame[key], name, str(key)) for key in _keys(frame)}
-    units = {str(key): unit for key in _keys(frame) if (unit := _unit(frame[key]))}
-    times = {str(key): _zone(frame[key]) for key in _keys(frame) if _holds_times(frame[key])}
+    given = _levels_of_index(frame) | {str(key): frame[key] for key in _keys(frame)}
+    columns: dict[str, Column] = {key: _column(values, name, key) for key, values in given.items()}
+    units = {key: unit for key, values in given.items() if (unit := _unit(values))}
+    times = {key: _zone(values) for key, values in given.items() if _holds_times(values)}
     index = getattr(frame, "index", None)
     clock: Array | None = None
     zone: bool | None = None
     if index is not None and not callable(index) and str(index.name) not in columns:
         values = _column(index, name, "index")
-        named = {} if index.name is None else {str(index.name): values}
+        named: dict[str, Column] = {} if index.name is None else {str(index.name): values}
         columns = named | columns
         if isinstance(values, np.ndarray) and is_time(np.asarray(index)):
             clock, zone = values, _zone(index)
@@ -70,6 +71,15 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
         times=times,
         clock_zone=zone,
     )
+
+
+def _levels_of_index(frame: Frame | Mapping[Any, Any]) -> dict[str, Any]:
+    """What the levels of an index hold (m,), by their names: ``pandas.concat`` names runs so."""
+    index: Any = getattr(frame, "index", None)
+    names = getattr(index, "names", None)
+    if names is None or len(names) < 2:
+        return {}
+    return {str(key): index.get_level_values(k) for k, key in enumerate(names) if key is not None}
 
 
 def _check_keys(frame: Frame | Mapping[Any, Any], name: str) -> None:
@@ -99,7 +109,7 @@ def _column(values: Any, name: str, key: str) -> Array | list[str]:
     """Numbers as float64, times in s, everything else as a list."""
     try:
         array = _vector(values)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, ArithmeticError):
         raise LogError(f"{name} [{key}]", "is no vector", "give one number a sample") from None
     if array.ndim != 1:
         raise LogError(f"{name} [{key}]", f"has the shape {array.shape}", "give one number a sample")
@@ -110,12 +120,22 @@ def _column(values: Any, name: str, key: str) -> Array | list[str]:
 def _vector(values: Any) -> Array:
     """As an array of numpy: NaN where a mask is, without the unit that a quantity has."""
     values = getattr(values, "magnitude", values)
-    array = np.asarray(values)
+    array = _array(values)
     if not np.ma.isMaskedArray(values):
         return array
     kind: Any = float if array.dtype.kind in "fiub" else object
     made: Array = np.where(np.ma.getmaskarray(values), np.nan, array.astype(kind))
     return made
+
+
+def _array(values: Any) -> Array:
+    """As numpy has it; whole numbers of 128 bits, which it has not, one by one."""
+    try:
+        return np.asarray(values)
+    except Exception:  # polars has errors of its own
+        if not callable(getattr(values, "to_list", None)):
+            raise
+        return np.array(values.to_list(), dtype=object)
 
 
 def _unit(values: Any) -> str | None:
@@ -127,7 +147,7 @@ def _unit(values: Any) -> str | None:
 
 def _holds_times(values: Any) -> bool:
     """Whether a column holds instants or spans of numpy; of a quantity its unit tells."""
-    return not hasattr(values, "magnitude") and is_time(np.asarray(values))
+    return not hasattr(values, "magnitude") and is_time(_array(values))
 
 
 def _cells(cells: list[Any]) -> Array | list[str]:
@@ -135,13 +155,22 @@ def _cells(cells: list[Any]) -> Array | list[str]:
     missing = [_is_missing(cell) for cell in cells]
     known = [cell for cell, none in zip(cells, missing) if not none]
     if known and all(isinstance(cell, float | int | Decimal) for cell in known):
-        return np.array([np.nan if none else cell for cell, none in zip(cells, missing)], dtype=float)
+        return np.array([np.nan if none else _number(cell) for cell, none in zip(cells, missing)])
     return ["" if none else str(cell) for cell, none in zip(cells, missing)]
 
 
+def _number(cell: float | Decimal) -> float:
+    """As a float: infinite where it is beyond all of them, which is refused by its row."""
+    try:
+        return float(cell)
+    except OverflowError:
+        return np.inf if cell > 0 else -np.inf
+
+
 def _is_missing(cell: Any) -> bool:
-    """Whether it is None, NaN, NaT or what pandas has for them, which cannot be compared."""
+    """Whether it is None, NaN, NaT or what pandas has for them, which cannot be compared, as the signalling
+    NaN of decimals cannot."""
     try:
         return cell is None or bool(cell != cell)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, ArithmeticError):
         return True

@@ -15,6 +15,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import LogError
 from focgen.logs.dialect import lines_of
+from focgen.logs.scales import unit_of_time
 from focgen.logs.table import LARGEST, LogTable, check_units
 from focgen.logs.text_file import decoded, table_of
 from focgen.logs.units import TIME_WORDS
@@ -23,6 +24,7 @@ from focgen.textfile import read_log_bytes
 _END = "***End_of_Header***"
 _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 _TIME, _COMMENT = "X_Value", "Comment"
+_WORDS = {_COMMENT: "holds LabVIEW's words beside its rows"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,7 @@ class _Segment:
     settings: Mapping[str, Sequence[str]]
     names: Sequence[str]
     lines: Sequence[tuple[int, Sequence[str]]]
+    commented: bool
 
 
 def read(path: Path) -> LogTable:
@@ -71,7 +74,8 @@ def _segments(lines: Sequence[str], separator: str) -> Iterator[_Segment]:
     for begin, head, end in zip(begins, heads, [*heads[1:], len(lines)]):
         names = [name for name in cells[begin] if name != _COMMENT]
         body = [(i, cells[i]) for i in range(begin + 1, end) if any(cells[i])]
-        yield _Segment(_keys(lines[head:begin], separator), names, body)
+        commented = _COMMENT in cells[begin]
+        yield _Segment(_keys(lines[head:begin], separator), names, body, commented)
 
 
 def _head(cells: Sequence[Sequence[str]], begin: int) -> int:
@@ -99,6 +103,7 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
         clock = np.concatenate([_clock(path, s) for s in segments])
         columns = {name: column for name, column in columns.items() if name != _TIME}
     runs = [str(k) for k, s in enumerate(segments, start=1) for _ in s.lines] if len(segments) > 1 else None
+    notes = _unknown_unit(segments) if clock is not None else ()
     units, *others = (dict(zip(first[1:], s.settings.get("Y_Unit_Label", ()))) for s in segments)
     check_units(path, [units, *others])
     units |= _unit_of_time(path, segments)
@@ -110,6 +115,8 @@ def _table(path: Path, segments: Sequence[_Segment], decimal: str, time: str) ->
         units={name: unit for name, unit in units.items() if unit},
         clock=clock,
         runs=runs,
+        notes=notes,
+        skipped=_WORDS if any(s.commented for s in segments) else {},
     )
 
 
@@ -121,13 +128,27 @@ def _unit_of_time(path: Path, segments: Sequence[_Segment]) -> dict[str, str]:
     if other:
         what = f"goes over {other.lower()}, not over time"
         raise LogError(str(path), what, "save what was measured over time, or write Time as X_Dimension")
-    given = [{_TIME: (s.settings.get("X_Unit_Label") or [""])[0]} for s in segments]
+    given = [{_TIME: _label(s)} for s in segments]
     check_units(path, given)
     return {name: unit for name, unit in given[0].items() if unit}
 
 
+def _unknown_unit(segments: Sequence[_Segment]) -> tuple[str, ...]:
+    """A note where the steps of a clock are in what is no unit of time that is known."""
+    unit = _label(segments[0])
+    known = not unit or unit_of_time(unit) is not None
+    return () if known else (f"{unit!r} is no unit of time that is known: Delta_X is taken as in s",)
+
+
+def _label(segment: _Segment) -> str:
+    """The unit of the X values, "" where the file gives none."""
+    return (segment.settings.get("X_Unit_Label") or [""])[0].strip()
+
+
 def _clock(path: Path, segment: _Segment) -> Array:
-    """The time (m,) in s. Raises LogError where the file does not say it, or says another of each channel."""
+    """The time (m,) in s, from the unit that the file gives for it.
+
+    Raises LogError where the file does not say the time, or says another of each channel."""
     count = len(segment.names) - 1
     try:
         given = [
@@ -142,4 +163,5 @@ def _clock(path: Path, segment: _Segment) -> Array:
     if others or more:
         what = "gives its channels different X0 or Delta_X, so a row is not of one time"
         raise LogError(str(path), what, "save it with one column of X values")
-    return begin + step * np.arange(len(segment.lines))
+    _, seconds = unit_of_time(_label(segment) or "s") or ("", 1.0)
+    return seconds * (begin + step * np.arange(len(segment.lines)))

@@ -14,6 +14,7 @@ import numpy as np
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
 from focgen.logs.cells import Levels
+from focgen.logs.columns import run_instead
 from focgen.logs.dialect import MISSING
 from focgen.logs.experiment import Experiment
 from focgen.logs.frames import Frame, is_frame, table_of
@@ -120,7 +121,7 @@ def _experiments(
     columns, notes = _present(table, signals)
     time, said = time_of(table, signals)
     reading, column = reading_of(table, signals), signals.time if signals.time in table else None
-    notes = (*table.notes, *said, *notes)
+    notes = (*table.notes, *said, *notes, *_no_run(table, signals))
     for name, rows in _runs(table, signals.run):
         run = Raw(name, table.path, "", time, columns, table.line, notes, reading, column).part(rows)
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
@@ -161,8 +162,23 @@ def _unit_note(table: LogTable, role: str, signals: Roles) -> str | None:
 
 
 def _absence(table: LogTable, role: str, name: str, taken: set[str]) -> str:
+    if name in table.skipped:
+        why = table.skipped[name]
+        return f"no column {name!r} that can be read, for it {why}: {role} taken as not logged"
     near = table.closest(name, taken)
     return f"no column {name!r}: {role} taken as not logged" + (f" (is it {near!r}?)" if near else "")
+
+
+def _no_run(table: LogTable, signals: Roles) -> tuple[str, ...]:
+    """A note where the rig's column of runs is not there, and another may be meant. Without one nothing shows
+    that a log has several runs: rigs name the column for others."""
+    run = signals.run
+    if run is None or run in table or table.runs is not None:
+        return ()
+    if run in table.skipped:
+        return (f"no column {run!r} that can be read, for it {table.skipped[run]}: no runs are told apart",)
+    near = run_instead(table, run, taken_columns(signals))
+    return (f"no column {run!r}: no runs are told apart (is it {near!r}?)",) if near else ()
 
 
 def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, slice | Ints]]:

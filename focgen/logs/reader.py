@@ -90,6 +90,7 @@ def _columns(table: LogTable) -> tuple[dict[str, Any], list[Array]]:
         "aliases": dict(table.aliases),
         "runs": table.runs,
         "times": dict(table.times),
+        "skipped": dict(table.skipped),
     }
     clocks = {"differing": table.differing, "clock_zone": table.clock_zone, "clock": table.clock is not None}
     return {"columns": head, **known, **clocks}, numbers

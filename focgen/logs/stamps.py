@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime, time
+from typing import Any
 
 import numpy as np
 
 from focgen.arrays import Array
 
 _DAY = 86400.0
+_COUNTED_IN_NS = 9.2e9  # s: 64 bits count so many on either side of 1970
+_COUNTS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "m": 60.0, "h": 3600.0, "D": _DAY, "W": 7.0 * _DAY}  # s
 _PACKED = tuple(10.0**k for k in range(10))  # of a second: what hhmmss may count behind its seconds
 _POINTED = (0.01, 0.0001)  # the same of mm.ss and of h.mmss
 _PART = 1 << 14  # stamps that are looked at side by side
@@ -163,7 +166,20 @@ def of_numpy(values: Array) -> Array:
     kind = kinds.get(values.dtype.kind)
     if kind is None:
         return values
+    found = _in_its_unit(values)
+    if not (np.abs(found[~np.isnat(values)]) < _COUNTED_IN_NS).all():
+        return np.where(np.isnat(values), np.nan, found)
     return np.where(np.isnat(values), np.nan, values.astype(kind).astype(np.int64) * 1e-9)
+
+
+def _in_its_unit(values: Any) -> Array:
+    """The same by the unit that the times are stored in: in ns those of 2263 would begin anew in 1678."""
+    unit, count = np.datetime_data(values.dtype)
+    if unit in _COUNTS:
+        found: Array = values.astype(np.int64) * (count * _COUNTS[unit])
+    else:
+        found = values.astype(f"{values.dtype.kind}8[s]").astype(float)
+    return found
 
 
 def carried_on(values: Array) -> tuple[Array, dict[int, float]]:

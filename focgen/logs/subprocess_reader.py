@@ -67,7 +67,8 @@ def _table(path: Path, head: dict[str, Any], body: bytes) -> LogTable:
         columns[name] = numbers[at : at + count].copy() if texts is None else texts
         at += count if texts is None else 0
     clock = numbers[at:].copy() if head["clock"] else None
-    known = {key: head[key] for key in ("units", "aliases", "runs", "differing", "times", "clock_zone")}
+    kept = ("units", "aliases", "runs", "differing", "times", "clock_zone", "skipped")
+    known = {key: head[key] for key in kept}
     grouped, unsure = marks(columns)
     return LogTable(str(path), columns, clock=clock, grouped=grouped, unsure=unsure, **known)
 

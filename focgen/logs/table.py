@@ -55,7 +55,8 @@ class LogTable:
     columns have clocks of their own that differ, so there is none. ``grouped``: columns whose points may
     stand between thousands; ``unsure``: those that show nothing else but numbers like "1.200". ``times``:
     columns that held instants or spans and are in s by nature, and whether they have a zone, None of spans.
-    ``clock_zone``: the same of the ``clock``, None as well of one that does not count from 1970.
+    ``clock_zone``: the same of the ``clock``, None as well of one that does not count from 1970. ``skipped``:
+    what the file holds besides and is no column, by name, and why.
     """
 
     path: str
@@ -72,6 +73,7 @@ class LogTable:
     unsure: frozenset[str] = frozenset()
     times: Mapping[str, bool | None] = field(default_factory=dict)
     clock_zone: bool | None = None
+    skipped: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -87,19 +89,22 @@ class LogTable:
         """The unit that the file gives for a column."""
         return self.units.get(self.own(name))
 
-    def closest(self, name: str, taken: Collection[str] = ()) -> str | None:
+    def closest(self, name: str, taken: Collection[str] = (), least: float = 0.6) -> str | None:
         """The column, not one of those ``taken``, whose name is nearest to ``name``, or None where none is
-        near.
+        near: has ``least`` of the letters of both in common.
         """
         names = [*self.columns, *self.aliases]
         lowered = {column.lower(): column for column in names if column not in taken}
-        near = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
+        near = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=least)
         return lowered[near[0]] if near else None
 
     def missing(self, role: str, name: str, taken: Collection[str] = ()) -> LogError:
         """The error for a column that is needed and not there; those ``taken`` have another role."""
         if role == "time" and self.differing:
             return self.without_clock()
+        if name in self.skipped:
+            what = f"has no column {name!r} ({role}) that can be read: it {self.skipped[name]}"
+            return LogError(self.path, what.replace(";", ","), "save it as a vector, of one value a sample")
         near = self.closest(name, taken)
         there = ", ".join(self.columns)
         holder = next((n for n, c in self.columns.items() if n not in taken and _holds(c, name)), None)

@@ -18,13 +18,16 @@ from pathlib import Path
 
 from focgen.errors import LogError
 from focgen.logs.cells import Gathered, Lines, marks_of
-from focgen.logs.dialect import SAMPLE, Comments, Dialect, is_number, lines_of, rows_of, sniffed
+from focgen.logs.dialect import SAMPLE, Comments, Dialect, is_bare, is_number, lines_of, rows_of, sniffed
 from focgen.logs.table import LogTable
 from focgen.textfile import log_parts, open_log
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 MOST_COLUMNS = 4096
 _LONGEST_LINE = 1 << 18  # characters: of 4096 columns, 64 each
+_MOST_LINES = 1 << 25
+_BARE, _BARE_A_ROW = 1_000_000, 4  # lines without a reading: so many, and so many for each line with one
+_AT_ONCE = 1 << 14  # characters whose lines are counted: the few that are cut do not count
 _LOOKED_AT = 1 << 22  # characters
 _IN_BRACKETS = re.compile(r"(.+?)\s*[\[(]([^\[\]()]*)[\])]")
 
@@ -125,7 +128,7 @@ def _encoding(path: Path) -> tuple[str, str]:
 
 def _encoding_of(parts: Iterable[bytes], path: Path) -> tuple[str, str]:
     """The codec of a text, and its name where it was guessed. Raises LogError for binary files."""
-    codec = ""
+    codec, lines = "", _Counted(path)
     decoder: codecs.IncrementalDecoder = codecs.getincrementaldecoder("utf-8")()
     for part in parts:
         if not codec:
@@ -138,11 +141,33 @@ def _encoding_of(parts: Iterable[bytes], path: Path) -> tuple[str, str]:
         if text is None or "\0" in text:
             raise LogError(str(path), "is not text", "save it as UTF-8")
         _check_lines(text, path)
+        lines.see(text)
     if _decoded_part(decoder, b"", True) is None:  # ends within a character
         if codec != "utf-8":
             raise LogError(str(path), "is not text", "save it as UTF-8")
         codec = "cp1252"
     return codec or "utf-8", "Windows-1252" if codec == "cp1252" else ""
+
+
+class _Counted:
+    """Lines so far, and those of them that are bare: empty, comments, or nothing but marks between columns.
+    Packed they take next to no room."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.lines, self.bare = path, 0, 0
+
+    def see(self, text: str) -> None:
+        """A part has been read. Raises LogError for more lines, or bare ones, than a log has."""
+        for at in range(0, len(text), _AT_ONCE):
+            found = text[at : at + _AT_ONCE].splitlines()
+            self.lines += len(found)
+            self.bare += sum(is_bare(line) for line in found if not line[:1].isdigit())
+        if self.bare > _BARE + _BARE_A_ROW * (self.lines - self.bare):
+            what = f"has {self.bare} lines without a reading among its first {self.lines}"
+            raise LogError(str(self.path), what, "leave out empty lines and comments")
+        if self.lines > _MOST_LINES:
+            what = f"has more than {_MOST_LINES} lines"
+            raise LogError(str(self.path), what, "split it into smaller files")
 
 
 def _check_lines(text: str, path: Path) -> None:

@@ -30,7 +30,20 @@ def time_of(table: LogTable, signals: Roles) -> tuple[Array, tuple[str, ...]]:
     if table.clock is None:
         raise table.missing("time", signals.time, taken_columns(signals) - {signals.time})
     step = float(np.median(np.diff(table.clock))) if len(table) > 1 else 0.0
-    return table.clock, (f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples",)
+    note = f"no column {signals.time!r}: time is the log's own, {step:.6g} s between samples"
+    return table.clock, (note + _not_of_clock(table, signals),)
+
+
+def _not_of_clock(table: LogTable, signals: Roles) -> str:
+    """What the rig says of the column of time, and does not hold for a log's own clock, which is in s."""
+    scale, given = signals.scales.get("time"), unit_of_time(table.unit(signals.time) or "")
+    own = 1.0 if scale is None else scale.scale
+    if scale is not None and scale.unit is not None:
+        own = (unit_of_time(scale.unit) or ("", 1.0))[1]
+    if own == 1.0 or (given is not None and abs(own / given[1] - 1.0) <= _ONE_CLOCK):
+        return ""
+    taken = f"not in {scale.unit}" if scale is not None and scale.unit else f"not multiplied by {own:g}"
+    return f", {taken}, as the rig has it for its column"
 
 
 def _is_unscaled(table: LogTable, name: str, scale: Scale) -> bool:

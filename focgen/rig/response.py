@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import RigError
 from focgen.fractional.decomposition import dense
 from focgen.fractional.transfer import TransferFunction
@@ -20,18 +21,32 @@ _GROWN = 25.0  # time constants that a pole may grow for: beyond, what it makes 
 
 def response_time(rig: Rig, h: float, record: float) -> float:
     """When the nominal chain's response to a step passes 63 % of its value at a third of the record, in s; of
-    a rig that integrates, when its rate does, for its response never settles."""
+    a rig that integrates, when its rate does, for its response never settles; of one that lets no constant
+    through, when its integral does, for its response comes back to 0."""
     count = int(min(max(record / h / 3, 20), 20_000))
     span = max(record / 3 / count, h)
     run = Run.of([count + 1], [0.0], span)
     y = Chain(rig).run(np.r_[0.0, np.ones(count)], "regulator", "sensor", run)
-    y = np.diff(y - y[0], integrations(rig))
+    y = y - y[0]
+    count = _integrations(rig)
+    y = np.diff(y, count) if count >= 0 else _summed(y, -count)
     passed = np.abs(y) >= 0.63 * abs(y[-1])
     return float(np.clip(span * max(int(np.argmax(passed)), 1), 3 * h, record / 3))
 
 
 def integrations(rig: Rig) -> int:
-    """How often the rig integrates its input: 0 where a constant one brings it to rest."""
+    """How often the rig integrates its input: 0 where a constant one brings it to rest, at 0 or elsewhere."""
+    return max(_integrations(rig), 0)
+
+
+def _summed(y: Array, count: int) -> Array:
+    for _ in range(count):
+        y = np.cumsum(y)
+    return y
+
+
+def _integrations(rig: Rig) -> int:
+    """The same; below 0 of a rig that differentiates, as one whose sensor lets no constant through."""
     stages = [rig.regulator, rig.sensor]
     if isinstance(rig.actuator, LinearActuator):
         stages.append(rig.actuator.dynamics)

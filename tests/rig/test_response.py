@@ -12,7 +12,7 @@ import focgen
 from focgen.diagnosis.proposals.identifiability import plan
 from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.response import check_bounded
+from focgen.rig.response import check_bounded, integrations, response_time
 from focgen.rig.rig import LinearActuator, Rig, Signals
 
 LAG = TransferFunction([(10.0, 0.0)], [(1.0, 1.0), (10.0, 0.0)])
@@ -21,6 +21,11 @@ SIGNALS = Signals("t", "y", command="u")
 
 def rig(*den, num=((1.0, 0.0),)):
     return Rig("axis", 0.01, SIGNALS, LinearActuator(TransferFunction(num, den)), LAG, LAG)
+
+
+def coupled(order):
+    """A stage that lets no constant through, as an amplifier that is coupled by a capacitor."""
+    return TransferFunction([(1.0, order)], [(1.0, order), (10.0, 0.0)])
 
 
 RUNAWAYS = {
@@ -66,3 +71,26 @@ def test_no_run_of_it_ends_in_numbers_that_are_none(run):
     )
     with pytest.raises(RigError, match="grows by itself"):
         run(away, [log])
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("stage", ["regulator", "sensor", "actuator"])
+def test_a_rig_that_lets_no_constant_through_has_a_response_time(order, stage):
+    """It integrates less than not at all, which no difference of a response is."""
+    away = LinearActuator(coupled(order)) if stage == "actuator" else coupled(order)
+    made = replace(rig((0.4, 1.0), (1.0, 0.0)), **{stage: away})
+    t = np.arange(300) * 0.01
+    log = {"t": t, "u": (t > 1.0).astype(float), "y": np.where(t > 1.0, np.exp(1.0 - t), 0.0)}
+    assert integrations(made) == 0 and 0.02 < response_time(made, 0.01, 3.0) < 1.0
+    assert all(np.isfinite(r["output"]).all() for r in focgen.replay(made, [log]).simulated.values())
+
+
+def test_it_is_as_slow_as_what_its_integral_does():
+    lag = TransferFunction([(10.0, 0.0)], [(1.0, 1.0), (10.0, 0.0)])
+    same, ac = (replace(rig((0.4, 1.0), (1.0, 0.0)), sensor=s) for s in (lag, coupled(1.0)))
+    assert response_time(ac, 0.01, 9.0) == pytest.approx(response_time(same, 0.01, 9.0), abs=0.03)
+
+
+def test_what_differentiates_an_integrator_is_no_integrator():
+    made = replace(rig((1.0, 2.0), (1.0, 1.0)), sensor=coupled(1.0))
+    assert integrations(rig((1.0, 2.0), (1.0, 1.0))) == 1 and integrations(made) == 0
