@@ -21,14 +21,19 @@ _DRIVES = ("command", "pressure")
 
 @dataclass(frozen=True)
 class _Signal:
-    """A signal without holes (m,), what to say of it, its readings without outliers where it was logged, at
-    the rows ``there``, and the rows in which there were outliers."""
+    """A signal without holes (m,), what to say of it, its readings without outliers (m,), the rows of fresh
+    ones and of those ``there``, and the rows in which there were outliers."""
 
     filled: Array
     notes: list[str]
-    logged: Array
+    readings: Array
+    fresh: Ints | slice
     there: Ints | slice
     wrong: Ints
+
+    def logged(self) -> Array:
+        """The readings where it was logged: made anew, for a log may be long."""
+        return _held(self.readings, self.fresh, self.there)
 
 
 def mended(time: Array, values: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, ...]]:
@@ -75,7 +80,7 @@ def _mended(role: str, time: Array, y: Array, drive: Drive | None) -> _Signal:
         notes.append(
             Note(f"readings of {role} missing, {how}", int(gone.sum()), f"at {time[np.argmax(gone)]:g} s")
         )
-    return _Signal(_filled(role, time, y, rows, there), notes, _held(y, rows, there), there, wrong)
+    return _Signal(_filled(role, time, y, rows, there), notes, y, rows, there, wrong)
 
 
 def _straightened(role: str, time: Array, y: Array, drive: Drive | None) -> tuple[Array, Bools, list[str]]:
@@ -97,7 +102,7 @@ def _straightened(role: str, time: Array, y: Array, drive: Drive | None) -> tupl
     far = [] if drive is None else strays(y, drive.signal)
     if far:
         first = far[0]
-        what = f"{role} leaves and comes back farther than anywhere else, while the command does not jump"
+        what = f"{role} jumps away and back, farther than anywhere else, while the command does not jump"
         place = f"{first.stop - first.start} readings from {time[first.start]:g} s"
         notes.append(Note(f"{what}: cut it off with --from and --to, or mend the log", len(far), place))
     return y, wrong, notes
@@ -191,7 +196,7 @@ def _frozen(time: Array, signals: Mapping[str, _Signal]) -> list[str]:
     notes: list[str] = []
     for role, signal in signals.items():
         others = [other.filled[signal.there] for name, other in signals.items() if name != role]
-        stretch = None if role in HELD else frozen(signal.logged, others)
+        stretch = None if role in HELD else frozen(signal.logged(), others)
         if stretch:
             first, rows = stretch
             at = time[signal.there]

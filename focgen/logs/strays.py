@@ -15,7 +15,7 @@ _LONGEST = 50  # readings in a row
 _SETTLED = 100  # readings behind a jump of the command: what is quick has answered by then
 _FAR = 8.0  # times the usual change from one reading to the next, made a standard deviation
 _BLOCK = 128  # readings over which that is taken as even
-_PART = _BLOCK << 9  # readings that are looked at at a time
+_PART = _BLOCK << 6  # readings that are looked at at a time
 _SIDE = 5  # readings on either side whose median counts
 _AGREE = 0.25  # of how far it leaves: so near it comes back
 _FEWEST = 20  # readings
@@ -23,7 +23,7 @@ _FEWEST = 20  # readings
 
 def strays(y: Array, command: Array) -> list[slice]:
     """The stretches of up to 50 readings of ``y`` (n,) that leave and come back while ``command`` (n,) does
-    not jump, nor has just done so.
+    not jump, nor has just done so, nor has the log just begun.
 
     They leave and come back from one reading to the next, by more than the signal does so anywhere else.
     Where the command moves at all, or they are shorter than four readings, they are also farther off than all
@@ -31,7 +31,9 @@ def strays(y: Array, command: Array) -> list[slice]:
     """
     if len(y) < _FEWEST or np.ptp(y) == 0.0:
         return []
-    leaps = _leaps(y, jumped(command, _SETTLED)[1:])
+    moving = jumped(command, _SETTLED)
+    moving[:_SETTLED] = True  # what was before is not known
+    leaps = _leaps(y, moving[1:])
     if not len(leaps):
         return []
     groups = np.split(leaps, np.flatnonzero(np.diff(leaps) > _LONGEST) + 1)
@@ -97,6 +99,8 @@ def _sides(y: Array, leaps: Ints) -> tuple[float, float]:
 
 def _comes_back(y: Array, leaps: Ints) -> bool:
     """Whether ``y`` (n,) is the same again behind the last of some leaps, and no more than briefly away."""
+    if leaps[0] < _SIDE or len(y) - leaps[-1] < _SIDE:
+        return False
     before, after = _sides(y, leaps)
     away = np.abs(y[leaps[0] : leaps[-1]] - before).max(initial=0.0)
     return bool(0 < leaps[-1] - leaps[0] <= _LONGEST and abs(after - before) <= _AGREE * away)

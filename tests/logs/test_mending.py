@@ -10,7 +10,7 @@ from focgen.errors import LogError
 from focgen.logs import Experiment, notes_of
 from focgen.logs.drives import barred_by, turned_by
 from focgen.logs.notes import Note
-from focgen.logs.outliers import outliers
+from focgen.logs.outliers import are_many, outliers
 from focgen.logs.read import in_session_order
 from focgen.logs.repeats import fresh_rows, frozen
 from tests.logs.test_read import STEP, read_columns, table
