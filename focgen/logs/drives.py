@@ -11,6 +11,8 @@ from focgen.logs.answers import WIDEST, Answers
 from focgen.logs.outliers import ends_of_medians, largest_jump
 
 _AHEAD, _AFTER = 3, 10  # readings around a jump of the command that are left alone
+_LATE = 40  # readings behind a jump, in which rigs with a dead time answer
+_EVEN = 0.5  # times as often at rest as anywhere: what comes from outside knows no command
 _JUMP = 0.05  # of the span: so much from one reading to the next is a jump
 _FEWEST = 16  # readings: of fewer, nothing lasts
 
@@ -29,10 +31,17 @@ class Drive:
         """The drive of a ``command`` (n,), or of a pressure where there is none."""
         return cls(command, barred_by(command), turned_by(command), answers_to(command))
 
-    def of(self, rows: slice | Ints) -> Drive:
-        """The same at some ``rows``."""
-        answers = None if self.answers is None else self.answers.of(rows)
+    def of(self, rows: slice | Ints, whole: bool) -> Drive:
+        """The same at some ``rows``; unless these are the ``whole`` of what was logged, a pulse may lie
+        between two, and no answer is known."""
+        answers = None if self.answers is None or not whole else self.answers.of(rows)
         return Drive(self.signal[rows], self.barred[rows], self.never[rows], answers)
+
+    def is_elsewhere(self, found: Bools) -> bool:
+        """Whether what was ``found`` (n,) is at rest nearly as often as behind jumps of the signal: else it
+        is an answer, perhaps a late one."""
+        resting = ~jumped(self.signal, _LATE)
+        return bool(found[resting].mean() >= _EVEN * found.mean()) if resting.any() else True
 
 
 def barred_by(command: Array) -> Bools:

@@ -67,7 +67,7 @@ def _mended(role: str, time: Array, y: Array, drive: Drive | None) -> _Signal:
         if slow:
             rows = slow[1] if isinstance(there, slice) else there[slow[1]]
             notes.append(_slow_note(role, slow[0] * len(time) / np.sum(~gone), time))
-        here = None if drive is None else drive.of(rows)
+        here = None if drive is None else drive.of(rows, whole=slow is None)
         straight, off, said = _straightened(role, time[rows], y[rows], here)
         if off.any():
             y, wrong = _with(y, rows, straight), np.arange(len(y))[rows][off]
@@ -88,12 +88,14 @@ def _straightened(role: str, time: Array, y: Array, drive: Drive | None) -> tupl
     them and cannot be mended."""
     notes: list[str] = []
     wrong = outliers(y) if drive is None else outliers(y, drive.barred, drive.never, drive.answers)
-    if are_many(wrong):
+    many = are_many(wrong)
+    if many and (drive is None or drive.is_elsewhere(wrong)):
         what = (
             f"{role} stands out from both sides in more than one reading in a hundred, too many to be mended"
         )
         what += ": mend the log, or leave such cells empty, if nothing was read"
         notes.append(Note(what, int(wrong.sum()), f"at {time[np.argmax(wrong)]:g} s"))
+    if many:
         wrong = np.zeros(len(y), bool)
     if wrong.any():
         what = f"outliers of {role} replaced by the straight line between their neighbours"
