@@ -8,7 +8,7 @@ import pytest
 
 from focgen.identification.ranges import seen_ranges
 from focgen.logs import Experiment
-from focgen.logs.drives import answers_to, barred_by, turned_by
+from focgen.logs.drives import Drive, answers_to, barred_by, turned_by
 from focgen.logs.mending import mended
 from focgen.logs.outliers import outliers
 from focgen.rig.rig import Ranges
@@ -95,6 +95,15 @@ def test_more_outliers_than_are_mended_are_told_of():
     sparks = rng.random(COUNT) < 0.02
     signals["pressure"][sparks] = rng.uniform(0.5, 1.0, sparks.sum())
     assert any("pressure stands out" in note and "mend the log" in note for note in told(signals))
+
+
+def test_late_answers_to_pulses_are_not_told_of_as_too_many_outliers():
+    """What comes from outside comes at rest as well; a dead time is longer than what is barred."""
+    command = np.where(np.arange(COUNT) % 75 == 40, 1.0, 0.0)
+    y = np.roll(command, 20) + 1e-3 * np.random.default_rng(5).normal(size=COUNT)
+    assert not told({"command": command, "output": y})
+    drive, sparks = Drive.by(command), np.random.default_rng(6).random(COUNT) < 0.02
+    assert drive.is_elsewhere(sparks) and not drive.is_elsewhere(np.roll(command, 20) > 0.5)
 
 
 @pytest.mark.parametrize("kind", ("bits", "dither"))
