@@ -8,7 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.logs.experiment import Experiment
+from focgen.logs.strays import astray
 from focgen.rig.rig import Ranges
 
 _ROOM = 1.25  # beyond what was seen: a controller may have to go a little further than the logs did
@@ -18,12 +20,13 @@ _DIGITS = 2
 def seen_ranges(given: Ranges, experiments: Sequence[Experiment]) -> tuple[Ranges, tuple[str, ...]]:
     """Return ``given`` with pressure and output, where absent, from the logs, and a sentence for each.
 
-    A range from logs spans zero and what was seen with a quarter of room, rounded outwards to two digits. The
-    command's is no matter of logs: whoever designs takes the regulator's 0–10 V.
+    A range from logs spans zero and what was seen with a quarter of room, rounded outwards to two digits.
+    Readings that are told of as astray are left out. The command's is no matter of logs: whoever designs
+    takes the regulator's 0–10 V.
     """
     notes = []
     for role in ("pressure", "output"):
-        seen = [e.signals[role] for e in experiments if role in e.signals]
+        seen = [_usable(e, role) for e in experiments if role in e.signals]
         if getattr(given, role) is None and seen:
             span = _with_room(float(min(map(np.min, seen))), float(max(map(np.max, seen))))
             given = replace(given, **{role: span})
@@ -32,6 +35,16 @@ def seen_ranges(given: Ranges, experiments: Sequence[Experiment]) -> tuple[Range
                 "from the logs with a quarter of room"
             )
     return given, tuple(notes)
+
+
+def _usable(experiment: Experiment, role: str) -> Array:
+    """The signal (n,) of a role without the readings that are astray."""
+    y = experiment.signals[role]
+    drive = experiment.signals.get("command", experiment.signals.get("pressure"))
+    if drive is None or drive is y:
+        return y
+    kept: Array = y[~astray(y, drive)]
+    return kept if len(kept) else y
 
 
 def _with_room(low: float, high: float) -> tuple[float, float]:

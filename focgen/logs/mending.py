@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from focgen.arrays import Array, Bools, Ints
 from focgen.logs.clipped import end_of_range
 from focgen.logs.clock import HELD, between
+from focgen.logs.drives import Drive
 from focgen.logs.notes import Note
-from focgen.logs.outliers import (
-    barred_by,
-    first_stands_out,
-    outliers,
-    stand_in,
-    straightened,
-    turned_by,
-)
+from focgen.logs.outliers import are_many, first_stands_out, outliers, stand_in, straightened
 from focgen.logs.repeats import fresh_rows, frozen
+from focgen.logs.strays import strays
 
 _DRIVES = ("command", "pressure")
+
+
+@dataclass(frozen=True)
+class _Signal:
+    """A signal without holes (m,), what to say of it, its readings without outliers (m,), the rows of fresh
+    ones and of those ``there``, and the rows in which there were outliers."""
+
+    filled: Array
+    notes: list[str]
+    readings: Array
+    fresh: Ints | slice
+    there: Ints | slice
+    wrong: Ints
+
+    def logged(self) -> Array:
+        """The readings where it was logged: made anew, for a log may be long."""
+        return _held(self.readings, self.fresh, self.there)
 
 
 def mended(time: Array, values: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, ...]]:
@@ -31,39 +44,95 @@ def mended(time: Array, values: Mapping[str, Array]) -> tuple[dict[str, Array], 
     at its fresh readings, with straight lines between: it would seem late by half of what it repeats. An
     output that repeats is left so, for the controller reads it late.
     """
-    found: dict[str, Array] = {}
-    notes: list[str] = []
+    found: dict[str, _Signal] = {}
+    drive = None
     for role in sorted(values, key=lambda role: (role not in HELD, role not in _DRIVES)):
-        found[role], said = _mended(role, time, values[role], found.get("command", found.get("pressure")))
-        notes += said
-    notes += _frozen(time, values)
-    return {role: found[role] for role in values}, tuple(notes)
+        found[role] = _mended(role, time, values[role], drive)
+        if drive is None and role in _DRIVES:
+            drive = Drive.by(found[role].filled)
+    notes = [note for signal in found.values() for note in signal.notes]
+    if drive is not None and "command" in found:
+        notes += _row_notes(time, drive, found)
+    notes += _frozen(time, {role: found[role] for role in values})
+    return {role: found[role].filled for role in values}, tuple(notes)
 
 
-def _mended(role: str, time: Array, y: Array, drive: Array | None) -> tuple[Array, list[str]]:
+def _mended(role: str, time: Array, y: Array, drive: Drive | None) -> _Signal:
     gone, notes = np.isnan(y), []
     there: Ints | slice = np.flatnonzero(~gone) if gone.any() else slice(0, len(y))
     rows: Ints | slice = there
+    wrong = np.zeros(0, int)
     if role not in HELD:
         slow = fresh_rows(y[there])
         if slow:
             rows = slow[1] if isinstance(there, slice) else there[slow[1]]
             notes.append(_slow_note(role, slow[0] * len(time) / np.sum(~gone), time))
-        barred, never = (None if drive is None else by(drive)[rows] for by in (barred_by, turned_by))
-        wrong = outliers(y[rows], barred, never)
-        if wrong.any():
-            what = f"outliers of {role} replaced by the straight line between their neighbours"
-            notes.append(Note(what, int(wrong.sum()), f"at {time[rows][np.argmax(wrong)]:g} s"))
-            y = _with(y, rows, straightened(time[rows], y[rows], wrong))
-        notes += _first_note(role, y[rows], time[rows], barred)
-        notes += _stand_in_note(role, y[rows], time[rows])
-        notes += _clipped_note(role, y[rows], time[rows])
+        here = None if drive is None else drive.of(rows, whole=slow is None)
+        straight, off, said = _straightened(role, time[rows], y[rows], here)
+        if off.any():
+            y, wrong = _with(y, rows, straight), np.arange(len(y))[rows][off]
+        notes += said
+        notes += _first_note(role, straight, time[rows], None if here is None else here.barred)
+        notes += _stand_in_note(role, straight, time[rows])
+        notes += _clipped_note(role, straight, time[rows])
     if gone.any():
         how = "held" if role in HELD else "bridged by straight lines"
         notes.append(
             Note(f"readings of {role} missing, {how}", int(gone.sum()), f"at {time[np.argmax(gone)]:g} s")
         )
-    return _filled(role, time, y, rows, there), notes
+    return _Signal(_filled(role, time, y, rows, there), notes, y, rows, there, wrong)
+
+
+def _straightened(role: str, time: Array, y: Array, drive: Drive | None) -> tuple[Array, Bools, list[str]]:
+    """Readings (m,) without outliers, which were some (m,), and what to say of these and of what is like
+    them and cannot be mended."""
+    notes: list[str] = []
+    wrong = outliers(y) if drive is None else outliers(y, drive.barred, drive.never, drive.answers)
+    many = are_many(wrong)
+    if many and (drive is None or drive.is_elsewhere(wrong)):
+        what = (
+            f"{role} stands out from both sides in more than one reading in a hundred, too many to be mended"
+        )
+        what += ": mend the log, or leave such cells empty, if nothing was read"
+        notes.append(Note(what, int(wrong.sum()), f"at {time[np.argmax(wrong)]:g} s"))
+    if many:
+        wrong = np.zeros(len(y), bool)
+    if wrong.any():
+        what = f"outliers of {role} replaced by the straight line between their neighbours"
+        notes.append(Note(what, int(wrong.sum()), f"at {time[np.argmax(wrong)]:g} s"))
+        y = straightened(time, y, wrong)
+    far = [] if drive is None else strays(y, drive.signal)
+    if far:
+        first = far[0]
+        what = f"{role} jumps away and back, farther than anywhere else, while the command does not jump"
+        place = f"{first.stop - first.start} readings from {time[first.start]:g} s"
+        notes.append(Note(f"{what}: cut it off with --from and --to, or mend the log", len(far), place))
+    return y, wrong, notes
+
+
+def _held(y: Array, rows: Ints | slice, there: Ints | slice) -> Array:
+    """The readings at the rows ``there``, each fresh one of ``rows`` until the next."""
+    if isinstance(rows, slice) or rows is there:
+        return y[there]
+    logged = np.arange(len(y))[there]
+    return y[rows[np.searchsorted(rows, logged, side="right") - 1]]
+
+
+def _row_notes(time: Array, drive: Drive, found: Mapping[str, _Signal]) -> list[str]:
+    """A word on rows in which the command leaves and comes back together with what is measured."""
+    answers = drive.answers
+    if answers is None:
+        return []
+    along = {
+        role: [row for row in signal.wrong if answers.between(int(row), int(row) + 1)[1] > 0.0]
+        for role, signal in found.items()
+    }
+    rows = sorted({int(row) for of in along.values() for row in of})
+    if not rows:
+        return []
+    whose = " and ".join(role for role, of in along.items() if of)
+    what = f"command leaves and comes back together with {whose}, as where a row is misread: it is left so"
+    return [Note(f"{what}; leave its cells empty there", len(rows), f"at {time[rows[0]]:g} s")]
 
 
 def _first_note(role: str, y: Array, time: Array, barred: Bools | None) -> list[str]:
@@ -113,9 +182,7 @@ def _filled(role: str, time: Array, y: Array, rows: Ints | slice, there: Ints | 
     if isinstance(rows, slice):
         return y
     if rows is not there and role == "output":
-        there = np.arange(len(y)) if isinstance(there, slice) else there
-        held = y[rows[np.searchsorted(rows, there, side="right") - 1]]
-        return np.interp(time, time[there], held)
+        return np.interp(time, time[there], _held(y, rows, there))
     return between(role, time, time[rows], y[rows])
 
 
@@ -127,15 +194,16 @@ def _slow_note(role: str, period: float, time: Array) -> str:
     return f"{role} is fresh in every {period:.3g}. row only ({rate:.3g} Hz): {done}"
 
 
-def _frozen(time: Array, values: Mapping[str, Array]) -> list[str]:
+def _frozen(time: Array, signals: Mapping[str, _Signal]) -> list[str]:
     notes: list[str] = []
-    for role in values:
-        others = [y for other, y in values.items() if other != role and not np.isnan(y).any()]
-        stretch = None if role in HELD or np.isnan(values[role]).any() else frozen(values[role], others)
+    for role, signal in signals.items():
+        others = [other.filled[signal.there] for name, other in signals.items() if name != role]
+        stretch = None if role in HELD else frozen(signal.logged(), others)
         if stretch:
             first, rows = stretch
-            last = min(first + rows, len(time) - 1)
-            place = f"for {time[last] - time[first]:.3g} s from {time[first]:g} s"
+            at = time[signal.there]
+            last = min(first + rows, len(at) - 1)
+            place = f"for {at[last] - at[first]:.3g} s from {at[first]:g} s"
             what = f"{role} frozen while the rig moves: cut it off with --from and --to"
             notes.append(Note(what, 1, place))
     return notes

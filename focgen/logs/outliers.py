@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from focgen.arrays import Array, Bools, Ints
+from focgen.logs.answers import WIDEST, Answers
 
-WIDEST = 3  # readings in a row
 _SIDE = 3  # readings on either side that have to agree
 _FAR = 5.2  # robust standard deviations of a reading from the line through its neighbours
 _CLEAR = 2.75  # times the worst departure of the neighbours from that line
@@ -18,7 +19,6 @@ _EVEN = 0.6  # of the farthest of several in a row is the nearest: they come and
 _BLOCK = 128  # readings over which the noise is taken as even
 _RARE = 0.01  # of the readings: more of them are the signal's own
 _FEWEST = 20  # readings
-_AHEAD, _AFTER = 3, 10  # readings around a jump of the command that are left alone
 _MOVES = 3.0  # times what noise could do: a signal that does no more may have been released as its log begins
 _BEHIND = WIDEST + 2 * _SIDE  # readings of which the command has to rest where there is one side only
 _PART = 1 << 16  # windows that are looked at side by side
@@ -30,16 +30,57 @@ _AGAIN = 5  # stretches of exactly the same number, at least …
 _ALONE = 0.9  # … and of all that are so far off: what swings has two ends
 
 
-def outliers(y: Array, barred: Bools | None = None, never: Bools | None = None) -> Bools:
+@dataclass(frozen=True)
+class _Bounds:
+    """How far off an outlier is in some places, and in which; ``answers`` count in ``jump``."""
+
+    barred: Bools
+    never: Bools
+    answers: Answers | None
+    jump: float
+    reach: float
+
+    def allow(self, size: Array, begin: int, width: int) -> Bools:
+        """Whether pulses (k,) of ``width`` readings and ``size`` (k,) may be outliers, in windows from
+        ``begin`` on."""
+        whole = 2 * _SIDE + width
+        rows = slice(begin, begin + len(size) + whole - 1)
+        barred, never = (_touched(where[rows], whole) for where in (self.barred, self.never))
+        far: Bools = size > self.reach
+        if not never.any():
+            return ~barred | far
+        if self.answers is None:
+            return ~never & (~barred | far)
+        near, along = (self.jump * x for x in self.answers.between(rows.start, rows.stop))
+        beyond = size > sliding_window_view(near, whole).max(axis=1)
+        found: Bools = _together(along, size, width) | ((~barred | far) & (~never | (far & beyond)))
+        return found
+
+
+def _together(along: Array, size: Array, width: int) -> Bools:
+    """Whether pulses (k,) leave and come back as the command does, farther off than they could be ``along``
+    with it."""
+    windows = sliding_window_view(along, 2 * _SIDE + width)
+    inside = windows[:, _SIDE:-_SIDE]
+    there = (inside.min(axis=1) > 0.0) & (windows[:, _SIDE - 1] == 0.0) & (windows[:, -_SIDE] == 0.0)
+    found: Bools = there & (size > inside.max(axis=1))
+    return found
+
+
+def outliers(
+    y: Array, barred: Bools | None = None, never: Bools | None = None, answers: Answers | None = None
+) -> Bools:
     """Which readings of ``y`` (n,) are outliers, as a mask (n,); where ``barred`` (n,), only those farther
-    off than all that the signal does, and where ``never`` (n,), which is ``barred`` unless given, none.
+    off than all that the signal does. Where ``never`` (n,), which is ``barred`` unless given, they are also
+    farther off than ``answers`` say, or leave and come back together with the command; without ``answers``
+    none is.
 
     One to three readings in a row count that lie on one side of the line through three neighbours on either
     side, farther off than noise could (a Hampel test on that distance, with the noise of the place), than the
     neighbours scatter, and than the two sides differ. So corners, overshoot and edges are none. At its ends a
     signal has neighbours on one side only. There, too, it has to be farther off than all that the signal
-    does, which has to be more than to rest, while the command is known to rest. Where more than one in a
-    hundred would be, the signal is like that, and none is.
+    does, which has to be more than to rest, while the command is known to rest. More than one in a hundred
+    may be the signal's own: see ``are_many``.
     """
     found = np.zeros(len(y), bool)
     if len(y) < _FEWEST or np.ptp(y) == 0.0:
@@ -47,44 +88,20 @@ def outliers(y: Array, barred: Bools | None = None, never: Bools | None = None) 
     resting = np.zeros(0, bool) if barred is None else ~barred
     barred = found.copy() if barred is None else barred
     never = barred if never is None else never
-    least, reach = _least_noise(y), _reach(y)
+    least, reach = least_noise(y), _reach(y)
+    jump = _jump_beside_sparks(y) if answers is not None and never.any() else np.inf
+    bounds = _Bounds(barred, never, answers if jump < np.inf else None, jump, reach)
     for width in range(1, WIDEST + 1):
-        for at in _pulses(y, (barred, never), width, least, reach):
+        for at in _pulses(y, bounds, width, least):
             found[at : at + width] = True
     for way in (slice(None), slice(None, None, -1)):  # views: of the first readings, then of the last ones
         found[way][: _at_an_end(y[way], resting[way], least, reach)] = True
-    return found if found.sum() <= max(WIDEST, _RARE * len(y)) else np.zeros(len(y), bool)
-
-
-def barred_by(command: Array) -> Bools:
-    """Where ``command`` (n,) jumps, and shortly after: a signal may move fast there."""
-    return _around(np.abs(np.diff(command)) > _jump_of(command))
-
-
-def turned_by(command: Array) -> Bools:
-    """Where ``command`` (n,) jumps there and back within a few readings, and shortly after: what answers a
-    pulse is as short as an outlier."""
-    steps, least = np.diff(command), _jump_of(command)
-    at = np.flatnonzero(np.abs(steps) > least)
-    turned = (np.diff(at) <= _AFTER) & (np.diff(np.sign(steps[at])) != 0.0)
-    ends = np.zeros(len(steps), bool)
-    ends[at[:-1][turned]] = ends[at[1:][turned]] = True
-    return _around(ends)
-
-
-def _jump_of(command: Array) -> float:
-    """The change from one reading to the next that is a jump."""
-    return 0.05 * (float(np.ptp(command)) or np.inf)
-
-
-def _around(jumps: Bools) -> Bools:
-    """The readings (n,) around changes (n − 1,) from one to the next."""
-    count, found = len(jumps), np.zeros(len(jumps) + 1, bool)
-    for late in range(1 - _AHEAD, 2 + _AFTER):  # of a change, after the reading ahead of it
-        first, last = max(-late, 0), min(count, count + 1 - late)
-        if first < last:
-            found[first + late : last + late] |= jumps[first:last]
     return found
+
+
+def are_many(found: Bools) -> bool:
+    """Whether so many outliers (n,) were found that the signal may be like that: they are left."""
+    return bool(found.sum() > max(WIDEST, _RARE * len(found)))
 
 
 def first_stands_out(y: Array, barred: Bools) -> bool:
@@ -93,8 +110,8 @@ def first_stands_out(y: Array, barred: Bools) -> bool:
     if len(y) < _FEWEST or barred[:_BEHIND].any():
         return False
     off, rough = _ahead_of_line(y, 1)
-    least = _FAR * max(rough, _least_noise(y))
-    return bool(abs(off[0]) > max(least, 2.0 * _jumps(y)) and abs(y[0]) > least)
+    least = _FAR * max(rough, least_noise(y))
+    return bool(abs(off[0]) > max(least, 2.0 * largest_jump(y)) and abs(y[0]) > least)
 
 
 def straightened(time: Array, y: Array, wrong: Bools) -> Array:
@@ -130,24 +147,22 @@ def _ahead_of_line(y: Array, width: int) -> tuple[Array, float]:
     return off[:width], float(np.abs(off[width:]).max())
 
 
-def _pulses(y: Array, kept: tuple[Bools, Bools], width: int, least: float, reach: float) -> Ints:
-    """Where outliers of ``width`` readings begin, of size ``reach`` in the first of ``kept``, and nowhere in
-    the second."""
+def _pulses(y: Array, bounds: _Bounds, width: int, least: float) -> Ints:
+    """Where outliers of ``width`` readings begin that the ``bounds`` allow."""
     whole = 2 * _SIDE + width
     if len(y) < whole:
         return np.zeros(0, int)
     found, sizes, off = [], [], np.empty(len(y) - whole + 1)
     for begin, part in _parts(y, whole):
         first, size, hit = _standing_out(part, width)
-        barred, never = (_touched(where[begin : begin + len(part)], whole) for where in kept)
-        hit[never | (barred & (size <= reach))] = False
+        hit &= bounds.allow(size, begin, width)
         off[begin : begin + len(first)] = first
         found.append(begin + np.flatnonzero(hit))
         sizes.append(size[hit])
     at, size = np.concatenate(found), np.concatenate(sizes)
     far = size > _FAR * np.maximum(_noise(off, at), least)
     if width > 1 and far.any():  # pulses as high as the jumps of the signal itself are its own
-        far &= size > 2.0 * _jumps(y)
+        far &= size > 2.0 * largest_jump(y)
     return at[far] + _SIDE
 
 
@@ -194,10 +209,10 @@ def _noise(off: Array, at: Ints) -> Array:
     return made
 
 
-def _least_noise(y: Array) -> float:
+def least_noise(y: Array) -> float:
     """Half a step of a quantised signal, or a little of the span: the median of steps that mostly stay away
     is 0. The span is that of the medians of three, so a reading of 10⁹ makes no step a rounding error."""
-    low, high = _ends_of_medians(y, 3)
+    low, high = ends_of_medians(y, 3)
     span = high - low
     steps = np.abs(np.diff(y))
     finest = float(np.min(steps, where=steps > 1e-9 * span, initial=np.inf))
@@ -206,22 +221,33 @@ def _least_noise(y: Array) -> float:
 
 def _reach(y: Array) -> float:
     """The span of all that a signal does for longer than an outlier lasts, 0 among it: there it rests."""
-    low, high = _ends_of_medians(y, 2 * WIDEST + 1)
+    low, high = ends_of_medians(y, 2 * WIDEST + 1)
     return max(high, 0.0) - min(low, 0.0)
 
 
-def _ends_of_medians(y: Array, width: int) -> tuple[float, float]:
+def ends_of_medians(y: Array, width: int) -> tuple[float, float]:
     """The least and the largest of the medians of ``width`` readings in a row."""
     middles = [np.median(sliding_window_view(part, width), axis=1) for _, part in _parts(y, width)]
     return min(float(m.min()) for m in middles), max(float(m.max()) for m in middles)
 
 
-def _jumps(y: Array) -> float:
-    """The largest change from one reading to the next that lasts."""
-    return max((_largest_jump(part) for _, part in _parts(y, 14)), default=np.inf) if len(y) >= 16 else np.inf
+def largest_jump(y: Array) -> float:
+    """The largest change of ``y`` (n,) from one reading to the next that lasts; infinite of fewer than 16."""
+    return max((_lasting(part) for _, part in _parts(y, 14)), default=np.inf) if len(y) >= 16 else np.inf
 
 
-def _largest_jump(y: Array) -> float:
+def _jump_beside_sparks(y: Array) -> float:
+    """The same of the medians of three: a spark beside a jump makes it no larger."""
+    return max((_lasting(_middle_of_three(part)) for _, part in _parts(y, 16)), default=np.inf)
+
+
+def _middle_of_three(y: Array) -> Array:
+    low, high = np.minimum(y[:-1], y[1:]), np.maximum(y[:-1], y[1:])
+    made: Array = np.maximum(low[:-1], np.minimum(high[:-1], y[2:]))
+    return made
+
+
+def _lasting(y: Array) -> float:
     middle = np.median(sliding_window_view(y, 7), axis=1)
     lasting = np.abs(middle[7:] - middle[:-7])
     return float(np.minimum(lasting, np.abs(np.diff(y))[6 : 6 + len(lasting)]).max())

@@ -14,6 +14,7 @@ import pytest
 from focgen.errors import LogError
 from focgen.logs import cells, outliers
 from focgen.logs.cells import Levels, Lines
+from focgen.logs.drives import barred_by
 from focgen.logs.read import read_logs
 from focgen.logs.table import read_table
 from focgen.rig.rig import Signals
@@ -134,7 +135,7 @@ def test_parts_of_a_signal_show_the_same_outliers(monkeypatch):
     """However long the parts are; one lies across two of them."""
     y = measured(3000)["y"]
     y[[400, 1023, 1024, 2000]] += 3.0
-    barred = outliers.barred_by(np.where(np.arange(3000) < 1990, 0.0, 1.0))
+    barred = barred_by(np.where(np.arange(3000) < 1990, 0.0, 1.0))
     whole = outliers.outliers(y, barred)
     assert np.flatnonzero(whole).tolist() == [400, 1023, 1024]
     for part in (1, 7, 1024):

@@ -1,0 +1,152 @@
+"""Readings that jump away and back, alone or for longer, in rest and among jumps of the command.
+
+Red when one is taken as it stands without a word, or an honest log has such a word.
+"""
+
+import numpy as np
+import pytest
+
+from focgen.identification.ranges import seen_ranges
+from focgen.logs import Experiment
+from focgen.logs.drives import Drive, answers_to, barred_by, turned_by
+from focgen.logs.mending import mended
+from focgen.logs.outliers import outliers
+from focgen.rig.rig import Ranges
+
+STEP, COUNT = 0.02, 1500
+TOLD = ("jumps away", "outliers", "stands out", "together", "frozen")
+
+
+def lagged(u: np.ndarray, rows: float) -> np.ndarray:
+    """``u`` through a first-order lag of so many rows; of none, as it is."""
+    if not rows:
+        return u.copy()
+    share, now, y = 1.0 - np.exp(-1.0 / rows), 0.0, np.empty(len(u))
+    for k, x in enumerate(u):
+        now += share * (x - now)
+        y[k] = now
+    return y
+
+
+def answered(command: np.ndarray, rows: float = 3.0, noise: float = 0.005, seed: int = 1) -> dict:
+    """A log of a quick pressure and a slower output, by role."""
+    rng = np.random.default_rng(seed)
+    p = lagged(0.1 * command, rows)
+    signals = {"pressure": p, "output": lagged(0.1 * p, 8.0 * rows)}
+    noisy = {role: y + noise * np.ptp(y) * rng.normal(size=len(y)) for role, y in signals.items()}
+    return {"command": command, **noisy}
+
+
+def stairs() -> np.ndarray:
+    return np.repeat([0.0, 1.0, 0.5, 1.5, 0.0], COUNT // 5)
+
+
+def told(signals: dict) -> list[str]:
+    notes = mended(STEP * np.arange(len(signals["command"])), signals)[1]
+    return [note for note in notes if any(word in note for word in TOLD)]
+
+
+def commands(rng: np.random.Generator) -> dict[str, np.ndarray]:
+    rows = np.arange(COUNT)
+    bits = np.where(rows < 50, 0.0, np.repeat(rng.integers(0, 2, COUNT // 4), 4)[:COUNT])
+    pulses = np.where((rows % 190 > 120) & (rows % 190 < 120 + rng.integers(2, 40)), 1.0, 0.0)
+    return {
+        "steps": stairs(),
+        "sine": np.sin(2 * np.pi * rows / rng.uniform(8.0, 800.0)),
+        "bits": bits,
+        "pulses": pulses,
+        "pulses on steps": stairs() + pulses,
+        "dither": stairs() + 0.1 * rng.normal(size=COUNT),
+        "begins high": 1.0 - rows / COUNT,
+    }
+
+
+@pytest.mark.parametrize("rows", (0.0, 0.5, 3.0, 40.0))
+def test_nothing_is_told_of_honest_answers(rows):
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        for kind, command in commands(rng).items():
+            signals = answered(command, rows, rng.uniform(0.004, 0.02), seed)
+            assert not told(signals), (kind, seed)
+
+
+@pytest.mark.parametrize("width", (4, 10, 50))
+@pytest.mark.parametrize("what", ("far", "zero", "a third more", "random"))
+def test_a_loose_plug_is_told_of(width, what):
+    signals = answered(stairs())
+    rng, y = np.random.default_rng(2), signals["pressure"]
+    made = {"far": 1.0, "zero": 0.0, "a third more": 0.2, "random": rng.uniform(-1.0, 1.0, width)}
+    y[1100 : 1100 + width] = made[what] + 1e-3 * rng.normal(size=width)
+    (note,) = [note for note in told(signals) if "jumps away" in note]
+    assert "pressure" in note and f"{width} readings from 22 s" in note and "--from" in note
+
+
+def test_open_ranges_are_taken_without_a_loose_plug():
+    signals = answered(stairs())
+    before, _ = seen_ranges(Ranges(), [Experiment("a", STEP, signals)])
+    signals["output"] = signals["output"].copy()
+    signals["output"][1100:1104] = 1.0
+    after, _ = seen_ranges(Ranges(), [Experiment("a", STEP, signals)])
+    assert before.output is not None and after == before
+
+
+def test_more_outliers_than_are_mended_are_told_of():
+    signals, rng = answered(stairs()), np.random.default_rng(3)
+    sparks = rng.random(COUNT) < 0.02
+    signals["pressure"][sparks] = rng.uniform(0.5, 1.0, sparks.sum())
+    assert any("pressure stands out" in note and "mend the log" in note for note in told(signals))
+
+
+def test_late_answers_to_pulses_are_not_told_of_as_too_many_outliers():
+    """What comes from outside comes at rest as well; a dead time is longer than what is barred."""
+    command = np.where(np.arange(COUNT) % 75 == 40, 1.0, 0.0)
+    y = np.roll(command, 20) + 1e-3 * np.random.default_rng(5).normal(size=COUNT)
+    assert not told({"command": command, "output": y})
+    drive, sparks = Drive.by(command), np.random.default_rng(6).random(COUNT) < 0.02
+    assert drive.is_elsewhere(sparks) and not drive.is_elsewhere(np.roll(command, 20) > 0.5)
+
+
+@pytest.mark.parametrize("kind", ("bits", "dither"))
+@pytest.mark.parametrize("size", (1.0, 1e5))
+def test_a_spark_among_jumps_of_the_command_is_mended(kind, size):
+    command = commands(np.random.default_rng(0))[kind]
+    for role in ("pressure", "output"):
+        signals = answered(command)
+        clean = signals[role].copy()
+        signals[role][1003] = size
+        found, notes = mended(STEP * np.arange(COUNT), signals)
+        assert np.abs(found[role] - clean).max() < 0.1 and any(f"outliers of {role}" in n for n in notes)
+
+
+@pytest.mark.parametrize("row", ((0.0, 0.0, 0.0), (10.0, 1.0, 0.1), (5.0, 0.35, 0.04)))
+def test_a_row_misread_as_a_whole_is_mended_and_told_of(row):
+    signals = answered(stairs(), rows=3.0, noise=0.002)
+    clean = signals["pressure"].copy()
+    for role, x in zip(signals, row, strict=True):
+        signals[role][1100] = x
+    found, notes = mended(STEP * np.arange(COUNT), signals)
+    assert np.abs(found["pressure"] - clean).max() < 2e-3
+    assert any("command leaves" in n and "pressure and output" in n and "at 22 s" in n for n in notes)
+
+
+def test_a_static_answer_in_the_row_of_the_pulse_is_no_misread_row():
+    command = stairs()
+    command[[1050, 1100]] = [0.0, 10.0]
+    y = 0.1 * command + 1e-4 * np.random.default_rng(4).normal(size=COUNT)
+    assert not outliers(y, barred_by(command), turned_by(command), answers_to(command)).any()
+
+
+@pytest.mark.parametrize("also", ("nothing", "an empty cell", "empty others", "a spark", "sparks elsewhere"))
+def test_an_empty_cell_or_a_spark_hides_no_frozen_reading(also):
+    signals = answered(stairs(), rows=10.0)
+    y, p = signals["output"], signals["pressure"]
+    y[310:400] = y[310]
+    if also == "an empty cell":
+        y[900] = np.nan
+    elif also == "empty others":
+        p[900] = np.nan
+    elif also == "a spark":
+        y[800] = 5.0
+    elif also == "sparks elsewhere":
+        p[800] = 50.0
+    assert any("output frozen" in note and "from 6.2 s" in note for note in told(signals))
