@@ -202,11 +202,17 @@ def _noise(off: Array, at: Ints) -> Array:
     count = max(1, len(off) // _BLOCK)
     parts = np.array_split(off, count)
     medians = np.array([np.median(part) for part in parts])
-    padded = np.concatenate([medians[:1], medians, medians[-1:]])
-    near = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    near = noisiest_near(medians)
     block = np.searchsorted(np.cumsum([len(part) for part in parts]), at, side="right")
     made: Array = 1.4826 * np.maximum(near[block], np.median(off))
     return made
+
+
+def noisiest_near(medians: Array) -> Array:
+    """Of blocks (k,) each one's median, or that of a neighbour, whichever is larger."""
+    padded = np.concatenate([medians[:1], medians, medians[-1:]])
+    near: Array = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    return near
 
 
 def least_noise(y: Array) -> float:

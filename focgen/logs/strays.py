@@ -9,7 +9,7 @@ import numpy as np
 from focgen.arrays import Array, Bools, Ints
 from focgen.logs.answers import WIDEST
 from focgen.logs.drives import Drive, jump_of, jumped
-from focgen.logs.outliers import are_many, least_noise, outliers
+from focgen.logs.outliers import are_many, least_noise, noisiest_near, outliers
 
 _LONGEST = 50  # readings in a row
 _SETTLED = 100  # readings behind a jump of the command: what is quick has answered by then
@@ -80,9 +80,7 @@ def _steps(y: Array) -> Iterator[tuple[int, Array]]:
 def _noisiest(medians: Array, least: float) -> Array:
     """Of blocks (k,) the deviation that stands for the noise of each: of the noisiest of it and its
     neighbours, or of most."""
-    padded = np.concatenate([medians[:1], medians, medians[-1:]])
-    near = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
-    made: Array = np.maximum(1.4826 * np.maximum(near, np.median(medians)), least)
+    made: Array = np.maximum(1.4826 * np.maximum(noisiest_near(medians), np.median(medians)), least)
     return made
 
 
