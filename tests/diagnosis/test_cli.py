@@ -98,7 +98,9 @@ def test_plan_needs_no_data(made, capsys):
     assert effects["creep"]["survives"] < 0.3
 
 
-@pytest.mark.parametrize("effect", ["fixed_point", "short_memory", "output_saturation"])
+@pytest.mark.parametrize(
+    "effect", ["fixed_point", "short_memory", pytest.param("output_saturation", marks=pytest.mark.long)]
+)
 def test_the_controller_departs_by_what_was_done_to_it(tmp_path, capsys, effect):
     """A closed loop of the trials' generator: rig, logs, and the ideal controller."""
     rng = np.random.default_rng(7)

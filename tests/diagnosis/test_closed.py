@@ -31,7 +31,10 @@ def test_a_hum_that_goes_round_the_loop_is_no_resonance():
 
 @pytest.mark.parametrize(
     "effect, case",
-    [("gain_nonlinearity", {"lock": 2.5}), ("hysteresis", {"slip": 0.4})],
+    [
+        ("gain_nonlinearity", {"lock": 2.5}),
+        pytest.param("hysteresis", {"slip": 0.4}, marks=pytest.mark.long),
+    ],
 )
 def test_an_effect_is_named_through_the_loop(effect, case):
     found = diagnose(RIG, closed_session(1, **case))

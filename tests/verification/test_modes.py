@@ -105,10 +105,12 @@ def sound(tmp_path_factory):
 
 
 def cases():
+    """Every fault in one arithmetic, by turns; in the others it is in the long suite."""
     for name, faults in (("spba", FAULTS), ("both", BOTH)):
-        for fault in faults:
-            for arithmetic in fault.where if fault.where != ARITHMETICS else ("q15", "f32"):
-                yield pytest.param(name, arithmetic, fault, id=f"{name}-{arithmetic}-{fault}")
+        for turn, fault in enumerate(faults):
+            for i, arithmetic in enumerate(fault.where):
+                marks = () if i == turn % len(fault.where) else pytest.mark.long
+                yield pytest.param(name, arithmetic, fault, id=f"{name}-{arithmetic}-{fault}", marks=marks)
 
 
 @pytest.mark.parametrize("name, arithmetic, fault", list(cases()))

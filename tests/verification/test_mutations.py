@@ -208,10 +208,12 @@ def rewrite(folder: Path, change) -> None:
 
 
 def cases():
+    """Every fault in one arithmetic, by turns; in the others it is in the long suite."""
     for name, special in (("spba", PAPER), ("filter", FILTER)):
-        for fault in EITHER + UNUSABLE + special:
-            for arithmetic in fault.where:
-                yield pytest.param(name, arithmetic, fault, id=f"{name}-{arithmetic}-{fault}")
+        for turn, fault in enumerate(EITHER + UNUSABLE + special):
+            for i, arithmetic in enumerate(fault.where):
+                marks = () if i == turn % len(fault.where) else pytest.mark.long
+                yield pytest.param(name, arithmetic, fault, id=f"{name}-{arithmetic}-{fault}", marks=marks)
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)

@@ -187,7 +187,9 @@ def test_what_is_strewn_is_of_every_kind():
 # -------------------------------------------------------------------------------------------- the room
 
 
-@pytest.mark.parametrize("seed", range(500, 540))
+@pytest.mark.parametrize(
+    "seed", [*range(500, 520), *(pytest.param(s, marks=pytest.mark.long) for s in range(520, 600))]
+)
 def test_no_usable_input_overflows(seed):
     """The largest usable inputs, with the signs that are worst and at random: all stays finite; and nothing
     reaches what is proved to be the most. Every other controller remembers by modes."""
