@@ -22,6 +22,7 @@ except OSError:
     pass
 print("loaded")"""
 _PATIENCE = 60.0  # s
+ANEW = "generate the folder again, or set CC to another compiler"
 _REMEDY = "install gcc or clang, or pip install 'focgen[targets]'"
 
 
@@ -31,7 +32,9 @@ def find_compiler() -> list[str]:
     if chosen:
         if shutil.which(chosen[0]) is None:
             raise BuildError(
-                "the compiler", f"$CC names {chosen[0]!r}, which is not there", "unset CC or correct it"
+                "the compiler",
+                f"$CC names {chosen[0]!r}, which is no program that can be run",
+                "unset CC or correct it",
             )
         return chosen
     for name in _USUAL:
@@ -78,8 +81,11 @@ def compile_shared(
         raise BuildError(
             str(sources[0]),
             f"does not compile: {first_complaint(done.stderr)}",
-            "generate the folder again, or set CC to another compiler",
+            ANEW,
         )
+    if not Path(target).is_file():
+        what = f"{command[0]!r} ends well and writes nothing: it is no compiler"
+        raise BuildError("the compiler", what, "unset CC or correct it")
     if _chosen():
         _check_loading(Path(target), sources[0])
 

@@ -12,7 +12,7 @@ from cffi import FFI
 
 from focgen.arrays import Numbers
 from focgen.codegen.render import render
-from focgen.compiler import compile_shared
+from focgen.compiler import ANEW, compile_shared
 from focgen.errors import BuildError
 from focgen.plan.plan import Plan
 from focgen.plan.scenario import Params
@@ -100,7 +100,7 @@ def _loaded(ffi: FFI, plan: Plan, folder: Path) -> Any:
             return ffi.dlopen(str(target))
         except OSError as reason:
             what = f"does not link: {str(reason).rpartition(': ')[2]}"
-            raise BuildError(str(folder / f"{plan.name}.c"), what, "generate the folder again") from None
+            raise BuildError(str(folder / f"{plan.name}.c"), what, ANEW) from None
 
 
 def _tunable(plan: Plan) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from cffi import FFI
 
 from focgen.arrays import Numbers
-from focgen.compiler import compile_shared
+from focgen.compiler import ANEW, compile_shared
 from focgen.errors import BuildError
 from focgen.plan.plan import Plan
 from focgen.plan.scenario import Scenario, Trace
@@ -51,9 +51,7 @@ class Library:
             try:
                 self._library = self._ffi.dlopen(str(target))
             except OSError as reason:
-                raise BuildError(
-                    str(sources[0]), f"does not link: {_said(reason, target)}", "generate the folder again"
-                ) from None
+                raise BuildError(str(sources[0]), f"does not link: {_said(reason, target)}", ANEW) from None
 
     def run(self, plan: Plan, scenario: Scenario) -> Trace:
         """Run raw inputs; returns raw u and d and the flags, shape (lanes, samples).

@@ -13,6 +13,7 @@ from focgen.children import environment, python
 from focgen.codegen.generate import generate
 from focgen.compiler import compile_shared, find_compiler
 from focgen.errors import BuildError
+from focgen.verification.verify import verify
 from tests.controllers import seed_controller
 
 posix = pytest.mark.skipif(os.name != "posix", reason="the system has no such signals")
@@ -77,4 +78,26 @@ def test_a_compiler_of_ones_own_is_used(tmp_path, monkeypatch):
 def test_a_quote_that_does_not_close_is_told(monkeypatch, words):
     monkeypatch.setenv("CC", words)
     with pytest.raises(BuildError, match="is no command"):
+        find_compiler()
+
+
+@posix
+def test_a_compiler_that_makes_nothing_is_told(tmp_path, monkeypatch):
+    """Its folder was blamed before."""
+    generate(seed_controller(5), tmp_path / "fw", "q15")
+    idle = tmp_path / "idle"
+    idle.write_text("#!/bin/sh\nexit 0\n")
+    idle.chmod(0o755)
+    monkeypatch.setenv("CC", str(idle))
+    with pytest.raises(BuildError, match="writes nothing: it is no compiler; unset CC"):
+        verify(tmp_path / "fw", 100)
+
+
+@posix
+@pytest.mark.parametrize("kind", ["folder", "text", "absent"])
+def test_what_is_no_program_is_told(tmp_path, monkeypatch, kind):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "text").write_text("no program\n")
+    monkeypatch.setenv("CC", str(tmp_path / kind))
+    with pytest.raises(BuildError, match="no program that can be run"):
         find_compiler()
