@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from focgen.arrays import Array
 from focgen.errors import LogError
@@ -208,6 +207,8 @@ def guessed(columns: Sequence[Column]) -> dict[str, Guess]:
     An output is always found, and an input: without a name or a unit that tells, the held column, or the
     first, is the input, and the last the output.
     """
+    from scipy.optimize import linear_sum_assignment  # takes longer to import than a log to read
+
     moving = [c for c in columns if c.moves]
     scores = np.array([[points(c)[role] for c in moving] for role in SIGNALS]).reshape(len(SIGNALS), -1)
     worth = np.maximum(scores - _LEAST, 0.0)
