@@ -4,7 +4,7 @@ kept."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,10 +12,14 @@ from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit, innovations,
 from focgen.diagnosis.fitting.jumps import by_trying
 from focgen.diagnosis.fitting.noise import fit_ar
 from focgen.diagnosis.fitting.repeats import without_hearsay
+from focgen.diagnosis.hypotheses.abreast import abreast
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.rig.plant import plant_of
+from focgen.rig.rig import LinearActuator
 
 _COARSE = 5000  # samples of the first, coarse pass
+_LONG = 4000  # samples from which on a plant's own steps take longer than what is about them
 _QUICKEST = 4.0  # of them at least in a response
 _DEEP = 5  # how many forms are fitted to the end beside the families' best
 _QUICK = 0.3  # of the best quick fit's fall in the sum of squares: forms below are left at that
@@ -67,7 +71,7 @@ def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffec
     thin = problem.thinned(factor)
     ground = fit(thin, problem.stretched(base, 1.0 / factor), WHITE)
     from_ = footings(thin, ground.vector) if candidates else []
-    tried = [t for candidate in candidates if (t := best_start(thin, from_, candidate)) is not None]
+    tried = [t for t in _started(thin, from_, candidates) if t is not None]
     tried = without_hearsay(ground, tried)
     errors = _errors(tried, ground)
     tried = _promising(tried, ground)
@@ -81,6 +85,17 @@ def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffec
     )
     full = [on_all(t, problem, factor) for t in (ground, *kept)]
     return finish(full[0], full[1:], errors)
+
+
+def _started(
+    thin: Problem, from_: Sequence[Footing], candidates: Sequence[CandidateEffect]
+) -> list[Fit | None]:
+    """The best start of each candidate: on all cores where the plant is one that is run in steps. The rest is
+    quick, and mostly Python's own work, of which one thread at a time does any."""
+    own = thin.nominals.rig.actuator
+    if not (isinstance(own, LinearActuator) and plant_of(own.dynamics) and len(thin.segment.y) >= _LONG):
+        return [best_start(thin, from_, candidate) for candidate in candidates]
+    return abreast(lambda c: best_start(replace(thin, memory={}), from_, c), candidates)
 
 
 def coarseness(problem: Problem) -> int:
