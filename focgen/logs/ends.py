@@ -25,7 +25,7 @@ def at_an_end(y: Array, least: float, reach: float, first: bool, calm: bool) -> 
     signal does more than to rest. The others come and go, so a ``calm`` command is enough: it has no pulses.
     """
     found = np.zeros(ROWS, bool)
-    usual = usual_noise(y)
+    usual = 1.4826 * float(np.median(np.abs(np.diff(y[:_BLOCK]))))
     for ahead in range(0 if first else 1, SIDE):
         for width in range(1, WIDEST + 1):
             off, rough = ahead_of_line(y, ahead + width)
@@ -37,12 +37,6 @@ def at_an_end(y: Array, least: float, reach: float, first: bool, calm: bool) -> 
             if far and abs(np.sign(off[ahead:]).sum()) == width:
                 found[ahead : ahead + width] = True
     return found
-
-
-def usual_noise(y: Array) -> float:
-    """What the first readings of ``y`` (n,) usually change from one to the next, as a standard deviation: six
-    readings that happen to lie on a line tell less."""
-    return 1.4826 * float(np.median(np.abs(np.diff(y[:_BLOCK]))))
 
 
 def ahead_of_line(y: Array, width: int) -> tuple[Array, float]:

@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from focgen.arrays import Array, Bools, Ints
 from focgen.logs.answers import WIDEST, Answers
-from focgen.logs.ends import CLEAR, FAR, ROWS, SIDE, ahead_of_line, at_an_end, usual_noise
+from focgen.logs.ends import CLEAR, FAR, ROWS, SIDE, ahead_of_line, at_an_end
 
 _LEVEL = 3.0  # times what the two sides differ by
 _EVEN = 0.6  # of the farthest of several in a row is the nearest: they come and go at once
@@ -115,7 +115,7 @@ def first_stands_out(y: Array, barred: Bools) -> bool:
     if len(y) < _FEWEST or barred[:_BEHIND].any():
         return False
     off, rough = ahead_of_line(y, 1)
-    least = FAR * max(rough, least_noise(y), usual_noise(y))
+    least = FAR * max(rough, least_noise(y))
     return bool(abs(off[0]) > max(least, 2.0 * largest_jump(y)) and abs(y[0]) > least)
 
 

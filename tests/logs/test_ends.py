@@ -112,10 +112,3 @@ def test_pulses_of_a_command_with_a_dead_time_are_not_taken_off_the_beginning():
     command = np.where(np.arange(COUNT) % 90 == 85, 1.0, 0.0)
     y = np.where(np.arange(COUNT) % 90 == 1, 0.1, 0.0) + 1e-4 * np.random.default_rng(3).normal(size=COUNT)
     assert y[1] > 0.05 and not seen(command, y)
-
-
-def test_noise_does_not_begin_with_a_reading_left_from_before():
-    """Six readings that happen to lie on a line made it seem so in one of sixty logs."""
-    for seed in range(300):
-        y = 0.1 + 1e-3 * np.random.default_rng(seed).normal(size=200)
-        assert not told({"command": np.ones(200), "pressure": y}), seed
