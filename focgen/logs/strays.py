@@ -21,7 +21,7 @@ _AGREE = 0.25  # of how far it leaves: so near it comes back
 _FEWEST = 20  # readings
 _STILL = 8.0  # times the usual change of a command from one reading to the next: no more is noise of it
 _ROUNDED = 1e-9  # of the span of a command
-_EARLY = 300  # readings: what begins so early may answer what was ahead of the log, if it rests
+_EARLY = 300  # readings: what begins so early may answer a pulse that began ahead of the log
 _SMALL = 0.05  # of the span of the signal: what leaves by less at rest is left
 
 
@@ -32,8 +32,8 @@ def strays(y: Array, command: Array) -> list[slice]:
     They leave and come back from one reading to the next, by more than the signal does so anywhere else.
     Where the command moves at all, or they are shorter than four readings, they are also farther off than all
     that the signal does elsewhere, and no longer than 50 readings. Where the command rests they may be as
-    long as that lasts, and leave by less than behind a jump of it. Then the log has not just begun by 300
-    readings, and no pulse of the command ahead is as long, whose answer might come late.
+    long as that lasts, and leave by less than behind a jump of it. Then no pulse of the command ahead is
+    as long, whose answer might come late, nor could one have been that began ahead of the log.
     """
     if len(y) < _FEWEST or np.ptp(y) == 0.0:
         return []
@@ -122,14 +122,22 @@ def _in_a_rest(y: Array, command: Array, part: slice) -> bool:
     and more than small."""
     there = command[max(part.start - _SETTLED, 0) : part.stop + 1]
     noise = max(_STILL * float(np.median(np.abs(np.diff(there)))), _ROUNDED * float(np.ptp(command)))
-    if part.start < _EARLY or _length(part) <= WIDEST or float(np.ptp(there)) > noise:
+    if _length(part) <= WIDEST or float(np.ptp(there)) > noise:
         return False
-    if _sizes(y, np.array([part.start, part.stop])).min() < _SMALL * np.ptp(y):
-        return False
-    steps = np.diff(command[: part.start])
+    small = _sizes(y, np.array([part.start, part.stop])).min() < _SMALL * np.ptp(y)
+    return not small and not _may_be_late(command, part)
+
+
+def _may_be_late(command: Array, part: slice) -> bool:
+    """Whether a stretch is as long as a pulse of ``command`` (n,) ahead of it, or as one that may have begun
+    ahead of the log."""
+    steps, length = np.diff(command[: part.start]), _length(part)
     at = np.flatnonzero(np.abs(steps) > jump_of(command))
+    near = WIDEST + _AGREE * length
+    if part.start < _EARLY and (not len(at) or at[0] < length + near):
+        return True
     pulses = np.diff(at)[np.diff(np.sign(steps[at])) != 0.0]
-    return not bool(np.any(np.abs(pulses - _length(part)) <= WIDEST + _AGREE * _length(part)))
+    return bool(np.any(np.abs(pulses - length) <= near))
 
 
 def _steps(y: Array) -> Iterator[tuple[int, Array]]:

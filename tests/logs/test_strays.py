@@ -203,3 +203,19 @@ def test_late_and_small_answers_are_not_told_of(kind, late):
         answer = 0.05 * ((np.arange(COUNT) > 150) & (np.arange(COUNT) < 180))
         signals["pressure"] = signals["pressure"] + answer
     assert not told(signals)
+
+
+def test_a_short_run_of_one_step_has_dropouts_at_its_hold_told_of():
+    command = np.where(np.arange(450) < 100, 0.0, 1.0)
+    signals = answered(command, 0.5)
+    signals["pressure"][250:280] = 0.0
+    assert any("jumps away" in note and "30 readings from 5 s" in note for note in told(signals))
+
+
+def test_what_may_answer_a_pulse_that_began_ahead_of_the_log_is_not_told_of():
+    """The command ends it in the tenth reading; the answer, to a pulse of 30, comes 150 readings late."""
+    rows = np.arange(900)
+    command = np.where((rows < 10) | ((rows >= 500) & (rows < 640)) | (rows >= 780), 1.0, 0.0)
+    late = np.where(((rows >= 130) & (rows < 160)) | ((rows >= 650) & (rows < 790)), 1.0, 0.0)
+    y = 0.1 * late + 1e-4 * np.random.default_rng(1).normal(size=900)
+    assert not told({"command": command, "pressure": y})
