@@ -212,10 +212,12 @@ def test_a_short_run_of_one_step_has_dropouts_at_its_hold_told_of():
     assert any("jumps away" in note and "30 readings from 5 s" in note for note in told(signals))
 
 
-def test_what_may_answer_a_pulse_that_began_ahead_of_the_log_is_not_told_of():
-    """The command ends it in the tenth reading; the answer, to a pulse of 30, comes 150 readings late."""
-    rows = np.arange(900)
-    command = np.where((rows < 10) | ((rows >= 500) & (rows < 640)) | (rows >= 780), 1.0, 0.0)
-    late = np.where(((rows >= 130) & (rows < 160)) | ((rows >= 650) & (rows < 790)), 1.0, 0.0)
-    y = 0.1 * late + 1e-4 * np.random.default_rng(1).normal(size=900)
+@pytest.mark.parametrize("begin", (-20, 20, 310))
+def test_what_may_answer_a_pulse_late_is_not_told_of(begin):
+    """A pulse of 30 readings, which may have begun ahead of the log; the answer comes 150 readings late."""
+    rows = np.arange(begin + 930) - begin
+    edges = (0, 30, 520, 660, 800)  # the later ones answered while the command has just jumped again
+    command = np.searchsorted(edges, rows, side="right") % 2.0
+    late = np.searchsorted(edges, rows - 150, side="right") % 2.0
+    y = 0.1 * late + 1e-4 * np.random.default_rng(1).normal(size=len(rows))
     assert not told({"command": command, "pressure": y})
