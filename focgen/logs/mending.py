@@ -104,7 +104,7 @@ def _straightened(role: str, time: Array, y: Array, drive: Drive | None) -> tupl
     far = [] if drive is None else strays(y, drive.signal)
     if far:
         first = far[0]
-        what = f"{role} jumps away and back, farther than anywhere else, while the command does not jump"
+        what = f"{role} jumps away and back while the command does not, farther than it does so elsewhere"
         place = f"{first.stop - first.start} readings from {time[first.start]:g} s"
         notes.append(Note(f"{what}: cut it off with --from and --to, or mend the log", len(far), place))
     return y, wrong, notes

@@ -10,17 +10,14 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from focgen.arrays import Array, Bools, Ints
 from focgen.logs.answers import WIDEST, Answers
+from focgen.logs.ends import CLEAR, FAR, ROWS, SIDE, ahead_of_line, at_an_end
 
-_SIDE = 3  # readings on either side that have to agree
-_FAR = 5.2  # robust standard deviations of a reading from the line through its neighbours
-_CLEAR = 2.75  # times the worst departure of the neighbours from that line
 _LEVEL = 3.0  # times what the two sides differ by
 _EVEN = 0.6  # of the farthest of several in a row is the nearest: they come and go at once
 _BLOCK = 128  # readings over which the noise is taken as even
 _RARE = 0.01  # of the readings: more of them are the signal's own
 _FEWEST = 20  # readings
-_MOVES = 3.0  # times what noise could do: a signal that does no more may have been released as its log begins
-_BEHIND = WIDEST + 2 * _SIDE  # readings of which the command has to rest where there is one side only
+_BEHIND = WIDEST + 2 * SIDE  # readings of which the command has to rest where there is one side only
 _PART = 1 << 16  # windows that are looked at side by side
 _FINE = 1e-3  # of the span: what noise there is at least
 _FAR_OFF = 0.2  # of the span: so far off both sides is a number that stands for no reading …
@@ -43,7 +40,7 @@ class _Bounds:
     def allow(self, size: Array, begin: int, width: int) -> Bools:
         """Whether pulses (k,) of ``width`` readings and ``size`` (k,) may be outliers, in windows from
         ``begin`` on."""
-        whole = 2 * _SIDE + width
+        whole = 2 * SIDE + width
         rows = slice(begin, begin + len(size) + whole - 1)
         barred, never = (_touched(where[rows], whole) for where in (self.barred, self.never))
         far: Bools = size > self.reach
@@ -56,13 +53,21 @@ class _Bounds:
         found: Bools = _together(along, size, width) | ((~barred | far) & (~never | (far & beyond)))
         return found
 
+    def least(self, rows: slice) -> float:
+        """What a pulse within ``rows`` at an end of the signal has to exceed."""
+        if not self.never[rows].any():
+            return self.reach
+        if self.answers is None:
+            return np.inf
+        return max(self.reach, self.jump * float(self.answers.between(rows.start, rows.stop)[0].max()))
+
 
 def _together(along: Array, size: Array, width: int) -> Bools:
     """Whether pulses (k,) leave and come back as the command does, farther off than they could be ``along``
     with it."""
-    windows = sliding_window_view(along, 2 * _SIDE + width)
-    inside = windows[:, _SIDE:-_SIDE]
-    there = (inside.min(axis=1) > 0.0) & (windows[:, _SIDE - 1] == 0.0) & (windows[:, -_SIDE] == 0.0)
+    windows = sliding_window_view(along, 2 * SIDE + width)
+    inside = windows[:, SIDE:-SIDE]
+    there = (inside.min(axis=1) > 0.0) & (windows[:, SIDE - 1] == 0.0) & (windows[:, -SIDE] == 0.0)
     found: Bools = there & (size > inside.max(axis=1))
     return found
 
@@ -85,7 +90,7 @@ def outliers(
     found = np.zeros(len(y), bool)
     if len(y) < _FEWEST or np.ptp(y) == 0.0:
         return found
-    resting = np.zeros(0, bool) if barred is None else ~barred
+    known = barred is not None
     barred = found.copy() if barred is None else barred
     never = barred if never is None else never
     least, reach = least_noise(y), _reach(y)
@@ -94,8 +99,8 @@ def outliers(
     for width in range(1, WIDEST + 1):
         for at in _pulses(y, bounds, width, least):
             found[at : at + width] = True
-    for way in (slice(None), slice(None, None, -1)):  # views: of the first readings, then of the last ones
-        found[way][: _at_an_end(y[way], resting[way], least, reach)] = True
+    for way, ends in _at_ends(y, bounds, known, least):
+        found[way][:ROWS] |= ends
     return found
 
 
@@ -109,8 +114,8 @@ def first_stands_out(y: Array, barred: Bools) -> bool:
     command rests, not at rest itself, and farther than any change that lasts."""
     if len(y) < _FEWEST or barred[:_BEHIND].any():
         return False
-    off, rough = _ahead_of_line(y, 1)
-    least = _FAR * max(rough, least_noise(y))
+    off, rough = ahead_of_line(y, 1)
+    least = FAR * max(rough, least_noise(y))
     return bool(abs(off[0]) > max(least, 2.0 * largest_jump(y)) and abs(y[0]) > least)
 
 
@@ -121,35 +126,18 @@ def straightened(time: Array, y: Array, wrong: Bools) -> Array:
     return made
 
 
-def _at_an_end(y: Array, resting: Bools, least: float, reach: float) -> int:
-    """How many of the first readings are outliers, off the line through those behind by ``reach``."""
-    if not np.all(resting[:_BEHIND]) or not len(resting):
-        return 0
-    for width in range(1, WIDEST + 1):
-        off, rough = _ahead_of_line(y, width)
-        noise = _FAR * max(rough, least)
-        if (
-            abs(np.sign(off).sum()) == width
-            and np.abs(off).min() > max(noise, reach)
-            and reach > _MOVES * noise
-        ):
-            return width
-    return 0
-
-
-def _ahead_of_line(y: Array, width: int) -> tuple[Array, float]:
-    """How far the first ``width`` readings are off the line through six behind them, and how far the worst
-    of these six is."""
-    places = np.arange(width + 2 * _SIDE) - width - _SIDE + 0.5
-    behind, places_behind = y[width : width + 2 * _SIDE], places[width:]
-    slope = behind @ places_behind / np.sum(places_behind**2)
-    off = y[: width + 2 * _SIDE] - behind.mean() - slope * places
-    return off[:width], float(np.abs(off[width:]).max())
+def _at_ends(y: Array, bounds: _Bounds, known: bool, least: float) -> Iterator[tuple[slice, Bools]]:
+    """Yield (view, mask): which readings are outliers among the first in a view of ``y`` (n,), forwards and
+    backwards; ``known``: there is a command."""
+    for way, rows in ((slice(None), slice(0, ROWS)), (slice(None, None, -1), slice(len(y) - ROWS, len(y)))):
+        resting = known and not bounds.barred[way][:_BEHIND].any()
+        calm = known and not bounds.never.any()
+        yield way, at_an_end(y[way], least, bounds.least(rows), resting, calm)
 
 
 def _pulses(y: Array, bounds: _Bounds, width: int, least: float) -> Ints:
     """Where outliers of ``width`` readings begin that the ``bounds`` allow."""
-    whole = 2 * _SIDE + width
+    whole = 2 * SIDE + width
     if len(y) < whole:
         return np.zeros(0, int)
     found, sizes, off = [], [], np.empty(len(y) - whole + 1)
@@ -160,10 +148,10 @@ def _pulses(y: Array, bounds: _Bounds, width: int, least: float) -> Ints:
         found.append(begin + np.flatnonzero(hit))
         sizes.append(size[hit])
     at, size = np.concatenate(found), np.concatenate(sizes)
-    far = size > _FAR * np.maximum(_noise(off, at), least)
+    far = size > FAR * np.maximum(_noise(off, at), least)
     if width > 1 and far.any():  # pulses as high as the jumps of the signal itself are its own
         far &= size > 2.0 * largest_jump(y)
-    return at[far] + _SIDE
+    return at[far] + SIDE
 
 
 def _touched(where: Bools, width: int) -> Bools:
@@ -180,17 +168,17 @@ def _parts(y: Array, width: int) -> Iterator[tuple[int, Array]]:
 def _standing_out(y: Array, width: int) -> tuple[Array, Array, Bools]:
     """For each window of ``y`` (n,): how far its first reading inside is off the line through the neighbours,
     how far the nearest of ``width`` is, and whether these stand out as an outlier does."""
-    whole = 2 * _SIDE + width
+    whole = 2 * SIDE + width
     windows = sliding_window_view(y, whole)
-    beside = np.r_[:_SIDE, _SIDE + width : whole]
+    beside = np.r_[:SIDE, SIDE + width : whole]
     places = np.arange(whole) - (whole - 1) / 2.0
     level = windows[:, beside].mean(axis=1)
     slope = windows[:, beside] @ places[beside] / np.sum(places[beside] ** 2)
     off = windows - level[:, None] - slope[:, None] * places
-    inside, rough = off[:, _SIDE:-_SIDE], np.abs(off[:, beside]).max(axis=1)
+    inside, rough = off[:, SIDE:-SIDE], np.abs(off[:, beside]).max(axis=1)
     size = np.abs(inside).min(axis=1)
-    differ = np.abs(windows[:, :_SIDE].mean(axis=1) - windows[:, -_SIDE:].mean(axis=1))
-    hit = (np.abs(np.sign(inside).sum(axis=1)) == width) & (size > _CLEAR * rough) & (size > _LEVEL * differ)
+    differ = np.abs(windows[:, :SIDE].mean(axis=1) - windows[:, -SIDE:].mean(axis=1))
+    hit = (np.abs(np.sign(inside).sum(axis=1)) == width) & (size > CLEAR * rough) & (size > _LEVEL * differ)
     if width > 1:  # pulses that swell are the signal's own
         hit &= size > _EVEN * np.abs(inside).max(axis=1)
     return np.abs(inside[:, 0]), size, hit
@@ -217,8 +205,10 @@ def noisiest_near(medians: Array) -> Array:
 
 def least_noise(y: Array) -> float:
     """Half a step of a quantised signal, or a little of the span: the median of steps that mostly stay away
-    is 0. The span is that of the medians of three, so a reading of 10⁹ makes no step a rounding error."""
-    low, high = ends_of_medians(y, 3)
+    is 0. The span is that of medians, so readings of 10⁹ make no step a rounding error."""
+    low, high = ends_of_medians(y, 2 * WIDEST + 1)
+    if high == low:
+        low, high = ends_of_medians(y, 3)
     span = high - low
     steps = np.abs(np.diff(y))
     finest = float(np.min(steps, where=steps > 1e-9 * span, initial=np.inf))

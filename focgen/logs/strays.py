@@ -11,7 +11,7 @@ from focgen.logs.answers import WIDEST
 from focgen.logs.drives import Drive, jump_of, jumped
 from focgen.logs.outliers import are_many, least_noise, noisiest_near, outliers
 
-_LONGEST = 50  # readings in a row
+_LONGEST = 50  # readings in a row, unless the command rests; so far apart leaps are looked at together
 _SETTLED = 100  # readings behind a jump of the command: what is quick has answered by then
 _FAR = 8.0  # times the usual change from one reading to the next, made a standard deviation
 _BLOCK = 128  # readings over which that is taken as even
@@ -19,29 +19,32 @@ _PART = _BLOCK << 6  # readings that are looked at at a time
 _SIDE = 5  # readings on either side whose median counts
 _AGREE = 0.25  # of how far it leaves: so near it comes back
 _FEWEST = 20  # readings
+_STILL = 8.0  # times the usual change of a command from one reading to the next: no more is noise of it
+_ROUNDED = 1e-9  # of the span of a command
+_EARLY = 300  # readings: what begins so early may answer a pulse that began ahead of the log
+_SMALL = 0.05  # of the span of the signal: what leaves by less at rest is left
 
 
 def strays(y: Array, command: Array) -> list[slice]:
-    """The stretches of up to 50 readings of ``y`` (n,) that leave and come back while ``command`` (n,) does
-    not jump, nor has just done so, nor has the log just begun.
+    """The stretches of ``y`` (n,) that leave and come back while ``command`` (n,) does not jump, nor has just
+    done so, nor has the log just begun.
 
     They leave and come back from one reading to the next, by more than the signal does so anywhere else.
     Where the command moves at all, or they are shorter than four readings, they are also farther off than all
-    that the signal does elsewhere.
+    that the signal does elsewhere, and no longer than 50 readings. Where the command rests they may be as
+    long as that lasts, and leave by less than behind a jump of it. Then no pulse of the command ahead is
+    as long, whose answer might come late, nor could one have been that began ahead of the log.
     """
     if len(y) < _FEWEST or np.ptp(y) == 0.0:
         return []
     moving = jumped(command, _SETTLED)
     moving[:_SETTLED] = True  # what was before is not known
-    leaps = _leaps(y, moving[1:])
-    if not len(leaps):
-        return []
-    groups = np.split(leaps, np.flatnonzero(np.diff(leaps) > _LONGEST) + 1)
-    back = [slice(int(g[0]), int(g[-1])) for g in groups if _comes_back(y, g)]
-    lasting = [g for g in groups if not _comes_back(y, g)]
-    own = max((_least_of(y, g) for g in lasting), default=0.0)  # it moves so by itself
-    found = [part for part in back if _least_of(y, [part.start, part.stop]) > own]
-    return _farther(y, command, found)
+    leaps, own = _leaps(y, moving[1:])
+    far = _that_come_back(y, leaps[_sizes(y, leaps) > own], moving)
+    near = _that_come_back(y, leaps, moving)
+    found = _farther(y, command, [part for part in far if _length(part) <= _LONGEST])
+    found += [part for part in [*far, *near] if _in_a_rest(y, command, part)]
+    return _apart(found)
 
 
 def astray(y: Array, command: Array) -> Bools:
@@ -55,9 +58,9 @@ def astray(y: Array, command: Array) -> Bools:
     return found
 
 
-def _leaps(y: Array, moving: Bools) -> Ints:
-    """The rows that are farther from the one ahead than noise is, and than any where the signal is ``moving``
-    (n − 1,)."""
+def _leaps(y: Array, moving: Bools) -> tuple[Ints, float]:
+    """The rows that are farther from the one ahead than noise is, and not where the signal is ``moving``
+    (n − 1,); and how far the farthest there is."""
     own, medians = 0.0, []
     for begin, steps in _steps(y):
         own = max(own, float(steps.max(where=moving[begin : begin + len(steps)], initial=0.0)))
@@ -66,9 +69,75 @@ def _leaps(y: Array, moving: Bools) -> Ints:
     found = [np.empty(0, int)]
     for begin, steps in _steps(y):
         there = noise[begin // _BLOCK : -(-(begin + len(steps)) // _BLOCK)]
-        least = np.maximum(_FAR * np.repeat(there, _BLOCK)[: len(steps)], own)
+        least = _FAR * np.repeat(there, _BLOCK)[: len(steps)]
         found.append(np.flatnonzero((steps > least) & ~moving[begin : begin + len(steps)]) + begin + 1)
-    return np.concatenate(found)
+    return np.concatenate(found), own
+
+
+def _that_come_back(y: Array, leaps: Ints, moving: Bools) -> list[slice]:
+    """The stretches between some ``leaps`` at whose end ``y`` (n,) is the same again, and which leap farther
+    than any that does not come back."""
+    if not len(leaps):
+        return []
+    back, lasting = _paired(y, np.split(leaps, np.flatnonzero(np.diff(leaps) > _LONGEST) + 1), moving)
+    own = max((float(_sizes(y, g).min()) for g in lasting), default=0.0)  # it moves so by itself
+    return [slice(int(g[0]), int(g[-1])) for g in back if _sizes(y, g[[0, -1]]).min() > own]
+
+
+def _paired(y: Array, groups: list[Ints], moving: Bools) -> tuple[list[Ints], list[Ints]]:
+    """The groups of leaps that come back, alone or with the next one ahead of any jump, and the others."""
+    back: list[Ints] = []
+    lasting: list[Ints] = []
+    waiting: Ints | None = None
+    for group in groups:
+        if _comes_back(y, group):
+            back.append(group)
+            continue
+        if waiting is not None and not moving[waiting[-1] : group[0]].any():
+            both = np.concatenate([waiting, group])
+            if _comes_back(y, both):
+                back.append(both)
+                waiting = None
+                continue
+        lasting += [] if waiting is None else [waiting]
+        waiting = group
+    return back, lasting if waiting is None else [*lasting, waiting]
+
+
+def _length(part: slice) -> int:
+    return int(part.stop - part.start)
+
+
+def _apart(parts: list[slice]) -> list[slice]:
+    """Of stretches that overlap the first named, all in the order of time."""
+    kept: list[slice] = []
+    for part in parts:
+        if all(part.stop <= other.start or other.stop <= part.start for other in kept):
+            kept.append(part)
+    return sorted(kept, key=lambda part: int(part.start))
+
+
+def _in_a_rest(y: Array, command: Array, part: slice) -> bool:
+    """Whether ``command`` (n,) rests around a stretch of ``y`` (n,) that is no late answer to a pulse of it,
+    and more than small."""
+    there = command[max(part.start - _SETTLED, 0) : part.stop + 1]
+    noise = max(_STILL * float(np.median(np.abs(np.diff(there)))), _ROUNDED * float(np.ptp(command)))
+    if _length(part) <= WIDEST or float(np.ptp(there)) > noise:
+        return False
+    small = _sizes(y, np.array([part.start, part.stop])).min() < _SMALL * np.ptp(y)
+    return not small and not _may_be_late(command, part)
+
+
+def _may_be_late(command: Array, part: slice) -> bool:
+    """Whether a stretch is as long as a pulse of ``command`` (n,) ahead of it, or as one that may have begun
+    ahead of the log."""
+    steps, length = np.diff(command[: part.start]), _length(part)
+    at = np.flatnonzero(np.abs(steps) > jump_of(command))
+    near = WIDEST + _AGREE * length
+    if part.start < _EARLY and (not len(at) or at[0] < length + near):
+        return True
+    pulses = np.diff(at)[np.diff(np.sign(steps[at])) != 0.0]
+    return bool(np.any(np.abs(pulses - length) <= near))
 
 
 def _steps(y: Array) -> Iterator[tuple[int, Array]]:
@@ -84,9 +153,10 @@ def _noisiest(medians: Array, least: float) -> Array:
     return made
 
 
-def _least_of(y: Array, rows: Ints | list[int]) -> float:
-    """The least of the changes of ``y`` (n,) from the reading ahead of each row."""
-    return float(min(abs(y[row] - y[row - 1]) for row in rows))
+def _sizes(y: Array, rows: Ints) -> Array:
+    """The changes of ``y`` (n,) from the reading ahead of each row."""
+    made: Array = np.abs(y[rows] - y[rows - 1])
+    return made
 
 
 def _sides(y: Array, leaps: Ints) -> tuple[float, float]:
@@ -96,12 +166,12 @@ def _sides(y: Array, leaps: Ints) -> tuple[float, float]:
 
 
 def _comes_back(y: Array, leaps: Ints) -> bool:
-    """Whether ``y`` (n,) is the same again behind the last of some leaps, and no more than briefly away."""
+    """Whether ``y`` (n,) is the same again behind the last of some leaps."""
     if leaps[0] < _SIDE or len(y) - leaps[-1] < _SIDE:
         return False
     before, after = _sides(y, leaps)
     away = np.abs(y[leaps[0] : leaps[-1]] - before).max(initial=0.0)
-    return bool(0 < leaps[-1] - leaps[0] <= _LONGEST and abs(after - before) <= _AGREE * away)
+    return bool(leaps[-1] > leaps[0] and abs(after - before) <= _AGREE * away)
 
 
 def _farther(y: Array, command: Array, found: list[slice]) -> list[slice]:

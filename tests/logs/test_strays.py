@@ -150,3 +150,74 @@ def test_an_empty_cell_or_a_spark_hides_no_frozen_reading(also):
     elif also == "sparks elsewhere":
         p[800] = 50.0
     assert any("output frozen" in note and "from 6.2 s" in note for note in told(signals))
+
+
+@pytest.mark.parametrize("rows", (0.0, 0.5, 3.0))
+@pytest.mark.parametrize("width", (4, 10, 50, 51, 120))
+def test_a_dropout_at_a_hold_is_told_of_however_quick_the_rig(rows, width):
+    """A quick rig falls as far behind a step of its command; at rest of it nothing does."""
+    signals = answered(stairs(), rows)
+    y = signals["pressure"]
+    y[1060 : 1060 + width] -= y[1059]
+    (note,) = [note for note in told(signals) if "jumps away" in note]
+    assert "pressure" in note and f"{width} readings from 21.2 s" in note
+
+
+@pytest.mark.parametrize("width", (51, 80, 130))
+@pytest.mark.parametrize("what", ("far", "noisy"))
+def test_a_loose_plug_is_told_of_as_long_as_the_command_rests(width, what):
+    signals, rng = answered(stairs()), np.random.default_rng(2)
+    y = signals["pressure"]
+    y[1060 : 1060 + width] = 1.0 if what == "far" else 0.4 + 1e-3 * rng.normal(size=width)
+    assert any("jumps away" in note and f"{width} readings" in note for note in told(signals))
+
+
+@pytest.mark.parametrize("every", (2, 3))
+def test_a_chattering_plug_is_told_of_as_one(every):
+    signals = answered(stairs())
+    signals["pressure"][1050:1110:every] += 0.5
+    notes = [note for note in told(signals) if "jumps away" in note]
+    assert len(notes) == 1 and "from 21 s" in notes[0]
+
+
+def late_ones() -> dict[str, np.ndarray]:
+    """Commands whose answers come when they rest, or that seem to rest."""
+    rows, steps = np.arange(COUNT), np.repeat([0.0, 1.0, 0.5], COUNT // 3)
+    pulse = np.where((rows > 700) & (rows < 722), 0.3, 0.0)
+    return {
+        "pulse in a hold": steps + pulse,
+        "before the log": np.where((rows >= 850) & (rows < 950), 1.0, 0.0),
+        "a step of four per cent": steps + np.where((rows > 700) & (rows < 780), 0.03, 0.0),
+        "slopes": np.clip(np.minimum(rows - 300, 1000 - rows) / 30.0, 0.0, 1.0),
+    }
+
+
+@pytest.mark.parametrize("kind", late_ones())
+@pytest.mark.parametrize("late", (0, 110, 150))
+def test_late_and_small_answers_are_not_told_of(kind, late):
+    command = late_ones()[kind]
+    signals = answered(command, 0.0, 1e-3)
+    for role in ("pressure", "output"):
+        signals[role] = np.concatenate([np.full(late, signals[role][0]), signals[role][: COUNT - late]])
+    if kind == "before the log":
+        answer = 0.05 * ((np.arange(COUNT) > 150) & (np.arange(COUNT) < 180))
+        signals["pressure"] = signals["pressure"] + answer
+    assert not told(signals)
+
+
+def test_a_short_run_of_one_step_has_dropouts_at_its_hold_told_of():
+    command = np.where(np.arange(450) < 100, 0.0, 1.0)
+    signals = answered(command, 0.5)
+    signals["pressure"][250:280] = 0.0
+    assert any("jumps away" in note and "30 readings from 5 s" in note for note in told(signals))
+
+
+@pytest.mark.parametrize("begin", (-20, 20, 310))
+def test_what_may_answer_a_pulse_late_is_not_told_of(begin):
+    """A pulse of 30 readings, which may have begun ahead of the log; the answer comes 150 readings late."""
+    rows = np.arange(begin + 930) - begin
+    edges = (0, 30, 520, 660, 800)  # the later ones answered while the command has just jumped again
+    command = np.searchsorted(edges, rows, side="right") % 2.0
+    late = np.searchsorted(edges, rows - 150, side="right") % 2.0
+    y = 0.1 * late + 1e-4 * np.random.default_rng(1).normal(size=len(rows))
+    assert not told({"command": command, "pressure": y})
