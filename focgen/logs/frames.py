@@ -70,6 +70,7 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
         unsure=unsure,
         times=times,
         clock_zone=zone,
+        unnamed=_unnamed_levels(frame, name) if clock is None else {},
     )
 
 
@@ -80,6 +81,18 @@ def _levels_of_index(frame: Frame | Mapping[Any, Any]) -> dict[str, Any]:
     if names is None or len(names) < 2:
         return {}
     return {str(key): index.get_level_values(k) for k, key in enumerate(names) if key is not None}
+
+
+def _unnamed_levels(frame: Frame | Mapping[Any, Any], name: str) -> dict[str, Column]:
+    """What the levels of an index hold (m,) that has no name, by words: ``pandas.concat`` leaves runs so,
+    where it is not told ``names``. One that only counts the rows holds nothing."""
+    index: Any = getattr(frame, "index", None)
+    names = getattr(index, "names", None)
+    if names is None or hasattr(index, "step"):
+        return {}
+    whose = ["its index"] if len(names) < 2 else [f"level {k} of its index" for k in range(len(names))]
+    held = {whose[k]: index.get_level_values(k) for k, key in enumerate(names) if key is None}
+    return {words: _column(values, name, "index") for words, values in held.items()}
 
 
 def _check_keys(frame: Frame | Mapping[Any, Any], name: str) -> None:
