@@ -14,7 +14,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.errors import LogError
-from focgen.logs.dialect import lines_of
+from focgen.logs.dialect import is_number, lines_of
 from focgen.logs.scales import unit_of_time
 from focgen.logs.table import LARGEST, LogTable, check_units
 from focgen.logs.text_file import decoded, table_of
@@ -105,7 +105,8 @@ def _table(path: Path, segments: Sequence[_Segment], settings: Mapping[str, Sequ
         raise LogError(str(path), "holds a time for each channel", "save it with one column of X values")
     clocked = time == "No" or not any(row[0] for s in segments for _, row in s.lines)
     parts = [_rows(s, clocked) for s in segments]
-    rows = [_whole(path, line, len(first)) for part in parts for line in part]
+    rows = [_whole(path, line, s) for s, part in zip(segments, parts) for line in part]
+    _check_shifted(path, rows, len(first), begin=int(clocked))
     columns = {name: [row[j] for _, row in rows] for j, name in enumerate(first)}
     if len(columns) != len(first):
         raise LogError(str(path), "has a channel's name twice", "give each channel a name of its own")
@@ -139,16 +140,35 @@ def _rows(segment: _Segment, clocked: bool) -> list[_Line]:
     return [line for line in segment.lines if len(line[1]) > 1]
 
 
-def _whole(path: Path, line: _Line, width: int) -> _Line:
-    """A row with as many cells as there are columns. Raises LogError where it has others."""
+def _whole(path: Path, line: _Line, segment: _Segment) -> _Line:
+    """A row with a cell for each column at least, behind which a comment may stand. Raises LogError where it
+    has fewer cells or more."""
     number, row = line
-    if not any(row):
+    width = len(segment.names)
+    count = max((j for j, cell in enumerate(row, start=1) if cell), default=0)
+    if not count:
         return number, [""] * width
-    count = max(j for j, cell in enumerate(row, start=1) if cell)
-    if len(row) < width or count > width + 1:
-        what = f"line {number + 1} has {max(count, min(len(row), width))} values for {width} columns"
-        raise LogError(str(path), what, "complete the line")
-    return line
+    if width <= len(row) and count <= width + segment.commented:
+        return line
+    held = max(count, min(len(row), width))
+    what = f"line {number + 1} has {held} values for {width} columns"
+    remedy = "complete the line" if held < width else "take out the cell that is too many"
+    raise LogError(str(path), what, remedy)
+
+
+def _check_shifted(path: Path, rows: Sequence[_Line], width: int, begin: int) -> None:
+    """Raise LogError where numbers stand in place of comments beside empty cells alone: so they do behind a
+    cell too many. ``begin``: the first column that is to be filled."""
+    ends = [line for line in rows if len(line[1]) > width and is_number(line[1][width].replace(",", "."))]
+    if not ends or not all(_lacks_one(row[begin:width]) for _, row in ends):
+        return
+    what = f"has a number as comment of line {ends[0][0] + 1}, and an empty cell ahead of it"
+    raise LogError(str(path), what, "take out the empty cell, or write the comment in words")
+
+
+def _lacks_one(cells: Sequence[str]) -> bool:
+    """Whether one is empty and another is not."""
+    return any(cells) and not all(cells)
 
 
 def _lost(segments: Sequence[_Segment], parts: Sequence[Sequence[_Line]], clocked: bool) -> tuple[str, ...]:

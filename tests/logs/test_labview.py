@@ -1,12 +1,14 @@
-"""The rows of an .lvm by which its time is counted.
+"""The rows of an .lvm: its time is counted by them, and each cell is of one channel.
 
 Red when a row of missing readings moves all that follows in time, or a header that counts other samples than
-there are rows goes without a word; or when one that fits, or LabVIEW's own way to append, has such a word.
+there are rows goes without a word; when readings behind a cell too many are those of another channel; or when
+LabVIEW's own ways have such a word.
 """
 
 import numpy as np
 import pytest
 
+from focgen.errors import LogError
 from focgen.logs import read_logs
 from focgen.logs.table import read_table
 from focgen.rig.rig import Signals
@@ -96,3 +98,45 @@ def test_of_what_fits_nothing_is_said(tmp_path, behind, columns):
     body = [*rows(timed=columns == "One"), *behind]
     path = saved(tmp_path, segment(body), segment(body, None), segment(body, 0), columns=columns)
     assert words(path) == [] and len(read_table(path)) == 3 * COUNT
+
+
+def without_comments(part):
+    return [line.replace("\tComment", "") for line in part]
+
+
+@pytest.mark.parametrize("timed", [True, False])
+@pytest.mark.parametrize("cell", ["", "0.3"])
+def test_a_cell_too_many_is_refused(tmp_path, timed, cell):
+    """Taken, it moves the readings behind it to the next columns."""
+    body = rows(timed=timed)
+    body[40] = body[40].rstrip("\t").replace("\t", f"\t{cell}\t", 1)
+    path = saved(tmp_path, without_comments(segment(body)), columns="One" if timed else "No")
+    with pytest.raises(LogError, match="line 52 has 4 values for 3 columns; take out the cell"):
+        read_table(path)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+@pytest.mark.parametrize("count", [1, COUNT - 40])
+@pytest.mark.parametrize("mark", [".", ","])
+def test_readings_that_an_empty_cell_moves_into_the_comments_are_refused(tmp_path, timed, count, mark):
+    body = [row.replace(".", mark) for row in rows(timed=timed)]
+    body[40 : 40 + count] = [row.replace("\t", "\t\t", 1) for row in body[40 : 40 + count]]
+    path = saved(tmp_path, segment(body), columns="One" if timed else "No")
+    with pytest.raises(LogError, match="a number as comment of line 52, and an empty cell .*; take out"):
+        read_table(path)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_comments_are_no_readings(tmp_path, timed):
+    """Words beside an empty cell, numbers beside full ones, and beside one of the empty ones too."""
+    columns, plain = "One" if timed else "No", rows(timed=timed)
+    lacking = plain[:9] + [row.split("\t")[0] + "\t\t0.001\t" for row in plain[9:11]] + plain[11:]
+    for body in (
+        [row + "7" for row in plain],
+        [row + ("a word" if k == 9 else "") for k, row in enumerate(lacking)],
+        [row + ("7" if k < 10 else "8") for k, row in enumerate(lacking)],
+        [row + ("\t" if k % 2 else "") for k, row in enumerate(plain)],
+    ):
+        assert len(read_table(saved(tmp_path, segment(body), columns=columns))) == COUNT
+    path = saved(tmp_path, without_comments(segment(plain)), columns=columns)
+    assert len(read_table(path)) == COUNT
