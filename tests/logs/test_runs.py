@@ -198,3 +198,45 @@ def test_of_levels_without_a_name_behind_the_others_nothing_is_said(tmp_path):
     lines = ["t,p,y,", *(f"{t:.2f},{p},{y:.6f},{v}" for t, p, y, v in rows)]
     (tmp_path / "log.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     assert names_and_notes(tmp_path / "log.csv", Signals("t", "y", None, "p", run="run")) == (["log"], [])
+
+
+BIG = {
+    "beyond 2^53": np.repeat([2**53, 2**53 + 1], COUNT),
+    "beyond 2^63": np.repeat(np.array([2**63 + 5, 2**63 + 6], np.uint64), COUNT),
+    "of one sign": np.repeat([-(2**60), -(2**60) - 1], COUNT),
+}
+
+
+@pytest.mark.parametrize("numbers", BIG.values(), ids=BIG)
+def test_runs_by_whole_numbers_that_no_float_has_are_told_apart(tmp_path, numbers):
+    names = list(dict.fromkeys(map(str, numbers.tolist())))
+    for held in (numbers, numbers.tolist(), numbers.astype(object), [None, *numbers.tolist()[1:]]):
+        made = LOG | {"run": held}
+        if held[0] is None:
+            with pytest.raises(LogError, match="is empty"):
+                names_and_notes(made)
+        else:
+            assert names_and_notes(made) == (names, [])
+    for held in (cells(numbers.tolist()), numbers):
+        savemat(tmp_path / "log.mat", LOG | {"run": held})
+        assert names_and_notes(tmp_path / "log.mat") == (names, [])
+
+
+def test_so_they_are_in_parquet(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pandas.DataFrame(LOG | {"run": BIG["beyond 2^53"]}).to_parquet(tmp_path / "log.parquet")
+    assert len(names_and_notes(tmp_path / "log.parquet")[0]) == 2
+
+
+def test_large_whole_numbers_stay_readings():
+    for large in (10**17, 2**62):
+        log = LOG | {"y": np.arange(large, large + 2 * COUNT)}  # many of one float
+        (found,) = read_logs(log, Signals("t", "y", None, "p"), 0.05)
+        assert np.array_equal(found["output"], np.asarray(log["y"], float))
+
+
+def test_cells_alone_are_no_missing_vectors(tmp_path):
+    savemat(tmp_path / "log.mat", {name: cells(list(values)) for name, values in LOG.items()})
+    said = "holds no vectors: 't' has 120 cells, which are a column beside vectors only; save one vector"
+    with pytest.raises(LogError, match=said):
+        names_and_notes(tmp_path / "log.mat")
