@@ -137,7 +137,12 @@ def _rows(segment: _Segment, clocked: bool) -> list[_Line]:
         return [line for line in segment.lines if any(line[1])]
     if 0 <= segment.samples - len(segment.lines) <= segment.after:
         return list(segment.lines)
-    return [line for line in segment.lines if len(line[1]) > 1]
+    return [line for line in segment.lines if not _is_bare(line[1])]
+
+
+def _is_bare(row: Sequence[str]) -> bool:
+    """Whether a line has neither cells nor separators."""
+    return len(row) == 1 and not row[0]
 
 
 def _whole(path: Path, line: _Line, segment: _Segment) -> _Line:
@@ -193,7 +198,7 @@ def _blank(segments: Sequence[_Segment], parts: Sequence[Sequence[_Line]], clock
     if not clocked:
         return ()
     unsure = [s for s, part in zip(segments, parts) if s.samples != len(part)]
-    found = [number for s in unsure for number, row in s.lines if len(row) == 1]
+    found = [number for s in unsure for number, row in s.lines if _is_bare(row)]
     if not found:
         return ()
     return (f"{len(found)} blank lines among its rows are counted as none, the first is line {found[0] + 1}",)

@@ -140,3 +140,11 @@ def test_comments_are_no_readings(tmp_path, timed):
         assert len(read_table(saved(tmp_path, segment(body), columns=columns))) == COUNT
     path = saved(tmp_path, without_comments(segment(plain)), columns=columns)
     assert len(read_table(path)) == COUNT
+
+
+@pytest.mark.parametrize("columns", ["No", "One"])
+def test_a_line_that_is_no_row_is_refused(tmp_path, columns):
+    body = rows(timed=columns == "One")
+    body[40] = "0.1"
+    with pytest.raises(LogError, match="line 52 has 1 values for 3 columns; complete the line"):
+        read_table(saved(tmp_path, segment(body), columns=columns))
