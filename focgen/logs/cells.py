@@ -9,13 +9,15 @@ from typing import Any, overload
 
 import numpy as np
 
-from focgen.arrays import Array, Ints
+from focgen.arrays import Array, Ints, Numbers
 from focgen.logs.dialect import MISSING, grouped
 
 PART = 400_000
 """Cells that are held as texts before they are put away: of fewer, all stay as they stand in the file."""
 _NUMBER = re.compile(r"\s*[-+]?\d*\.\d+(?:[eEdD][-+]?\d+)?\s*")
 _LEVELS = 4096  # different texts that a column is kept as: names of runs, levels of a command
+EXACT = 2**53
+"""The largest size up to which floats tell all whole numbers apart."""
 
 
 class Levels(Sequence[str]):
@@ -30,6 +32,19 @@ class Levels(Sequence[str]):
         known: dict[str, int] = {}
         codes = [known.setdefault(cell, len(known)) for cell in cells]
         return cls(tuple(known), np.array(codes, dtype=int))
+
+    @classmethod
+    def of_whole(cls, numbers: Numbers) -> Levels | None:
+        """A column of whole numbers (m,) that floats would not tell apart, as names of runs may be; None
+        where floats do, or the numbers are many."""
+        if not numbers.size or numbers.dtype.kind not in "iu":
+            return None
+        if -EXACT <= int(numbers.min()) and int(numbers.max()) <= EXACT:
+            return None
+        different, codes = np.unique(numbers, return_inverse=True)
+        if len(different) > _LEVELS or len(np.unique(different.astype(float))) == len(different):
+            return None
+        return cls([str(number) for number in different.tolist()], codes.reshape(-1))
 
     def __len__(self) -> int:
         return len(self.codes)

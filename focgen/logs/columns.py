@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from focgen.arrays import Array
+from focgen.arrays import Array, Numbers
 from focgen.errors import LogError
 from focgen.logs.scales import known as measures
 from focgen.logs.scales import unit_of_time
@@ -37,6 +37,8 @@ _KINDS = {  # points for a unit's kind, by role
     "curvature": {"output": 2.0, "curvature": 1.5, "reference": 0.5},
     "angle": {"output": 2.0, "curvature": 1.5, "reference": 0.5},
 }
+_NAMELESS = re.compile(r"|index|level_\d+|(Unnamed: |column |_duplicated_|__index_level_)\d+(__)?")
+# what pandas, polars and this library call a column, or a level of an index, that has no name
 _NAMED, _LETTER, _MAYBE = 3.0, 2.0, 1.6  # points for a word, for a single letter, for a word of two roles
 _LEAST = 1.5  # points: less is no role's column
 _SURE = 2.0  # points: less is a guess
@@ -149,7 +151,10 @@ def _is_of_runs(name: str) -> bool:
 def parts_of(table: LogTable, name: str) -> int:
     """How many different names a column has that is constant over long parts; 0 of any other one."""
     column = table.column(name)
-    labels = column if isinstance(column, np.ndarray) else np.array(table.texts(name))
+    return _parts(column if isinstance(column, np.ndarray) else np.array(table.texts(name)))
+
+
+def _parts(labels: Numbers) -> int:
     named = not np.any(np.isnan(labels) if labels.dtype.kind == "f" else labels == "")
     long = len(labels) > 1 and named and np.mean(labels[1:] == labels[:-1]) > 0.9
     return len(np.unique(labels)) if long else 0
@@ -164,6 +169,52 @@ def run_instead(table: LogTable, run: str, taken: Collection[str]) -> str | None
     likely += [name for name in table.columns if name not in taken and _is_of_runs(name)]
     bare = (name for name in likely if not (table.unit(name) or unit_named(name)))
     return next((name for name in bare if parts_of(table, name) > 1), None)
+
+
+def runs_without_name(table: LogTable, taken: Collection[str], time: Array) -> tuple[str, int] | None:
+    """What has no name and tells several parts apart, each in one place, and how many: a level of an index,
+    by words for it, or else what became of one where it was kept or read without its name.
+
+    Not one of the columns ``taken``, nor one that counts on with ``time`` (m,). Numbers behind other columns
+    of a file are readings, for an index stands first.
+    """
+    found = {**table.unnamed, **_nameless(table, taken)}
+    for words, column in found.items():
+        numbers = _numbers(column)
+        labels = np.array(column) if numbers is None else numbers
+        parts = _parts(labels)
+        at_once = parts == 1 + np.count_nonzero(labels[1:] != labels[:-1])
+        if parts > 1 and at_once and (numbers is None or not _counts_on(numbers, time)):
+            return words, parts
+    return None
+
+
+def _nameless(table: LogTable, taken: Collection[str]) -> dict[str, Sequence[str] | Array]:
+    """The columns, not of those ``taken``, that have no name, by words."""
+    found: dict[str, Sequence[str] | Array] = {}
+    for name in table.columns:
+        if name in taken or not _NAMELESS.fullmatch(name):
+            continue
+        column = table.column(name)
+        column = column if isinstance(column, np.ndarray) else table.texts(name)
+        behind = name.startswith("column ") and name != "column 1"
+        if not behind or _numbers(column) is None:
+            found[f"the column {name!r}"] = column
+    return found
+
+
+def _numbers(column: Sequence[str] | Array) -> Array | None:
+    """Labels as numbers, None where one is none."""
+    try:
+        return np.asarray(column, dtype=float)
+    except ValueError:
+        return None
+
+
+def _counts_on(labels: Array, time: Array) -> bool:
+    """Whether labels are the time in coarser steps."""
+    apart = (labels - labels[0]) - (time - time[0])
+    return bool(np.all(np.abs(apart) <= np.max(np.abs(np.diff(labels)), initial=0.0)))
 
 
 def points(column: Column) -> dict[str, float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.errors import LogError
-from focgen.logs.cells import marks
+from focgen.logs.cells import EXACT, Levels, marks
 from focgen.logs.stamps import is_time, of_numpy
 from focgen.logs.table import Column, LogTable
 
@@ -70,6 +70,7 @@ def table_of(frame: Frame | Mapping[Any, Any], name: str) -> LogTable:
         unsure=unsure,
         times=times,
         clock_zone=zone,
+        unnamed=_unnamed_levels(frame, name) if clock is None else {},
     )
 
 
@@ -80,6 +81,18 @@ def _levels_of_index(frame: Frame | Mapping[Any, Any]) -> dict[str, Any]:
     if names is None or len(names) < 2:
         return {}
     return {str(key): index.get_level_values(k) for k, key in enumerate(names) if key is not None}
+
+
+def _unnamed_levels(frame: Frame | Mapping[Any, Any], name: str) -> dict[str, Column]:
+    """What the levels of an index hold (m,) that has no name, by words: ``pandas.concat`` leaves runs so,
+    where it is not told ``names``. One that only counts the rows holds nothing."""
+    index: Any = getattr(frame, "index", None)
+    names = getattr(index, "names", None)
+    if names is None or hasattr(index, "step"):
+        return {}
+    whose = ["its index"] if len(names) < 2 else [f"level {k} of its index" for k in range(len(names))]
+    held = {whose[k]: index.get_level_values(k) for k, key in enumerate(names) if key is None}
+    return {words: _column(values, name, "index") for words, values in held.items()}
 
 
 def _check_keys(frame: Frame | Mapping[Any, Any], name: str) -> None:
@@ -105,8 +118,8 @@ def _keys(frame: Frame | Mapping[Any, Any]) -> list[Any]:
     return list(frame) if isinstance(frame, Mapping) else list(frame.columns)
 
 
-def _column(values: Any, name: str, key: str) -> Array | list[str]:
-    """Numbers as float64, times in s, everything else as a list."""
+def _column(values: Any, name: str, key: str) -> Column:
+    """Numbers as float64, times in s, everything else as texts."""
     try:
         array = _vector(values)
     except (ValueError, TypeError, ArithmeticError):
@@ -114,6 +127,9 @@ def _column(values: Any, name: str, key: str) -> Array | list[str]:
     if array.ndim != 1:
         raise LogError(f"{name} [{key}]", f"has the shape {array.shape}", "give one number a sample")
     array = of_numpy(array)
+    whole = Levels.of_whole(array)
+    if whole is not None:
+        return whole
     return array.astype(float) if array.dtype.kind in "fiub" else _cells(array.tolist())
 
 
@@ -154,9 +170,17 @@ def _cells(cells: list[Any]) -> Array | list[str]:
     """Numbers as float64, NaN where one is missing; else all as texts, "" where one is missing."""
     missing = [_is_missing(cell) for cell in cells]
     known = [cell for cell, none in zip(cells, missing) if not none]
-    if known and all(isinstance(cell, float | int | Decimal) for cell in known):
+    numeric = bool(known) and all(isinstance(cell, float | int | Decimal) for cell in known)
+    if numeric and not _fall_together(known):
         return np.array([np.nan if none else _number(cell) for cell, none in zip(cells, missing)])
     return ["" if none else str(cell) for cell, none in zip(cells, missing)]
+
+
+def _fall_together(cells: list[Any]) -> bool:
+    """Whether some of these are whole numbers that floats would not tell apart."""
+    whole = {cell for cell in cells if isinstance(cell, int) and abs(cell) >= EXACT}
+    known = [number for number in map(_number, whole) if np.isfinite(number)]
+    return len(set(known)) < len(known)
 
 
 def _number(cell: float | Decimal) -> float:

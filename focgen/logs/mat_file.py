@@ -9,7 +9,7 @@ column.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from scipy.io.matlab import MatReadError
 
 from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
+from focgen.logs.cells import EXACT
 from focgen.logs.table import Column, LogTable
 
 _REMEDY = "save one vector a column"
@@ -42,11 +43,19 @@ def read(path: Path) -> LogTable:
     columns, aliases = _by_name(found, path)
     lengths = {len(column) for column in columns.values()}
     if not columns:
-        raise LogError(str(path), "holds no vectors", _REMEDY)
+        raise _no_columns(path, skipped)
     if len(lengths) > 1:
         sizes = ", ".join(f"{name} {len(column)}" for name, column in columns.items())
         raise LogError(str(path), f"holds vectors of different lengths ({sizes})", _ALONE)
     return LogTable(str(path), columns, aliases=aliases, skipped=skipped)
+
+
+def _no_columns(path: Path, skipped: Mapping[str, str]) -> LogError:
+    """The error for a file without vectors; what it holds instead is named."""
+    if not skipped:
+        return LogError(str(path), "holds no vectors", _REMEDY)
+    first, why = next(iter(skipped.items()))
+    return LogError(str(path), f"holds no vectors: {first!r} {why}".replace(";", ","), _REMEDY)
 
 
 def _version_73(path: Path) -> dict[str, Any]:
@@ -142,7 +151,10 @@ def _cells(value: Array) -> list[str] | None:
 
 
 def _text(cell: str | float) -> str:
-    """A text as it is; a number as the columns of numbers have it in text, whatever its type."""
+    """A text as it is; a number as the columns of numbers have it in text, whatever its type. Whole ones that
+    no float has keep all their digits."""
+    if isinstance(cell, int) and abs(cell) > EXACT:
+        return str(cell)
     return cell if isinstance(cell, str) else repr(float(cell)).removesuffix(".0")
 
 
@@ -172,7 +184,8 @@ def _parted(found: list[_Found]) -> tuple[list[tuple[str, str, Column]], dict[st
         if isinstance(value, np.ndarray) or (isinstance(value, list) and {len(value)} == counts):
             columns.append((way, name, value))
         else:
-            why = value if isinstance(value, str) else f"has {len(value)} cells, unlike the vectors"
+            beside = "unlike the vectors" if counts else "which are a column beside vectors only"
+            why = value if isinstance(value, str) else f"has {len(value)} cells, {beside}"
             skipped |= dict.fromkeys(_names(way, name), why)
     return columns, skipped
 

@@ -14,7 +14,7 @@ import numpy as np
 from focgen.arrays import Array, Ints
 from focgen.errors import LogError
 from focgen.logs.cells import Levels
-from focgen.logs.columns import run_instead
+from focgen.logs.columns import run_instead, runs_without_name
 from focgen.logs.dialect import MISSING
 from focgen.logs.experiment import Experiment
 from focgen.logs.frames import Frame, is_frame, table_of
@@ -121,7 +121,7 @@ def _experiments(
     columns, notes = _present(table, signals)
     time, said = time_of(table, signals)
     reading, column = reading_of(table, signals), signals.time if signals.time in table else None
-    notes = (*table.notes, *said, *notes, *_no_run(table, signals))
+    notes = (*table.notes, *said, *notes, *_no_run(table, signals, time))
     for name, rows in _runs(table, signals.run):
         run = Raw(name, table.path, "", time, columns, table.line, notes, reading, column).part(rows)
         where = table.path if len(run) == len(table) else f"{table.path} run {name}"
@@ -169,7 +169,7 @@ def _absence(table: LogTable, role: str, name: str, taken: set[str]) -> str:
     return f"no column {name!r}: {role} taken as not logged" + (f" (is it {near!r}?)" if near else "")
 
 
-def _no_run(table: LogTable, signals: Roles) -> tuple[str, ...]:
+def _no_run(table: LogTable, signals: Roles, time: Array) -> tuple[str, ...]:
     """A note where the rig's column of runs is not there, and another may be meant. Without one nothing shows
     that a log has several runs: rigs name the column for others."""
     run = signals.run
@@ -178,7 +178,13 @@ def _no_run(table: LogTable, signals: Roles) -> tuple[str, ...]:
     if run in table.skipped:
         return (f"no column {run!r} that can be read, for it {table.skipped[run]}: no runs are told apart",)
     near = run_instead(table, run, taken_columns(signals))
-    return (f"no column {run!r}: no runs are told apart (is it {near!r}?)",) if near else ()
+    if near is not None:
+        return (f"no column {run!r}: no runs are told apart (is it {near!r}?)",)
+    found = runs_without_name(table, taken_columns(signals), time)
+    if found is None:
+        return ()
+    name = f"and {found[0]} tells {found[1]} parts apart: name it {run!r} where these are the runs"
+    return (f"no column {run!r}: no runs are told apart, {name}",)
 
 
 def _runs(table: LogTable, run: str | None) -> Iterator[tuple[str, slice | Ints]]:

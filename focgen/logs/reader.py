@@ -18,6 +18,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.errors import LogError, MissingExtra
+from focgen.logs.cells import Levels
 from focgen.logs.table import FOREIGN, LogTable
 
 MEMORY = 4 << 30  # bytes; a log of 10 million rows and 20 columns takes less than half
@@ -76,7 +77,9 @@ def _columns(table: LogTable) -> tuple[dict[str, Any], list[Array]]:
     """The answer's first line, and the columns of numbers."""
     head: list[list[Any]] = []
     numbers: list[Array] = []
-    for name, column in table.columns.items():
+    for name, held in table.columns.items():
+        whole = Levels.of_whole(held) if isinstance(held, np.ndarray) else None
+        column = held if whole is None else whole
         if isinstance(column, np.ndarray) and column.dtype.kind in "fiub":
             numbers.append(np.ascontiguousarray(column, dtype=np.float64))
             head.append([str(name), None, len(column)])

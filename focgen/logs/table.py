@@ -56,7 +56,8 @@ class LogTable:
     stand between thousands; ``unsure``: those that show nothing else but numbers like "1.200". ``times``:
     columns that held instants or spans and are in s by nature, and whether they have a zone, None of spans.
     ``clock_zone``: the same of the ``clock``, None as well of one that does not count from 1970. ``skipped``:
-    what the file holds besides and is no column, by name, and why.
+    what the file holds besides and is no column, by name, and why. ``unnamed``: what the levels of an index
+    hold (m,) that has no name, by words for it ("its index").
     """
 
     path: str
@@ -74,6 +75,7 @@ class LogTable:
     times: Mapping[str, bool | None] = field(default_factory=dict)
     clock_zone: bool | None = None
     skipped: Mapping[str, str] = field(default_factory=dict)
+    unnamed: Mapping[str, Column] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import focgen
 from focgen.diagnosis.model import VERDICT
 from focgen.errors import InputError
 from focgen.journal import finish
@@ -20,6 +21,8 @@ _NUMBER = re.compile(r"[0-9]{4,9}")
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 _LOG = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")  # a file's name, never a path
 _GIVEN = re.compile(rf"rig\.toml|controller\.toml|logs/{_LOG.pattern}")
+_VERSION = re.compile(r"([0-9]{1,9})\.([0-9]{1,9})\.([0-9]{1,9})(?![0-9])")
+_FIRST = (0, 1, 0)  # no trial is of an earlier version
 _WORD = re.compile(r"\w+")
 _ANEW = "make the cases anew"
 
@@ -73,6 +76,7 @@ def facts_of(folder: Path) -> Facts:
     found = read_json(path, _ANEW)
     if not fits(found, _FACTS | _KINDS):
         raise InputError(str(path), f"is no trial: it needs {', '.join(_FACTS)}", _ANEW)
+    _check_version(path, found.get("focgen", focgen.__version__))
     facts = Facts(**{key: found[key] for key in _FACTS}, kinds=tuple(found.get("kinds", ())))
     if facts.suite not in SUITES or facts.signals not in SIGNALS or facts.seed < 0:
         what = f"suite {facts.suite!r}, signals {facts.signals!r}, seed {facts.seed} are none of a trial's"
@@ -83,6 +87,23 @@ def facts_of(folder: Path) -> Facts:
         if not fits(digest, _DIGEST):
             raise InputError(str(path), f"has no SHA-256 for case {number}", _ANEW)
     return facts
+
+
+def _check_version(path: Path, said: object) -> None:
+    """Raise InputError for a trial that says it is of a version that there was not, or of a later one: who
+    makes, runs and scores cases in another way has other figures."""
+    known = isinstance(said, str) and _FIRST <= _release(said) <= _release(focgen.__version__)
+    if said != focgen.__version__ and not known:
+        what = f"says that focgen {str(said)[:20]!r} made it, and this is {focgen.__version__}"
+        raise InputError(
+            str(path), what.replace(";", ","), f"put back the one the cases were made with, or {_ANEW}"
+        )
+
+
+def _release(version: str) -> tuple[int, ...]:
+    """The three numbers of a version; none of what is no version."""
+    found = _VERSION.match(version)
+    return tuple(map(int, found.groups())) if found else ()
 
 
 def finish_all(folder: Path) -> bool:

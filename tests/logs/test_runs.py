@@ -131,3 +131,112 @@ def test_comments_of_labview_are_told_of_where_the_rig_takes_them_for_runs(tmp_p
     (log,) = read_logs(tmp_path / "log.lvm", Signals("X_Value", "y", None, "p", run="Comment"), 0.05)
     assert any("'Comment' that can be read, for it holds LabVIEW's words" in note for note in log.notes)
     assert all(b > a for a, b in pairwise(log.time))
+
+
+def unnamed(pandas, labels, ways):
+    """A log with labels in an index that has no name, as it is and as it is kept."""
+    one = pandas.DataFrame(LOG).set_index(pandas.Index(labels))
+    frames = {
+        "one": one,
+        "two": one.set_index(np.arange(2 * COUNT) % COUNT, append=True),
+        "reset": one.set_index(np.arange(2 * COUNT) % COUNT, append=True).reset_index(),
+        "reset one": one.reset_index(),
+    }
+    return frames[ways]
+
+
+@pytest.mark.parametrize(
+    "ways, where",
+    [
+        ("one", "its index"),
+        ("two", "level 0 of its index"),
+        ("reset", "the column 'level_0'"),
+        ("reset one", "the column 'index'"),
+    ],
+)
+@pytest.mark.parametrize("labels", [NAMES, [1] * COUNT + [2] * COUNT, ["a"] * COUNT + ["b"] * COUNT])
+def test_runs_in_an_index_without_a_name_are_told_of(ways, where, labels):
+    """As ``pandas.concat({name: frame})`` leaves them."""
+    pandas = pytest.importorskip("pandas")
+    runs, notes = names_and_notes(unnamed(pandas, labels, ways))
+    said = f"no runs are told apart, and {where} tells 2 parts apart: name it 'run' where these are the runs"
+    assert runs == ["log"] and notes == [f"no column 'run': {said}"]
+    plain = Signals("t", "y", None, "p")
+    assert not any("apart" in note for note in read_logs(unnamed(pandas, labels, ways), plain, 0.05)[0].notes)
+
+
+@pytest.mark.parametrize("ending, where", [("csv", "column 1"), ("parquet", "__index_level_0__")])
+def test_runs_that_were_saved_without_a_name_are_told_of(tmp_path, ending, where):
+    pandas = pytest.importorskip("pandas")
+    path = tmp_path / f"log.{ending}"
+    getattr(unnamed(pandas, NAMES, "two"), f"to_{ending}")(path)
+    runs, notes = names_and_notes(path)
+    assert runs == ["log"] and f"the column {where!r} tells 2 parts apart" in notes[0]
+
+
+NO_RUNS = {
+    "a count": np.arange(5, 5 + 2 * COUNT),
+    "a count that begins anew": np.arange(2 * COUNT) % COUNT,
+    "one name": ["7"] * (2 * COUNT),
+    "the time in whole seconds": np.floor(TIME),
+    "a state that comes again": ["rest"] * 50 + ["step"] * 20 + ["rest"] * 50,
+    "names that are not held": ["a", "b"] * COUNT,
+    "some without a name": [*NAMES[:-1], None],
+    "the time": TIME,
+}
+
+
+@pytest.mark.parametrize("labels", NO_RUNS.values(), ids=NO_RUNS)
+@pytest.mark.parametrize("ways", ["one", "two", "reset", "reset one"])
+def test_of_an_index_that_tells_no_runs_nothing_is_said(labels, ways):
+    pandas = pytest.importorskip("pandas")
+    assert names_and_notes(unnamed(pandas, labels, ways)) == (["log"], [])
+
+
+def test_of_levels_without_a_name_behind_the_others_nothing_is_said(tmp_path):
+    rows = zip(TIME, LOG["p"], LOG["y"], np.repeat([1, 2, 3], 2 * COUNT // 3))
+    lines = ["t,p,y,", *(f"{t:.2f},{p},{y:.6f},{v}" for t, p, y, v in rows)]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert names_and_notes(tmp_path / "log.csv", Signals("t", "y", None, "p", run="run")) == (["log"], [])
+
+
+BIG = {
+    "beyond 2^53": np.repeat([2**53, 2**53 + 1], COUNT),
+    "beyond 2^63": np.repeat(np.array([2**63 + 5, 2**63 + 6], np.uint64), COUNT),
+    "of one sign": np.repeat([-(2**60), -(2**60) - 1], COUNT),
+}
+
+
+@pytest.mark.parametrize("numbers", BIG.values(), ids=BIG)
+def test_runs_by_whole_numbers_that_no_float_has_are_told_apart(tmp_path, numbers):
+    names = list(dict.fromkeys(map(str, numbers.tolist())))
+    for held in (numbers, numbers.tolist(), numbers.astype(object), [None, *numbers.tolist()[1:]]):
+        made = LOG | {"run": held}
+        if held[0] is None:
+            with pytest.raises(LogError, match="is empty"):
+                names_and_notes(made)
+        else:
+            assert names_and_notes(made) == (names, [])
+    for held in (cells(numbers.tolist()), numbers):
+        savemat(tmp_path / "log.mat", LOG | {"run": held})
+        assert names_and_notes(tmp_path / "log.mat") == (names, [])
+
+
+def test_so_they_are_in_parquet(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pandas.DataFrame(LOG | {"run": BIG["beyond 2^53"]}).to_parquet(tmp_path / "log.parquet")
+    assert len(names_and_notes(tmp_path / "log.parquet")[0]) == 2
+
+
+def test_large_whole_numbers_stay_readings():
+    for large in (10**17, 2**62):
+        log = LOG | {"y": np.arange(large, large + 2 * COUNT)}  # many of one float
+        (found,) = read_logs(log, Signals("t", "y", None, "p"), 0.05)
+        assert np.array_equal(found["output"], np.asarray(log["y"], float))
+
+
+def test_cells_alone_are_no_missing_vectors(tmp_path):
+    savemat(tmp_path / "log.mat", {name: cells(list(values)) for name, values in LOG.items()})
+    said = "holds no vectors: 't' has 120 cells, which are a column beside vectors only; save one vector"
+    with pytest.raises(LogError, match=said):
+        names_and_notes(tmp_path / "log.mat")

@@ -19,7 +19,7 @@ from focgen.errors import InputError
 from focgen.trials import achieved, belongs, worker
 from focgen.trials import run as running
 from focgen.trials import score as scoring
-from focgen.trials.facts import achieved_in, kept_achieved
+from focgen.trials.facts import achieved_in, facts_of, kept_achieved
 from tests.trials.test_untrusted import RUN
 
 NUMBERS = ("0001", "0002", "0003")
@@ -328,3 +328,20 @@ def test_a_case_that_was_taken_off_the_list_is_told(trial, capsys):
     for folder in ("sealed", "cases"):
         shutil.rmtree(trial / folder / "0002")
     assert scored(trial) in (0, 1)
+
+
+@pytest.mark.parametrize("version", ["0", "0.0.9", "99.0.0", "", "newest", 0, None, "0.1.0000000000"])
+def test_a_trial_of_a_version_that_is_not_known_is_told(trial, version, capsys):
+    facts = json.loads((trial / "trial.json").read_text())
+    (trial / "trial.json").write_text(json.dumps({**facts, "focgen": version}))
+    assert scored(trial) == 2
+    assert f"says that focgen {str(version)!r} made it, and this is" in capsys.readouterr().err
+
+
+def test_a_trial_of_an_earlier_version_is_one(trial, monkeypatch):
+    monkeypatch.setattr(focgen, "__version__", "0.12.3")
+    assert facts_of(trial).suite == "short"
+    monkeypatch.setattr(focgen, "__version__", "0.12.3rc1")
+    facts = json.loads((trial / "trial.json").read_text())
+    (trial / "trial.json").write_text(json.dumps({**facts, "focgen": "0.12.3rc1"}))
+    assert facts_of(trial).suite == "short"
