@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,8 +44,9 @@ def strays(y: Array, command: Array) -> list[slice]:
     far = _that_come_back(y, leaps[_sizes(y, leaps) > own], moving)
     near = _that_come_back(y, leaps, moving)
     found = _farther(y, command, [part for part in far if _length(part) <= _LONGEST])
-    found += [part for part in [*far, *near] if _in_a_rest(y, command, part)]
-    return _apart(found)
+    asked, small = _Asked.of(command), _SMALL * float(np.ptp(y))
+    found += [part for part in [*far, *near] if _in_a_rest(y, asked, part, small)]
+    return _apart(found, len(y))
 
 
 def astray(y: Array, command: Array) -> Bools:
@@ -108,35 +110,52 @@ def _length(part: slice) -> int:
     return int(part.stop - part.start)
 
 
-def _apart(parts: list[slice]) -> list[slice]:
-    """Of stretches that overlap the first named, all in the order of time."""
-    kept: list[slice] = []
+def _apart(parts: list[slice], count: int) -> list[slice]:
+    """Of stretches of ``count`` readings that overlap the first named, all in the order of time."""
+    kept, taken = [], np.zeros(count, bool)
     for part in parts:
-        if all(part.stop <= other.start or other.stop <= part.start for other in kept):
+        if not taken[part].any():
+            taken[part] = True
             kept.append(part)
     return sorted(kept, key=lambda part: int(part.start))
 
 
-def _in_a_rest(y: Array, command: Array, part: slice) -> bool:
-    """Whether ``command`` (n,) rests around a stretch of ``y`` (n,) that is no late answer to a pulse of it,
-    and more than small."""
-    there = command[max(part.start - _SETTLED, 0) : part.stop + 1]
-    noise = max(_STILL * float(np.median(np.abs(np.diff(there)))), _ROUNDED * float(np.ptp(command)))
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """A ``command`` (n,), the ``least`` that is no rounding of it, the readings ``at`` (m,) behind which it
+    jumps, and where two such jumps in a row (m − 1,) are a ``pulse``, for they go opposite ways."""
+
+    command: Array
+    least: float
+    at: Ints
+    pulse: Bools
+
+    @classmethod
+    def of(cls, command: Array) -> _Asked:
+        steps = np.diff(command)
+        at = np.flatnonzero(np.abs(steps) > jump_of(command))
+        return cls(command, _ROUNDED * float(np.ptp(command)), at, np.diff(np.sign(steps[at])) != 0.0)
+
+
+def _in_a_rest(y: Array, asked: _Asked, part: slice, small: float) -> bool:
+    """Whether the command rests around a stretch of ``y`` (n,) that is no late answer to a pulse of it, and
+    leaves by more than is ``small``."""
+    there = asked.command[max(part.start - _SETTLED, 0) : part.stop + 1]
+    noise = max(_STILL * float(np.median(np.abs(np.diff(there)))), asked.least)
     if _length(part) <= WIDEST or float(np.ptp(there)) > noise:
         return False
-    small = _sizes(y, np.array([part.start, part.stop])).min() < _SMALL * np.ptp(y)
-    return not small and not _may_be_late(command, part)
+    leaves = _sizes(y, np.array([part.start, part.stop])).min()
+    return bool(leaves >= small) and not _may_be_late(asked, part)
 
 
-def _may_be_late(command: Array, part: slice) -> bool:
-    """Whether a stretch is as long as a pulse of ``command`` (n,) ahead of it, or as one that may have begun
-    ahead of the log."""
-    steps, length = np.diff(command[: part.start]), _length(part)
-    at = np.flatnonzero(np.abs(steps) > jump_of(command))
+def _may_be_late(asked: _Asked, part: slice) -> bool:
+    """Whether a stretch is as long as a pulse of the command ahead of it, or as one that may have begun ahead
+    of the log."""
+    at, length = asked.at[: np.searchsorted(asked.at, part.start - 1)], _length(part)
     near = WIDEST + _AGREE * length
     if part.start < _EARLY and (not len(at) or at[0] < length + near):
         return True
-    pulses = np.diff(at)[np.diff(np.sign(steps[at])) != 0.0]
+    pulses = np.diff(at)[asked.pulse[: max(len(at) - 1, 0)]]
     return bool(np.any(np.abs(pulses - length) <= near))
 
 
