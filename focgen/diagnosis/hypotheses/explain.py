@@ -206,14 +206,15 @@ def _explained(
     asked = AcceptanceCriteria(threshold, carried, noise, converter, only is not None)
     rankings, candidates = _grown(problem, given, candidates, guests, asked)
     weighing = Weighing(rankings[-1].ar)
-    best = _dropped(rankings[-1].base, weighing, threshold)
+    known = [f for r in rankings for f in (r.base, *r.best.values())]
+    best = _dropped(rankings[-1].base, weighing, threshold, known)
     best = realigned(best if asked.granted else foretelling(best, weighing), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     errors = rankings[0].errors
     if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
         best, nominal = (_moved_to(f, seen, weighing) for f in (best, nominal))
-        best, rankings = _dropped(best, weighing, threshold), []
-    beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted)
+        best, rankings = _dropped(best, weighing, threshold, known), []
+    beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted, known)
     best, causes = reexamined(best, beside)
     if converter is not None:
         best, causes = converter.beside(best, nominal, causes, weighing)
@@ -318,12 +319,12 @@ def _worth_trying(
     return candidates if seems_more(base, vector) else []
 
 
-def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
+def _dropped(best: Fit, weighing: Weighing, threshold: float, known: Sequence[Fit] = ()) -> Fit:
     """Without the effects that the later ones made needless."""
     while len(best.problem.candidates) > 1:
         found = []
         for candidate in best.problem.candidates:
-            without = left_out(best, [candidate], weighing)
+            without = left_out(best, [candidate], weighing, known)
             found.append((evidence(best, without), without))
         least, without = min(found, key=lambda pair: pair[0])
         if least > threshold:

@@ -55,8 +55,8 @@ class Cause:
 @dataclass(frozen=True, eq=False)
 class Beside:
     """What every effect is doubted with: the fit without any, the ``rankings`` made, which those made anew
-    join, the ``candidates`` to try, the ``weighing`` of residuals, the ``surroundings``, and whether effects
-    are ``granted`` to be there."""
+    join, the ``candidates`` to try, the ``weighing`` of residuals, the ``surroundings``, whether effects are
+    ``granted`` to be there, and the fits ``known`` from the search."""
 
     nominal: Fit
     rankings: list[Ranking]
@@ -64,6 +64,7 @@ class Beside:
     weighing: Weighing
     surroundings: Surroundings
     granted: bool = False
+    known: Sequence[Fit] = ()
 
 
 def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
@@ -80,7 +81,7 @@ def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
         needless = min(first, key=_needed, default=None)
         if needless is None or _needed(needless) >= 0.0 or beside.granted:
             return best, causes
-        best = without_family(best, needless.effect, beside.weighing)
+        best = without_family(best, needless.effect, beside.weighing, beside.known)
     return best, _causes(best, beside)
 
 
@@ -100,7 +101,7 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     """One effect of ``best`` and its rivals, the best first. Of a rival that the experiments are not made to
     show, no more free values are counted than of the effect: they were not to be seen."""
     own = [c for c in best.problem.candidates if c.effect == name]
-    without = without_family(best, name, beside.weighing)
+    without = without_family(best, name, beside.weighing, beside.known)
     ranking = _ranking(name, without, beside)
     fits = {name: best} | dict(_rivals(best, ranking, beside, len(own) > 1))
     ground = Ground.of(beside.nominal, without, list(fits.values()), beside.weighing, beside.surroundings)
@@ -198,13 +199,16 @@ def _second_form(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weigh
     return better if evidence(better, of) > 0 else of
 
 
-def without_family(of: Fit, name: str, weighing: Weighing) -> Fit:
+def without_family(of: Fit, name: str, weighing: Weighing, known: Sequence[Fit] = ()) -> Fit:
     """``of`` without any form of this family, fitted again."""
-    return left_out(of, [c for c in of.problem.candidates if c.effect == name], weighing)
+    return left_out(of, [c for c in of.problem.candidates if c.effect == name], weighing, known)
 
 
-def left_out(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:
-    """``of`` without ``candidates``, fitted again."""
+def left_out(
+    of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing, known: Sequence[Fit] = ()
+) -> Fit:
+    """``of`` without ``candidates``, fitted again, or what is ``known`` of the same, if that is better: what
+    was fitted beside an effect may be far from what it is without, as a valve's band that jumps."""
     problem, head = of.problem, of.problem.head
     kept, vector, place = [], [of.vector[:head]], head
     for candidate in problem.candidates:
@@ -213,4 +217,6 @@ def left_out(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing)
             kept.append(candidate)
             vector.append(of.vector[place : place + count])
         place += count
-    return fit(problem.with_candidates(kept), np.concatenate(vector), weighing, 8)
+    whole = problem.with_candidates(kept)
+    found = [f.vector for f in known if f.problem.candidates == whole.candidates]
+    return min((fit(whole, s, weighing, 8) for s in (np.concatenate(vector), *found)), key=lambda f: f.cost)
