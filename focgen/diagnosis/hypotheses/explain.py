@@ -15,7 +15,7 @@ from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria, select
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.left import remembers, unleft
-from focgen.diagnosis.hypotheses.nuisances import seems_more, uncertain, ways
+from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain, ways
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.numbers import NUMBERS
@@ -316,7 +316,7 @@ def _worth_trying(
     base: Problem, vector: np.ndarray, candidates: list[CandidateEffect]
 ) -> list[CandidateEffect]:
     """All candidate effects where there seems to be more than noise; else none."""
-    return candidates if seems_more(base, vector) else []
+    return candidates if may_be_more(base, vector) else []
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float, known: Sequence[Fit] = ()) -> Fit:
