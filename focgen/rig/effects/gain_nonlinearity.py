@@ -27,12 +27,6 @@ def _exponential(x: Array, values: Values, run: Run) -> Array:
     return made
 
 
-def _limited(x: Array, values: Values, run: Run) -> Array:
-    """Folds and fibres that run out of length: beyond a load they give way less, or no more."""
-    share, load, width = values
-    return x - share * _curves.softly_beyond(x, load, width)
-
-
 def _stiffening(x: Dynamics, values: Values, run: None) -> Dynamics:
     size, scale = values
     return replace(x, bend=Bend(0.0, size, scale))
@@ -92,16 +86,7 @@ EFFECT = Effect(
             (Parameter("bend", level=-1, lower=-0.97, upper=3.0, starts=(0.3, -0.3), zero=0.0),),
             _gent,
         ),
-        Form(
-            "limited",
-            "drive",
-            (
-                Parameter("share", lower=0.0, upper=1.0, starts=(0.5, 0.9, 0.9), zero=0.0),
-                Parameter("load", level=1, lower=0.2, upper=1.5, starts=(0.6, 0.8, 0.5)),
-                Parameter("width", level=1, lower=0.05, upper=0.5, starts=(0.1, 0.1, 0.2), log=True),
-            ),
-            _limited,
-        ),
+        _curves.limited("drive"),
         # of the actuator's own spring, which is the quicker where it is the stiffer
         Form(
             "stiffening",
