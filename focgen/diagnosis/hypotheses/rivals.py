@@ -11,7 +11,7 @@ from focgen.diagnosis.belief.choice import prior
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.standing import any_of, behind, holds, nominal_off
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
-from focgen.diagnosis.hypotheses.search import Ranking, evidence, on_all, rank
+from focgen.diagnosis.hypotheses.search import Ranking, evidence, is_itself, on_all, rank
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.rig.effects import library
 
@@ -184,7 +184,8 @@ def _rivals(best: Fit, ranking: Ranking, beside: Beside, mended: bool) -> list[t
         again = fit(candidate.problem, candidate.vector, beside.weighing, 6, leader=best)
         if mended and len(found) < _MENDED:
             again = _second_form(again, beside.candidates, beside.weighing)
-        found.append((other, again))
+        if is_itself(again):
+            found.append((other, again))
     return found
 
 

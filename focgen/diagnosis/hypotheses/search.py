@@ -175,6 +175,7 @@ def finish(ground: Fit, tried: Sequence[Fit], errors: dict[str, float]) -> Ranki
 
 def _ranking(ground: Fit, ar: np.ndarray, tried: Sequence[Fit], errors: dict[str, float]) -> Ranking:
     families: dict[str, Fit] = {}
+    tried = [t for t in tried if is_itself(t)]
     for one in sorted(tried, key=lambda t: -evidence(t, ground)):
         families.setdefault(family(one), one)
     gain = {name: evidence(f, ground) for name, f in families.items()}
@@ -185,6 +186,13 @@ def _ranking(ground: Fit, ar: np.ndarray, tried: Sequence[Fit], errors: dict[str
 def family(of: Fit) -> str:
     """The family added last."""
     return of.problem.candidates[-1].effect
+
+
+def is_itself(of: Fit) -> bool:
+    """Whether the effect added last is, with the values found, what its family says."""
+    actuator = of.problem.rig(of.vector).actuator
+    form, values = of.problem.candidates[-1].form, of.problem.values(of.vector)[-1]
+    return actuator is None or form.itself(values, actuator.dynamics.den)
 
 
 @dataclass(frozen=True, eq=False)
