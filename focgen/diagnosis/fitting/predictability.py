@@ -88,8 +88,8 @@ def predictable_share(segment: Segment, residual: np.ndarray, response: float) -
 
 
 def even_share(segment: Segment, residual: np.ndarray, response: float) -> float:
-    """The same where every stretch of the session counts alike: a few large moves that no regression foretells
-    hide what it foretells of all the rest."""
+    """The same where every stretch of the session counts alike: a few large moves that no regression
+    foretells hide what it foretells of all the rest."""
     return _Regression.of(segment, residual, response).even.most
 
 

@@ -119,7 +119,7 @@ def seems_more(base: Problem, vector: np.ndarray) -> bool:
 
 
 def may_be_more(base: Problem, vector: np.ndarray) -> bool:
-    """The same, or they predict something of what is left but for the largest of it: then effects are tried."""
+    """The same, or they predict something of most stretches: then effects are tried."""
     ground = _ground(base, vector)
     response = base.references.clocks["response"]
     return _shows_more(ground) or even_share(base.segment, ground.weighed, response) > NUMBERS.chance

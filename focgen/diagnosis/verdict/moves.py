@@ -75,7 +75,7 @@ def _damping(before: TransferFunction, after: TransferFunction, time: float) -> 
         return 1.0
     old, new, last = before.den[1], after.den[1], before.den[-1]
     scale = after.den[-1].coefficient / last.coefficient
-    return new.coefficient / old.coefficient / scale / time ** (old.order - last.order)
+    return float(new.coefficient / old.coefficient / scale / time ** (old.order - last.order))
 
 
 def _factors(before: TransferFunction, after: TransferFunction) -> tuple[float, float]:
