@@ -93,8 +93,8 @@ def candidates_for(segment: Segment, rig: Rig) -> list[CandidateEffect]:
     """Every form that may act in this segment. In a rig of one stage every family may, but of those that
     share a formula and its place, or a linear one, only the one at home there; where the gain is bent, ahead
     of it is another place than behind. Where every experiment begins at rest, none that says where something
-    lay before."""
-    every = _placed_in(segment, rig)
+    lay before; where the input goes one way, none that asks for both."""
+    every = [c for c in _placed_in(segment, rig) if segment.both_ways or not c.form.both_ways]
     return every if segment.run.begins else [c for c in every if not c.form.begun]
 
 
@@ -143,7 +143,7 @@ def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
         for stage in e.also
         if stage in segment.stages and e.stage not in segment.stages
         for form in e.forms
-        if fits_in(form, stage, rig)
+        if fits_in(form, stage, rig) and (segment.both_ways or not form.both_ways)
     ]
 
 

@@ -120,6 +120,7 @@ class Form:
     linear, None where not. ``wanders``: it follows the session's time through free values, so that it
     predicts nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
     ``leads``: linear though it is, away from home it stays ahead of the actuator's gain, which may be bent.
+    ``both_ways``: it is to be told from another form only where the input goes both ways.
     ``itself(values, den)``: whether it is what its family says, in an actuator of this denominator.
     """
 
@@ -133,6 +134,7 @@ class Form:
     wanders: bool = False
     jumps: bool = False
     leads: bool = False
+    both_ways: bool = False
     itself: Callable[[Values, Polynomial], bool] = lambda values, den: True
 
     @property
