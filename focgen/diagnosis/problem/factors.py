@@ -77,6 +77,6 @@ def factors(rig: Rig, stages: Sequence[str], freely: str | None) -> Iterator[Fac
             if known.time > 0.0 and any(t.order for t in (*transfer.num, *transfer.den)):
                 yield Factor(stage, "time", known.time, +1)
             if known.time > 0.0 and len(transfer.den) > 2:  # what gives a bandwidth gives a damping no better
-                yield Factor(stage, "damping", known.time, 0)
+                yield Factor(stage, "damping", known.time, +1)
         if known.time > 0.0 and getattr(rig.delays, stage) > 0.0:
             yield Factor(stage, "delay", known.time, +1)
