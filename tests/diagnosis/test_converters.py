@@ -90,7 +90,7 @@ def test_levels_of_a_finer_converter_behind_are_steps(monkeypatch):
     monkeypatch.setattr(converter, "_is_closer", lambda problem, found: False)
     rng, step, fine = np.random.default_rng(6), 1.0, 24.0 / 4095
     logs = []
-    for i, log in enumerate(session(step, 0.0, 4)):
+    for log in session(step, 0.0, 4):
         near = answered(log["command"]) + 0.14 * step * rng.normal(size=840)
         read = fine * np.round(step * np.round(near / step) / fine)
         logs.append(replace(log, signals={"command": log["command"], "output": read}))

@@ -76,7 +76,8 @@ MOTOR = Rig(
 
 
 def spun(command: np.ndarray, friction: float) -> np.ndarray:
-    """The speed of 0.6 w' + w + friction sign(w) = 2 u, held at 0 below it, in steps of a tenth of a sample."""
+    """The speed of 0.6 w' + w + friction sign(w) = 2 u, held at 0 below it, in steps of a tenth of a
+    sample."""
     speed, found = 0.0, []
     for u in command:
         for _ in range(10):
@@ -127,7 +128,7 @@ def test_a_damping_a_tenth_off_is_no_effect(damping):
     drive = TransferFunction([(0.5, 0.0)], [(0.01, 2.0), (0.12 * damping, 1.0), (1.0, 0.0)])
     rig = replace(MOTOR, regulator=drive, signals=Signals("t", "w", "u", pressure="p"))
     rng, logs = np.random.default_rng(7), []
-    for i, log in enumerate(turned(0.0)):
+    for log in turned(0.0):
         pressure = passed(0.5, (0.01, 0.12, 1.0), log["command"])
         made = {"pressure": pressure, "output": passed(1.9, (0.63, 1.0), pressure)}
         noisy = {k: v + 0.004 * np.ptp(v) * rng.normal(size=len(v)) for k, v in made.items()}

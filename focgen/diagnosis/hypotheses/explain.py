@@ -18,6 +18,7 @@ from focgen.diagnosis.hypotheses.left import remembers, unleft
 from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain, ways
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
+from focgen.diagnosis.hypotheses.two import two_at_once
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import Segment, is_single, owner
@@ -284,7 +285,25 @@ def _grown(
     """A ranking for each effect that the data ask for, the last one being of what is left; and the candidate
     effects that were tried.
     """
-    rankings: list[Ranking] = []
+    rankings, candidates = _added([], base, vector, candidates, guests, asked)
+    if asked.granted or not _much_left(rankings[:2][-1].base):
+        return rankings, candidates
+    pair = two_at_once(rankings, candidates, asked)
+    if pair is None:
+        return rankings, candidates
+    ahead, both = pair
+    return _added(ahead, both.problem, both.vector, candidates, [], asked)
+
+
+def _added(
+    rankings: list[Ranking],
+    base: Problem,
+    vector: np.ndarray,
+    candidates: list[CandidateEffect],
+    guests: list[CandidateEffect],
+    asked: AcceptanceCriteria,
+) -> tuple[list[Ranking], list[CandidateEffect]]:
+    """The same from ``base``, which the ``rankings`` before led to."""
     while len(rankings) < _DEPTH:
         rankings.append(rank(base, vector, _worth_trying(base, vector, base.untried(candidates))))
         best = select(rankings, asked)
