@@ -6,7 +6,7 @@ and the checks of a running controller.
 """
 
 CONSTANTS = {
-    "belief/standing.py": ["_SURE"],
+    "belief/standing.py": ["_SAME", "_SURE"],
     "controller/quantisation.py": ["_DECIMAL", "_DIGITS", "_OFF", "_SAME"],
     "controller/replayed.py": ["_SLOWER"],
     "controller/check.py": ["_LARGE", "_NEARLY", "_RESOLVED", "_ROUNDED", "_STEADY", "_TIED"],
@@ -14,7 +14,7 @@ CONSTANTS = {
     "fitting/fit.py": ["FIXED", "STEP", "_LAGGING"],
     "fitting/integrating.py": ["_OF_RESPONSE"],
     "fitting/jumps.py": ["_ABOUT", "_FINEST", "_STEP", "_WORTH"],
-    "fitting/predictability.py": ["_DAMPING", "_PERIODS", "_RIDGES", "_SAMPLES"],
+    "fitting/predictability.py": ["_DAMPING", "_PERIODS", "_QUIETEST", "_RIDGES", "_SAMPLES"],
     "fitting/realign.py": ["_TAKEN"],
     "fitting/repeats.py": ["_ALIKE", "_AS_WELL", "_CELL", "_CLOSES", "_LATER", "_MOVED", "_ONE_SENSE"],
     "hypotheses/bootstrap.py": ["_RARE"],
@@ -26,13 +26,14 @@ CONSTANTS = {
     "hypotheses/left.py": ["_ERRORS", "_OFF", "_STILL"],
     "hypotheses/level_pace.py": ["_PART"],
     "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],
+    "hypotheses/rivals.py": ["_NEAR"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK", "_QUICKEST"],
     "problem/decimate.py": ["_WITHIN"],
     "problem/excitation.py": ["_STEADY"],
     "problem/factors.py": ["LEAST", "WITHIN"],
     "problem/free.py": ["_SLACK", "_USUAL"],
     "problem/problem.py": ["_BASELINE", "_FAR_OFF", "_OFF", "_ZERO"],
-    "problem/segments.py": ["_FOLLOWED", "_TIMING"],
+    "problem/segments.py": ["_EITHER", "_FOLLOWED", "_TIMING"],
     "proposals/candidate_rigs.py": ["_STEP"],
     "proposals/menu.py": ["_SHORTEST"],
     "proposals/next_experiment.py": ["_CERTAIN", "_ENOUGH", "_MOST", "_SHARES", "_SURE"],

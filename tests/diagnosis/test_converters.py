@@ -13,6 +13,7 @@ import pytest
 from scipy.signal import lfilter
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.hypotheses import converter
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import form_of
@@ -81,3 +82,18 @@ def test_rests_of_a_rig_that_answers_within_a_sample_are_no_steps():
     assert SEEN(seen) is not None  # by sight they may be
     found = diagnose(rig, [Experiment("stairs", H, {"command": pump, "output": seen})])
     assert "sensor_quantization" not in [c.candidates[0].effect for c in found.causes]
+
+
+def test_levels_of_a_finer_converter_behind_are_steps(monkeypatch):
+    """Each level is read as its nearest of 4096, so that none is where even steps would have it. That they
+    are steps needs no model that comes closer by them."""
+    monkeypatch.setattr(converter, "_is_closer", lambda problem, found: False)
+    rng, step, fine = np.random.default_rng(6), 1.0, 24.0 / 4095
+    logs = []
+    for log in session(step, 0.0, 4):
+        near = answered(log["command"]) + 0.14 * step * rng.normal(size=840)
+        read = fine * np.round(step * np.round(near / step) / fine)
+        logs.append(replace(log, signals={"command": log["command"], "output": read}))
+    assert len(np.unique(np.concatenate([log["output"] for log in logs]))) < 40
+    found = diagnose(HEATER, logs)
+    assert [c.candidates[0].effect for c in found.causes] == ["sensor_quantization"]

@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.fitting.predictability import predictable_share, predicted
+from focgen.diagnosis.fitting.predictability import even_share, predictable_share, predicted
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.rivals import Cause
@@ -74,6 +74,18 @@ def test_ringing_is_predictable_and_noise_is_not():
     rung *= 0.5 / np.sqrt(np.mean(rung**2))
     assert predictable_share(segment, noise, 2.0) < 0.01
     assert predictable_share(segment, noise + rung, 2.0) > 0.6 * 0.2
+
+
+def test_a_few_large_moves_do_not_hide_what_inputs_predict_of_the_rest():
+    """Three dips that no regression foretells make most of the mean square, and none of the session."""
+    segment = actuator().segment
+    rng, count = np.random.default_rng(5), len(segment.y)
+    noise, t = 0.01 * rng.normal(size=count), np.arange(count)
+    dips = sum(s * np.exp(-(((t - p) / 25.0) ** 2)) for p, s in ((400, 1.0), (2100, -0.8), (4300, 1.2)))
+    rest = 0.01 * np.tanh(3.0 * (segment.asked - 0.5))
+    assert predictable_share(segment, rest + dips + noise, 1.0) < NUMBERS.chance
+    assert even_share(segment, rest + dips + noise, 1.0) > 10.0 * NUMBERS.chance
+    assert even_share(segment, noise, 1.0) < NUMBERS.chance
 
 
 @pytest.mark.parametrize("size", [0.0, 0.3, 1.0])

@@ -10,6 +10,7 @@ from scipy.special import expit
 from focgen.diagnosis.numbers import NUMBERS
 
 _SURE = 500.0  # nats: more is no surer
+_SAME = 1e-3  # nats: forms whose odds are as close answer alike
 
 
 def tied_within() -> float:
@@ -43,6 +44,20 @@ def sureness(odds: float) -> float:
 def holds(odds: float) -> bool:
     """Whether what has these log odds over all else holds, by itself, what a set is to hold."""
     return odds > float(np.log(NUMBERS.held) - np.log1p(-NUMBERS.held))
+
+
+def any_of(odds: Sequence[float]) -> float:
+    """Log odds of a family that may take any of several forms, from those of each.
+
+    How it is doubted must not hang on which of them fits best: a curve of two values that fits a little
+    worse than one of five may be the likelier, and a family is the likelier the more of its forms will do.
+    Forms that come to the same, as a limit of one sign and of both where the signal has one, are one.
+    """
+    found: list[float] = []
+    for nats in sorted(odds, reverse=True):
+        if not found or found[-1] - nats > _SAME:
+            found.append(nats)
+    return float(np.logaddexp.reduce(found))
 
 
 def probabilities(odds: Sequence[float], instead: Sequence[float] = ()) -> np.ndarray:

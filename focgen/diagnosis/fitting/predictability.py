@@ -21,6 +21,7 @@ _FOLDS = 8
 _PERIODS = np.geomspace(0.03, 2.0, 16)  # of the response: of modes that may ring,
 _DAMPING = 0.1  # so damped that each is heard as far as the next
 _SAMPLES = 6.0  # of a period: a shorter one does not show
+_QUIETEST = 0.1  # of the median stretch's mean square: a stretch counts as no quieter
 _RIDGES = (1e-4, 1e-2)  # of the mean square of a regressor, added to it
 
 
@@ -86,6 +87,12 @@ def predictable_share(segment: Segment, residual: np.ndarray, response: float) -
     return _Regression.of(segment, residual, response).most
 
 
+def even_share(segment: Segment, residual: np.ndarray, response: float) -> float:
+    """The same where every stretch of the session counts alike: a few large moves that no regression
+    foretells hide what it foretells of all the rest."""
+    return _Regression.of(segment, residual, response).even.most
+
+
 def predictability(segment: Segment, residual: np.ndarray, response: float) -> Predictability:
     """What of ``residual`` (n,), weighed by trust, the segment's input predicts; ``response`` in s."""
     regression = _Regression.of(segment, residual, response)
@@ -109,20 +116,33 @@ def predicted(segment: Segment, residual: np.ndarray, response: float, share: fl
 
 @dataclass(frozen=True, eq=False)
 class _Regression:
-    """``groups`` of regressors (n, k), those that are ``ringing`` (n, k), the residual ``target`` (n,), all
-    thinned, and the ``ridges`` to try."""
+    """``groups`` of regressors (n, k), those that are ``ringing`` (n, k), the residual ``target`` (n,) and
+    the regressor of its ``level`` (n,), all thinned, and the ``ridges`` to try."""
 
     groups: dict[str, np.ndarray]
     ringing: np.ndarray
     target: np.ndarray
     ridges: Sequence[float]
+    level: np.ndarray
 
     @classmethod
     def of(cls, segment: Segment, residual: np.ndarray, response: float) -> _Regression:
         """Of references, which rest for long, a tighter regression may tell more."""
         groups, ringing = _regressors(segment, response)
         target = _thinned(residual[:, None], _thin(segment))[:, 0]
-        return cls(groups, ringing, target, _RIDGES if segment.led else _RIDGES[:1])
+        ridges = _RIDGES if segment.led else _RIDGES[:1]
+        return cls(groups, ringing, target, ridges, np.ones(len(target)))
+
+    @property
+    def even(self) -> _Regression:
+        """The same with each stretch as a share of its own root mean square."""
+        stretch = np.arange(len(self.target)) // max(8, len(self.target) // (12 * _FOLDS))
+        squares = np.bincount(stretch, self.target**2) / np.bincount(stretch)
+        least = _QUIETEST * np.median(squares)
+        weight = 1.0 / np.sqrt(np.maximum(squares, max(least, 1e-300)))[stretch]
+        groups = {name: columns * weight[:, None] for name, columns in self.groups.items()}
+        ringing, target = self.ringing * weight[:, None], self.target * weight
+        return _Regression(groups, ringing, target, self.ridges, self.level * weight)
 
     @property
     def whole(self) -> float:
@@ -137,7 +157,7 @@ class _Regression:
 
     def share(self, names: Iterable[str], *more: np.ndarray) -> float:
         """What the groups ``names`` predict."""
-        columns = [np.ones((len(self.target), 1)), *(self.groups[name] for name in names), *more]
+        columns = [self.level[:, None], *(self.groups[name] for name in names), *more]
         return _predictable_share(np.hstack(columns), self.target, self.ridges)
 
 

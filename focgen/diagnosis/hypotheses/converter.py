@@ -21,6 +21,7 @@ from focgen.rig.effects._effect import Run, Values
 from focgen.rig.engine import slot_in
 
 _SHARP = 20_000  # parts of the range: what readings may lie off a level that is one
+_READINGS = 2  # of one level at most, in the mean: then there is little between the levels
 _PINNED = 0.25 * FIXED  # of a reference: what is held may move either way
 _REFITTED = 6  # iterations
 _EASED = (0.2, 0.06)  # of a step: what it rises in, as it is fitted
@@ -108,10 +109,12 @@ def _held(candidate: CandidateEffect, entries: Sequence[float]) -> CandidateEffe
 
 
 def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> bool:
-    """Whether most readings are levels, but for the rounding of the file."""
+    """Whether most readings are levels, but for the rounding of the file, or there are hardly more readings
+    than levels: a finer converter behind the coarse one gives each level as its own nearest."""
     y = problem.segment.y
-    away = np.abs(y - candidate.form.act(y, values, problem.segment.run))
-    return bool(_SHARP * np.median(away) < np.ptp(y))
+    levels = candidate.form.act(y, values, problem.segment.run)
+    few = len(np.unique(y)) <= _READINGS * len(np.unique(levels))
+    return few or bool(_SHARP * np.median(np.abs(y - levels)) < np.ptp(y))
 
 
 def _is_closer(problem: Problem, found: Converter) -> bool:

@@ -15,9 +15,10 @@ from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria, select
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.left import remembers, unleft
-from focgen.diagnosis.hypotheses.nuisances import seems_more, uncertain, ways
+from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain, ways
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
+from focgen.diagnosis.hypotheses.two import two_at_once
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import Segment, is_single, owner
@@ -93,8 +94,8 @@ def candidates_for(segment: Segment, rig: Rig) -> list[CandidateEffect]:
     """Every form that may act in this segment. In a rig of one stage every family may, but of those that
     share a formula and its place, or a linear one, only the one at home there; where the gain is bent, ahead
     of it is another place than behind. Where every experiment begins at rest, none that says where something
-    lay before."""
-    every = _placed_in(segment, rig)
+    lay before; where the input goes one way, none that asks for both."""
+    every = [c for c in _placed_in(segment, rig) if segment.both_ways or not c.form.both_ways]
     return every if segment.run.begins else [c for c in every if not c.form.begun]
 
 
@@ -143,7 +144,7 @@ def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
         for stage in e.also
         if stage in segment.stages and e.stage not in segment.stages
         for form in e.forms
-        if fits_in(form, stage, rig)
+        if fits_in(form, stage, rig) and (segment.both_ways or not form.both_ways)
     ]
 
 
@@ -206,14 +207,15 @@ def _explained(
     asked = AcceptanceCriteria(threshold, carried, noise, converter, only is not None)
     rankings, candidates = _grown(problem, given, candidates, guests, asked)
     weighing = Weighing(rankings[-1].ar)
-    best = _dropped(rankings[-1].base, weighing, threshold)
+    known = [f for r in rankings for f in (r.base, *r.best.values())]
+    best = _dropped(rankings[-1].base, weighing, threshold, known)
     best = realigned(best if asked.granted else foretelling(best, weighing), weighing)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     errors = rankings[0].errors
     if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
         best, nominal = (_moved_to(f, seen, weighing) for f in (best, nominal))
-        best, rankings = _dropped(best, weighing, threshold), []
-    beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted)
+        best, rankings = _dropped(best, weighing, threshold, known), []
+    beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted, known)
     best, causes = reexamined(best, beside)
     if converter is not None:
         best, causes = converter.beside(best, nominal, causes, weighing)
@@ -283,7 +285,25 @@ def _grown(
     """A ranking for each effect that the data ask for, the last one being of what is left; and the candidate
     effects that were tried.
     """
-    rankings: list[Ranking] = []
+    rankings, candidates = _added([], base, vector, candidates, guests, asked)
+    if asked.granted or not _much_left(rankings[:2][-1].base):
+        return rankings, candidates
+    pair = two_at_once(rankings, candidates, asked)
+    if pair is None:
+        return rankings, candidates
+    ahead, both = pair
+    return _added(ahead, both.problem, both.vector, candidates, [], asked)
+
+
+def _added(
+    rankings: list[Ranking],
+    base: Problem,
+    vector: np.ndarray,
+    candidates: list[CandidateEffect],
+    guests: list[CandidateEffect],
+    asked: AcceptanceCriteria,
+) -> tuple[list[Ranking], list[CandidateEffect]]:
+    """The same from ``base``, which the ``rankings`` before led to."""
     while len(rankings) < _DEPTH:
         rankings.append(rank(base, vector, _worth_trying(base, vector, base.untried(candidates))))
         best = select(rankings, asked)
@@ -315,15 +335,15 @@ def _worth_trying(
     base: Problem, vector: np.ndarray, candidates: list[CandidateEffect]
 ) -> list[CandidateEffect]:
     """All candidate effects where there seems to be more than noise; else none."""
-    return candidates if seems_more(base, vector) else []
+    return candidates if may_be_more(base, vector) else []
 
 
-def _dropped(best: Fit, weighing: Weighing, threshold: float) -> Fit:
+def _dropped(best: Fit, weighing: Weighing, threshold: float, known: Sequence[Fit] = ()) -> Fit:
     """Without the effects that the later ones made needless."""
     while len(best.problem.candidates) > 1:
         found = []
         for candidate in best.problem.candidates:
-            without = left_out(best, [candidate], weighing)
+            without = left_out(best, [candidate], weighing, known)
             found.append((evidence(best, without), without))
         least, without = min(found, key=lambda pair: pair[0])
         if least > threshold:

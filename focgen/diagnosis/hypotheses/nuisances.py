@@ -13,6 +13,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.fitting.integrating import pace
+from focgen.diagnosis.fitting.predictability import even_share
 from focgen.diagnosis.hypotheses.disturbance import disturbance
 from focgen.diagnosis.hypotheses.level_pace import level_pace
 from focgen.diagnosis.numbers import NUMBERS
@@ -115,6 +116,13 @@ def _widened(problem: Problem) -> Problem:
 def seems_more(base: Problem, vector: np.ndarray) -> bool:
     """Whether inputs predict something of the residual, or it is slower or less steady than noise is."""
     return _shows_more(_ground(base, vector))
+
+
+def may_be_more(base: Problem, vector: np.ndarray) -> bool:
+    """The same, or they predict something of most stretches: then effects are tried."""
+    ground = _ground(base, vector)
+    response = base.references.clocks["response"]
+    return _shows_more(ground) or even_share(base.segment, ground.weighed, response) > NUMBERS.chance
 
 
 def _ground(base: Problem, vector: np.ndarray) -> Fit:

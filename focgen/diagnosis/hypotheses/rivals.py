@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from focgen.diagnosis.belief.choice import prior
 from focgen.diagnosis.belief.further import Ground, Surroundings
-from focgen.diagnosis.belief.standing import behind, holds, nominal_off
+from focgen.diagnosis.belief.standing import any_of, behind, holds, nominal_off
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
-from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
+from focgen.diagnosis.hypotheses.search import Ranking, evidence, is_itself, on_all, rank
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.rig.effects import library
 
 _SWAPS = 3
+_NEAR = 6.0  # nats: of families that are further behind no further form is asked
 _MENDED = 3  # rivals that get a second form where the best has one
 
 
@@ -54,8 +55,8 @@ class Cause:
 @dataclass(frozen=True, eq=False)
 class Beside:
     """What every effect is doubted with: the fit without any, the ``rankings`` made, which those made anew
-    join, the ``candidates`` to try, the ``weighing`` of residuals, the ``surroundings``, and whether effects
-    are ``granted`` to be there."""
+    join, the ``candidates`` to try, the ``weighing`` of residuals, the ``surroundings``, whether effects are
+    ``granted`` to be there, and the fits ``known`` from the search."""
 
     nominal: Fit
     rankings: list[Ranking]
@@ -63,6 +64,7 @@ class Beside:
     weighing: Weighing
     surroundings: Surroundings
     granted: bool = False
+    known: Sequence[Fit] = ()
 
 
 def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
@@ -79,7 +81,7 @@ def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
         needless = min(first, key=_needed, default=None)
         if needless is None or _needed(needless) >= 0.0 or beside.granted:
             return best, causes
-        best = without_family(best, needless.effect, beside.weighing)
+        best = without_family(best, needless.effect, beside.weighing, beside.known)
     return best, _causes(best, beside)
 
 
@@ -99,20 +101,48 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     """One effect of ``best`` and its rivals, the best first. Of a rival that the experiments are not made to
     show, no more free values are counted than of the effect: they were not to be seen."""
     own = [c for c in best.problem.candidates if c.effect == name]
-    without = without_family(best, name, beside.weighing)
-    others = _rivals(best, _ranking(name, without, beside), beside, len(own) > 1)
-    fits = [best, *(f for _, f in others)]
-    ground = Ground.of(beside.nominal, without, fits, beside.weighing, beside.surroundings)
-    odds, gain = ground.odds(best) + prior(name, without), evidence(best, without)
-    rivals = [Rival(name, own[0].stage, 0.0, gain, best, odds, _change(best, without))]
-    for other, again in others:
-        most = best.size - without.size if best.problem.lacks(other) else None
-        theirs = ground.odds(again, most) + prior(other, without)
-        stage = again.problem.candidates[-1].stage
-        away, more = behind(theirs, odds), evidence(again, without)
-        rivals.append(Rival(other, stage, away, more, again, theirs, _change(again, without)))
+    without = without_family(best, name, beside.weighing, beside.known)
+    ranking = _ranking(name, without, beside)
+    fits = {name: best} | dict(_rivals(best, ranking, beside, len(own) > 1))
+    ground = Ground.of(beside.nominal, without, list(fits.values()), beside.weighing, beside.surroundings)
+    most = {n: best.size - without.size if best.problem.lacks(n) and n != name else None for n in fits}
+    odds = {n: ground.odds(f, most[n]) for n, f in fits.items()}
+    for other in _near(odds) if len(own) == 1 else ():
+        forms = [fits[other], *_other_forms(other, fits[other], best, ranking, beside)]
+        odds[other] = any_of([ground.odds(f, most[other]) for f in forms])
+    odds = {n: o + prior(n, without) for n, o in odds.items()}
+    rivals = [
+        Rival(
+            n,
+            own[0].stage if n == name else f.problem.candidates[-1].stage,
+            behind(odds[n], odds[name]),
+            evidence(f, without),
+            f,
+            odds[n],
+            _change(f, without),
+        )
+        for n, f in fits.items()
+    ]
     share = share_of(beside.nominal, without, best)
-    return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), gain, share)
+    return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), evidence(best, without), share)
+
+
+def _near(odds: Mapping[str, float]) -> list[str]:
+    """The families that further forms may bring to the front, or keep there."""
+    best = max(odds.values())
+    return [name for name, o in odds.items() if o > best - _NEAR]
+
+
+def _other_forms(name: str, of: Fit, best: Fit, ranking: Ranking, beside: Beside) -> list[Fit]:
+    """The further forms of a family, fitted beside the others where the best of it is."""
+    problem, found = ranking.base.problem, []
+    for left in ranking.left:
+        candidate = left.problem.candidates[-1]
+        if candidate.effect != name or candidate in of.problem.candidates:
+            continue
+        whole = on_all(left, problem, round(problem.slack / left.problem.slack))
+        found.append(fit(whole.problem, whole.vector, beside.weighing, 6, leader=best))
+    return found
 
 
 def _change(of: Fit, without: Fit) -> float:
@@ -128,7 +158,7 @@ def _ranking(name: str, without: Fit, beside: Beside) -> Ranking:
     for ranking in beside.rankings:
         if _alike(ranking.base.problem, without.problem):
             return ranking
-    untried = [c for c in beside.candidates if c.effect != name and not c.form.seen]
+    untried = [c for c in beside.candidates if not c.form.seen]
     beside.rankings.append(rank(without.problem, without.vector, untried))
     return beside.rankings[-1]
 
@@ -154,7 +184,8 @@ def _rivals(best: Fit, ranking: Ranking, beside: Beside, mended: bool) -> list[t
         again = fit(candidate.problem, candidate.vector, beside.weighing, 6, leader=best)
         if mended and len(found) < _MENDED:
             again = _second_form(again, beside.candidates, beside.weighing)
-        found.append((other, again))
+        if is_itself(again):
+            found.append((other, again))
     return found
 
 
@@ -169,13 +200,16 @@ def _second_form(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weigh
     return better if evidence(better, of) > 0 else of
 
 
-def without_family(of: Fit, name: str, weighing: Weighing) -> Fit:
+def without_family(of: Fit, name: str, weighing: Weighing, known: Sequence[Fit] = ()) -> Fit:
     """``of`` without any form of this family, fitted again."""
-    return left_out(of, [c for c in of.problem.candidates if c.effect == name], weighing)
+    return left_out(of, [c for c in of.problem.candidates if c.effect == name], weighing, known)
 
 
-def left_out(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:
-    """``of`` without ``candidates``, fitted again."""
+def left_out(
+    of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing, known: Sequence[Fit] = ()
+) -> Fit:
+    """``of`` without ``candidates``, fitted again, or what is ``known`` of the same, if that is better: what
+    was fitted beside an effect may be far from what it is without, as a valve's band that jumps."""
     problem, head = of.problem, of.problem.head
     kept, vector, place = [], [of.vector[:head]], head
     for candidate in problem.candidates:
@@ -184,4 +218,6 @@ def left_out(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing)
             kept.append(candidate)
             vector.append(of.vector[place : place + count])
         place += count
-    return fit(problem.with_candidates(kept), np.concatenate(vector), weighing, 8)
+    whole = problem.with_candidates(kept)
+    found = [f.vector for f in known if f.problem.candidates == whole.candidates]
+    return min((fit(whole, s, weighing, 8) for s in (np.concatenate(vector), *found)), key=lambda f: f.cost)

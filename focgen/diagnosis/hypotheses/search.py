@@ -40,7 +40,8 @@ class Ranking:
 
     ``errors``: by family, the root-mean-square residual with its best form, over that of ``base`` (a quick
     fit's where no more was worth while). ``gain`` are nats of evidence over ``base``: half the
-    log-likelihood ratio's worth less half k ln n.
+    log-likelihood ratio's worth less half k ln n. ``left``: further forms, as far as they were fitted: on
+    means of samples where they had fallen behind another of their family.
     """
 
     base: Fit
@@ -48,6 +49,7 @@ class Ranking:
     best: dict[str, Fit]
     gain: dict[str, float]
     errors: dict[str, float]
+    left: tuple[Fit, ...] = ()
 
     @property
     def winner(self) -> str | None:
@@ -84,7 +86,8 @@ def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffec
         else [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR]
     )
     full = [on_all(t, problem, factor) for t in (ground, *kept)]
-    return finish(full[0], full[1:], errors)
+    found = finish(full[0], full[1:], errors)
+    return replace(found, left=(*found.left, *(t for t in tried if t not in kept)))
 
 
 def _started(
@@ -172,14 +175,24 @@ def finish(ground: Fit, tried: Sequence[Fit], errors: dict[str, float]) -> Ranki
 
 def _ranking(ground: Fit, ar: np.ndarray, tried: Sequence[Fit], errors: dict[str, float]) -> Ranking:
     families: dict[str, Fit] = {}
+    tried = [t for t in tried if is_itself(t)]
     for one in sorted(tried, key=lambda t: -evidence(t, ground)):
         families.setdefault(family(one), one)
-    return Ranking(ground, ar, families, {name: evidence(f, ground) for name, f in families.items()}, errors)
+    gain = {name: evidence(f, ground) for name, f in families.items()}
+    left = tuple(t for t in tried if families[family(t)] is not t)
+    return Ranking(ground, ar, families, gain, errors, left)
 
 
 def family(of: Fit) -> str:
     """The family added last."""
     return of.problem.candidates[-1].effect
+
+
+def is_itself(of: Fit) -> bool:
+    """Whether the effect added last is, with the values found, what its family says."""
+    actuator = of.problem.rig(of.vector).actuator
+    form, values = of.problem.candidates[-1].form, of.problem.values(of.vector)[-1]
+    return actuator is None or form.itself(values, actuator.dynamics.den)
 
 
 @dataclass(frozen=True, eq=False)

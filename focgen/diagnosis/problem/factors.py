@@ -1,4 +1,5 @@
-"""Factors by which a refit may move a stage that was given: its gain, all of its times, its dead time."""
+"""Factors by which a refit may move a stage that was given: its gain, all of its times, its damping, its dead
+time."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ LEAST = 0.05  # of a number as given: no refit moves it below, nor above the inv
 
 @dataclass(frozen=True)
 class Factor:
-    """One of them, as a logarithm: the ``kind`` "gain", "time" or "delay" of ``stage``, known to
+    """One of them, as a logarithm: the ``kind`` "gain", "time", "damping" or "delay" of ``stage``, known to
     ``uncertainty``, a part of itself. ``faults``: the direction, +1 or −1, in which an effect stands for
     what goes beyond three times that, 0 where none does."""
 
@@ -45,8 +46,7 @@ class Factor:
             later = factor * getattr(rig.delays, self.stage)
             return replace(rig, delays=replace(rig.delays, **{self.stage: later}))
         transfer = getattr(rig, self.stage)
-        moved = transfer * factor if self.kind == "gain" else slower(transfer, factor)
-        changes: dict[str, Any] = {self.stage: moved}
+        changes: dict[str, Any] = {self.stage: _MOVED[self.kind](transfer, factor)}
         return replace(rig, **changes)
 
 
@@ -54,6 +54,16 @@ def slower(transfer: TransferFunction, factor: float) -> TransferFunction:
     """With s → ``factor`` s: every time constant times the factor, the gain at rest as it was."""
     num, den = ([(t.coefficient * factor**t.order, t.order) for t in p] for p in (transfer.num, transfer.den))
     return TransferFunction(num, den)
+
+
+def damped(transfer: TransferFunction, factor: float) -> TransferFunction:
+    """With the coefficients between the first and the last of the denominator times ``factor``: of a second
+    order the damping, as every time and the gain at rest stay."""
+    first, *middle, last = transfer.den
+    return TransferFunction(transfer.num, [first, *((t.coefficient * factor, t.order) for t in middle), last])
+
+
+_MOVED = {"gain": TransferFunction.__mul__, "time": slower, "damping": damped}
 
 
 def factors(rig: Rig, stages: Sequence[str], freely: str | None) -> Iterator[Factor]:
@@ -66,5 +76,7 @@ def factors(rig: Rig, stages: Sequence[str], freely: str | None) -> Iterator[Fac
                 yield Factor(stage, "gain", known.gain, -1 if stage == "regulator" else 0)
             if known.time > 0.0 and any(t.order for t in (*transfer.num, *transfer.den)):
                 yield Factor(stage, "time", known.time, +1)
+            if known.time > 0.0 and len(transfer.den) > 2:  # what gives a bandwidth gives a damping no better
+                yield Factor(stage, "damping", known.time, +1)
         if known.time > 0.0 and getattr(rig.delays, stage) > 0.0:
             yield Factor(stage, "delay", known.time, +1)

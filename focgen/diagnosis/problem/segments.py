@@ -18,6 +18,7 @@ _ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"
 _LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
 _TIMING = 0.3  # of a sample: what loggers leave open
 _FOLLOWED = 0.3  # correlation of an output with the reference that leads it
+_EITHER = 0.1  # of the larger side at least: then a signal goes both ways
 _ORDER = ("command", "pressure", "curvature", "output")
 
 
@@ -56,6 +57,11 @@ class Segment:
     def level_in(self) -> float:
         """The largest magnitude of the input, in its unit."""
         return float(np.max(np.abs(self.x))) or 1.0
+
+    @cached_property
+    def both_ways(self) -> bool:
+        """Whether the input goes well to either side of 0."""
+        return bool(np.ptp(self.x) > (1.0 + _EITHER) * self.level_in)
 
     @cached_property
     def level_out(self) -> float:

@@ -60,7 +60,7 @@ def conclude(
         unknown += at_odds
         summary = _summary(rig, logs, rigs, explanations, unknown)
     made, squares, floor, total = summary.made, summary.squares, summary.floor, summary.total
-    found = _ordered([_found(e, c, summary.rigs, logs, squares, floor, total) for e, c in summary.causes])
+    found = _ordered([_found(e, c, summary, logs) for e, c in summary.causes])
     found += _departures(controller)
     word = _word(found, unknown, [e for e in explanations if e.kept_by(rig, summary.rigs.refitted)])
     if controller is not None and controller.large and not found:
@@ -115,10 +115,15 @@ class _Summary:
 
     @property
     def more_is_left(self) -> bool:
-        """Whether effects close less of the gap than they leave above the noise. Where nothing explains
-        that, what was found beside it is not what the gap comes from."""
+        """Whether effects close less of the gap than they leave above the noise. Then the gap comes from
+        something else, which they may stand for."""
         refitted, explained = (float(np.mean(self.squares[name])) for name in ("refitted", "explained"))
         return bool(self.causes) and refitted - explained < explained - self.floor
+
+    @property
+    def stands_for_more(self) -> bool:
+        """The same, but for steps of a rounding, which never fall where a model has them."""
+        return self.more_is_left and not any(is_rounded(e) for e, _ in self.causes)
 
 
 def _summary(
@@ -249,16 +254,16 @@ def _moved(e: Explanation) -> bool:
 def _found(
     e: Explanation,
     cause: Cause,
-    rigs: compose.Rigs,
+    summary: _Summary,
     logs: Sequence[Experiment],
-    squares: dict[str, np.ndarray],
-    floor: float,
-    total: Improvement | None,
 ) -> Found:
+    rigs = summary.rigs
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
+    sure = sure * NUMBERS.unlikely if summary.stands_for_more else sure
     sure = sure * _lasting(e, cause) * _beside(e, cause)
-    lost = _share_lost(cause, rigs, logs, squares, floor, total or Improvement(0.0, (0.0, 0.0)))
+    total = summary.total or Improvement(0.0, (0.0, 0.0))
+    lost = _share_lost(cause, rigs, logs, summary.squares, summary.floor, total)
     candidates = tuple(_candidate(r, float(p), rigs.fitted) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
 

@@ -31,6 +31,8 @@ def _moves(given: Rig, refitted: Rig) -> Iterator[tuple[str, str, float, float]]
         gain, time = _factors(getattr(given, stage), getattr(refitted, stage))
         yield stage, "gain", gain - 1.0, known.gain
         yield stage, "times", time - 1.0, known.time
+        damping = _damping(getattr(given, stage), getattr(refitted, stage), time)
+        yield stage, "damping", damping - 1.0, known.time
     before, after = given.actuator, refitted.actuator
     if isinstance(before, Actuator) and isinstance(after, Actuator):
         yield "actuator", "T", after.T / before.T - 1.0, given.uncertainty.actuator.time
@@ -64,6 +66,16 @@ def _coefficients(
                     moved,
                     float(np.max(ends * np.sign(moved))) / WITHIN,
                 )
+
+
+def _damping(before: TransferFunction, after: TransferFunction, time: float) -> float:
+    """What the coefficients between the first and the last of the denominator are times, beside a factor of
+    ``time``."""
+    if len(before.den) < 3:
+        return 1.0
+    old, new, last = before.den[1], after.den[1], before.den[-1]
+    scale = after.den[-1].coefficient / last.coefficient
+    return float(new.coefficient / old.coefficient / scale / time ** (old.order - last.order))
 
 
 def _factors(before: TransferFunction, after: TransferFunction) -> tuple[float, float]:

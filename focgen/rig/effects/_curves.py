@@ -19,6 +19,19 @@ def softly_beyond(x: Array, place: float, width: float) -> Array:
     return made
 
 
+def _limited(x: Array, values: Values, run: Run) -> Array:
+    share, place, width = values
+    return x - share * softly_beyond(x, place, width)
+
+
+def limited(slot: str) -> Form:
+    """What runs out of length, as folds and fibres do: beyond a load it gives way less, or no more."""
+    share = Parameter("share", lower=0.0, upper=1.0, starts=(0.5, 0.9, 0.9), zero=0.0)
+    load = Parameter("load", level=1, lower=0.2, upper=1.5, starts=(0.6, 0.8, 0.5))
+    width = Parameter("width", level=1, lower=0.05, upper=0.5, starts=(0.1, 0.1, 0.2), log=True)
+    return Form("limited", slot, (share, load, width), _limited)
+
+
 def _quartic(x: Array, values: Values, run: Run) -> Array:
     *sizes, scale = values
     place = np.minimum(np.abs(x) / scale, _BEYOND)

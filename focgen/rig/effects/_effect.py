@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from focgen.arrays import Array, Bytes, Complex
+from focgen.fractional.transfer import Polynomial
 from focgen.logs.begin import Begin
 
 STAGES = ("regulator", "actuator", "sensor")
@@ -119,6 +120,8 @@ class Form:
     linear, None where not. ``wanders``: it follows the session's time through free values, so that it
     predicts nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
     ``leads``: linear though it is, away from home it stays ahead of the actuator's gain, which may be bent.
+    ``both_ways``: it is to be told from another form only where the input goes both ways.
+    ``itself(values, den)``: whether it is what its family says, in an actuator of this denominator.
     """
 
     name: str
@@ -131,6 +134,8 @@ class Form:
     wanders: bool = False
     jumps: bool = False
     leads: bool = False
+    both_ways: bool = False
+    itself: Callable[[Values, Polynomial], bool] = lambda values, den: True
 
     @property
     def begun(self) -> bool:

@@ -92,7 +92,7 @@ EFFECT = Effect(
         # it pushes the actuator itself, which comes to rest the sooner; a wall is as stiff as it likes
         Form("spring", "dynamics", (_PLACE, _WALL), _spring),
         # stops at both ends of a stroke
-        Form("both_ways", "dynamics", (_PLACE, _WALL), _both_ways),
+        Form("both_ways", "dynamics", (_PLACE, _WALL), _both_ways, both_ways=True),
         Form("gradual", "response", (_PLACE, _STIFFNESS), _gradual),
         Form("hertz", "response", (_PLACE, _STIFFNESS), _hertz),
     ],

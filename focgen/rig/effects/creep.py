@@ -79,7 +79,7 @@ EFFECT = Effect(
             (
                 Parameter("quick", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0),
                 Parameter("slow", lower=0.0, upper=3.0, starts=(0.05, 0.05), zero=0.0),
-                _tau(20.0, 30.0, 80.0),
+                _tau(30.0, 40.0, 80.0),
             ),
             _two,
             response=_two_response,

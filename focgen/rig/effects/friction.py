@@ -20,6 +20,11 @@ def _rising(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, drag=x.drag + Friction(force, force), rise=Rise(rise, speed))
 
 
+def _turning(x: Dynamics, values: Values, run: None) -> Dynamics:
+    """Of what turns on, whose output is the speed itself: it stands against that, and holds it at 0."""
+    return replace(x, preload=x.preload + values[0])
+
+
 # what drives the actuator bears it: K(p) p, or the input of a num/den actuator
 _FORCE = Parameter("force", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.2), zero=0.0, at="drive")
 # below 0, friction falls with the speed: what is left stays a friction
@@ -39,5 +44,7 @@ EFFECT = Effect(
         Form("coulomb", "dynamics", (_FORCE,), _coulomb),
         Form("rising", "dynamics", (_FORCE, _RISE, _SPEED), _rising),
         Form("breakaway", "dynamics", (_FORCE, _MORE), _breakaway),
+        # where nothing goes back, a seat and a spring on it are no other to any log
+        Form("turning", "dynamics", (_FORCE,), _turning, both_ways=True),
     ],
 )

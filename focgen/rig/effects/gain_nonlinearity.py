@@ -86,6 +86,7 @@ EFFECT = Effect(
             (Parameter("bend", level=-1, lower=-0.97, upper=3.0, starts=(0.3, -0.3), zero=0.0),),
             _gent,
         ),
+        _curves.limited("drive"),
         # of the actuator's own spring, which is the quicker where it is the stiffer
         Form(
             "stiffening",

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from focgen.arrays import Array, Complex
+from focgen.fractional.transfer import Polynomial
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._effect import PERIOD, Effect, Form, Parameter, Run, Values
 from focgen.rig.linear import oscillator
@@ -27,6 +28,15 @@ def _mass(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, mass=x.mass + (values[0] / (2.0 * np.pi)) ** 2)
 
 
+def _rings(values: Values, den: Polynomial) -> bool:
+    """Whether a mass swings on its spring: where it hardly overshoots it creeps back, and is one lag more."""
+    others = [t for t in den[:-1] if t.order != 2.0]
+    own = sum(t.coefficient for t in den if t.order == 2.0)
+    s = 1j / np.sqrt((values[0] / (2.0 * np.pi)) ** 2 + own / den[-1].coefficient)
+    damped = sum(t.coefficient * s**t.order for t in others) / den[-1].coefficient
+    return bool(abs(np.imag(damped)) < 2.0 * _SWINGS)
+
+
 def _mode_response(period: float, damping: float, s: Complex) -> Complex:
     w: Any = 2.0 * np.pi / period
     made: Complex = w * w / (s * s + 2.0 * damping * w * s + w * w)
@@ -42,6 +52,7 @@ def _beside_response(values: Values, s: Complex) -> Complex:
 # a sharp mode is found from close by only
 _STARTS = tuple(0.02 * 1.16**k for k in range(41))
 _PERIOD = Parameter(PERIOD, time=1, lower=0.002, upper=30.0, starts=_STARTS, log=True)
+_SWINGS = 0.8  # damping from which on a step overshoots by less than 1.5 %
 _DAMPING = Parameter("damping", lower=0.005, upper=0.3, starts=(0.1,), log=True)
 
 EFFECT = Effect(
@@ -78,6 +89,7 @@ EFFECT = Effect(
             "dynamics",
             (Parameter(PERIOD, time=1, lower=0.002, upper=30.0, starts=(1.0, 3.0, 6.0), log=True),),
             _mass,
+            itself=_rings,
         ),
     ],
 )

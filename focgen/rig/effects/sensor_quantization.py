@@ -69,8 +69,9 @@ def _exactly(y: Array) -> Values | None:
     step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
     if step < _COARSE * span or np.mean(np.abs(gaps / step - np.round(gaps / step)) < 0.1) < 0.9:
         return None
-    turns = np.angle(np.mean(np.exp(2j * np.pi * common / step))) / (2 * np.pi)
-    return step, float(turns * step)
+    number = np.round((common - common[0]) / step)
+    step, first = np.polyfit(number, common, 1)
+    return float(step), float((first / step - np.round(first / step)) * step)
 
 
 EFFECT = Effect(

@@ -32,7 +32,7 @@ EFFECT = Effect(
     forms=[
         Form("hard", "reading", (_LIMIT,), _hard),
         # a converter ends on both sides of its zero
-        Form("both_ways", "reading", (_LIMIT,), _both_ways),
+        Form("both_ways", "reading", (_LIMIT,), _both_ways, both_ways=True),
         Form(
             "soft",
             "reading",

@@ -32,7 +32,7 @@ EFFECT = Effect(
     forms=[
         Form("hard", "supply", (_CEILING,), _hard),
         # an amplifier clips what goes either way
-        Form("both_ways", "supply", (_CEILING,), _both_ways),
+        Form("both_ways", "supply", (_CEILING,), _both_ways, both_ways=True),
         Form(
             "soft",
             "supply",
