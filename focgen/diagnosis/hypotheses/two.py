@@ -27,6 +27,8 @@ def two_at_once(
     """Two effects that leave little, of what they change, that inputs predict, and are likelier than what was
     found, and the rankings that lead to them; None where there are none."""
     first, found = rankings[0], []
+    if _explains(rankings[-1].base, first):
+        return None
     for one in list(first.best.values())[:_TRIED]:
         second = rank(one.problem, one.vector, one.problem.untried(candidates))
         if second.winner is not None:
@@ -40,10 +42,10 @@ def two_at_once(
     return [first, second], both
 
 
-def _explains(both: Fit, first: Ranking) -> bool:
-    """Whether what inputs still predict beside two effects is little of what they change."""
-    before, after = (float(np.mean(f.weighed**2)) for f in (first.base, both))
-    return both.predictable_share * after < NUMBERS.much * (before - after)
+def _explains(of: Fit, first: Ranking) -> bool:
+    """Whether what inputs still predict beside effects is little of what they change."""
+    before, after = (float(np.mean(f.weighed**2)) for f in (first.base, of))
+    return of.predictable_share * after < NUMBERS.much * (before - after)
 
 
 def _likelier(both: Fit, first: Ranking, found: Fit, weighing: Weighing, asked: AcceptanceCriteria) -> bool:
