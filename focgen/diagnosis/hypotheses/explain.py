@@ -205,7 +205,8 @@ def _explained(
     given, converter = problem.nominal(), converter_of(problem, candidates)
     carried, noise = _unsure(problem, given, unsure)
     asked = AcceptanceCriteria(threshold, carried, noise, converter, only is not None)
-    rankings, candidates = _grown(problem, given, candidates, guests, asked)
+    rankings, candidates = _grown([], problem, given, candidates, guests, asked)
+    rankings = _or_two(rankings, candidates, asked)
     weighing = Weighing(rankings[-1].ar)
     known = [f for r in rankings for f in (r.base, *r.best.values())]
     best = _dropped(rankings[-1].base, weighing, threshold, known)
@@ -275,27 +276,20 @@ def _in_the_end(rival: Rival, found: Fit, best: Fit) -> Rival:
     return replace(rival, fit=best) if rival.fit is found else rival
 
 
-def _grown(
-    base: Problem,
-    vector: np.ndarray,
-    candidates: list[CandidateEffect],
-    guests: list[CandidateEffect],
-    asked: AcceptanceCriteria,
-) -> tuple[list[Ranking], list[CandidateEffect]]:
-    """A ranking for each effect that the data ask for, the last one being of what is left; and the candidate
-    effects that were tried.
-    """
-    rankings, candidates = _added([], base, vector, candidates, guests, asked)
+def _or_two(
+    rankings: list[Ranking], candidates: list[CandidateEffect], asked: AcceptanceCriteria
+) -> list[Ranking]:
+    """The rankings of what was found one by one, or of two effects at once and what follows them."""
     if asked.granted or not _much_left(rankings[:2][-1].base):
-        return rankings, candidates
+        return rankings
     pair = two_at_once(rankings, candidates, asked)
     if pair is None:
-        return rankings, candidates
+        return rankings
     ahead, both = pair
-    return _added(ahead, both.problem, both.vector, candidates, [], asked)
+    return _grown(ahead, both.problem, both.vector, candidates, [], asked)[0]
 
 
-def _added(
+def _grown(
     rankings: list[Ranking],
     base: Problem,
     vector: np.ndarray,
@@ -303,7 +297,9 @@ def _added(
     guests: list[CandidateEffect],
     asked: AcceptanceCriteria,
 ) -> tuple[list[Ranking], list[CandidateEffect]]:
-    """The same from ``base``, which the ``rankings`` before led to."""
+    """The ``rankings`` that led to ``base``, and one more for each further effect that the data ask for, the
+    last one being of what is left; and the candidate effects that were tried.
+    """
     while len(rankings) < _DEPTH:
         rankings.append(rank(base, vector, _worth_trying(base, vector, base.untried(candidates))))
         best = select(rankings, asked)

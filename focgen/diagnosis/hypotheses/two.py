@@ -25,7 +25,7 @@ def two_at_once(
     rankings: Sequence[Ranking], candidates: Sequence[CandidateEffect], asked: AcceptanceCriteria
 ) -> tuple[list[Ranking], Fit] | None:
     """Two effects that leave little, of what they change, that inputs predict, and are likelier than what was
-    found, and the rankings that lead to them; None where there are none."""
+    found, and the rankings that lead to them; None where there are none, or nothing asks for them."""
     first, found = rankings[0], []
     if _explains(rankings[-1].base, first):
         return None
