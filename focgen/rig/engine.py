@@ -9,7 +9,7 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.present import present
-from focgen.rig import linear
+from focgen.rig import kernels, linear
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.delay import delayed
@@ -176,7 +176,9 @@ class Chain:
         delay = getattr(self.rig.delays, stage)
         if stage == "actuator":
             return _actuator(self.rig.actuator, here, between, delay)
-        transfer = getattr(self.rig, stage)
+        transfer, dynamics = getattr(self.rig, stage), _dynamics(here)
+        if dynamics != UNCHANGED:
+            return [_two_paced(transfer, dynamics.unloading, between, delay)]
         return [] if transfer == UNITY and not delay else [_transfer(transfer, between, delay)]
 
 
@@ -204,6 +206,27 @@ def _transfer(transfer: TransferFunction, between: Between | bool, delay: float)
     )
 
 
+def _dynamics(here: Sequence[Placed]) -> Dynamics:
+    """What effects of a stage change of its own equation."""
+    dynamics = UNCHANGED
+    for p in here:
+        if p.slot == "dynamics":
+            dynamics = p.form.act(dynamics, p.values, None)
+    return dynamics
+
+
+def _two_paced(transfer: TransferFunction, falling: float, between: Between | bool, delay: float) -> Step:
+    """A lag of order 1 that falls ``falling`` times as fast as it rises."""
+    gain, T, _ = present(linear.single_lag(transfer))
+
+    def act(x: Array, run: Run) -> Array:
+        held = between == Between.HELD
+        made = gain * kernels.lag(x, run.rest, run.h, T, T / falling, held)
+        return delayed(made, run.rest, run.h, delay) if delay else made
+
+    return (transfer, falling, between, delay), act, None
+
+
 def _actuator(
     actuator: Actuator | LinearActuator | None, here: Sequence[Placed], between: Between | bool, delay: float
 ) -> list[Step]:
@@ -211,10 +234,7 @@ def _actuator(
     if actuator is None:
         return [*drive, _transfer(UNITY, between, delay)] if delay else drive
     weak = [p for p in here if p.slot == "spring"]
-    dynamics = UNCHANGED
-    for p in here:
-        if p.slot == "dynamics":
-            dynamics = p.form.act(dynamics, p.values, None)
+    dynamics = _dynamics(here)
     if isinstance(actuator, LinearActuator):
         zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
         steps = _linear(actuator, dynamics, between, delay)
@@ -301,11 +321,19 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
         return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
     if form.slot != "dynamics":
         return True
-    if stage != "actuator" or rig.actuator is None:
+    if stage == "sensor" or (stage == "actuator" and rig.actuator is None):
         return False
     changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
-    made: bool = changed <= _changeable(rig.actuator)
+    may = _changeable(rig.actuator) if rig.actuator and stage == "actuator" else _pace_of(rig.regulator)
+    made: bool = changed <= may
     return made
+
+
+def _pace_of(regulator: TransferFunction) -> frozenset[str]:
+    """What effects may change of a regulator's own equation: of one that fills and vents through the same
+    lag, how fast it vents."""
+    lag = linear.single_lag(regulator)
+    return frozenset({"unloading"} if lag and lag[2] == 1.0 else ())
 
 
 def _has_spring(actuator: Actuator | LinearActuator) -> bool:

@@ -61,14 +61,14 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
     }
 }
 
-/* First-order lag, x linear between samples, whose coefficients {a, of the past x, of the present x} differ up and down:
- * up where x lies above y. */
-void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const double *down)
+/* First-order lag whose coefficients {a, of the past x, of the present x} differ up and down: up where x lies above y,
+ * `present` of it as it is now and the rest as it was: 0.5 where it runs in lines, 0 where it is held. */
+void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const double *down, double present)
 {
     double now = 0.0, past = 0.0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) now = past = rest[k] == BALANCED ? x[k] : 0.0;
-        const double *c = 0.5 * (past + x[k]) > now ? up : down;
+        const double *c = past + present * (x[k] - past) > now ? up : down;
         now = c[0] * now + c[1] * past + c[2] * x[k];
         past = x[k];
         y[k] = now;

@@ -27,7 +27,7 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
     const double *b0, const double *b1, const double *pair, double through, int switching, double place,
     double stiffness, double slide, double stick, double *z);
 void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const
-    double *down);
+    double *down, double present);
 void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
     double vent, double scale, int sub);
 void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, double h, double rate,
@@ -126,9 +126,13 @@ def modes(
     )
 
 
-def lag(x: Array, rest: Bytes, h: float, up: float, down: float) -> Array:
-    """A first-order lag with time constants ``up`` while rising and ``down`` while falling, s (0: none)."""
-    return _call("focgen_lag", x, rest, *_doubles(*(np.array(_lag(h, float(t))) for t in (up, down))))
+def lag(x: Array, rest: Bytes, h: float, up: float, down: float, held: bool = False) -> Array:
+    """A first-order lag with time constants ``up`` while rising and ``down`` while falling, s (0: none), of
+    what runs in lines, or is ``held``, from one sample to the next."""
+    rows = [_lag(h, float(t)) for t in (up, down)]
+    if held:
+        rows = [(a, past + now, 0.0) for a, past, now in rows]
+    return _call("focgen_lag", x, rest, *_doubles(*map(np.array, rows)), 0.0 if held else 0.5)
 
 
 def _lag(h: float, tau: float) -> tuple[float, float, float]:

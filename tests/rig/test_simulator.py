@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lsim
 
 from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
 from focgen.rig import kernels, linear
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects import Run, form_of
@@ -200,6 +201,25 @@ def test_unloading_speed_acts_only_when_unloading():
     plain = respond(x, rest(401), 0.05, 1.0, 0.8, 20.0)
     np.testing.assert_allclose(slow[:200], plain[:200], atol=1e-12)
     assert np.all(slow[205:300] > plain[205:300] + 0.01)
+
+
+@pytest.mark.parametrize("between", [Between.HELD, Between.STRAIGHT])
+def test_a_regulator_vents_at_its_own_pace(between):
+    """p' = (u - p)/T, T twice as long while p lies above u."""
+    h, T, gain = 0.05, 0.4, 0.3
+    u = np.random.default_rng(3).uniform(0.0, 5.0, 41)
+    k = np.arange(400) / 10.0
+    u = u[k.astype(int)] if between == Between.HELD else np.interp(k, np.arange(41), u)
+    rig = Rig("valve", h, Signals("u", "p"), None, regulator=TransferFunction([(gain, 0)], [(T, 1), (1, 0)]))
+    placed = Placed("valve_asymmetry", form_of("valve_asymmetry", "speed"), "regulator", (0.5,))
+    made = Chain(rig, (placed,)).run(u, "regulator", "regulator", Run.of([len(u)], [0.0], h), between)
+    exact, p, parts = [], 0.0, 1000
+    for before, now in zip(np.r_[0.0, u], u):
+        for j in range(parts):
+            x = before if between == Between.HELD else before + (now - before) * (j + 0.5) / parts
+            p += h / parts * (x - p) / (T if x > p else 2.0 * T)
+        exact.append(gain * p)
+    np.testing.assert_allclose(made, exact, atol=2e-3 if between == Between.STRAIGHT else 1e-4)
 
 
 def test_a_curve_drawn_through_points_is_the_natural_spline():

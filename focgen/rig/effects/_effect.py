@@ -18,13 +18,13 @@ from focgen.logs.begin import Begin
 
 STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
-    "regulator": ("command", "supply"),
+    "regulator": ("command", "dynamics", "supply"),
     "actuator": ("load", "drive", "spring", "dynamics", "response"),
     "sensor": ("strain", "reading"),
 }
 """Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the
 pressure entering the actuator; ``drive``: K(p) p; ``spring``: how much further a spring that gives way is
-bent at rest, as a function of how far it was; ``dynamics``: the actuator's own equation; ``response``:
+bent at rest, as a function of how far it was; ``dynamics``: the stage's own equation; ``response``:
 what leaves it; ``strain``: into the sensor; ``reading``: what leaves it."""
 
 

@@ -1,7 +1,10 @@
 """A linear lag more than nominal, shared by the families that have one."""
 
+from dataclasses import replace
+
 from focgen.arrays import Array, Complex
 from focgen.rig import kernels
+from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._effect import Form, Parameter, Run, Values
 from focgen.rig.modes import respond
 
@@ -84,3 +87,13 @@ def deep_forms(slot: str) -> list[Form]:
         *slower_forms(slot),
         Form("spread", slot, (*_LAG, order), _spread, response=_spread_response),
     ]
+
+
+def _paces(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, unloading=x.unloading * values[0])
+
+
+def two_paced(name: str) -> Form:
+    """A stage whose own equation runs ``name`` times as fast while it falls back."""
+    speed = Parameter(name, lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True)
+    return Form("speed", "dynamics", (speed,), _paces)

@@ -1,15 +1,9 @@
 """Dynamics that are faster or slower when unloading."""
 
-from dataclasses import replace
-
 from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
-
-
-def _speed(x: Dynamics, values: Values, run: None) -> Dynamics:
-    return replace(x, unloading=x.unloading * values[0])
+from focgen.rig.effects._lags import two_paced
 
 
 def _lag(x: Array, values: Values, run: Run) -> Array:
@@ -25,12 +19,7 @@ EFFECT = Effect(
     confused_with=("valve_asymmetry", "hysteresis", "sensor_hysteresis", "gain_nonlinearity"),
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
-        Form(
-            "speed",
-            "dynamics",
-            (Parameter("unloading_speed", lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True),),
-            _speed,
-        ),
+        two_paced("unloading_speed"),
         Form(
             "lag",
             "response",

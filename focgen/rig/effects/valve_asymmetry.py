@@ -3,6 +3,7 @@
 from focgen.arrays import Array
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._lags import two_paced
 
 
 def _time(name: str, *starts: float) -> Parameter:
@@ -26,6 +27,8 @@ EFFECT = Effect(
     confused_with=("slow_regulator", "flow_limit", "unloading_asymmetry", "transport_delay"),
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
+        # the lag that fills and vents is the regulator's own
+        two_paced("venting_speed"),
         Form("two_lags", "supply", (_time("fill", 0.02, 0.02), _time("vent", 0.2, 1.0)), _lags),
         Form(
             "orifice",
