@@ -158,7 +158,8 @@ def _ranking(name: str, without: Fit, beside: Beside) -> Ranking:
     for ranking in beside.rankings:
         if _alike(ranking.base.problem, without.problem):
             return ranking
-    untried = [c for c in beside.candidates if not c.form.seen]
+    families = without.problem.families
+    untried = [c for c in without.problem.untried(beside.candidates) if c.effect not in families]
     beside.rankings.append(rank(without.problem, without.vector, untried))
     return beside.rankings[-1]
 

@@ -11,7 +11,8 @@ def _time(name: str, *starts: float) -> Parameter:
 
 
 def _lags(x: Array, values: Values, run: Run) -> Array:
-    return kernels.lag(x, run.rest, run.h, *values)
+    fill, vent = values
+    return kernels.lag(x, run.rest, run.h, fill, vent)
 
 
 def _orifice(x: Array, values: Values, run: Run) -> Array:
