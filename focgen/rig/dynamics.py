@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -65,7 +66,16 @@ class Rise:
     speed: float = 1.0
 
 
+@dataclass(frozen=True)
+class Flow:
+    """The highest rates of a pressure, units of it per s: while it rises, and while it falls."""
+
+    fill: float = math.inf
+    vent: float = math.inf
+
+
 STRAIGHT, NO_FRICTION, LINEAR, LEVEL, EVEN = Bend(), Friction(), Spring(), Rise(), Power()
+FREE = Flow()
 
 
 @dataclass(frozen=True)
@@ -78,7 +88,9 @@ class Dynamics:
     for one on either side, as far away. Of that and of any other spring y follows ``bend``, and dry friction,
     the ``drag``, takes away from x, in its unit. So does a ``preload``, which presses the spring against a
     seat at 0. A ``mass`` in s² adds mass·D² y. A ``loss`` goes with a power of y. Of a
-    :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag.
+    :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag. Of
+    a regulator: the pressure of its ``supply``, which it fills from; of one lag, too, ``unloading``, its
+    highest ``flow``, and the ``ceiling`` that it stops at.
     """
 
     unloading: float = 1.0
@@ -91,6 +103,9 @@ class Dynamics:
     loss: Power = EVEN
     spring: Spring = LINEAR
     rise: Rise = LEVEL
+    flow: Flow = FREE
+    ceiling: float = math.inf
+    supply: float = math.inf
 
     @property
     def changed(self) -> frozenset[str]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
@@ -14,7 +16,7 @@ from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.delay import delayed
 from focgen.rig.dynamics import UNCHANGED, Dynamics
-from focgen.rig.effects import SLOTS, Form, Run
+from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.weak import weakened
@@ -56,14 +58,20 @@ class Placed:
         return slot_in(self.form, self.stage)
 
 
+_EQUATION = dict(zip(STAGES, EQUATIONS))
+
+
 def slot_in(form: Form, stage: str) -> str:
-    """The slot of ``form`` in ``stage``: its own, or where it is not at home the first for what is at home
-    ahead of the actuator, the last for what is behind it, and for the actuator's own the one on the same side
-    of the dynamics. What is linear may stand on either side: behind, where a delay interpolates what is
-    smooth, unless it leads. Of a regulator alone the output is what its own gauge reads: behind it, the
-    memory of a sensor of its own would stand for whatever fills and vents at another pace."""
+    """The slot of ``form`` in ``stage``: its own. Where it is not at home, the stage's own equation for what
+    acts in one, the first for what is at home ahead of the actuator, the last for what is behind it, and for
+    the actuator's own the one on the same side of the dynamics. What is linear may stand on either side:
+    behind, where a delay interpolates what is smooth, unless it leads. Of a regulator alone the output is
+    what its own gauge reads: behind it, the memory of a sensor of its own would stand for whatever fills and
+    vents at another pace."""
     if form.slot in SLOTS[stage]:
         return form.slot
+    if form.slot in EQUATIONS and stage in _EQUATION:
+        return _EQUATION[stage]
     first, *_, last = SLOTS[stage]
     ahead = form.slot in (*SLOTS["regulator"], "load", "drive")
     ahead = ahead or (form.slot == "strain" and stage == "regulator")
@@ -177,9 +185,10 @@ class Chain:
         if stage == "actuator":
             return _actuator(self.rig.actuator, here, between, delay)
         transfer, dynamics = getattr(self.rig, stage), _dynamics(here)
-        if dynamics != UNCHANGED:
-            return [_two_paced(transfer, dynamics.unloading, between, delay)]
-        return [] if transfer == UNITY and not delay else [_transfer(transfer, between, delay)]
+        fed = [_fed(transfer, dynamics.supply)] if np.isfinite(dynamics.supply) else []
+        if dynamics.changed - {"supply"}:
+            return [*fed, _chamber(transfer, dynamics, between, delay)]
+        return fed if transfer == UNITY and not delay else [*fed, _transfer(transfer, between, delay)]
 
 
 def between_of(rig: Rig, entry: str) -> Between:
@@ -210,21 +219,29 @@ def _dynamics(here: Sequence[Placed]) -> Dynamics:
     """What effects of a stage change of its own equation."""
     dynamics = UNCHANGED
     for p in here:
-        if p.slot == "dynamics":
+        if p.slot in EQUATIONS:
             dynamics = p.form.act(dynamics, p.values, None)
     return dynamics
 
 
-def _two_paced(transfer: TransferFunction, falling: float, between: Between | bool, delay: float) -> Step:
-    """A lag of order 1 that falls ``falling`` times as fast as it rises."""
+def _fed(transfer: TransferFunction, supply: float) -> Step:
+    """What a regulator is asked for, of what its supply can give."""
+    most, way = supply / abs(transfer.dc_gain), np.copysign(1.0, transfer.dc_gain)
+    return ("fed", most, way), lambda x, run: way * np.minimum(way * x, most), None
+
+
+def _chamber(transfer: TransferFunction, own: Dynamics, between: Between | bool, delay: float) -> Step:
+    """A lag of order 1 that effects change."""
     gain, T, _ = present(linear.single_lag(transfer))
+    size, way = abs(gain), np.copysign(1.0, gain)
+    lags, rates = (T, T / own.unloading), (own.flow.fill / size, own.flow.vent / size)
 
     def act(x: Array, run: Run) -> Array:
         held = between == Between.HELD
-        made = gain * kernels.lag(x, run.rest, run.h, T, T / falling, held)
+        made = size * kernels.chamber(way * x, run.rest, run.h, lags, rates, own.ceiling / size, held)
         return delayed(made, run.rest, run.h, delay) if delay else made
 
-    return (transfer, falling, between, delay), act, None
+    return (transfer, own, between, delay), act, None
 
 
 def _actuator(
@@ -319,21 +336,22 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     in that equation."""
     if form.slot == "spring":
         return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
-    if form.slot != "dynamics":
+    if form.slot not in EQUATIONS:
         return True
     if stage == "sensor" or (stage == "actuator" and rig.actuator is None):
         return False
     changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
-    may = _changeable(rig.actuator) if rig.actuator and stage == "actuator" else _pace_of(rig.regulator)
+    may = _changeable(rig.actuator) if rig.actuator and stage == "actuator" else _own_of(rig.regulator)
     made: bool = changed <= may
     return made
 
 
-def _pace_of(regulator: TransferFunction) -> frozenset[str]:
-    """What effects may change of a regulator's own equation: of one that fills and vents through the same
-    lag, how fast it vents."""
-    lag = linear.single_lag(regulator)
-    return frozenset({"unloading"} if lag and lag[2] == 1.0 else ())
+def _own_of(regulator: TransferFunction) -> frozenset[str]:
+    """What effects may change of a regulator's own equation: what it fills from where it has dynamics, and
+    of one that fills and vents through one lag, how fast it vents, its highest flow, and where it stops."""
+    lag, gain = linear.single_lag(regulator), regulator.dc_gain
+    found = {"supply"} if len(regulator.den) > 1 and np.isfinite(gain) and gain else set()
+    return frozenset(found | ({"unloading", "flow", "ceiling"} if lag and lag[2] == 1.0 else set()))
 
 
 def _has_spring(actuator: Actuator | LinearActuator) -> bool:

@@ -61,15 +61,44 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
     }
 }
 
-/* First-order lag whose coefficients {a, of the past x, of the present x} differ up and down: up where x lies above y,
- * `present` of it as it is now and the rest as it was: 0.5 where it runs in lines, 0 where it is held. */
-void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const double *down, double present)
+/* First-order lag, x linear between samples, whose coefficients {a, of the past x, of the present x} differ up and down:
+ * up where x lies above y. */
+void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const double *down)
 {
     double now = 0.0, past = 0.0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) now = past = rest[k] == BALANCED ? x[k] : 0.0;
-        const double *c = past + present * (x[k] - past) > now ? up : down;
+        const double *c = 0.5 * (past + x[k]) > now ? up : down;
         now = c[0] * now + c[1] * past + c[2] * x[k];
+        past = x[k];
+        y[k] = now;
+    }
+}
+
+/* What is left of the gap towards x after h in a chamber of lag tau whose flow is at most `rate`: less than that only
+ * where the gap is below tau rate. */
+static double choked(double gap, double h, double tau, double rate)
+{
+    double until = fabs(gap) / rate - tau, way = gap > 0.0 ? 1.0 : -1.0;
+    return until < h ? way * tau * rate * exp(-(h - until) / tau) : gap - way * rate * h;
+}
+
+/* Chamber that fills and vents each with its own {a, of the past x, of the present x, lag, highest rate}, and cannot pass
+ * `most`. Which it does tells x, `present` of it as it is now and the rest as it was: 0.5 where it runs in lines, 0
+ * where it is held. */
+void focgen_chamber(int n, const double *x, double *y, const unsigned char *rest, double h, const double *fill, const double *vent, double present, double most)
+{
+    double now = 0.0, past = 0.0;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) now = past = rest[k] == BALANCED ? x[k] : 0.0;
+        if (now > most) now = most;
+        double to = past + present * (x[k] - past), gap = to - now;
+        const double *c = gap > 0.0 ? fill : vent;
+        if (fabs(gap) > c[3] * c[4])
+            now = to - choked(gap, h, c[3], c[4]);
+        else
+            now = c[0] * now + c[1] * past + c[2] * x[k];
+        if (now > most) now = most;
         past = x[k];
         y[k] = now;
     }

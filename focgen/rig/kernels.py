@@ -27,7 +27,9 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
     const double *b0, const double *b1, const double *pair, double through, int switching, double place,
     double stiffness, double slide, double stick, double *z);
 void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const
-    double *down, double present);
+    double *down);
+void focgen_chamber(int n, const double *x, double *y, const unsigned char *rest, double h, const double
+    *fill, const double *vent, double present, double most);
 void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
     double vent, double scale, int sub);
 void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, double h, double rate,
@@ -126,13 +128,27 @@ def modes(
     )
 
 
-def lag(x: Array, rest: Bytes, h: float, up: float, down: float, held: bool = False) -> Array:
-    """A first-order lag with time constants ``up`` while rising and ``down`` while falling, s (0: none), of
-    what runs in lines, or is ``held``, from one sample to the next."""
-    rows = [_lag(h, float(t)) for t in (up, down)]
-    if held:
-        rows = [(a, past + now, 0.0) for a, past, now in rows]
-    return _call("focgen_lag", x, rest, *_doubles(*map(np.array, rows)), 0.0 if held else 0.5)
+def lag(x: Array, rest: Bytes, h: float, up: float, down: float) -> Array:
+    """A first-order lag with time constants ``up`` while rising and ``down`` while falling, s (0: none)."""
+    return _call("focgen_lag", x, rest, *_doubles(*(np.array(_lag(h, float(t))) for t in (up, down))))
+
+
+def chamber(
+    x: Array,
+    rest: Bytes,
+    h: float,
+    lags: tuple[float, float],
+    rates: tuple[float, float],
+    most: float,
+    held: bool,
+) -> Array:
+    """A chamber that fills and vents towards ``x`` with these ``lags``, s, no faster than ``rates``, units of
+    x per s, and to no more than ``most``; x runs in lines, or is ``held``, from one sample to the next."""
+    rows = []
+    for tau, rate in zip(lags, rates):
+        a, past, now = _lag(h, tau)
+        rows.append(np.array([a, *((past + now, 0.0) if held else (past, now)), tau, rate]))
+    return _call("focgen_chamber", x, rest, h, *_doubles(*rows), 0.0 if held else 0.5, float(most))
 
 
 def _lag(h: float, tau: float) -> tuple[float, float, float]:

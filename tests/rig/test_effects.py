@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import focgen
+from focgen.fractional.transfer import TransferFunction
 from focgen.rig import plant
 from focgen.rig.dynamics import UNCHANGED
-from focgen.rig.effects import SLOTS, STAGES, Excitation, Run, form_of, library
+from focgen.rig.effects import EQUATIONS, SLOTS, STAGES, Excitation, Run, form_of, library
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.plant import Plant
 from focgen.rig.rig import Actuator, Rig, Signals
@@ -103,14 +104,20 @@ def test_a_form_stands_where_it_may(effect, form):
         assert not p.log or p.lower > 0
 
 
-LAG = Rig("lag", 0.02, Signals("c", "y"), Actuator(0.3, 0.7, (1.0,)))
+LAG = Rig(
+    "lag",
+    0.02,
+    Signals("c", "y"),
+    Actuator(0.3, 0.7, (1.0,)),
+    TransferFunction([(1.0, 0.0)], [(0.03, 1.0), (1.0, 0.0)]),
+)
 
 
-def _answers(form, x, run):
+def _answers(form, stage, x, run, start=0):
     """What a lag, or a mass on a spring where the form is of a plant's, answers: nominal, as the form's zero
     leaves it, and changed."""
 
-    starts = tuple(p.starts[0] for p in form.parameters)
+    starts = tuple(p.starts[start] for p in form.parameters)
     zero = tuple(s if p.zero is None else p.zero for s, p in zip(starts, form.parameters))
     if not any(p.zero is not None for p in form.parameters):
         zero = (form.parameters[0].lower,)  # a mode far above the samples
@@ -120,17 +127,17 @@ def _answers(form, x, run):
         if of_plant:
             dynamics = form.act(UNCHANGED, *values, None) if values else UNCHANGED
             return plant.respond(Plant(2, 0.2, 0.3, 1.0), x, run.rest, run.h, dynamics)
-        placed = tuple(Placed("effect", form, "actuator", v) for v in values)
-        return Chain(LAG, placed).run(x, "actuator", "actuator", run)
+        placed = tuple(Placed("effect", form, stage, v) for v in values)
+        return Chain(LAG, placed).run(x, stage, stage, run)
 
     return made(), made(zero), made(starts)
 
 
 @pytest.mark.parametrize("effect, form", forms())
 def test_a_form_is_nested_in_the_nominal_chain(effect, form):
-    if form.slot == "dynamics":
+    if form.slot in EQUATIONS:
         x, run = session()
-        nominal, zero, _ = _answers(form, x, run)
+        nominal, zero, _ = _answers(form, effect.stage, x, run)
         np.testing.assert_allclose(zero, nominal, rtol=0.0, atol=2e-5 if form.name == "mass" else 1e-9)
         return
     assert any(p.zero is not None for p in form.parameters) or effect.name == "resonance"
@@ -143,10 +150,10 @@ def test_a_form_is_nested_in_the_nominal_chain(effect, form):
 
 @pytest.mark.parametrize("effect, form", forms())
 def test_a_form_changes_something_and_stays_finite(effect, form):
-    if form.slot == "dynamics":
+    if form.slot in EQUATIONS:
         x, run = session(1)
-        nominal, _, changed = _answers(form, x, run)
-        assert np.max(np.abs(changed - nominal)) > 1e-3
+        answers = [_answers(form, effect.stage, x, run, start) for start in (0, -1)]
+        assert max(np.max(np.abs(changed - nominal)) for nominal, _, changed in answers) > 1e-3
         return
     x, run = session(1)
     x = np.where(np.arange(len(x)) > 550, -x, x)

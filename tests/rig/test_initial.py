@@ -93,7 +93,7 @@ def every_form():
     for effect in library().values():
         for form in (f for f in effect.forms if not f.seen):
             slot = slot_in(form, effect.stage)
-            size = {"command": 1.8, "supply": 0.2, "load": 0.2}.get(slot, 0.02)
+            size = {"command": 1.8, "chamber": 0.2, "supply": 0.2, "load": 0.2}.get(slot, 0.02)
             values = [p.starts[0] * size**p.level * clocks[p.clock] ** p.time for p in form.parameters]
             yield pytest.param(
                 Placed(effect.name, form, effect.stage, tuple(values)), id=f"{effect.name}-{form.name}"

@@ -203,23 +203,48 @@ def test_unloading_speed_acts_only_when_unloading():
     assert np.all(slow[205:300] > plain[205:300] + 0.01)
 
 
+OWN = {  # p' of a regulator that is asked for u, and the pressure that it stops at
+    ("valve_asymmetry", "speed", 0.5): (lambda gap: gap if gap > 0.0 else 0.5 * gap, np.inf),
+    ("valve_asymmetry", "choked_supply", 0.6): (lambda gap: min(gap, 0.6), np.inf),
+    ("valve_asymmetry", "choked_exhaust", 0.6): (lambda gap: max(gap, -0.6), np.inf),
+    ("flow_limit", "choked", 0.6): (lambda gap: min(max(gap, -0.6), 0.6), np.inf),
+    ("supply_saturation", "relieved", 0.9): (lambda gap: gap, 0.9),
+}
+
+
 @pytest.mark.parametrize("between", [Between.HELD, Between.STRAIGHT])
-def test_a_regulator_vents_at_its_own_pace(between):
-    """p' = (u - p)/T, T twice as long while p lies above u."""
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("effect, form, value", OWN)
+def test_a_regulator_fills_and_vents_by_its_own_equation(effect, form, value, sign, between):
+    """T p' = u - p, with what the effect makes of it, in steps of a thousandth of a sample."""
     h, T, gain = 0.05, 0.4, 0.3
     u = np.random.default_rng(3).uniform(0.0, 5.0, 41)
     k = np.arange(400) / 10.0
     u = u[k.astype(int)] if between == Between.HELD else np.interp(k, np.arange(41), u)
-    rig = Rig("valve", h, Signals("u", "p"), None, regulator=TransferFunction([(gain, 0)], [(T, 1), (1, 0)]))
-    placed = Placed("valve_asymmetry", form_of("valve_asymmetry", "speed"), "regulator", (0.5,))
-    made = Chain(rig, (placed,)).run(u, "regulator", "regulator", Run.of([len(u)], [0.0], h), between)
+    lag = TransferFunction([(sign * gain, 0)], [(T, 1), (1, 0)])
+    rig = Rig("valve", h, Signals("u", "p"), None, regulator=lag)
+    placed = Placed(effect, form_of(effect, form), "regulator", (value,))
+    made = Chain(rig, (placed,)).run(sign * u, "regulator", "regulator", Run.of([len(u)], [0.0], h), between)
+    flow, most = OWN[effect, form, value]
     exact, p, parts = [], 0.0, 1000
     for before, now in zip(np.r_[0.0, u], u):
         for j in range(parts):
             x = before if between == Between.HELD else before + (now - before) * (j + 0.5) / parts
-            p += h / parts * (x - p) / (T if x > p else 2.0 * T)
-        exact.append(gain * p)
-    np.testing.assert_allclose(made, exact, atol=2e-3 if between == Between.STRAIGHT else 1e-4)
+            p = min(p + h / parts * flow((gain * x - p) / T), most)
+        exact.append(p)
+    np.testing.assert_allclose(made, exact, atol=4e-3 if between == Between.STRAIGHT else 2e-4)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_regulator_fills_from_no_more_than_its_supply(sign):
+    h, order = 0.05, TransferFunction([(sign * 0.3, 0)], [(0.01, 2), (0.2, 1), (1, 0)])
+    u = np.repeat([0.0, 5.0, 2.0, 6.0], 100)
+    rig, run = Rig("valve", h, Signals("u", "p"), None, regulator=order), Run.of([len(u)], [0.0], h)
+    placed = Placed("supply_saturation", form_of("supply_saturation", "fed"), "regulator", (0.9,))
+    made = Chain(rig, (placed,)).run(sign * u, "regulator", "regulator", run)
+    asked = Chain(rig).run(sign * np.minimum(u, 3.0), "regulator", "regulator", run)
+    np.testing.assert_array_equal(made, asked)
+    assert made.max() == pytest.approx(0.9, abs=0.02)
 
 
 def test_a_curve_drawn_through_points_is_the_natural_spline():

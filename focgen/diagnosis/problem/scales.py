@@ -36,6 +36,7 @@ def _levels(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> dict[str,
     return {
         "command": entry,
         "supply": supply,
+        "chamber": supply,
         "load": supply,
         "drive": drive,
         "spring": response,

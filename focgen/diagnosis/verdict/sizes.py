@@ -11,7 +11,13 @@ from focgen.rig.effects import Parameter
 from focgen.rig.engine import slot_in
 from focgen.rig.rig import Actuator, Rig
 
-_ROLES = {"command": "command", "supply": "pressure", "load": "pressure", "reading": "output"}
+_ROLES = {
+    "command": "command",
+    "chamber": "pressure",
+    "supply": "pressure",
+    "load": "pressure",
+    "reading": "output",
+}
 
 
 def estimates(of: Fit, which: int, rig: Rig) -> dict[str, Estimate]:

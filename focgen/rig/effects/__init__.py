@@ -13,9 +13,20 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import NoReturn
 
-from focgen.rig.effects._effect import SLOTS, STAGES, STEP, Effect, Excitation, Form, Parameter, Run
+from focgen.rig.effects._effect import (
+    EQUATIONS,
+    SLOTS,
+    STAGES,
+    STEP,
+    Effect,
+    Excitation,
+    Form,
+    Parameter,
+    Run,
+)
 
 __all__ = [
+    "EQUATIONS",
     "SLOTS",
     "STAGES",
     "STEP",

@@ -18,14 +18,18 @@ from focgen.logs.begin import Begin
 
 STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
-    "regulator": ("command", "dynamics", "supply"),
+    "regulator": ("command", "chamber", "supply"),
     "actuator": ("load", "drive", "spring", "dynamics", "response"),
     "sensor": ("strain", "reading"),
 }
-"""Where on the way a form acts. ``command``: into the regulator; ``supply``: what leaves it; ``load``: the
-pressure entering the actuator; ``drive``: K(p) p; ``spring``: how much further a spring that gives way is
-bent at rest, as a function of how far it was; ``dynamics``: the stage's own equation; ``response``:
-what leaves it; ``strain``: into the sensor; ``reading``: what leaves it."""
+"""Where on the way a form acts. ``command``: into the regulator; ``chamber``: the regulator's own equation;
+``supply``: what leaves it; ``load``: the pressure entering the actuator; ``drive``: K(p) p; ``spring``: how
+much further a spring that gives way is bent at rest, as a function of how far it was; ``dynamics``: the
+actuator's own equation; ``response``: what leaves it; ``strain``: into the sensor; ``reading``: what leaves
+it."""
+
+EQUATIONS = ("chamber", "dynamics")
+"""The slots where no signal passes: what acts there changes the equation of its stage."""
 
 
 @dataclass(frozen=True)
@@ -105,15 +109,15 @@ class Run:
 
 
 Values = tuple[float, ...]
-Act = Callable[[Any, Values, Any], Any]  # in the slot `dynamics` no signal passes: see Form
+Act = Callable[[Any, Values, Any], Any]  # in a slot of EQUATIONS no signal passes: see Form
 
 
 @dataclass(frozen=True)
 class Form:
     """One formula: ``act(x, values, run)`` maps what passes its ``slot``, shape (n,), to what leaves it.
 
-    In the slot ``dynamics`` it maps what is changed of the actuator's own equation,
-    :class:`~focgen.rig.modes.Dynamics`, and there is no ``run``.
+    In a slot of :data:`EQUATIONS` it maps what is changed of the stage's own equation,
+    :class:`~focgen.rig.dynamics.Dynamics`, and there is no ``run``.
     ``seen(y)`` reads the values off what was measured, (n,), where that can be done at sight; None where it
     is not there. ``leaves(x, values, run)`` is what outlives the session's end, by name: ``run.carried`` of
     a later session. ``response(values, s)`` is its frequency response at s = jω (complex, 1/s) where it is

@@ -8,6 +8,9 @@ from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._effect import Form, Parameter, Run, Values
 from focgen.rig.modes import respond
 
+RATE = Parameter("rate", level=1, time=-1, lower=1e-3, upper=1e3, starts=(10.0, 2.0, 0.5), zero=1e3, log=True)
+"""The highest rate of a signal."""
+
 _LAG = (Parameter("lag", time=1, lower=0.0, upper=20.0, starts=(0.02, 0.2), zero=0.0),)
 
 
@@ -93,7 +96,7 @@ def _paces(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, unloading=x.unloading * values[0])
 
 
-def two_paced(name: str) -> Form:
+def two_paced(slot: str, name: str) -> Form:
     """A stage whose own equation runs ``name`` times as fast while it falls back."""
     speed = Parameter(name, lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True)
-    return Form("speed", "dynamics", (speed,), _paces)
+    return Form("speed", slot, (speed,), _paces)

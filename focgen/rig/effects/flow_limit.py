@@ -1,12 +1,12 @@
 """A supply or valve that cannot move the pressure faster than a rate, up or down."""
 
+from dataclasses import replace
+
 from focgen.arrays import Array
 from focgen.rig import kernels
+from focgen.rig.dynamics import Dynamics, Flow
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
-
-_RATE = Parameter(
-    "rate", level=1, time=-1, lower=1e-3, upper=1e3, starts=(10.0, 2.0, 0.5), zero=1e3, log=True
-)
+from focgen.rig.effects._lags import RATE
 
 
 def _hard(x: Array, values: Values, run: Run) -> Array:
@@ -17,6 +17,10 @@ def _soft(x: Array, values: Values, run: Run) -> Array:
     return kernels.rate_limit(x, run.rest, run.h, values[0], tau=values[1], soft=True)
 
 
+def _own(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, flow=Flow(values[0], values[0]))
+
+
 EFFECT = Effect(
     name="flow_limit",
     stage="regulator",
@@ -25,12 +29,14 @@ EFFECT = Effect(
     confused_with=("slow_regulator", "valve_asymmetry"),
     needs=lambda e: None if e.levels >= 3 and e.fastest < 1.0 else "needs fast steps of several sizes",
     forms=[
-        Form("hard", "supply", (_RATE,), _hard),
+        Form("hard", "supply", (RATE,), _hard),
+        # what flows into the chamber itself
+        Form("choked", "chamber", (RATE,), _own),
         Form(
             "saturating",
             "supply",
             (
-                _RATE,
+                RATE,
                 Parameter("lag", time=1, lower=0.0, upper=5.0, starts=(0.05, 0.05, 0.1), zero=0.0),
             ),
             _soft,

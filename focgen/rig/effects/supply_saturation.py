@@ -1,8 +1,11 @@
 """A pressure that cannot pass a ceiling: an exhausted supply, a relief valve."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
@@ -21,6 +24,14 @@ def _soft(x: Array, values: Values, run: Run) -> Array:
     return x - softly_beyond(x, *values)
 
 
+def _stops(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, ceiling=min(x.ceiling, values[0]))
+
+
+def _fed(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, supply=min(x.supply, values[0]))
+
+
 EFFECT = Effect(
     name="supply_saturation",
     stage="regulator",
@@ -31,6 +42,10 @@ EFFECT = Effect(
     static=True,
     forms=[
         Form("hard", "supply", (_CEILING,), _hard),
+        # a chamber that fills from its supply comes to rest there as slowly as anywhere
+        Form("fed", "chamber", (_CEILING,), _fed),
+        # a relief valve opens at once, and there is nothing above to come down from
+        Form("relieved", "chamber", (_CEILING,), _stops),
         # an amplifier clips what goes either way
         Form("both_ways", "supply", (_CEILING,), _both_ways, both_ways=True),
         Form(

@@ -19,7 +19,7 @@ EFFECT = Effect(
     confused_with=("valve_asymmetry", "hysteresis", "sensor_hysteresis", "gain_nonlinearity"),
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
-        two_paced("unloading_speed"),
+        two_paced("dynamics", "unloading_speed"),
         Form(
             "lag",
             "response",

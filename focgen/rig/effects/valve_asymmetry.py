@@ -1,9 +1,12 @@
 """A valve that vents more slowly, or faster, than it fills."""
 
+from dataclasses import replace
+
 from focgen.arrays import Array
 from focgen.rig import kernels
+from focgen.rig.dynamics import Dynamics, Flow
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
-from focgen.rig.effects._lags import two_paced
+from focgen.rig.effects._lags import RATE, two_paced
 
 
 def _time(name: str, *starts: float) -> Parameter:
@@ -20,6 +23,14 @@ def _orifice(x: Array, values: Values, run: Run) -> Array:
     return kernels.orifice(x, run.rest, run.h, fill, vent, scale)
 
 
+def _fill(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, flow=Flow(fill=values[0], vent=x.flow.vent))
+
+
+def _vent(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, flow=Flow(fill=x.flow.fill, vent=values[0]))
+
+
 EFFECT = Effect(
     name="valve_asymmetry",
     stage="regulator",
@@ -29,7 +40,10 @@ EFFECT = Effect(
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
         # the lag that fills and vents is the regulator's own
-        two_paced("venting_speed"),
+        two_paced("chamber", "venting_speed"),
+        # one of its ways is too narrow
+        Form("choked_supply", "chamber", (RATE,), _fill),
+        Form("choked_exhaust", "chamber", (RATE,), _vent),
         Form("two_lags", "supply", (_time("fill", 0.02, 0.02), _time("vent", 0.2, 1.0)), _lags),
         Form(
             "orifice",
