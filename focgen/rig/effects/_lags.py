@@ -62,16 +62,16 @@ def _spread_response(values: Values, s: Complex) -> Complex:
     return 1.0 / ((tau * s) ** order + 1.0)
 
 
-def _partial_form(slot: str) -> Form:
+def _partial_form(slot: str, slowest: float) -> Form:
     share = Parameter("share", lower=0.0, upper=1.0, starts=(0.3, 0.5), zero=0.0)
-    tau = Parameter("lag", time=1, lower=0.02, upper=20.0, starts=(0.2, 1.5), log=True)
+    tau = Parameter("lag", time=1, lower=0.02, upper=slowest, starts=(0.2, 1.5), log=True)
     return Form("partial", slot, (share, tau), _partial, response=_partial_response)
 
 
-def slower_forms(slot: str) -> list[Form]:
+def slower_forms(slot: str, slowest: float = 6.0) -> list[Form]:
     """Besides, two lags of which one is the longer, as of a valve and its line, and a lag of a part of the
-    signal: what makes a lag of a longer one."""
-    return [*forms(slot), _unequal_form(slot), _partial_form(slot)]
+    signal: what makes a lag of a longer one. A part ``slowest`` response times slow or more creeps."""
+    return [*forms(slot), _unequal_form(slot), _partial_form(slot, slowest)]
 
 
 def forms(slot: str) -> list[Form]:
@@ -87,7 +87,7 @@ def deep_forms(slot: str) -> list[Form]:
     Phys. 9, 1941), as where something has to soak in."""
     order = Parameter("order", lower=0.4, upper=1.0, starts=(0.8,))
     return [
-        *slower_forms(slot),
+        *slower_forms(slot, slowest=20.0),
         Form("spread", slot, (*_LAG, order), _spread, response=_spread_response),
     ]
 

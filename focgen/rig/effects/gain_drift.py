@@ -18,6 +18,7 @@ _SPRING = [replace(f, name=f"spring_{f.name}") for f in _trends.forms("spring", 
 EFFECT = Effect(
     name="gain_drift",
     stage="actuator",
+    also=("regulator",),
     meaning="the gain moves slowly with time, whatever the load",
     reveals="the same experiment at the start and at the end",
     confused_with=("sensor_drift", "softening", "creep", "leak", "gain_nonlinearity"),

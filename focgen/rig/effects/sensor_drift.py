@@ -6,6 +6,7 @@ from focgen.rig.effects._effect import Effect
 EFFECT = Effect(
     name="sensor_drift",
     stage="sensor",
+    also=("regulator",),
     meaning="the offset moves slowly with time",
     reveals="the unloaded reading at the start and at the end, with the curvature logged",
     confused_with=("gain_drift", "creep", "sensor_relaxation"),
