@@ -5,6 +5,7 @@ Red when what changes a regulator's own equation is taken for anything else.
 
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
@@ -69,3 +70,36 @@ def test_a_regulator_fills_and_vents_in_a_way_of_its_own(seed, kind, pressure):
     assert (cause.stage, first.effect) == ("regulator", effect[0])
     assert first.confidence > 0.5
     assert first.parameters[effect[1]].value == pytest.approx(effect[2], rel=0.03)
+
+
+DRIFTS = {
+    "gain_drift": lambda p, k: p * (1.0 + 0.1 * (1.0 - np.exp(-k / 1500.0))),
+    "sensor_drift": lambda p, k: p + 0.05 * (1.0 - np.exp(-k / 1500.0)),
+}
+
+
+@pytest.mark.parametrize("effect", DRIFTS)
+def test_a_regulator_drifts_and_is_not_slow(effect):
+    """Seen in its own pressure, so that the actuator is not blamed for what moves ahead of it."""
+    rig = Rig(
+        "pump", H, Signals("t", "y", "u", pressure="p"), LinearActuator(lag(1.95, 0.42)), lag(1.01, 0.52)
+    )
+    rng, k = np.random.default_rng(5), np.arange(SAMPLES)
+    u = np.repeat(rng.uniform(0.0, 1.0, SAMPLES // 150), 150)
+    u[:50] = 0.0
+    pressure = DRIFTS[effect](answer(lag(1.0, 0.5), u, True), k)
+    output = answer(lag(2.0, 0.4), pressure, False)
+    log = {
+        "command": u,
+        "pressure": pressure + 0.004 * rng.standard_normal(SAMPLES),
+        "output": output + 0.008 * rng.standard_normal(SAMPLES),
+    }
+    found = diagnose(rig, [Experiment("holds", H, log)], pictures=False)
+    (cause,) = found.causes
+    assert (cause.stage, cause.candidates[0].effect) == ("regulator", effect)
+
+
+def answer(transfer, x, held):
+    """By scipy's simulation of the same equation, the input held or straight between samples."""
+    num, den = ([t.coefficient for t in terms] for terms in (transfer.num, transfer.den))
+    return lsim((num, den), x, H * np.arange(len(x)), interp=not held)[1]
