@@ -81,9 +81,8 @@ DRIFTS = {
 @pytest.mark.parametrize("effect", DRIFTS)
 def test_a_regulator_drifts_and_is_not_slow(effect):
     """Seen in its own pressure, so that the actuator is not blamed for what moves ahead of it."""
-    rig = Rig(
-        "pump", H, Signals("t", "y", "u", pressure="p"), LinearActuator(lag(1.95, 0.42)), lag(1.01, 0.52)
-    )
+    signals = Signals("t", "y", "u", pressure="p")
+    rig = Rig("pump", H, signals, LinearActuator(lag(1.95, 0.42)), lag(1.01, 0.52))
     rng, k = np.random.default_rng(5), np.arange(SAMPLES)
     u = np.repeat(rng.uniform(0.0, 1.0, SAMPLES // 150), 150)
     u[:50] = 0.0
