@@ -58,9 +58,6 @@ class Placed:
         return slot_in(self.form, self.stage)
 
 
-_EQUATION = dict(zip(STAGES, EQUATIONS))
-
-
 def slot_in(form: Form, stage: str) -> str:
     """The slot of ``form`` in ``stage``: its own. Where it is not at home, the stage's own equation for what
     acts in one, the first for what is at home ahead of the actuator, the last for what is behind it, and for
@@ -70,8 +67,8 @@ def slot_in(form: Form, stage: str) -> str:
     vents at another pace."""
     if form.slot in SLOTS[stage]:
         return form.slot
-    if form.slot in EQUATIONS and stage in _EQUATION:
-        return _EQUATION[stage]
+    if form.slot in EQUATIONS.values() and stage in EQUATIONS:
+        return EQUATIONS[stage]
     first, *_, last = SLOTS[stage]
     ahead = form.slot in (*SLOTS["regulator"], "load", "drive")
     ahead = ahead or (form.slot == "strain" and stage == "regulator")
@@ -219,7 +216,7 @@ def _dynamics(here: Sequence[Placed]) -> Dynamics:
     """What effects of a stage change of its own equation."""
     dynamics = UNCHANGED
     for p in here:
-        if p.slot in EQUATIONS:
+        if p.slot in EQUATIONS.values():
             dynamics = p.form.act(dynamics, p.values, None)
     return dynamics
 
@@ -336,7 +333,7 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     in that equation."""
     if form.slot == "spring":
         return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
-    if form.slot not in EQUATIONS:
+    if form.slot not in EQUATIONS.values():
         return True
     if stage == "sensor" or (stage == "actuator" and rig.actuator is None):
         return False

@@ -28,8 +28,8 @@ much further a spring that gives way is bent at rest, as a function of how far i
 actuator's own equation; ``response``: what leaves it; ``strain``: into the sensor; ``reading``: what leaves
 it."""
 
-EQUATIONS = ("chamber", "dynamics")
-"""The slots where no signal passes: what acts there changes the equation of its stage."""
+EQUATIONS = {"regulator": "chamber", "actuator": "dynamics"}
+"""The slots where no signal passes, by stage: what acts there changes the equation of its stage."""
 
 
 @dataclass(frozen=True)
