@@ -11,11 +11,11 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.present import present
-from focgen.rig import kernels, linear
+from focgen.rig import chamber, linear
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.delay import delayed
-from focgen.rig.dynamics import UNCHANGED, Dynamics
+from focgen.rig.dynamics import FREE, UNCHANGED, Dynamics
 from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
@@ -222,23 +222,15 @@ def _dynamics(here: Sequence[Placed]) -> Dynamics:
 
 
 def _fed(transfer: TransferFunction, supply: float) -> Step:
-    """What a regulator is asked for, of what its supply can give."""
-    most, way = supply / abs(transfer.dc_gain), np.copysign(1.0, transfer.dc_gain)
-    return ("fed", most, way), lambda x, run: way * np.minimum(way * x, most), None
+    return ("fed", transfer, supply), lambda x, run: chamber.asked(transfer, x, supply), None
 
 
 def _chamber(transfer: TransferFunction, own: Dynamics, between: Between | bool, delay: float) -> Step:
-    """A lag of order 1 that effects change."""
-    gain, T, _ = present(linear.single_lag(transfer))
-    size, way = abs(gain), np.copysign(1.0, gain)
-    lags, rates = (T, T / own.unloading), (own.flow.fill / size, own.flow.vent / size)
-
-    def act(x: Array, run: Run) -> Array:
-        held = between == Between.HELD
-        made = size * kernels.chamber(way * x, run.rest, run.h, lags, rates, own.ceiling / size, held)
-        return delayed(made, run.rest, run.h, delay) if delay else made
-
-    return (transfer, own, between, delay), act, None
+    return (
+        (transfer, own, between, delay),
+        lambda x, run: chamber.run(transfer, x, run.rest, run.h, own, between, delay),
+        None,
+    )
 
 
 def _actuator(
@@ -263,6 +255,8 @@ def _linear(
 ) -> list[Step]:
     if dynamics == UNCHANGED:
         return [_transfer(actuator.dynamics, between, delay)]
+    if dynamics.flow != FREE:
+        return _choked(actuator, dynamics, between, delay)
     if dynamics.mass:
         return _massive(actuator, dynamics, between, delay)
     plant, changed = plants.plant_of(actuator.dynamics), dynamics.changed
@@ -274,6 +268,17 @@ def _linear(
     gain, T, alpha = lag
     borne = replace(dynamics, drag=dynamics.drag * abs(gain), preload=dynamics.preload * abs(gain))
     return [_lag(gain, T, alpha, borne, delay)]
+
+
+def _choked(
+    actuator: LinearActuator, dynamics: Dynamics, between: Between | bool, delay: float
+) -> list[Step]:
+    """With a highest rate: in the equation of a lag of order 1, beside other changes of that behind it."""
+    others = replace(dynamics, flow=FREE)
+    if others.changed <= {"unloading"}:
+        return [_chamber(actuator.dynamics, dynamics, between, delay)]
+    behind = _chamber(_AT_ONCE, Dynamics(flow=dynamics.flow), Between.STRAIGHT, 0.0)
+    return [*_linear(actuator, others, between, delay), behind]
 
 
 def _massive(
@@ -323,6 +328,8 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
     )
 
 
+_AT_ONCE = TransferFunction([(1.0, 0.0)], [(1e-9, 1.0), (1.0, 0.0)])
+
 # what effects may change of a lag; of a mass on a spring, beside bend and drag, and run in steps
 _OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "mass", "bend", "drag", "loss"})
 _IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unloading", "mass"})
@@ -363,8 +370,9 @@ def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
     """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
     spring that bends where there is one; dry friction on what moves; of a mass on a spring also a hysteretic
     one, an obstacle, a preload, its damper and its mass."""
-    if isinstance(actuator, Actuator) or linear.single_lag(actuator.dynamics):
-        return _OF_LAGS
+    lag = None if isinstance(actuator, Actuator) else linear.single_lag(actuator.dynamics)
+    if isinstance(actuator, Actuator) or lag:
+        return _OF_LAGS | ({"flow"} if lag and lag[2] == 1.0 else set())
     plant = plants.plant_of(actuator.dynamics)
     found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
     if plant is not None:

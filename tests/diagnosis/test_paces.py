@@ -72,6 +72,18 @@ def test_a_regulator_fills_and_vents_in_a_way_of_its_own(seed, kind, pressure):
     assert first.parameters[effect[1]].value == pytest.approx(effect[2], rel=0.03)
 
 
+@pytest.mark.parametrize("kind", ["a narrow supply", "narrow ways"])
+def test_a_rig_of_one_stage_has_a_highest_rate(kind):
+    log = pumped(4, kind)
+    signals = {"command": log["command"], "output": log["pressure"]}
+    rig = Rig("servo", H, Signals("t", "y", "u"), LinearActuator(lag(1.02, 0.95)))
+    found = diagnose(rig, [Experiment("holds", H, signals)], pictures=False)
+    (cause,) = found.causes
+    effect, name, size = FOUND[kind]
+    assert cause.candidates[0].effect == effect
+    assert cause.candidates[0].parameters[name].value == pytest.approx(size, rel=0.03)
+
+
 DRIFTS = {
     "gain_drift": lambda p, k: p * (1.0 + 0.1 * (1.0 - np.exp(-k / 1500.0))),
     "sensor_drift": lambda p, k: p + 0.05 * (1.0 - np.exp(-k / 1500.0)),

@@ -20,7 +20,7 @@ from focgen.rig.effects import Run, form_of
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.modes import respond
 from focgen.rig.replay import effect_tables, placed_in
-from focgen.rig.rig import Actuator, Rig, Signals
+from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 
 
 def rest(*lengths):
@@ -233,6 +233,24 @@ def test_a_regulator_fills_and_vents_by_its_own_equation(effect, form, value, si
             p = min(p + h / parts * flow((gain * x - p) / T), most)
         exact.append(p)
     np.testing.assert_allclose(made, exact, atol=4e-3 if between == Between.STRAIGHT else 2e-4)
+
+
+def test_a_highest_rate_holds_beside_whatever_else_a_lag_has():
+    """In its equation alone or at another pace; behind it, where friction is in the equation, too."""
+    h, u = 0.05, np.repeat([0.0, 5.0, 2.0, 6.0], 100)
+    lag = LinearActuator(TransferFunction([(1.0, 0)], [(0.4, 1), (1, 0)]))
+    rig, run = Rig("servo", h, Signals("u", "y"), lag), Run.of([len(u)], [0.0], h)
+    limit = Placed("flow_limit", form_of("flow_limit", "choked"), "actuator", (2.0,))
+    pace = Placed("unloading_asymmetry", form_of("unloading_asymmetry", "speed"), "actuator", (0.3,))
+    rough = Placed("friction", form_of("friction", "coulomb"), "actuator", (0.5,))
+    alone, paced, rubbed = (
+        Chain(rig, placed).run(u, "actuator", "actuator", run)
+        for placed in ((limit,), (limit, pace), (limit, rough))
+    )
+    for y in (alone, paced, rubbed):
+        assert np.max(np.abs(np.diff(y))) <= 2.0 * h * (1 + 1e-9)
+    assert alone[199] == pytest.approx(5.0, abs=1e-3) and rubbed[199] == pytest.approx(4.5, abs=1e-3)
+    assert paced[280] > alone[280] + 0.01
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

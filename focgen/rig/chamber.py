@@ -1,0 +1,40 @@
+"""A lag of order 1 whose own equation effects change: a chamber that fills and vents, each in its way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.arrays import Array, Bytes
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
+from focgen.present import present
+from focgen.rig import kernels, linear
+from focgen.rig.delay import delayed
+from focgen.rig.dynamics import Dynamics
+
+
+def asked(transfer: TransferFunction, x: Array, supply: float) -> Array:
+    """What a regulator is asked for, (n,), of which its ``supply``, in units of its output, can give no more
+    than that."""
+    most, way = supply / abs(transfer.dc_gain), np.copysign(1.0, transfer.dc_gain)
+    made: Array = way * np.minimum(way * x, most)
+    return made
+
+
+def run(
+    transfer: TransferFunction,
+    x: Array,
+    rest: Bytes,
+    h: float,
+    own: Dynamics,
+    between: Between | bool,
+    delay: float = 0.0,
+) -> Array:
+    """The response (n,) of gain/(T s + 1) with another pace while it falls, a highest rate each way, and a
+    ceiling; the delay is exact in whole samples only."""
+    gain, T, _ = present(linear.single_lag(transfer))
+    size, way = abs(gain), np.copysign(1.0, gain)
+    lags, rates = (T, T / own.unloading), (own.flow.fill / size, own.flow.vent / size)
+    held = between == Between.HELD
+    made = size * kernels.chamber(way * x, rest, h, lags, rates, own.ceiling / size, held)
+    return delayed(made, rest, h, delay) if delay else made
