@@ -25,7 +25,8 @@ class Experiment:
     those where they were resampled. ``notes`` says what was done to the log. ``continues``: the rig ran just
     before, in samples that are missing or cut out, so that the state in which it begins is unknown.
     ``begins``: by role, what a signal was before the first sample; others were at rest at 0. ``anew``:
-    ahead of it the log's clock fell back.
+    ahead of it the log's clock fell back. ``paused``: how long the rig rested before it is not known, and
+    ``start`` is as if no time had passed.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Experiment:
     continues: bool = False
     begins: Mapping[str, Begin] = field(default_factory=dict)
     anew: bool = False
+    paused: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "begins", MappingProxyType(dict(self.begins)))

@@ -270,8 +270,9 @@ def in_session_order(experiments: Sequence[Experiment]) -> tuple[Experiment, ...
         return tuple(replace(e, notes=(*e.notes, _MOVED)) if id(e) in moved else e for e in by_time)
     placed, now, before = [], 0.0, None
     for experiment in experiments:
+        paused = before is not None
         if before is not None and experiment.continues and experiment.start > before.start:
-            now = placed[-1].start + experiment.start - before.start
-        placed.append(replace(experiment, start=now))
+            now, paused = placed[-1].start + experiment.start - before.start, False
+        placed.append(replace(experiment, start=now, paused=paused))
         now, before = now + len(experiment) * experiment.sample_time, experiment
     return tuple(placed)

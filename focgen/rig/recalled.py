@@ -1,7 +1,8 @@
 """What the experiments of a session left in the rig, where it rested too short between two to forget them.
 
 The clock of the session says how long ago each earlier experiment was, and what the input was then is in the
-logs. Between two logs it counts as 0. A fractional actuator forgets by a power of time only: after a rest of
+logs. Between two logs it counts as 0. Where each has a clock of its own, the pause ahead of it is the one of
+several that suits the logs best. A fractional actuator forgets by a power of time only: after a rest of
 five response times its output is still off by some per cent. The input's past is given as levels, means over
 windows that are the longer, the longer they are ago: what is left of it changes no faster.
 """
@@ -29,6 +30,7 @@ _WIDTH = 0.1  # of how long ago it is: a window
 _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0, as in focgen.rig.initial
 _SEEN = 2e-3  # of the output's largest magnitude, in root mean square: less does not show
 _FIRST = 5  # samples that tell where the input begins
+_PAUSES = tuple(2.0**k for k in range(8))  # response times: of what is longer ago ever less is left
 
 
 def with_recalled(
@@ -38,10 +40,26 @@ def with_recalled(
     placed: Sequence[Placed] = (),
 ) -> tuple[Experiment, ...]:
     """The experiments as :func:`recalled` has them where that leaves less by ``left``, a mean square; else as
-    they are."""
-    known = recalled(rig, logs, placed)
-    asked = any(a is not b for a, b in zip(known, logs))
-    return known if asked and left(known) < _RECALLED * left(logs) else tuple(logs)
+    they are. Where the pauses between them are not known, each is as long as suits them best."""
+    tried = []
+    for session in _spaced(rig, logs):
+        known = recalled(rig, session, placed)
+        if any(a is not b for a, b in zip(known, session)):
+            tried.append((left(known), known))
+    least, best = min(tried, key=lambda pair: pair[0], default=(np.inf, ()))
+    return best if tried and least < _RECALLED * left(logs) else tuple(logs)
+
+
+def _spaced(rig: Rig, logs: Sequence[Experiment]) -> list[tuple[Experiment, ...]]:
+    """The session by its clock, or with each of several pauses where that is not known."""
+    if not any(log.paused for log in logs):
+        return [tuple(logs)]
+    response = response_time(rig, logs[0].sample_time, longest(logs))
+    ahead = np.cumsum([log.paused for log in logs])
+    return [
+        tuple(replace(log, start=log.start + pause * response * n) for log, n in zip(logs, ahead))
+        for pause in _PAUSES
+    ]
 
 
 def recalled(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
