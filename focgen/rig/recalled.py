@@ -31,6 +31,7 @@ _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0, as in foc
 _SEEN = 2e-3  # of the output's largest magnitude, in root mean square: less does not show
 _FIRST = 5  # samples that tell where the input begins
 _PAUSES = tuple(2.0**k for k in range(8))  # response times: of what is longer ago ever less is left
+_CLOSER = (2.0**0.5, 2.0**0.25, 2.0**0.125)  # times longer, or shorter, than the best of those
 
 
 def with_recalled(
@@ -41,25 +42,27 @@ def with_recalled(
 ) -> tuple[Experiment, ...]:
     """The experiments as :func:`recalled` has them where that leaves less by ``left``, a mean square; else as
     they are. Where the pauses between them are not known, each is as long as suits them best."""
-    tried = []
-    for session in _spaced(rig, logs):
+    paused = any(log.paused for log in logs)
+    response = response_time(rig, logs[0].sample_time, longest(logs)) if paused else 0.0
+
+    def tried(pause: float) -> tuple[float, float, tuple[Experiment, ...]]:
+        session = _spaced(logs, pause * response)
         known = recalled(rig, session, placed)
-        if any(a is not b for a, b in zip(known, session)):
-            tried.append((left(known), known))
-    least, best = min(tried, key=lambda pair: pair[0], default=(np.inf, ()))
-    return best if tried and least < _RECALLED * left(logs) else tuple(logs)
+        asked = any(a is not b for a, b in zip(known, session))
+        return (left(known) if asked else np.inf), pause, known
+
+    best = min(map(tried, _PAUSES if paused else (0.0,)), key=lambda t: t[0])
+    for step in _CLOSER if paused and np.isfinite(best[0]) else ():
+        best = min([best, tried(best[1] * step), tried(best[1] / step)], key=lambda t: t[0])
+    return best[2] if np.isfinite(best[0]) and best[0] < _RECALLED * left(logs) else tuple(logs)
 
 
-def _spaced(rig: Rig, logs: Sequence[Experiment]) -> list[tuple[Experiment, ...]]:
-    """The session by its clock, or with each of several pauses where that is not known."""
-    if not any(log.paused for log in logs):
-        return [tuple(logs)]
-    response = response_time(rig, logs[0].sample_time, longest(logs))
+def _spaced(logs: Sequence[Experiment], pause: float) -> tuple[Experiment, ...]:
+    """The session with a pause, s, wherever its clock does not tell how long that was."""
+    if not pause:
+        return tuple(logs)
     ahead = np.cumsum([log.paused for log in logs])
-    return [
-        tuple(replace(log, start=log.start + pause * response * n) for log, n in zip(logs, ahead))
-        for pause in _PAUSES
-    ]
+    return tuple(replace(log, start=log.start + pause * n) for log, n in zip(logs, ahead))
 
 
 def recalled(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:

@@ -6,6 +6,7 @@ the kernel t^(α − 1)/Γ(α).
 Red when what an earlier experiment left is lost, or is put into a rig that was reset.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 
 from focgen.diagnosis.hypotheses.initial import begun_session
 from focgen.logs.experiment import Experiment
+from focgen.logs.read import in_session_order
 from focgen.rig.files import read_rig
 from focgen.rig.recalled import recalled
 from focgen.rig.replay import replay, simulate_session
@@ -126,3 +128,32 @@ def test_windows_hold_what_went_in(tmp_path: Path, rest: float) -> None:
     logs = _logs(rest)
     begin = recalled(_rig(tmp_path), logs)[1].before("pressure")
     assert begin.samples(H).sum() == pytest.approx(np.sum(logs[0]["pressure"]), rel=0.01)
+
+
+def _own_clocks(logs: list[Experiment]) -> tuple[Experiment, ...]:
+    return in_session_order([replace(log, start=0.0) for log in logs])
+
+
+@pytest.mark.parametrize("rest", [3.0, 10.0, 30.0])
+def test_how_long_it_rested_is_told_where_every_log_has_a_clock_of_its_own(
+    tmp_path: Path, rest: float
+) -> None:
+    rig, logs = _rig(tmp_path), _own_clocks(_logs(rest))
+    assert [log.paused for log in logs] == [False, True, True]
+    told = begun_session(rig, logs)
+    first, second, _ = told
+    assert second.start - first.start - len(first) * H == pytest.approx(rest, rel=0.2)
+    assert _left(rig, list(logs)) > 1.5 * NOISE
+    assert _left(rig, list(told)) < 1.2 * NOISE
+
+
+def test_rigs_that_each_began_at_rest_have_no_pauses(tmp_path: Path) -> None:
+    rig, logs = _rig(tmp_path), _own_clocks(_logs(10.0))
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        reset = [
+            replace(log, signals={**log.signals, "output": made["output"] + rng.normal(0.0, NOISE, len(log))})
+            for log, made in zip(logs, simulate_session(rig, logs))
+        ]
+        told = begun_session(rig, reset)
+        assert [(log.start, dict(log.begins)) for log in told] == [(log.start, {}) for log in reset]
