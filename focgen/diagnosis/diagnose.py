@@ -40,6 +40,7 @@ from focgen.rig.plausibility import doubts
 from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
 
+_CARRIED = 2  # times that findings are made anew with what they left in later experiments
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml")  # beside the pictures
 
@@ -84,6 +85,7 @@ def diagnose(
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
     nominal = explanations[0].with_intersample(nominal)
     rigs = compose.compose(nominal, explanations, session)
+    explanations, rigs, session = _carried_on(nominal, explanations, rigs, session, only, bootstrap)
     session = begun_with(rigs.fitted, rigs.placed, session)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
     proposed = propose(nominal, session, explanations, diagnosis.causes)
@@ -100,6 +102,37 @@ def diagnose(
 
         write(out, diagnosis, proposed[1] if proposed else None, pictures, given)
     return diagnosis
+
+
+def _carried_on(
+    nominal: Rig,
+    explanations: tuple[Explanation, ...],
+    rigs: compose.Rigs,
+    session: tuple[Experiment, ...],
+    only: Sequence[str] | None,
+    bootstrap: int,
+) -> tuple[tuple[Explanation, ...], compose.Rigs, tuple[Experiment, ...]]:
+    """The findings and the session, made anew where an effect carries on from one experiment to the next and
+    less is left for it: what it left looked like another effect, or like a fault at a begin."""
+    for _ in range(_CARRIED):
+        carried = compose.carried_on(rigs, session)
+        if [log.begins for log in carried] == [log.begins for log in session]:
+            break
+        step("what carries on from one log to the next")
+        again = explain_all(nominal, carried, NUMBERS.nats, only, bootstrap)
+        if _left_by(again) >= _left_by(explanations):
+            break
+        explanations, rigs, session = again, compose.compose(nominal, again, carried), carried
+    return explanations, rigs, session
+
+
+def _left_by(explanations: Sequence[Explanation]) -> float:
+    """What explanations leave, in nats, and what their numbers cost (Schwarz's approximation)."""
+    spent = 0.0
+    for e in explanations:
+        count = len(e.best.weighed)
+        spent += 0.5 * count * float(np.log(e.square)) + 0.5 * e.best.size * float(np.log(count))
+    return spent
 
 
 def _check_place(out: Path, given: Sequence[object]) -> None:

@@ -28,9 +28,8 @@ _RECALLED = 0.98  # of the mean square that is left without: more is no sign tha
 _LONGEST = 250.0  # response times: what is longer ago counts as 0
 _WIDTH = 0.1  # of how long ago it is: a window
 _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0, as in focgen.rig.initial
-_SEEN = 2e-3  # of the output's largest magnitude, in root mean square: less does not show
-_FIRST = 5  # samples that tell where the input begins
-_PAUSES = tuple(2.0**k for k in range(8))  # response times: of what is longer ago ever less is left
+_SEEN = 5e-4  # of the output's largest magnitude, in root mean square: less does not show
+_PAUSES = (0.0, *(2.0**k for k in range(-2, 8)))  # response times: of what is longer ago ever less is left
 _CLOSER = (2.0**0.5, 2.0**0.25, 2.0**0.125)  # times longer, or shorter, than the best of those
 
 
@@ -52,7 +51,7 @@ def with_recalled(
         return (left(known) if asked else np.inf), pause, known
 
     best = min(map(tried, _PAUSES if paused else (0.0,)), key=lambda t: t[0])
-    for step in _CLOSER if paused and np.isfinite(best[0]) else ():
+    for step in _CLOSER if best[1] and np.isfinite(best[0]) else ():
         best = min([best, tried(best[1] * step), tried(best[1] / step)], key=lambda t: t[0])
     return best[2] if np.isfinite(best[0]) and best[0] < _RECALLED * left(logs) else tuple(logs)
 
@@ -65,14 +64,16 @@ def _spaced(logs: Sequence[Experiment], pause: float) -> tuple[Experiment, ...]:
     return tuple(replace(log, start=log.start + pause * n) for log, n in zip(logs, ahead))
 
 
-def recalled(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
+def recalled(
+    rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = (), closer: bool = True
+) -> tuple[Experiment, ...]:
     """The experiments, each that begins with an input of 0 with what the earlier ones put in; as they are
-    where that would not show, or in a rig that integrates."""
+    where that would not show, or come no ``closer``, or in a rig that integrates."""
     if len(logs) < 2 or not all(map(len, logs)) or integrations(rig):
         return tuple(logs)
     past = _LONGEST * response_time(rig, logs[0].sample_time, longest(logs))
     found = tuple(_recalled(log, [other for other in logs if _end(other) <= log.start], past) for log in logs)
-    return found if _shows(rig, placed, logs, found) else tuple(logs)
+    return found if _shows(rig, placed, logs, found, closer) else tuple(logs)
 
 
 def _end(log: Experiment) -> float:
@@ -88,9 +89,15 @@ def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float) -> Ex
 
 
 def _idle(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
-    """Whether an input is 0 where the experiment begins."""
+    """Whether an input was 0 until the experiment begins: it is at first, or what it moves still is, as where
+    a log begins with its first step."""
+    inputs = [r for r in ENTERS if r in log and all(r in other for other in earlier)]
+    return any(_starts_at_zero(log, earlier, r) for r in inputs[inputs.index(role) :])
+
+
+def _starts_at_zero(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
     largest = max(float(np.max(np.abs(each[role]))) for each in (log, *earlier))
-    return abs(float(np.mean(log[role][:_FIRST]))) <= _NOTHING * largest
+    return abs(float(log[role][0])) <= _NOTHING * largest
 
 
 def _begin(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Begin:
@@ -115,9 +122,14 @@ def _ago(log: Experiment, other: Experiment) -> Array:
 
 
 def _shows(
-    rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], found: Sequence[Experiment]
+    rig: Rig,
+    placed: Sequence[Placed],
+    logs: Sequence[Experiment],
+    found: Sequence[Experiment],
+    closer: bool,
 ) -> bool:
-    """Whether what was before changes what is measured, and comes closer to it while the input is still 0.
+    """Whether what was before changes what is measured, and comes ``closer`` to it while the input is still
+    0, where that is asked.
 
     A rig that was reset cannot have moved there, whatever its parameters are.
     """
@@ -129,6 +141,8 @@ def _shows(
     before, after = (_made(rig, placed, of, entry, leaves[-1]) for of in (logs, found))
     if float(np.sqrt(np.mean((after - before) ** 2))) <= _SEEN * float(np.max(np.abs(before))):
         return False
+    if not closer:
+        return True
     idle = np.concatenate([_still(log, entry) for log in found if log.before(entry).known])
     known = np.concatenate([np.full(len(log), log.before(entry).known) for log in found])
     after, before = (y - after)[known][idle], (y - before)[known][idle]
@@ -145,7 +159,9 @@ def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry:
 
 
 def _still(log: Experiment, role: str) -> Bools:
-    """Which samples (n,) are ahead of the first at which the input is no longer 0."""
+    """Which samples (n,) are ahead of the first at which the input is no longer 0, and the first of all, at
+    which nothing has moved yet."""
     x = np.abs(np.asarray(log[role], float))
     made: Bools = np.logical_and.accumulate(x <= _NOTHING * float(np.max(x)))
+    made[:1] = True
     return made

@@ -15,6 +15,7 @@ from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.problem.segments import session
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.recalled import recalled, with_recalled
 from focgen.rig.replay import effect_tables, simulate_session
 from focgen.rig.rig import Rig
 
@@ -81,6 +82,19 @@ def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
 
 def _gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> float:
     return mean_square(logs, simulated(rig, placed, logs))
+
+
+def carried_on(rigs: Rigs, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments with what the earlier ones left in the rig with its effects, where that outlasts a
+    rest, as a creep does; else as they are. Fitted without, a creep is too quick to have left what it left,
+    so that it need not come closer yet, unless the rests are not known. What wanders makes up for what is
+    left out of a begin, and is not asked."""
+    lasting = tuple(p for p in rigs.placed if not p.form.wanders)
+    if not lasting:
+        return tuple(logs)
+    if any(log.paused for log in logs):
+        return with_recalled(rigs.fitted, logs, lambda found: _gap(rigs.fitted, lasting, found), lasting)
+    return recalled(rigs.fitted, logs, lasting, closer=False)
 
 
 def simulated(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> list[dict[str, np.ndarray]]:
