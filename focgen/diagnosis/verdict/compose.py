@@ -14,6 +14,7 @@ from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.problem.segments import session
 from focgen.logs.experiment import Experiment
+from focgen.rig.effects import library
 from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.recalled import recalled, with_recalled
 from focgen.rig.replay import effect_tables, simulate_session
@@ -87,9 +88,10 @@ def _gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> floa
 def carried_on(rigs: Rigs, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with what the earlier ones left in the rig with its effects, where that outlasts a
     rest, as a creep does; else as they are. Fitted without, a creep is too quick to have left what it left,
-    so that it need not come closer yet, unless the rests are not known. What wanders makes up for what is
-    left out of a begin, and is not asked."""
-    lasting = tuple(p for p in rigs.placed if not p.form.wanders)
+    so that it need not come closer yet, unless the rests are not known. Not asked are what wanders, which
+    makes up for what is left out of a begin, and what lies where its last turn was: the means over windows
+    that a past is given as have no turns."""
+    lasting = tuple(p for p in rigs.placed if not (p.form.wanders or library()[p.effect].remembers))
     if not lasting:
         return tuple(logs)
     if any(log.paused for log in logs):
