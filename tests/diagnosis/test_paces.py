@@ -64,7 +64,7 @@ def by_turns():
             yield pytest.param(seed, kind, pressure, marks=pytest.mark.long if other else ())
 
 
-@pytest.mark.parametrize("seed, kind, pressure", by_turns())
+@pytest.mark.parametrize("seed, kind, pressure", list(by_turns()))
 def test_a_regulator_fills_and_vents_in_a_way_of_its_own(seed, kind, pressure):
     signals = Signals("t", "y", "u", pressure=pressure)
     rig = Rig("pump", H, signals, LinearActuator(lag(1.95, 0.42)), lag(1.01, 1.05))
