@@ -15,7 +15,7 @@ from focgen.control.units import check_one_unit
 from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
 from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
-from focgen.diagnosis.hypotheses.explain import Explanation, candidates_for, explain
+from focgen.diagnosis.hypotheses.explain import Explanation, candidates_for, explain, gained
 from focgen.diagnosis.hypotheses.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
 from focgen.diagnosis.model import Diagnosis
@@ -113,10 +113,13 @@ def _carried_on(
     bootstrap: int,
 ) -> tuple[tuple[Explanation, ...], compose.Rigs, tuple[Experiment, ...]]:
     """The findings and the session, made anew where an effect carries on from one experiment to the next and
-    less is left for it: what it left looked like another effect, or like a fault at a begin."""
+    less is left for it: what it left looked like another effect, or like a fault at a begin. A refit of what
+    was found shows first whether that is worth a search."""
     for _ in range(_CARRIED):
         carried = compose.carried_on(rigs, session)
         if [log.begins for log in carried] == [log.begins for log in session]:
+            break
+        if sum(gained(e, carried) for e in explanations) < NUMBERS.nats:
             break
         step("what carries on from one log to the next")
         again = explain_all(nominal, carried, NUMBERS.nats, only, bootstrap)

@@ -21,7 +21,7 @@ from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.hypotheses.two import two_at_once
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
-from focgen.diagnosis.problem.segments import Segment, is_single, owner
+from focgen.diagnosis.problem.segments import Segment, is_single, owner, session
 from focgen.diagnosis.problem.smooth import Strays
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
@@ -269,6 +269,12 @@ def _moved_to(of: Fit, segment: Segment, weighing: Weighing) -> Fit:
     start = of.vector.copy()
     start[len(problem.nominal_start)] = 0.0  # the alignment made up for the wrong way
     return fit(problem, start, weighing, 8)
+
+
+def gained(of: Explanation, logs: Sequence[Experiment]) -> float:
+    """Nats that an explanation gains, its numbers fitted anew, where its experiments begin as in ``logs``."""
+    segment = replace(of.best.problem.segment, run=session(logs, of.segment.entry))
+    return evidence(_moved_to(of.best, segment, Weighing(of.ar)), of.best)
 
 
 def _in_the_end(rival: Rival, found: Fit, best: Fit) -> Rival:
