@@ -74,8 +74,19 @@ class Flow:
     vent: float = math.inf
 
 
+@dataclass(frozen=True)
+class Throat:
+    """The difference of pressures above which a flow is rather turbulent, and goes with its root: what fills,
+    and what vents. Far below it is laminar, and goes with the difference itself, at ``pace`` times that of
+    the lag."""
+
+    fill: float = math.inf
+    vent: float = math.inf
+    pace: float = 1.0
+
+
 STRAIGHT, NO_FRICTION, LINEAR, LEVEL, EVEN = Bend(), Friction(), Spring(), Rise(), Power()
-FREE = Flow()
+FREE, WIDE = Flow(), Throat()
 
 
 @dataclass(frozen=True)
@@ -90,7 +101,7 @@ class Dynamics:
     seat at 0. A ``mass`` in s² adds mass·D² y. A ``loss`` goes with a power of y. Of a
     :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag. Of
     a regulator: the pressure of its ``supply``, which it fills from; of one lag, too, ``unloading``, its
-    highest ``flow``, and the ``ceiling`` that it stops at.
+    highest ``flow``, the ``throat`` in its ways, and the ``ceiling`` that it stops at.
     """
 
     unloading: float = 1.0
@@ -105,6 +116,7 @@ class Dynamics:
     rise: Rise = LEVEL
     flow: Flow = FREE
     ceiling: float = math.inf
+    throat: Throat = WIDE
     supply: float = math.inf
 
     @property

@@ -352,10 +352,11 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
 
 def _own_of(regulator: TransferFunction) -> frozenset[str]:
     """What effects may change of a regulator's own equation: what it fills from where it has dynamics, and
-    of one that fills and vents through one lag, how fast it vents, its highest flow, and where it stops."""
+    of one that fills and vents through one lag, how fast it vents and through what, its highest flow, and
+    where it stops."""
     lag, gain = linear.single_lag(regulator), regulator.dc_gain
     found = {"supply"} if len(regulator.den) > 1 and np.isfinite(gain) and gain else set()
-    return frozenset(found | ({"unloading", "flow", "ceiling"} if lag and lag[2] == 1.0 else set()))
+    return frozenset(found | ({"unloading", "flow", "ceiling", "throat"} if lag and lag[2] == 1.0 else set()))
 
 
 def _has_spring(actuator: Actuator | LinearActuator) -> bool:

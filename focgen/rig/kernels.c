@@ -83,9 +83,26 @@ static double choked(double gap, double h, double tau, double rate)
     return until < h ? way * tau * rate * exp(-(h - until) / tau) : gap - way * rate * h;
 }
 
-/* Chamber that fills and vents each with its own {a, of the past x, of the present x, lag, highest rate}, and cannot pass
- * `most`. Which it does tells x, `present` of it as it is now and the rest as it was: 0.5 where it runs in lines, 0
- * where it is held. */
+/* What is left of `gap` > 0 after h in a chamber behind a throat: the difference of pressures is
+ * tau y' + tau² y'²/scale, of laminar and of turbulent flow. By v = sqrt(1 + 4 gap/scale) - 1 that is
+ * v + ln v falling by 1/tau; ln v by Newton's method from above, where it cannot overshoot. */
+static double throttled(double gap, double h, double tau, double scale)
+{
+    if (gap == 0.0) return 0.0;
+    double share = 4.0 * gap / scale, v = share / (1.0 + sqrt(1.0 + share));
+    double to = v + log(v) - h / tau, u = to > 1.0 ? log(to) : to;
+    for (int i = 0; i < 20; i++) {
+        double step = (exp(u) + u - to) / (exp(u) + 1.0);
+        u -= step;
+        if (step < 1e-12) break;
+    }
+    v = exp(u);
+    return 0.25 * scale * v * (v + 2.0);
+}
+
+/* Chamber that fills and vents each with its own {a, of the past x, of the present x, lag, highest rate, scale of its
+ * throat, none where that is 0}, and cannot pass `most`. Which it does tells x, `present` of it as it is now and the rest
+ * as it was: 0.5 where it runs in lines, 0 where it is held. */
 void focgen_chamber(int n, const double *x, double *y, const unsigned char *rest, double h, const double *fill, const double *vent, double present, double most)
 {
     double now = 0.0, past = 0.0;
@@ -94,7 +111,10 @@ void focgen_chamber(int n, const double *x, double *y, const unsigned char *rest
         if (now > most) now = most;
         double to = past + present * (x[k] - past), gap = to - now;
         const double *c = gap > 0.0 ? fill : vent;
-        if (fabs(gap) > c[3] * c[4])
+        if (c[5] > 0.0) {
+            double size = fabs(gap), left = fmax(throttled(size, h, c[3], c[5]), size - c[4] * h);
+            now = to - copysign(left, gap);
+        } else if (fabs(gap) > c[3] * c[4])
             now = to - choked(gap, h, c[3], c[4]);
         else
             now = c[0] * now + c[1] * past + c[2] * x[k];

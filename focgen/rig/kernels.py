@@ -139,15 +139,18 @@ def chamber(
     h: float,
     lags: tuple[float, float],
     rates: tuple[float, float],
+    throats: tuple[float, float],
     most: float,
     held: bool,
 ) -> Array:
     """A chamber that fills and vents towards ``x`` with these ``lags``, s, no faster than ``rates``, units of
-    x per s, and to no more than ``most``; x runs in lines, or is ``held``, from one sample to the next."""
+    x per s, and to no more than ``most``; through ``throats``, in the unit of x, whose flow goes with the
+    root of larger differences. x runs in lines, or is ``held``, from one sample to the next."""
     rows = []
-    for tau, rate in zip(lags, rates):
+    for tau, rate, throat in zip(lags, rates, throats):
         a, past, now = _lag(h, tau)
-        rows.append(np.array([a, *((past + now, 0.0) if held else (past, now)), tau, rate]))
+        of_x = (past + now, 0.0) if held else (past, now)
+        rows.append(np.array([a, *of_x, tau, rate, throat if np.isfinite(throat) else 0.0]))
     return _call("focgen_chamber", x, rest, h, *_doubles(*rows), 0.0 if held else 0.5, float(most))
 
 

@@ -203,7 +203,13 @@ def test_unloading_speed_acts_only_when_unloading():
     assert np.all(slow[205:300] > plain[205:300] + 0.01)
 
 
+def throttled(rate):
+    """How fast a lag of 0.4 s vents at twice the pace, turbulent from 0.3 on: gap = 0.2 s q + (0.2 s q)²/0.3."""
+    return rate if rate > 0.0 else -0.3 / 0.4 * (np.sqrt(1.0 - 4.0 * 0.4 * rate / 0.3) - 1.0)
+
+
 OWN = {  # p' of a regulator that is asked for u, and the pressure that it stops at
+    ("valve_asymmetry", "throat", (2.0, 0.3)): (throttled, np.inf),
     ("valve_asymmetry", "speed", 0.5): (lambda gap: gap if gap > 0.0 else 0.5 * gap, np.inf),
     ("valve_asymmetry", "choked_supply", 0.6): (lambda gap: min(gap, 0.6), np.inf),
     ("valve_asymmetry", "choked_exhaust", 0.6): (lambda gap: max(gap, -0.6), np.inf),
@@ -223,7 +229,7 @@ def test_a_regulator_fills_and_vents_by_its_own_equation(effect, form, value, si
     u = u[k.astype(int)] if between == Between.HELD else np.interp(k, np.arange(41), u)
     lag = TransferFunction([(sign * gain, 0)], [(T, 1), (1, 0)])
     rig = Rig("valve", h, Signals("u", "p"), None, regulator=lag)
-    placed = Placed(effect, form_of(effect, form), "regulator", (value,))
+    placed = Placed(effect, form_of(effect, form), "regulator", tuple(np.ravel(value)))
     made = Chain(rig, (placed,)).run(sign * u, "regulator", "regulator", Run.of([len(u)], [0.0], h), between)
     flow, most = OWN[effect, form, value]
     exact, p, parts = [], 0.0, 1000

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.dynamics import Dynamics, Flow
+from focgen.rig.dynamics import Dynamics, Flow, Throat
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
-from focgen.rig.effects._lags import RATE
+from focgen.rig.effects._lags import PACE, RATE, THROAT
 
 
 def _hard(x: Array, values: Values, run: Run) -> Array:
@@ -21,6 +21,11 @@ def _own(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, flow=Flow(values[0], values[0]))
 
 
+def _throats(x: Dynamics, values: Values, run: None) -> Dynamics:
+    pace, scale = values
+    return replace(x, throat=Throat(scale, scale, pace))
+
+
 EFFECT = Effect(
     name="flow_limit",
     stage="regulator",
@@ -32,6 +37,7 @@ EFFECT = Effect(
         Form("hard", "supply", (RATE,), _hard),
         # what flows into the chamber itself
         Form("choked", "chamber", (RATE,), _own),
+        Form("throats", "chamber", (PACE, THROAT), _throats),
         Form(
             "saturating",
             "supply",

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 from focgen.arrays import Array
 from focgen.rig import kernels
-from focgen.rig.dynamics import Dynamics, Flow
+from focgen.rig.dynamics import Dynamics, Flow, Throat
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
-from focgen.rig.effects._lags import RATE, two_paced
+from focgen.rig.effects._lags import PACE, RATE, THROAT, two_paced
+
+_SPEED = Parameter("venting_speed", lower=0.05, upper=20.0, zero=1.0, log=True)
 
 
 def _time(name: str, *starts: float) -> Parameter:
@@ -21,6 +23,16 @@ def _lags(x: Array, values: Values, run: Run) -> Array:
 def _orifice(x: Array, values: Values, run: Run) -> Array:
     fill, vent, scale = values
     return kernels.orifice(x, run.rest, run.h, fill, vent, scale)
+
+
+def _throat(x: Dynamics, values: Values, run: None) -> Dynamics:
+    speed, scale = values
+    return replace(x, unloading=x.unloading * speed, throat=Throat(vent=scale))
+
+
+def _throats(x: Dynamics, values: Values, run: None) -> Dynamics:
+    pace, speed, scale = values
+    return replace(x, unloading=x.unloading * speed, throat=Throat(scale, scale, pace))
 
 
 def _fill(x: Dynamics, values: Values, run: None) -> Dynamics:
@@ -41,6 +53,14 @@ EFFECT = Effect(
     forms=[
         # the lag that fills and vents is the regulator's own
         two_paced("chamber", "venting_speed"),
+        # it vents through a throat: pipes and silencers are laminar at small differences, turbulent at large
+        Form(
+            "throat",
+            "chamber",
+            (replace(_SPEED, starts=(0.7, 2.0)), THROAT),
+            _throat,
+        ),
+        Form("throats", "chamber", (PACE, replace(_SPEED, starts=(0.7, 0.7)), THROAT), _throats),
         # one of its ways is too narrow
         Form("choked_supply", "chamber", (RATE,), _fill),
         Form("choked_exhaust", "chamber", (RATE,), _vent),
