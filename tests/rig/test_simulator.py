@@ -204,7 +204,7 @@ def test_unloading_speed_acts_only_when_unloading():
 
 
 def throttled(rate):
-    """How fast a lag of 0.4 s vents at twice the pace, turbulent from 0.3 on: gap = 0.2 s q + (0.2 s q)²/0.3."""
+    """How fast a lag of 0.4 s vents, at twice its pace and turbulent beyond 0.3."""
     return rate if rate > 0.0 else -0.3 / 0.4 * (np.sqrt(1.0 - 4.0 * 0.4 * rate / 0.3) - 1.0)
 
 

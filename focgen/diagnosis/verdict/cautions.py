@@ -16,22 +16,27 @@ from focgen.diagnosis.verdict.predicted_improvement import paths
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
 
-def cautions(causes: Sequence[tuple[Explanation, Cause]], unknown: Sequence[Explanation]) -> Iterator[str]:
-    """What cannot be predicted, what may be there instead, and what is unexplained beside what is named."""
+def cautions(
+    causes: Sequence[tuple[Explanation, Cause]],
+    unknown: Sequence[Explanation],
+    changed: Sequence[Explanation] = (),
+) -> Iterator[str]:
+    """What cannot be predicted, what may be there instead, and what is unexplained beside what is named.
+    ``changed``: of what becomes another at once instead of a part of what was found."""
     for candidate in (candidate for e, _ in causes for candidate in paths(e)):
         yield (
             f"the {candidate.effect} wanders: followed through this session, its next turn cannot be "
             "predicted, and nothing of it is promised"
         )
     for e in unknown:
-        if changed := another(e):
-            yield f"{_within(e)}: not slowly, but at once it {_at_once(changed)}"
-    for e in dict.fromkeys(e for e, _ in causes):
-        if (changed := changed_at_once(e)) and changed.sure > 1.0 - NUMBERS.held:
-            named = " and ".join(sorted(changed.instead))
+        if at_once := another(e):
+            yield f"{_within(e)}: not slowly, but at once it {_at_once(at_once)}"
+    for e in dict.fromkeys([*changed, *(e for e, _ in causes)]):
+        if (at_once := changed_at_once(e)) and at_once.sure > 1.0 - NUMBERS.held:
+            named = " and ".join(sorted(at_once.instead))
             yield (
-                f"{_within(e)}: instead of {named} it may be ({changed.sure:.0%}) that at once it "
-                f"{_at_once(changed)}"
+                f"{_within(e)}: instead of {named} it may be ({at_once.sure:.0%}) that at once it "
+                f"{_at_once(at_once)}"
             )
     yield from _late(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
     yield from _nominal(causes)

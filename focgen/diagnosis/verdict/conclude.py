@@ -22,7 +22,7 @@ from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.late import logged_late
-from focgen.diagnosis.verdict.moments import another, changed_at_once
+from focgen.diagnosis.verdict.moments import another, changed_at_once, lasting_part
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.sizes import estimates
@@ -44,6 +44,10 @@ def conclude(
 ) -> tuple[compose.Rigs, Diagnosis, Evidence]:
     """The rigs that the verdict stands for, the diagnosis without a next experiment, and what it rests on.
     ``granted``: the effects are there, however little they explain."""
+    changed = {} if granted else _changed(explanations)
+    if changed:
+        explanations = [changed.get(e, e) for e in explanations]
+        rigs = compose.compose(rig, explanations, logs)
     unknown = [e for e in explanations if is_unknown(e)]
     summary = _summary(rig, logs, rigs, explanations, [*unknown, *_no_closer(rig, logs, rigs, explanations)])
     if summary.in_vain and not granted and (vain := _in_vain(summary)):
@@ -80,7 +84,7 @@ def conclude(
         notes=(
             *notes_of(logs),
             *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
-            *cautions(summary.causes, unknown),
+            *cautions(summary.causes, unknown, list(changed)),
             *lesser(beside),
             *gauges(at_odds),
             *another_command(controller),
@@ -145,6 +149,13 @@ def _summary(
     floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
     total = promised(rig, logs, held, squares, floor) if causes else None
     return _Summary(rigs, causes, made, squares, floor, total)
+
+
+def _changed(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:
+    """The explanations of which a part became another at once instead, each with the part that lasts, where
+    this explains its segment but for that."""
+    parts = ((e, lasting_part(e)) for e in explanations)
+    return {e: part for e, part in parts if part is not e and not is_unknown(part)}
 
 
 def _unaccounted(summary: _Summary) -> bool:

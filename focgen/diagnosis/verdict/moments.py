@@ -11,7 +11,7 @@ of them alone becomes another, or the gain as a whole, which takes fewer numbers
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -92,6 +92,16 @@ def another(e: Explanation) -> Changed | None:
     """What changed at once, where that is likelier than what was found."""
     changed = changed_at_once(e)
     return changed if changed is not None and changed.odds > 0.0 else None
+
+
+def lasting_part(e: Explanation) -> Explanation:
+    """The explanation without the families instead of which it became another at once, where others are not
+    in question; else as it is. What inputs predict is told of beside the change."""
+    changed = another(e)
+    if changed is None or not changed.instead < frozenset(e.best.problem.families):
+        return e
+    kept = tuple(c for c in e.causes if c.rivals[0].effect not in changed.instead)
+    return replace(e, best=changed.cut.of_fit, causes=kept) if kept else e
 
 
 def _judged(e: Explanation, before: float, after: float, cut: Pieces) -> tuple[float, Pieces]:
