@@ -133,10 +133,10 @@ def test_pump_vents_slowly(tmp_path):
     assert 2.3 / 6.1 < ratio < 2.8 / 5.5
 
 
-def filling_by_venting(venting_speed, scale, level):
-    """The time of a lag to 63 % by that of a throat from ``level`` to 37 %: by v = √(1 + 4 p/scale) − 1,
+def filling_by_venting(venting_speed, turbulent_above, level):
+    """The time of a lag to 63 % by that of a throat from ``level`` to 37 %: by v = √(1 + 4 p/turbulent) − 1,
     v + ln v falls by one in every lag."""
-    before, after = (np.sqrt(1.0 + 4.0 * p / scale) - 1.0 for p in (level, 0.37 * level))
+    before, after = (np.sqrt(1.0 + 4.0 * p / turbulent_above) - 1.0 for p in (level, 0.37 * level))
     return venting_speed / (before - after + np.log(before / after))
 
 

@@ -96,7 +96,7 @@ def another(e: Explanation) -> Changed | None:
 
 def lasting_part(e: Explanation) -> Explanation:
     """The explanation without the families instead of which it became another at once, where others are not
-    in question; else as it is. What inputs predict is told of beside the change."""
+    in question; else as it is. How much inputs predict stays what it was beside the whole."""
     changed = another(e)
     if changed is None or not changed.instead < frozenset(e.best.problem.families):
         return e

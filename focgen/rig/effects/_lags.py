@@ -15,7 +15,9 @@ RATE = Parameter("rate", level=1, time=-1, lower=1e-3, upper=1e3, starts=(10.0, 
 PACE = Parameter("pace", lower=0.05, upper=20.0, starts=(1.0, 2.0), zero=1.0, log=True)
 """How many times as fast as its lag a chamber is, both ways."""
 
-THROAT = Parameter("scale", level=1, lower=0.01, upper=20.0, starts=(0.5, 0.1), zero=math.inf, log=True)
+THROAT = Parameter(
+    "turbulent_above", level=1, lower=0.01, upper=20.0, starts=(0.5, 0.1), zero=math.inf, log=True
+)
 """The difference of pressures above which a flow is rather turbulent."""
 
 _LAG = (Parameter("lag", time=1, lower=0.0, upper=20.0, starts=(0.02, 0.2), zero=0.0),)
