@@ -10,6 +10,7 @@ from scipy.signal import lsim
 from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
+from focgen.rig.replay import placed_in
 from focgen.rig.rig import LinearActuator, Rig, Signals
 
 H, SAMPLES, PARTS = 0.02, 3000, 20
@@ -153,5 +154,7 @@ def test_what_lasts_is_named_beside_what_changes_at_once():
     (cause,) = found.causes
     assert [c.effect for c in cause.candidates] == ["valve_asymmetry"]
     assert cause.candidates[0].parameters["venting_speed"].value == pytest.approx(0.5, rel=0.05)
+    (placed,) = placed_in(found.augmented)
+    assert placed.values == pytest.approx((cause.candidates[0].parameters["venting_speed"].value,), rel=1e-9)
     (note,) = (n for n in found.notes if "at once" in n)
     assert float(note.split("becomes another: ")[1].split(" s into")[0]) == pytest.approx(33.0, abs=3.0)

@@ -211,14 +211,22 @@ def left_out(
 ) -> Fit:
     """``of`` without ``candidates``, fitted again, or what is ``known`` of the same, if that is better: what
     was fitted beside an effect may be far from what it is without, as a valve's band that jumps."""
-    problem, head = of.problem, of.problem.head
-    kept, vector, place = [], [of.vector[:head]], head
-    for candidate in problem.candidates:
+    whole, vector = _without(of, candidates)
+    found = [f.vector for f in known if f.problem.candidates == whole.candidates]
+    return min((fit(whole, s, weighing, 8) for s in (vector, *found)), key=lambda f: f.cost)
+
+
+def without(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:
+    """``of`` without ``candidates``, the rest as it was fitted beside them."""
+    return fit(*_without(of, candidates), weighing, 0)
+
+
+def _without(of: Fit, candidates: Sequence[CandidateEffect]) -> tuple[Problem, np.ndarray]:
+    kept, vector, place = [], [of.vector[: of.problem.head]], of.problem.head
+    for candidate in of.problem.candidates:
         count = len(candidate.form.parameters)
         if candidate not in candidates:
             kept.append(candidate)
             vector.append(of.vector[place : place + count])
         place += count
-    whole = problem.with_candidates(kept)
-    found = [f.vector for f in known if f.problem.candidates == whole.candidates]
-    return min((fit(whole, s, weighing, 8) for s in (np.concatenate(vector), *found)), key=lambda f: f.cost)
+    return of.problem.with_candidates(kept), np.concatenate(vector)

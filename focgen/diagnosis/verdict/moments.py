@@ -20,7 +20,7 @@ from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.belief.standing import sureness
 from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.hypotheses.rivals import left_out
+from focgen.diagnosis.hypotheses.rivals import left_out, without
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import Segment
 from focgen.diagnosis.verdict.pieces import Pieces, pieces
@@ -96,12 +96,14 @@ def another(e: Explanation) -> Changed | None:
 
 def lasting_part(e: Explanation) -> Explanation:
     """The explanation without the families instead of which it became another at once, where others are not
-    in question; else as it is. How much inputs predict stays what it was beside the whole."""
+    in question; else as it is. These stay as they were fitted beside them, and so does how much inputs
+    predict: a refit would make up for the change."""
     changed = another(e)
     if changed is None or not changed.instead < frozenset(e.best.problem.families):
         return e
     kept = tuple(c for c in e.causes if c.rivals[0].effect not in changed.instead)
-    return replace(e, best=changed.cut.of_fit, causes=kept) if kept else e
+    gone = [c for c in e.best.problem.candidates if c.effect in changed.instead]
+    return replace(e, best=without(e.best, gone, Weighing(e.ar)), causes=kept) if kept else e
 
 
 def _judged(e: Explanation, before: float, after: float, cut: Pieces) -> tuple[float, Pieces]:
