@@ -88,9 +88,10 @@ static double choked(double gap, double h, double tau, double rate)
  * v + ln v falling by 1/tau; ln v by Newton's method from above, where it cannot overshoot. */
 static double throttled(double gap, double h, double tau, double scale)
 {
-    if (gap == 0.0) return 0.0;
     double share = 4.0 * gap / scale, v = share / (1.0 + sqrt(1.0 + share));
+    if (share < 1e-12) return gap * exp(-h / tau); /* laminar to the last bits; 0 has no logarithm */
     double to = v + log(v) - h / tau, u = to > 1.0 ? log(to) : to;
+    if (to < -700.0) return 0.0;
     for (int i = 0; i < 20; i++) {
         double step = (exp(u) + u - to) / (exp(u) + 1.0);
         u -= step;

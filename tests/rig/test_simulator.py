@@ -241,6 +241,18 @@ def test_a_regulator_fills_and_vents_by_its_own_equation(effect, form, value, si
     np.testing.assert_allclose(made, exact, atol=4e-3 if between == Between.STRAIGHT else 2e-4)
 
 
+@pytest.mark.parametrize("T", [1e-9, 0.01, 3.0])
+def test_a_throat_empties_a_chamber_to_the_last(T):
+    """In samples of many lags and of a sixtieth of one, for long: nothing left is too small, or too quick."""
+    u = np.r_[np.zeros(3), np.ones(50), np.zeros(6000)]
+    rig = Rig(
+        "valve", 0.05, Signals("u", "p"), None, regulator=TransferFunction([(1.0, 0)], [(T, 1), (1, 0)])
+    )
+    placed = Placed("valve_asymmetry", form_of("valve_asymmetry", "throats"), "regulator", (1.0, 0.5, 0.3))
+    y = Chain(rig, (placed,)).run(u, "regulator", "regulator", Run.of([len(u)], [0.0], 0.05), Between.HELD)
+    assert np.all(np.isfinite(y)) and np.all(np.diff(y[54:]) <= 0.0) and 0.0 <= y[-1] < 1e-9
+
+
 def test_a_highest_rate_holds_beside_whatever_else_a_lag_has():
     """In its equation alone or at another pace; behind it, where friction is in the equation, too."""
     h, u = 0.05, np.repeat([0.0, 5.0, 2.0, 6.0], 100)
