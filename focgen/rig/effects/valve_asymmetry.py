@@ -8,7 +8,7 @@ from focgen.rig.dynamics import Dynamics, Flow, Throat
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import PACE, RATE, THROAT, two_paced
 
-_SPEED = Parameter("venting_speed", lower=0.05, upper=20.0, zero=1.0, log=True)
+_SPEED = Parameter("venting_speed", lower=0.05, upper=20.0, starts=(0.7, 2.0), zero=1.0, log=True)
 
 
 def _time(name: str, *starts: float) -> Parameter:
@@ -54,12 +54,7 @@ EFFECT = Effect(
         # the lag that fills and vents is the regulator's own
         two_paced("chamber", "venting_speed"),
         # it vents through a throat: pipes and silencers are laminar at small differences, turbulent at large
-        Form(
-            "throat",
-            "chamber",
-            (replace(_SPEED, starts=(0.7, 2.0)), THROAT),
-            _throat,
-        ),
+        Form("throat", "chamber", (_SPEED, THROAT), _throat),
         Form("throats", "chamber", (PACE, replace(_SPEED, starts=(0.7, 0.7)), THROAT), _throats),
         # one of its ways is too narrow
         Form("choked_supply", "chamber", (RATE,), _fill),
