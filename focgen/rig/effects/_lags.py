@@ -12,8 +12,8 @@ from focgen.rig.modes import respond
 RATE = Parameter("rate", level=1, time=-1, lower=1e-3, upper=1e3, starts=(10.0, 2.0, 0.5), zero=1e3, log=True)
 """The highest rate of a signal."""
 
-PACE = Parameter("pace", lower=0.05, upper=20.0, starts=(1.0, 2.0), zero=1.0, log=True)
-"""How many times as fast as its lag a chamber is, both ways."""
+PACE = Parameter("pace", lower=1.0, upper=20.0, starts=(1.1, 2.0), zero=1.0, log=True)
+"""How many times as fast as its lag a chamber is at small differences, both ways: below 1 it is slow."""
 
 THROAT = Parameter(
     "turbulent_above", level=1, lower=0.01, upper=20.0, starts=(0.5, 0.1), zero=math.inf, log=True
