@@ -89,9 +89,8 @@ static double choked(double gap, double h, double tau, double rate)
 static double throttled(double gap, double h, double tau, double scale)
 {
     double share = 4.0 * gap / scale, v = share / (1.0 + sqrt(1.0 + share));
-    if (share < 1e-12) return gap * exp(-h / tau); /* laminar to the last bits; 0 has no logarithm */
     double to = v + log(v) - h / tau, u = to > 1.0 ? log(to) : to;
-    if (to < -700.0) return 0.0;
+    if (to < -700.0) return 0.0; /* no number's size any more, and 0 has no logarithm */
     for (int i = 0; i < 20; i++) {
         double step = (exp(u) + u - to) / (exp(u) + 1.0);
         u -= step;
