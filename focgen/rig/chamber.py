@@ -30,12 +30,12 @@ def run(
     between: Between | bool,
     delay: float = 0.0,
 ) -> Array:
-    """The response (n,) of gain/(T s + 1) with another pace while it falls, a highest rate and a throat each
-    way, and a ceiling; the delay is exact in whole samples only."""
+    """The response (n,) of gain/(T s + 1) with another pace while it rises and while it falls, a highest rate
+    and a throat each way, and a ceiling; the delay is exact in whole samples only."""
     gain, T, _ = present(linear.single_lag(transfer))
     size, way = abs(gain), np.copysign(1.0, gain)
     T /= own.throat.pace
-    lags, rates = (T, T / own.unloading), (own.flow.fill / size, own.flow.vent / size)
+    lags, rates = (T / own.loading, T / own.unloading), (own.flow.fill / size, own.flow.vent / size)
     throats, held = (own.throat.fill / size, own.throat.vent / size), between == Between.HELD
     made = size * kernels.chamber(way * x, rest, h, lags, rates, throats, own.ceiling / size, held)
     return delayed(made, rest, h, delay) if delay else made

@@ -85,8 +85,17 @@ class Throat:
     pace: float = 1.0
 
 
+@dataclass(frozen=True)
+class Pace:
+    """How many times as slow a stage is: exp(``rate``) at its highest level, at the session's end or at its
+    greatest speed, by ``by``, which is ``level``, ``time`` or ``speed``; and 1 at none."""
+
+    by: str = "level"
+    rate: float = 0.0
+
+
 STRAIGHT, NO_FRICTION, LINEAR, LEVEL, EVEN = Bend(), Friction(), Spring(), Rise(), Power()
-FREE, WIDE = Flow(), Throat()
+FREE, WIDE, STEADY = Flow(), Throat(), Pace()
 
 
 @dataclass(frozen=True)
@@ -100,10 +109,12 @@ class Dynamics:
     the ``drag``, takes away from x, in its unit. So does a ``preload``, which presses the spring against a
     seat at 0. A ``mass`` in s² adds mass·D² y. A ``loss`` goes with a power of y. Of a
     :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag. Of
-    a regulator: the pressure of its ``supply``, which it fills from; of one lag, too, ``unloading``, its
-    highest ``flow``, the ``throat`` in its ways, and the ``ceiling`` that it stops at.
+    a regulator: the pressure of its ``supply``, which it fills from; of one lag, too, ``loading``, by which
+    every rate is multiplied while the load exceeds the response, ``unloading``, its highest ``flow``, the
+    ``throat`` in its ways, and the ``ceiling`` that it stops at. Of any stage with dynamics: its ``pace``.
     """
 
+    loading: float = 1.0
     unloading: float = 1.0
     place: float = 0.0
     stiffness: float = 0.0
@@ -118,6 +129,7 @@ class Dynamics:
     ceiling: float = math.inf
     throat: Throat = WIDE
     supply: float = math.inf
+    pace: Pace = STEADY
 
     @property
     def changed(self) -> frozenset[str]:

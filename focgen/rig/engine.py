@@ -11,11 +11,11 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.present import present
-from focgen.rig import chamber, linear
+from focgen.rig import chamber, linear, uneven
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.delay import delayed
-from focgen.rig.dynamics import FREE, UNCHANGED, Dynamics
+from focgen.rig.dynamics import FREE, STEADY, UNCHANGED, Dynamics, Pace
 from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
@@ -182,6 +182,8 @@ class Chain:
         if stage == "actuator":
             return _actuator(self.rig.actuator, here, between, delay)
         transfer, dynamics = getattr(self.rig, stage), _dynamics(here)
+        if dynamics.pace != STEADY:
+            return [_uneven(transfer, dynamics.pace, between, delay)]
         fed = [_fed(transfer, dynamics.supply)] if np.isfinite(dynamics.supply) else []
         if dynamics.changed - {"supply"}:
             return [*fed, _chamber(transfer, dynamics, between, delay)]
@@ -225,6 +227,14 @@ def _fed(transfer: TransferFunction, supply: float) -> Step:
     return ("fed", transfer, supply), lambda x, run: chamber.asked(transfer, x, supply), None
 
 
+def _uneven(transfer: TransferFunction, pace: Pace, between: Between | bool, delay: float) -> Step:
+    return (
+        (transfer, pace, between, delay),
+        lambda x, run: uneven.run(transfer, x, run, pace, between, delay),
+        None,
+    )
+
+
 def _chamber(transfer: TransferFunction, own: Dynamics, between: Between | bool, delay: float) -> Step:
     return (
         (transfer, own, between, delay),
@@ -241,6 +251,9 @@ def _actuator(
         return [*drive, _transfer(UNITY, between, delay)] if delay else drive
     weak = [p for p in here if p.slot == "spring"]
     dynamics = _dynamics(here)
+    if dynamics.pace != STEADY:
+        ahead = (("zero", actuator), lambda x, run: actuator.drive(x), None)
+        return [ahead, *drive, _uneven(actuator.dynamics, dynamics.pace, between, delay)]
     if isinstance(actuator, LinearActuator):
         zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
         steps = _linear(actuator, dynamics, between, delay)
@@ -342,21 +355,41 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
         return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
     if form.slot not in EQUATIONS.values():
         return True
-    if stage == "sensor" or (stage == "actuator" and rig.actuator is None):
-        return False
     changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
-    may = _changeable(rig.actuator) if rig.actuator and stage == "actuator" else _own_of(rig.regulator)
-    made: bool = changed <= may
+    made: bool = changed <= _changeable_in(stage, rig)
     return made
+
+
+def _changeable_in(stage: str, rig: Rig) -> frozenset[str]:
+    """What effects may change of a stage's own equation."""
+    if stage == "actuator":
+        own = rig.actuator
+        return _paced(own.dynamics) | _changeable(own) if own else frozenset()
+    if stage == "regulator":
+        return _paced(rig.regulator) | _own_of(rig.regulator)
+    return _paced(rig.sensor) | ({"loading", "unloading"} if _is_lag(rig.sensor) else set())
+
+
+def _paced(transfer: TransferFunction) -> frozenset[str]:
+    """What effects may change of any stage that has a pace."""
+    return frozenset({"pace"} if uneven.can_be_uneven(transfer) else ())
+
+
+def _is_lag(transfer: TransferFunction) -> bool:
+    """Whether it is one lag of order 1."""
+    lag = linear.single_lag(transfer)
+    return lag is not None and lag[2] == 1.0
 
 
 def _own_of(regulator: TransferFunction) -> frozenset[str]:
     """What effects may change of a regulator's own equation: what it fills from where it has dynamics, and
     of one that fills and vents through one lag, how fast it vents and through what, its highest flow, and
     where it stops."""
-    lag, gain = linear.single_lag(regulator), regulator.dc_gain
+    gain = regulator.dc_gain
     found = {"supply"} if len(regulator.den) > 1 and np.isfinite(gain) and gain else set()
-    return frozenset(found | ({"unloading", "flow", "ceiling", "throat"} if lag and lag[2] == 1.0 else set()))
+    return frozenset(
+        found | ({"loading", "unloading", "flow", "ceiling", "throat"} if _is_lag(regulator) else set())
+    )
 
 
 def _has_spring(actuator: Actuator | LinearActuator) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
-from focgen.rig.effects import Excitation, Form, Parameter, library
+from focgen.rig.effects import Effect, Excitation, Form, Parameter, library
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.rig import Rig
 
@@ -35,6 +35,11 @@ class CandidateEffect:
     def name(self) -> str:
         """Family and form."""
         return f"{self.effect}/{self.form.name}"
+
+    @property
+    def family(self) -> Effect | None:
+        """Its family, None where none of the library is."""
+        return library().get(self.effect)
 
 
 @dataclass(frozen=True)
@@ -114,7 +119,7 @@ class Problem:
     def with_candidates(self, candidates: Sequence[CandidateEffect]) -> Problem:
         """The same segment under other effects. A curve is as steep at zero as before, whatever it does
         further on, so that the gain makes up for it."""
-        bent = any(library()[c.effect].bends for c in candidates)
+        bent = any(c.family and c.family.bends for c in candidates)
         return replace(self, candidates=tuple(candidates), nominals=replace(self.nominals, bent=bent))
 
     def thinned(self, factor: int) -> Problem:
@@ -175,7 +180,7 @@ class Problem:
         """Whether a candidate effect says how late the output is: two numbers for one thing would share it at
         random.
         """
-        return any(library()[candidate.effect].delays for candidate in self.candidates)
+        return any(c.family and c.family.delays for c in self.candidates)
 
     def _least(self, p: Parameter) -> float:
         """The lower bound: a time constant of less than two samples is nothing that samples could show."""

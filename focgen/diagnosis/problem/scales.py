@@ -43,6 +43,7 @@ def _levels(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> dict[str,
         "dynamics": response,
         "response": response,
         "strain": response,
+        "filter": made.get("sensor", segment.level_out),
         "reading": made.get("sensor", segment.level_out),
     }
 

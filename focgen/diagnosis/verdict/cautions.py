@@ -12,7 +12,13 @@ from focgen.diagnosis.verdict.confidence import nominal_instead
 from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths
+from focgen.diagnosis.verdict.uneven import unevenly_paced
 
+_AT = {
+    "level": "at its highest level as at none",
+    "time": "at the session's end as at its begin",
+    "speed": "at its greatest speed as at none",
+}
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
 
@@ -39,6 +45,7 @@ def cautions(
                 f"{_at_once(at_once)}"
             )
     yield from _late(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
+    yield from _uneven(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
     yield from _nominal(causes)
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
@@ -63,6 +70,18 @@ def _late(explanations: Iterable[Explanation]) -> Iterator[str]:
                 f"{_within(e)}: instead of {' and '.join(sorted(late.instead))} the command may be "
                 f"({late.sure:.0%}) logged {late.seconds:.3g} s late ({late.samples} samples); see to it "
                 "that each row has what was sent as the readings were taken"
+            )
+
+
+def _uneven(explanations: Iterable[Explanation]) -> Iterator[str]:
+    """Where a pace may be uneven instead of an effect, or explains what no effect does."""
+    for e in explanations:
+        if (pace := unevenly_paced(e)) and pace.sure > 1.0 - NUMBERS.held:
+            named = " and ".join(sorted(pace.instead))
+            instead = f"instead of {named}" if named else "beside no effect"
+            yield (
+                f"{_within(e)}: {instead} the {pace.stage} may be ({pace.sure:.0%}) {pace.slowness:.2g} times "
+                f"as slow {_AT[pace.by]}, which no effect of the library is"
             )
 
 

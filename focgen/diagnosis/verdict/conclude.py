@@ -26,6 +26,7 @@ from focgen.diagnosis.verdict.moments import another, changed_at_once, lasting_p
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.sizes import estimates
+from focgen.diagnosis.verdict.uneven import unevenly_paced
 from focgen.diagnosis.verdict.unexplained import disturbed, is_rounded, is_unknown
 from focgen.diagnosis.verdict.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
@@ -281,8 +282,8 @@ def _found(
 
 def _lasting(e: Explanation, cause: Cause) -> float:
     """How likely a cause was there all along, and neither did the rig become another at once instead, nor was
-    the command logged late."""
-    found = [f for f in (changed_at_once(e), logged_late(e)) if f is not None]
+    the command logged late, nor a pace uneven."""
+    found = [f for f in (changed_at_once(e), logged_late(e), unevenly_paced(e)) if f is not None]
     first = cause.rivals[0].effect
     return float(np.prod([1.0 - f.sure for f in found if first in f.instead]))
 

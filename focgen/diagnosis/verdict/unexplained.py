@@ -11,19 +11,20 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.late import is_late
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.outside import from_outside
+from focgen.diagnosis.verdict.uneven import is_uneven
 from focgen.rig.effects import library
 
 
 def is_unknown(e: Explanation) -> bool:
     """Whether much of what inputs predict of the nominal residual is still there after the effects, or what
     hardly any of them explains is not just noise, or what moves with time moves at once, or the command was
-    logged late instead; unless a coarse converter explains it."""
+    logged late or a pace is uneven instead; unless a coarse converter explains it."""
     if e.converter is not None and e.converter.explains(e.best):
         return False
     left = disturbed(e)
     if _is_disturbed(e, left) or (e.segment.closed and _hidden(e, left)):
         return True
-    if e.causes and not is_rounded(e) and (from_outside(e) or another(e) or is_late(e)):
+    if e.causes and not is_rounded(e) and (from_outside(e) or another(e) or is_late(e) or is_uneven(e)):
         return True
     if e.predictability.share < NUMBERS.left:
         return False

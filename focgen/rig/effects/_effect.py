@@ -20,15 +20,15 @@ STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
     "regulator": ("command", "chamber", "supply"),
     "actuator": ("load", "drive", "spring", "dynamics", "response"),
-    "sensor": ("strain", "reading"),
+    "sensor": ("strain", "filter", "reading"),
 }
 """Where on the way a form acts. ``command``: into the regulator; ``chamber``: the regulator's own equation;
 ``supply``: what leaves it; ``load``: the pressure entering the actuator; ``drive``: K(p) p; ``spring``: how
 much further a spring that gives way is bent at rest, as a function of how far it was; ``dynamics``: the
-actuator's own equation; ``response``: what leaves it; ``strain``: into the sensor; ``reading``: what leaves
-it."""
+actuator's own equation; ``response``: what leaves it; ``strain``: into the sensor; ``filter``: the sensor's
+own equation; ``reading``: what leaves it."""
 
-EQUATIONS = {"regulator": "chamber", "actuator": "dynamics"}
+EQUATIONS = {"regulator": "chamber", "actuator": "dynamics", "sensor": "filter"}
 """The slots where no signal passes, by stage: what acts there changes the equation of its stage."""
 
 

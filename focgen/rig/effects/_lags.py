@@ -109,3 +109,27 @@ def two_paced(slot: str, name: str) -> Form:
     """A stage whose own equation runs ``name`` times as fast while it falls back."""
     speed = Parameter(name, lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True)
     return Form("speed", slot, (speed,), _paces)
+
+
+def _rises(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, loading=x.loading * values[0])
+
+
+def rising(form: str, slot: str, name: str) -> Form:
+    """A stage whose own equation runs ``name`` times as fast while it rises: the time that was given may be
+    that of its fall."""
+    speed = Parameter(name, lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True)
+    return Form(form, slot, (speed,), _rises)
+
+
+_ONE_WAY = Parameter("lag", time=1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0)
+
+
+def _lag_one_way(x: Array, values: Values, run: Run) -> Array:
+    up, down = max(-values[0], 0.0), max(values[0], 0.0)
+    return kernels.lag(x, run.rest, run.h, up, down)
+
+
+def one_way(name: str, slot: str) -> Form:
+    """One lag more, only while the signal falls; below 0, only while it rises."""
+    return Form(name, slot, (_ONE_WAY,), _lag_one_way)

@@ -6,9 +6,15 @@ from focgen.rig.effects._effect import Effect
 EFFECT = Effect(
     name="sensor_lag",
     stage="sensor",
-    meaning="slower than nominal",
+    meaning="slower than nominal, or one way only",
     reveals="steps and fast sines with the curvature logged",
     confused_with=("slow_regulator", "transport_delay", "sensor_relaxation", "creep"),
     needs=lambda e: None if e.fastest < 1.0 else "no change of the input is fast beside the rig's response",
-    forms=_lags.deep_forms("strain"),
+    forms=[
+        *_lags.deep_forms("strain"),
+        # a strip that recovers late, a reading that follows a peak at once
+        _lags.two_paced("filter", "recovering_speed"),
+        _lags.rising("rising", "filter", "rising_speed"),
+        _lags.one_way("one_way", "strain"),
+    ],
 )

@@ -1,15 +1,7 @@
 """Dynamics that are faster or slower when unloading."""
 
-from focgen.arrays import Array
-from focgen.rig import kernels
-from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
-from focgen.rig.effects._lags import two_paced
-
-
-def _lag(x: Array, values: Values, run: Run) -> Array:
-    up, down = max(-values[0], 0.0), max(values[0], 0.0)
-    return kernels.lag(x, run.rest, run.h, up, down)
-
+from focgen.rig.effects._effect import Effect
+from focgen.rig.effects._lags import one_way, two_paced
 
 EFFECT = Effect(
     name="unloading_asymmetry",
@@ -20,11 +12,6 @@ EFFECT = Effect(
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
         two_paced("dynamics", "unloading_speed"),
-        Form(
-            "lag",
-            "response",
-            (Parameter("lag", time=1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0),),
-            _lag,
-        ),
+        one_way("lag", "response"),
     ],
 )

@@ -6,7 +6,7 @@ from focgen.arrays import Array
 from focgen.rig import kernels
 from focgen.rig.dynamics import Dynamics, Flow, Throat
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
-from focgen.rig.effects._lags import PACE, RATE, THROAT, two_paced
+from focgen.rig.effects._lags import PACE, RATE, THROAT, rising, two_paced
 
 _SPEED = Parameter("venting_speed", lower=0.05, upper=20.0, starts=(0.7, 2.0), zero=1.0, log=True)
 
@@ -53,6 +53,7 @@ EFFECT = Effect(
     forms=[
         # the lag that fills and vents is the regulator's own
         two_paced("chamber", "venting_speed"),
+        rising("filling", "chamber", "filling_speed"),
         # it vents through a throat: pipes and silencers are laminar at small differences, turbulent at large
         Form("throat", "chamber", (_SPEED, THROAT), _throat),
         Form("throats", "chamber", (PACE, replace(_SPEED, starts=(0.7, 0.7)), THROAT), _throats),

@@ -1,0 +1,37 @@
+"""A stage whose pace depends on its level, on time or on its speed: no effect of the library, and yet what
+many a rig does a little."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.rig.dynamics import Dynamics, Pace
+from focgen.rig.effects import EQUATIONS, Form, Parameter
+from focgen.rig.engine import fits_in
+
+UNEVEN = "uneven_pace"
+_RATE = Parameter("rate", lower=-1.5, upper=1.5, starts=(0.3, -0.3), zero=0.0)
+
+
+def uneven_paces(problem: Problem) -> list[CandidateEffect]:
+    """Every pace that may be uneven: of each stage whose own equation no effect of the problem changes."""
+    changed = {c.stage for c in problem.candidates if c.form.slot in (*EQUATIONS.values(), "spring")}
+    return [
+        CandidateEffect(UNEVEN, form, stage)
+        for stage in problem.segment.stages
+        if stage not in changed
+        for form in _forms(EQUATIONS[stage])
+        if fits_in(form, stage, problem.nominals.rig)
+    ]
+
+
+def _forms(slot: str) -> list[Form]:
+    return [_form(by, slot) for by in ("level", "time", "speed")]
+
+
+def _form(by: str, slot: str) -> Form:
+    def act(x: Dynamics, values: tuple[float, ...], run: None) -> Dynamics:
+        return replace(x, pace=Pace(by, values[0]))
+
+    return Form(by, slot, (_RATE,), act)
