@@ -288,7 +288,7 @@ def _choked(
 ) -> list[Step]:
     """With a highest rate: in the equation of a lag of order 1, beside other changes of that behind it."""
     others = replace(dynamics, flow=FREE)
-    if others.changed <= {"unloading"}:
+    if others.changed <= {"loading", "unloading"}:
         return [_chamber(actuator.dynamics, dynamics, between, delay)]
     behind = _chamber(_AT_ONCE, Dynamics(flow=dynamics.flow), Between.STRAIGHT, 0.0)
     return [*_linear(actuator, others, between, delay), behind]
@@ -326,6 +326,9 @@ def _plant(plant: plants.Plant, dynamics: Dynamics, between: Between | bool, del
 
 
 def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) -> Step:
+    if dynamics.loading != 1.0:  # the compiled loops know a pace of the way up, and another's share of that
+        T /= dynamics.loading**alpha
+        dynamics = replace(dynamics, loading=1.0, unloading=dynamics.unloading / dynamics.loading)
     return (
         (gain, T, alpha, dynamics, delay),
         lambda x, run: respond(gain * x, run.rest, run.h, T, alpha, run.duration, dynamics, delay),
@@ -344,7 +347,9 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
 _AT_ONCE = TransferFunction([(1.0, 0.0)], [(1e-9, 1.0), (1.0, 0.0)])
 
 # what effects may change of a lag; of a mass on a spring, beside bend and drag, and run in steps
-_OF_LAGS = frozenset({"unloading", "place", "stiffness", "preload", "mass", "bend", "drag", "loss"})
+_OF_LAGS = frozenset(
+    {"loading", "unloading", "place", "stiffness", "preload", "mass", "bend", "drag", "loss"}
+)
 _IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unloading", "mass"})
 
 

@@ -110,6 +110,7 @@ LAG = Rig(
     Signals("c", "y"),
     Actuator(0.3, 0.7, (1.0,)),
     TransferFunction([(1.0, 0.0)], [(0.03, 1.0), (1.0, 0.0)]),
+    TransferFunction([(1.0, 0.0)], [(0.05, 1.0), (1.0, 0.0)]),
 )
 
 

@@ -80,8 +80,8 @@ def _uneven(explanations: Iterable[Explanation]) -> Iterator[str]:
             named = " and ".join(sorted(pace.instead))
             instead = f"instead of {named}" if named else "beside no effect"
             yield (
-                f"{_within(e)}: {instead} the {pace.stage} may be ({pace.sure:.0%}) {pace.slowness:.2g} times "
-                f"as slow {_AT[pace.by]}, which no effect of the library is"
+                f"{_within(e)}: {instead} the {pace.stage} may be ({pace.sure:.0%}) "
+                f"{pace.slowness:.2g} times as slow {_AT[pace.by]}, which no effect of the library is"
             )
 
 

@@ -1,7 +1,7 @@
 """Dynamics that are faster or slower when unloading."""
 
 from focgen.rig.effects._effect import Effect
-from focgen.rig.effects._lags import one_way, two_paced
+from focgen.rig.effects._lags import one_way, rising, two_paced
 
 EFFECT = Effect(
     name="unloading_asymmetry",
@@ -12,6 +12,7 @@ EFFECT = Effect(
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
     forms=[
         two_paced("dynamics", "unloading_speed"),
+        rising("rising", "dynamics", "loading_speed"),
         one_way("lag", "response"),
     ],
 )
