@@ -11,8 +11,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import gamma
 
 from focgen.fractional.transfer import TransferFunction
+from focgen.rig.changeable import fits_in
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed, fits_in
+from focgen.rig.engine import Chain, Placed
 from focgen.rig.kernels import BALANCED
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 

@@ -12,9 +12,10 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig import linear
+from focgen.rig.changeable import fits_in
 from focgen.rig.dynamics import Bend, Dynamics, Friction, Rise, Spring
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed, fits_in
+from focgen.rig.engine import Chain, Placed
 from focgen.rig.files import read_rig, write_rig
 from focgen.rig.kernels import BALANCED
 from focgen.rig.modes import respond as lag

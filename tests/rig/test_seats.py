@@ -11,9 +11,10 @@ from scipy.integrate import solve_ivp
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
+from focgen.rig.changeable import fits_in
 from focgen.rig.dynamics import Dynamics, Friction
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed, fits_in
+from focgen.rig.engine import Chain, Placed
 from focgen.rig.kernels import BALANCED
 from focgen.rig.modes import respond as lag
 from focgen.rig.plant import Plant, respond

@@ -26,8 +26,9 @@ from focgen.diagnosis.problem.smooth import Strays
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.present import present
+from focgen.rig.changeable import fits_in
 from focgen.rig.effects import Effect, library
-from focgen.rig.engine import between_of, fits_in, slot_in
+from focgen.rig.engine import between_of, slot_in
 from focgen.rig.rig import Actuator, Rig
 
 _DEPTH = 4

@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.rig.changeable import fits_in
 from focgen.rig.dynamics import Dynamics, Pace
 from focgen.rig.effects import EQUATIONS, Form, Parameter
-from focgen.rig.engine import fits_in
 
 UNEVEN = "uneven_pace"
 _RATE = Parameter("rate", lower=-1.5, upper=1.5, starts=(0.3, -0.3), zero=0.0)

@@ -1,0 +1,85 @@
+"""What effects may change of each stage's own equation, and so where their forms fit in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig import linear, uneven
+from focgen.rig import plant as plants
+from focgen.rig.dynamics import UNCHANGED
+from focgen.rig.effects import EQUATIONS, Form
+from focgen.rig.rig import Actuator, LinearActuator, Rig
+
+# what effects may change of a lag; of a mass on a spring, beside bend and drag, and run in steps
+_OF_LAGS = frozenset(
+    {"loading", "unloading", "place", "stiffness", "preload", "mass", "bend", "drag", "loss"}
+)
+IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unloading", "mass"})
+
+
+def fits_in(form: Form, stage: str, rig: Rig) -> bool:
+    """Whether a form can act in a stage of this rig: what it changes of the actuator's own equation has to be
+    in that equation."""
+    if form.slot == "spring":
+        return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
+    if form.slot not in EQUATIONS.values():
+        return True
+    changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
+    made: bool = changed <= _changeable_in(stage, rig)
+    return made
+
+
+def _changeable_in(stage: str, rig: Rig) -> frozenset[str]:
+    """What effects may change of a stage's own equation."""
+    if stage == "actuator":
+        own = rig.actuator
+        return _paced(own.dynamics) | _changeable(own) if own else frozenset()
+    if stage == "regulator":
+        return _paced(rig.regulator) | _own_of(rig.regulator)
+    return _paced(rig.sensor) | ({"loading", "unloading"} if _is_lag(rig.sensor) else set())
+
+
+def _paced(transfer: TransferFunction) -> frozenset[str]:
+    """What effects may change of any stage that has a pace."""
+    return frozenset({"pace"} if uneven.can_be_uneven(transfer) else ())
+
+
+def _is_lag(transfer: TransferFunction) -> bool:
+    """Whether it is one lag of order 1."""
+    lag = linear.single_lag(transfer)
+    return lag is not None and lag[2] == 1.0
+
+
+def _own_of(regulator: TransferFunction) -> frozenset[str]:
+    """What effects may change of a regulator's own equation: what it fills from where it has dynamics, and
+    of one that fills and vents through one lag, how fast it vents and through what, its highest flow, and
+    where it stops."""
+    gain = regulator.dc_gain
+    found = {"supply"} if len(regulator.den) > 1 and np.isfinite(gain) and gain else set()
+    return frozenset(
+        found | ({"loading", "unloading", "flow", "ceiling", "throat"} if _is_lag(regulator) else set())
+    )
+
+
+def _has_spring(actuator: Actuator | LinearActuator) -> bool:
+    """Whether a spring pulls it back, and what drives it pulls at that."""
+    if isinstance(actuator, Actuator):
+        return True
+    num, den = actuator.dynamics.num, actuator.dynamics.den
+    return len(num) == 1 and num[0].order == 0.0 and len(den) > 1 and den[-1].order == 0.0
+
+
+def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
+    """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
+    spring that bends where there is one; dry friction on what moves; of a mass on a spring also a hysteretic
+    one, an obstacle, a preload, its damper and its mass."""
+    lag = None if isinstance(actuator, Actuator) else linear.single_lag(actuator.dynamics)
+    if isinstance(actuator, Actuator) or lag:
+        return _OF_LAGS | ({"flow"} if lag and lag[2] == 1.0 else set())
+    plant = plants.plant_of(actuator.dynamics)
+    found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
+    if plant is not None:
+        found |= {"drag"} | ({"rise"} if plant.order == 2 else set())
+        found |= IN_STEPS if plant.order == 2 and not plant.integrates else set()
+    return frozenset(found)
