@@ -24,10 +24,18 @@ def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     if form.slot == "spring":
         return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
     if form.slot not in EQUATIONS.values():
-        return True
+        return not form.bare or _is_bare(stage, rig)
     changed = form.act(UNCHANGED, tuple(p.starts[0] for p in form.parameters), None).changed
     made: bool = changed <= _changeable_in(stage, rig)
     return made
+
+
+def _is_bare(stage: str, rig: Rig) -> bool:
+    """Whether a rig takes a stage for 1, or a number: it has no dynamics."""
+    if stage == "actuator":
+        return rig.actuator is None or len(rig.actuator.dynamics.den) == 1
+    transfer: TransferFunction = getattr(rig, stage)
+    return len(transfer.den) == 1
 
 
 def _changeable_in(stage: str, rig: Rig) -> frozenset[str]:

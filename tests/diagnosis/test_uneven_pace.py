@@ -110,3 +110,18 @@ def test_an_uneven_pace_is_no_effect(case, seed, signals):
     if (case, seed, signals) in QUICK_UNEVEN:
         assert found.verdict == "unknown"
         assert any("times as slow" in note and case[0] in note for note in found.notes)
+
+
+def test_a_sensor_that_the_rig_takes_for_1_may_lag_one_way():
+    """With the curvature logged; without it, nothing tells it from the actuator."""
+    log = logged(1, "sensor", "falls late")
+    y, made = 0.0, []
+    for k in log["curvature"]:
+        y += (k - y) * (1.0 if k > y else 1.0 - np.exp(-H / 0.5))
+        made.append(y)
+    log["output"] = np.array(made) + 0.008 * np.random.default_rng(9).standard_normal(SAMPLES)
+    given = Signals("t", "y", "u", pressure="pressure", curvature="curvature")
+    rig = Rig("rig", H, given, LinearActuator(lag(2.0, 0.8)), lag(1.0, 0.25))
+    found = diagnose(rig, [Experiment("holds", H, log)], pictures=False)
+    (cause,) = found.causes
+    assert (cause.stage, cause.candidates[0].effect) == ("sensor", "sensor_lag")

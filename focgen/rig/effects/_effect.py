@@ -125,6 +125,7 @@ class Form:
     predicts nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
     ``leads``: linear though it is, away from home it stays ahead of the actuator's gain, which may be bent.
     ``both_ways``: it is to be told from another form only where the input goes both ways.
+    ``bare``: only in a stage that the rig takes for 1: dynamics have the like in their own equation.
     ``itself(values, den)``: whether it is what its family says, in an actuator of this denominator.
     """
 
@@ -139,6 +140,7 @@ class Form:
     jumps: bool = False
     leads: bool = False
     both_ways: bool = False
+    bare: bool = False
     itself: Callable[[Values, Polynomial], bool] = lambda values, den: True
 
     @property

@@ -130,6 +130,6 @@ def _lag_one_way(x: Array, values: Values, run: Run) -> Array:
     return kernels.lag(x, run.rest, run.h, up, down)
 
 
-def one_way(name: str, slot: str) -> Form:
+def one_way(name: str, slot: str, bare: bool = False) -> Form:
     """One lag more, only while the signal falls; below 0, only while it rises."""
-    return Form(name, slot, (_ONE_WAY,), _lag_one_way)
+    return Form(name, slot, (_ONE_WAY,), _lag_one_way, bare=bare)

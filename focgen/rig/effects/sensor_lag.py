@@ -15,6 +15,6 @@ EFFECT = Effect(
         # a strip that recovers late, a reading that follows a peak at once
         _lags.two_paced("filter", "recovering_speed"),
         _lags.rising("rising", "filter", "rising_speed"),
-        _lags.one_way("one_way", "strain"),
+        _lags.one_way("one_way", "strain", bare=True),
     ],
 )
