@@ -22,7 +22,7 @@ from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.decimate import decimated
 from focgen.diagnosis.problem.segments import cuts, make
-from focgen.diagnosis.problem.smooth import freed, is_explained, strays
+from focgen.diagnosis.problem.smooth import freed, is_explained, slow_rest, strays
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.conclude import conclude
@@ -195,7 +195,9 @@ def explain_all(
         left = e.predictability.share
         foretold = predicted(e.segment, segment.y - made, response, left)
         x = freed(segment, made, foretold, left, noise)
-        ways = input_covariance(e) if is_explained(left, noise) else None
+        ways = None
+        if is_explained(left, noise):
+            ways = np.column_stack([input_covariance(e), slow_rest(segment, x, response)])
         unsure = strays(segment, made, response, left, noise)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)

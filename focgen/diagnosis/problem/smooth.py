@@ -18,6 +18,9 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import Segment
 
 
+_SLOW = (0.15, 0.5, 1.5)  # of a response time: what is slower than that
+
+
 def is_explained(left: float, noise: bool) -> bool:
     """Whether a signal is taken as simulated: inputs predict little of the residual, the share ``left``, and
     it is nothing but ``noise``."""
@@ -60,9 +63,21 @@ def strays(segment: Segment, simulated: np.ndarray, response: float, left: float
     return Strays(none, _slow(segment, backwards, response, left))
 
 
+def slow_rest(segment: Segment, taken: np.ndarray, response: float) -> np.ndarray:
+    """The slow parts (n, 3), ever slower, of what the output has beyond what is ``taken`` for it (n,): what a
+    form lacks of the rig is in them, and the next stage's output has that, too."""
+    rest = segment.parts(segment.y - taken)
+    return np.column_stack([_slowed(segment, rest, response, part) for part in _SLOW])
+
+
+def _slowed(segment: Segment, parts: Sequence[np.ndarray], response: float, part: float) -> np.ndarray:
+    """What is slower than a ``part`` of the response time, and than four samples."""
+    width = max(4.0, part * response / segment.run.h)
+    return np.concatenate([gaussian_filter1d(p, min(width, len(p) / 6), mode="nearest") for p in parts])
+
+
 def _slow(segment: Segment, backwards: Sequence[np.ndarray], response: float, left: float) -> np.ndarray:
-    width = max(4.0, 0.15 * response / segment.run.h)
-    slow = np.concatenate([gaussian_filter1d(p, min(width, len(p) / 6), mode="nearest") for p in backwards])
+    slow = _slowed(segment, backwards, response, _SLOW[0])
     most = left * sum(float(part @ part) for part in backwards)
     made: np.ndarray = slow * np.sqrt(max(most, 0.0) / max(float(slow @ slow), 1e-300))
     return made
