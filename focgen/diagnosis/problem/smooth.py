@@ -17,7 +17,6 @@ from scipy.signal import savgol_filter
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import Segment
 
-
 _SLOW = (0.15, 0.5, 1.5)  # of a response time: what is slower than that
 
 
