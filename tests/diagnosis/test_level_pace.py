@@ -67,6 +67,7 @@ def test_within_the_uncertainty_it_is_no_effect():
     """A tenth of the time beside noise of 0.2 %; taken for one number the rig is `unknown`."""
     found = diagnose(rig("transfer"), logs(lambda u: lag(u, 0.1), 2e-3), pictures=False)
     assert found.verdict in ("none", "parameters") and not found.causes
+    assert any("slower at its highest level" in note for note in found.notes)
 
 
 def test_a_loop_is_no_such_time():

@@ -25,17 +25,17 @@ def level_pace(rig: Rig, segment: Segment) -> np.ndarray | None:
     To first order: with Q y = g u − y, g the gain, a factor 1 + c y/max|y| of Q is c y/max|y| (y/g − u) more
     of u.
     """
-    stage = next((s for s in _AHEAD if s in segment.stages and getattr(rig, s) is not None), None)
+    stage = paced_stage(rig, segment)
     if stage is None:
         return None
     core, gain = _core(rig, stage)
     if gain == 0.0 or not np.isfinite(gain):
         return None
-    known: Relative = getattr(rig.uncertainty, stage)
+    part = slower_by(rig, stage, 1.0)
 
     def act(u: Array, values: tuple[float, ...], run: Run) -> Array:
         y = Chain(core).run(u, stage, stage, run, segment.between) / gain
-        made: Array = u + _PART * known.time * y / (float(np.max(np.abs(y))) or 1.0) * (y - u)
+        made: Array = u + part * y / (float(np.max(np.abs(y))) or 1.0) * (y - u)
         return made
 
     slower = Placed("level_pace", Form("level_pace", _AHEAD[stage], (), act), stage, ())
@@ -46,6 +46,18 @@ def level_pace(rig: Rig, segment: Segment) -> np.ndarray | None:
         for placed in ((), (slower,))
     )
     return other - usual if np.any(other != usual) else None
+
+
+def paced_stage(rig: Rig, segment: Segment) -> str | None:
+    """The stage whose pace it is."""
+    return next((s for s in _AHEAD if s in segment.stages and getattr(rig, s) is not None), None)
+
+
+def slower_by(rig: Rig, stage: str, size: float) -> float:
+    """By what part of its time a stage is slower at its highest level where what :func:`level_pace` gives is
+    there ``size`` times."""
+    known: Relative = getattr(rig.uncertainty, stage)
+    return size * _PART * known.time
 
 
 def _core(rig: Rig, stage: str) -> tuple[Rig, float]:

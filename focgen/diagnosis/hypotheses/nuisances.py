@@ -86,7 +86,7 @@ def _paced(problem: Problem) -> Problem:
     column = None if problem.segment.pace else level_pace(problem.nominals.rig, problem.segment)
     if column is None:
         return problem
-    segment = replace(problem.segment, loose=np.column_stack([problem.segment.loose, column]))
+    segment = replace(problem.segment, loose=np.column_stack([problem.segment.loose, column]), paced=True)
     return _where_all(problem, replace(problem, segment=segment, memory={}))
 
 

@@ -27,11 +27,17 @@ def uneven_paces(problem: Problem) -> list[CandidateEffect]:
 
 
 def _forms(slot: str) -> list[Form]:
-    return [_form(by, slot) for by in ("level", "time", "speed")]
+    """A regulator that is the slower the faster it goes is one whose flow is limited, and an effect."""
+    quicker = replace(_RATE, upper=0.0, starts=(-0.3,))
+    return [
+        _form("level", slot, _RATE),
+        _form("time", slot, _RATE),
+        _form("speed", slot, quicker if slot == EQUATIONS["regulator"] else _RATE),
+    ]
 
 
-def _form(by: str, slot: str) -> Form:
+def _form(by: str, slot: str, rate: Parameter) -> Form:
     def act(x: Dynamics, values: tuple[float, ...], run: None) -> Dynamics:
         return replace(x, pace=Pace(by, values[0]))
 
-    return Form(by, slot, (_RATE,), act)
+    return Form(by, slot, (rate,), act)

@@ -32,7 +32,8 @@ class Segment:
     ``closed``: whether a loop was closed around the rig; ``wanted`` (n,): its reference where it was, else
     the input, empty where none was. ``input_modes`` (n, k): ways in which an input that was simulated may be
     off, a standard deviation each. ``loose`` (n, k): what the output would be off by, were experiments to
-    begin a little otherwise than ``run`` says, in the output's unit. ``pace``: s after which an error no
+    begin a little otherwise than ``run`` says, in the output's unit; the last of it, where a stage is
+    ``paced`` otherwise at other levels, what that makes. ``pace``: s after which an error no
     longer counts, of a rig that integrates; 0: none is forgotten.
     """
 
@@ -51,6 +52,7 @@ class Segment:
     input_modes: np.ndarray
     loose: np.ndarray
     pace: float = 0.0
+    paced: bool = False
     wanted: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @cached_property

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from focgen.diagnosis.controller.check import ControllerCheck
 from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.level_pace import paced_stage, slower_by
 from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.confidence import nominal_instead
@@ -82,6 +83,20 @@ def _uneven(explanations: Iterable[Explanation]) -> Iterator[str]:
             yield (
                 f"{_within(e)}: {instead} the {pace.stage} may be ({pace.sure:.0%}) "
                 f"{pace.slowness:.2g} times as slow {_AT[pace.by]}, which no effect of the library is"
+            )
+
+
+def paced(explanations: Iterable[Explanation]) -> Iterator[str]:
+    """Where a time that depends on the level, within its uncertainty, explains what was not called a gap."""
+    for e in explanations:
+        problem = e.best.problem
+        rig, stage = problem.nominals.rig, paced_stage(problem.nominals.rig, problem.segment)
+        if problem.segment.paced and stage is not None:
+            size = float(e.best.vector[problem.head - problem.zeros - 1])
+            by = 100.0 * slower_by(rig, stage, size)
+            yield (
+                f"{_within(e)}: the {stage} seems to be {abs(by):.2g} % {'slower' if by > 0 else 'faster'} "
+                "at its highest level; that is within what its time may be off, and in no rig that is written"
             )
 
 

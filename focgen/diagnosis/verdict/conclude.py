@@ -15,7 +15,7 @@ from focgen.diagnosis.hypotheses.search import evidence as nats
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
-from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges, lesser
+from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges, lesser, paced
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
@@ -87,6 +87,7 @@ def conclude(
             *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
             *cautions(summary.causes, unknown, list(changed)),
             *lesser(beside),
+            *paced(explanations),
             *gauges(at_odds),
             *another_command(controller),
         ),
