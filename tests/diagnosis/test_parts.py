@@ -274,6 +274,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
     monkeypatch.setattr(unexplained, "from_outside", lambda e: False)
     monkeypatch.setattr(unexplained, "another", lambda e: None)
     monkeypatch.setattr(unexplained, "is_late", lambda e: False)
+    monkeypatch.setattr(unexplained, "is_uneven", lambda e: False)
     nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
     return SimpleNamespace(
         segment=SimpleNamespace(pace=0.0, closed=closed),

@@ -14,7 +14,7 @@ from focgen.diagnosis.diagnose import diagnose, explain_all
 from focgen.diagnosis.hypotheses.bootstrap import threshold
 from focgen.diagnosis.hypotheses.explain import candidates_for, explain
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.verdict import compose, conclude
+from focgen.diagnosis.verdict import compose, summary
 from focgen.diagnosis.verdict import predicted_improvement as promise
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.improvement import Improvement
@@ -196,9 +196,9 @@ def test_what_brings_the_whole_output_no_closer_is_not_named():
     (found,) = rigs.placed
     turned = replace(found, values=(-found.values[0], *found.values[1:]))
     assert found.values[0] > 0
-    assert conclude._no_closer(RIG, logs, rigs, explanations) == []
+    assert summary._no_closer(RIG, logs, rigs, explanations) == []
     worse = replace(rigs, placed=(turned,))
-    assert conclude._no_closer(RIG, logs, worse, explanations) == [explanations[-1]]
+    assert summary._no_closer(RIG, logs, worse, explanations) == [explanations[-1]]
 
 
 def test_noise_that_stays_in_an_input_is_known_behind_a_stage_that_hums(monkeypatch):
@@ -231,11 +231,11 @@ class Explained:
 
 def test_of_a_promise_of_next_to_nothing_segments_that_close_their_own_gap_are_not_in_vain(monkeypatch):
     """Of several as of one; but where errors add up, what is closed at the pace of the rig is no path."""
-    monkeypatch.setattr(conclude, "cross_validated_share", lambda e: e.share)
+    monkeypatch.setattr(summary, "cross_validated_share", lambda e: e.share)
     clear, vain, path = Explained(0.0, 0.9), Explained(0.0, 0.1), Explained(0.4, 0.9)
 
     def found(*explanations):
-        return conclude._in_vain(SimpleNamespace(causes=[(e, None) for e in explanations]))
+        return summary._in_vain(SimpleNamespace(causes=[(e, None) for e in explanations]))
 
     assert found(clear, vain, vain) == [vain]
     assert found(clear) == [] and found(vain) == [vain]
@@ -246,7 +246,7 @@ def test_of_a_promise_of_next_to_nothing_segments_that_close_their_own_gap_are_n
 def test_what_is_clear_in_one_segment_stands_whatever_is_left_in_another(share, causes, monkeypatch):
     """The output promises next to nothing; the pressure, logged, closes its own gap, or not even that."""
     monkeypatch.setattr(promise, "predict", lambda *given: Improvement(0.15, (0.0, 0.5)))
-    monkeypatch.setattr(conclude, "cross_validated_share", lambda *given: share)
+    monkeypatch.setattr(summary, "cross_validated_share", lambda *given: share)
     found = diagnose(RIG, session(11, vent=0.8, roles=("pressure",)), to=40.0)
     assert named(found) == causes
 
@@ -257,7 +257,7 @@ def test_what_was_fitted_beside_an_effect_goes_with_it():
     found = explain_all(RIG, logs, NUMBERS.nats, ["valve_asymmetry", "dead_zone"])
     rigs, zoned = compose.compose(RIG, found, logs), found[1]
     assert [c.rivals[0].effect for c in zoned.causes] == ["dead_zone"]
-    told = conclude._summary(RIG, logs, rigs, found, [zoned])
+    told = summary._summary(RIG, logs, rigs, found, [zoned])
     assert told.rigs.fitted.actuator == told.rigs.refitted.actuator != rigs.fitted.actuator
     assert np.mean(told.squares["explained"]) < np.mean(told.squares["refitted"])
 
@@ -299,14 +299,14 @@ def test_a_push_that_no_input_predicts_is_unknown_beside_what_is_clear():
 @pytest.mark.parametrize("noise, in_vain", [(0.8, True), (0.84, False)])
 def test_of_a_gap_little_above_the_noise_little_can_be_promised(noise, in_vain):
     squares = {"refitted": np.array([1.0, 1.0])}
-    told = conclude._Summary(None, [], {}, squares, noise**2, Improvement(0.1, (0.0, 0.5)))
+    told = summary.Summary(None, [], {}, squares, noise**2, Improvement(0.1, (0.0, 0.5)))
     assert told.in_vain == in_vain
 
 
 @pytest.mark.parametrize("explained, more", [(0.6, False), (0.7, True)])
 def test_more_is_left_where_less_than_half_above_the_noise_is_closed(explained, more):
     squares = {"refitted": np.array([1.1, 0.9]), "explained": np.array([explained, explained])}
-    told = conclude._Summary(None, ["one"], {}, squares, 0.25, None)
+    told = summary.Summary(None, ["one"], {}, squares, 0.25, None)
     assert told.more_is_left == more
     assert not replace(told, causes=[]).more_is_left
 
@@ -317,8 +317,8 @@ def test_more_is_left_where_less_than_half_above_the_noise_is_closed(explained, 
 def test_a_path_that_is_off_by_far_more_than_noise_is_not_the_rigs_own_numbers(noise, causes, is_there):
     """Gusts on a rig that integrates are gone from its errors at their pace, and the path keeps them."""
     squares = {"explained": np.array([1.2, 0.8])}
-    told = conclude._Summary(None, causes, {}, squares, noise**2, None)
-    assert conclude._unaccounted(told) == is_there
+    told = summary.Summary(None, causes, {}, squares, noise**2, None)
+    assert summary._unaccounted(told) == is_there
 
 
 def test_told_the_effect_it_considers_nothing_else():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -17,17 +17,15 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges, lesser, paced
 from focgen.diagnosis.verdict.confidence import tied
-from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.evidence import Evidence
-from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.late import logged_late
-from focgen.diagnosis.verdict.moments import another, changed_at_once, lasting_part
+from focgen.diagnosis.verdict.moments import another, changed_at_once
 from focgen.diagnosis.verdict.moves import far_moves
-from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.sizes import estimates
+from focgen.diagnosis.verdict.summary import Summary, parts_that_last, sorted_out
 from focgen.diagnosis.verdict.uneven import unevenly_paced
-from focgen.diagnosis.verdict.unexplained import disturbed, is_rounded, is_unknown
+from focgen.diagnosis.verdict.unexplained import disturbed
 from focgen.diagnosis.verdict.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
@@ -45,25 +43,12 @@ def conclude(
 ) -> tuple[compose.Rigs, Diagnosis, Evidence]:
     """The rigs that the verdict stands for, the diagnosis without a next experiment, and what it rests on.
     ``granted``: the effects are there, however little they explain."""
-    changed = {} if granted else _changed(explanations)
+    changed = {} if granted else parts_that_last(explanations)
     if changed:
         explanations = [changed.get(e, e) for e in explanations]
         rigs = compose.compose(rig, explanations, logs)
-    unknown = [e for e in explanations if is_unknown(e)]
-    summary = _summary(rig, logs, rigs, explanations, [*unknown, *_no_closer(rig, logs, rigs, explanations)])
-    if summary.in_vain and not granted and (vain := _in_vain(summary)):
-        unknown += vain
-        summary = _summary(rig, logs, rigs, explanations, unknown)
-    if not granted and not unknown and explanations[-1].segment.pace and _unaccounted(summary):
-        unknown += explanations[-1:]
-    beside = summary.causes if unknown and not granted and summary.more_is_left else []
-    if beside:
-        unknown += dict.fromkeys(e for e, _ in beside)
-        summary = _summary(rig, logs, rigs, explanations, unknown)
-    at_odds = [] if granted else _at_odds(summary)
-    if at_odds:
-        unknown += at_odds
-        summary = _summary(rig, logs, rigs, explanations, unknown)
+    stands = sorted_out(rig, logs, rigs, explanations, granted)
+    summary, unknown = stands.summary, stands.unknown
     made, squares, floor, total = summary.made, summary.squares, summary.floor, summary.total
     found = _ordered([_found(e, c, summary, logs) for e, c in summary.causes])
     found += _departures(controller)
@@ -86,129 +71,14 @@ def conclude(
             *notes_of(logs),
             *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
             *cautions(summary.causes, unknown, list(changed)),
-            *lesser(beside),
+            *lesser(stands.beside),
             *paced(explanations),
-            *gauges(at_odds),
+            *gauges(stands.at_odds),
             *another_command(controller),
         ),
         fits=_plain_fits(explanations),
     )
     return summary.rigs, diagnosis, Evidence(made, tuple(explanations))
-
-
-@dataclass(frozen=True, eq=False)
-class _Summary:
-    """What explanations amount to: ``made`` the simulated logs by rig, ``squares`` their mean square errors,
-    ``floor`` the noise's, ``total`` the promise."""
-
-    rigs: compose.Rigs
-    causes: list[tuple[Explanation, Cause]]
-    made: dict[str, list[dict[str, np.ndarray]]]
-    squares: dict[str, np.ndarray]
-    floor: float
-    total: Improvement | None
-
-    @property
-    def in_vain(self) -> bool:
-        """Whether effects that claim a gap well above the noise promise next to nothing: they mend what
-        something else does. Steps of a rounding do not come twice, whoever knows of them."""
-        return (
-            self.total is not None
-            and self.total.value < NUMBERS.vain
-            and self.floor < NUMBERS.above**2 * float(np.mean(self.squares["refitted"]))
-            and not any(is_rounded(e) or paths(e) for e, _ in self.causes)
-        )
-
-    @property
-    def more_is_left(self) -> bool:
-        """Whether effects close less of the gap than they leave above the noise. Then the gap comes from
-        something else, which they may stand for."""
-        refitted, explained = (float(np.mean(self.squares[name])) for name in ("refitted", "explained"))
-        return bool(self.causes) and refitted - explained < explained - self.floor
-
-    @property
-    def stands_for_more(self) -> bool:
-        """The same, but for steps of a rounding, which never fall where a model has them."""
-        return self.more_is_left and not any(is_rounded(e) for e, _ in self.causes)
-
-
-def _summary(
-    rig: Rig,
-    logs: Sequence[Experiment],
-    rigs: compose.Rigs,
-    explanations: Sequence[Explanation],
-    left_out: Sequence[Explanation],
-) -> _Summary:
-    held = _held(explanations, left_out)
-    rigs = compose.compose(rig, held, logs) if left_out else rigs
-    causes = [(e, c) for e in explanations for c in e.causes if e not in left_out]
-    made = {
-        "as given": compose.simulated(rig, (), logs),
-        "refitted": compose.simulated(rigs.refitted, (), logs),
-        "explained": compose.simulated(rigs.fitted, rigs.placed, logs),
-    }
-    squares = {name: compose.squares(logs, m) for name, m in made.items()}
-    floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
-    total = promised(rig, logs, held, squares, floor) if causes else None
-    return _Summary(rigs, causes, made, squares, floor, total)
-
-
-def _changed(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:
-    """The explanations of which a part became another at once instead, each with the part that lasts, where
-    this explains its segment but for that."""
-    parts = ((e, lasting_part(e)) for e in explanations)
-    return {e: part for e, part in parts if part is not e and not is_unknown(part)}
-
-
-def _unaccounted(summary: _Summary) -> bool:
-    """Whether nothing was found, and yet the output is off by far more than noise. Where errors add up, no
-    segment need show it: gusts in a path are gone from its own errors at their pace."""
-    return not summary.causes and summary.floor < NUMBERS.vain * float(np.mean(summary.squares["explained"]))
-
-
-def _in_vain(summary: _Summary) -> list[Explanation]:
-    """Of the segments with effects those whose own gap they do not close on new experiments either: what one
-    leaves unexplained takes nothing away from what is clear in another. Where errors add up, a fit does not
-    see its gap whole, but forgets it at its pace: there the promise tells, which is of the path."""
-    explained = dict.fromkeys(e for e, _ in summary.causes)
-    return [e for e in explained if e.segment.pace or cross_validated_share(e) < NUMBERS.vain]
-
-
-def _at_odds(summary: _Summary) -> list[Explanation]:
-    """The segments with effects, where what was found leaves the output further off than no effect.
-
-    Then a signal logged in between fits neither what is ahead of it nor what is behind, as of a gauge that is
-    at fault: either segments make up for one another, or without any effect there is no gap at all. A path
-    that one wanders is not foretold, so that only the latter tells then. Where errors add up, one may stand
-    for another."""
-    explained = list(dict.fromkeys(e for e, _ in summary.causes))
-    if not explained or any(is_rounded(e) or e.segment.pace for e in explained):
-        return []
-    found, *others = (float(np.mean(summary.squares[k])) for k in ("explained", "as given", "refitted"))
-    without = min(others)
-    if len(explained) > 1 and not any(map(paths, explained)):
-        return explained if found > without else []
-    no_gap, above = summary.floor > NUMBERS.above**2 * without, without < NUMBERS.above**2 * found
-    return explained if no_gap and above else []
-
-
-def _no_closer(
-    rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations: Sequence[Explanation]
-) -> list[Explanation]:
-    """The last segment, where its effects fit its measured input but bring the whole chain's output no
-    closer: what they mend is that input. A rounding leaves more, by nature."""
-    last = explanations[-1]
-    if not last.causes or is_rounded(last):
-        return []
-    without = compose.compose(rig, _held(explanations, [last]), logs)
-    both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
-    found, bare = (compose.mean_square(logs, made) for made in both)
-    return [last] if found > bare else []
-
-
-def _held(explanations: Sequence[Explanation], left_out: Sequence[Explanation]) -> list[Explanation]:
-    """The explanations, those that are left out without their effects and what was fitted beside them."""
-    return [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
 
 
 def _plain_fits(explanations: Sequence[Explanation]) -> tuple[PlainFit, ...]:
@@ -267,7 +137,7 @@ def _moved(e: Explanation) -> bool:
 def _found(
     e: Explanation,
     cause: Cause,
-    summary: _Summary,
+    summary: Summary,
     logs: Sequence[Experiment],
 ) -> Found:
     rigs = summary.rigs

@@ -1,0 +1,179 @@
+"""Which explanations stand, and what they amount to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.rivals import Cause
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.verdict import compose
+from focgen.diagnosis.verdict.cross_validation import cross_validated_share
+from focgen.diagnosis.verdict.floor import floor as noise_floor
+from focgen.diagnosis.verdict.improvement import Improvement
+from focgen.diagnosis.verdict.moments import lasting_part
+from focgen.diagnosis.verdict.predicted_improvement import paths, promised
+from focgen.diagnosis.verdict.unexplained import is_rounded, is_unknown
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """What explanations amount to: ``made`` the simulated logs by rig, ``squares`` their mean square errors,
+    ``floor`` the noise's, ``total`` the promise."""
+
+    rigs: compose.Rigs
+    causes: list[tuple[Explanation, Cause]]
+    made: dict[str, list[dict[str, np.ndarray]]]
+    squares: dict[str, np.ndarray]
+    floor: float
+    total: Improvement | None
+
+    @property
+    def in_vain(self) -> bool:
+        """Whether effects that claim a gap well above the noise promise next to nothing: they mend what
+        something else does. Steps of a rounding do not come twice, whoever knows of them."""
+        return (
+            self.total is not None
+            and self.total.value < NUMBERS.vain
+            and self.floor < NUMBERS.above**2 * float(np.mean(self.squares["refitted"]))
+            and not any(is_rounded(e) or paths(e) for e, _ in self.causes)
+        )
+
+    @property
+    def more_is_left(self) -> bool:
+        """Whether effects close less of the gap than they leave above the noise. Then the gap comes from
+        something else, which they may stand for."""
+        refitted, explained = (float(np.mean(self.squares[name])) for name in ("refitted", "explained"))
+        return bool(self.causes) and refitted - explained < explained - self.floor
+
+    @property
+    def stands_for_more(self) -> bool:
+        """The same, but for steps of a rounding, which never fall where a model has them."""
+        return self.more_is_left and not any(is_rounded(e) for e, _ in self.causes)
+
+
+@dataclass(frozen=True, eq=False)
+class SortedOut:
+    """The ``summary`` of what stands, and the explanations that are ``unknown``: among them those of effects
+    ``beside`` a larger part of the gap that nothing explains, and those ``at_odds`` with one another."""
+
+    summary: Summary
+    unknown: list[Explanation]
+    beside: list[tuple[Explanation, Cause]]
+    at_odds: list[Explanation]
+
+
+def sorted_out(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    rigs: compose.Rigs,
+    explanations: Sequence[Explanation],
+    granted: bool,
+) -> SortedOut:
+    """Which explanations stand. Every one that is left out changes what the others amount to."""
+
+    def summary_without(unknown: Sequence[Explanation]) -> Summary:
+        return _summary(rig, logs, rigs, explanations, unknown)
+
+    unknown = [e for e in explanations if is_unknown(e)]
+    summary = summary_without([*unknown, *_no_closer(rig, logs, rigs, explanations)])
+    if granted:
+        return SortedOut(summary, unknown, [], [])
+    if summary.in_vain and (vain := _in_vain(summary)):
+        unknown += vain
+        summary = summary_without(unknown)
+    if not unknown and explanations[-1].segment.pace and _unaccounted(summary):
+        unknown += explanations[-1:]
+    beside = summary.causes if unknown and summary.more_is_left else []
+    if beside:
+        unknown += dict.fromkeys(e for e, _ in beside)
+        summary = summary_without(unknown)
+    at_odds = _at_odds(summary)
+    if at_odds:
+        unknown += at_odds
+        summary = summary_without(unknown)
+    return SortedOut(summary, unknown, beside, at_odds)
+
+
+def _summary(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    rigs: compose.Rigs,
+    explanations: Sequence[Explanation],
+    left_out: Sequence[Explanation],
+) -> Summary:
+    held = _held(explanations, left_out)
+    rigs = compose.compose(rig, held, logs) if left_out else rigs
+    causes = [(e, c) for e in explanations for c in e.causes if e not in left_out]
+    made = {
+        "as given": compose.simulated(rig, (), logs),
+        "refitted": compose.simulated(rigs.refitted, (), logs),
+        "explained": compose.simulated(rigs.fitted, rigs.placed, logs),
+    }
+    squares = {name: compose.squares(logs, m) for name, m in made.items()}
+    floor = noise_floor(explanations[-1], float(np.mean(squares["explained"])))
+    total = promised(rig, logs, held, squares, floor) if causes else None
+    return Summary(rigs, causes, made, squares, floor, total)
+
+
+def parts_that_last(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:
+    """The explanations of which a part became another at once instead, each with the part that lasts, where
+    this explains its segment but for that."""
+    parts = ((e, lasting_part(e)) for e in explanations)
+    return {e: part for e, part in parts if part is not e and not is_unknown(part)}
+
+
+def _unaccounted(summary: Summary) -> bool:
+    """Whether nothing was found, and yet the output is off by far more than noise. Where errors add up, no
+    segment need show it: gusts in a path are gone from its own errors at their pace."""
+    return not summary.causes and summary.floor < NUMBERS.vain * float(np.mean(summary.squares["explained"]))
+
+
+def _in_vain(summary: Summary) -> list[Explanation]:
+    """Of the segments with effects those whose own gap they do not close on new experiments either: what one
+    leaves unexplained takes nothing away from what is clear in another. Where errors add up, a fit does not
+    see its gap whole, but forgets it at its pace: there the promise tells, which is of the path."""
+    explained = dict.fromkeys(e for e, _ in summary.causes)
+    return [e for e in explained if e.segment.pace or cross_validated_share(e) < NUMBERS.vain]
+
+
+def _at_odds(summary: Summary) -> list[Explanation]:
+    """The segments with effects, where what was found leaves the output further off than no effect.
+
+    Then a signal logged in between fits neither what is ahead of it nor what is behind, as of a gauge that is
+    at fault: either segments make up for one another, or without any effect there is no gap at all. A path
+    that one wanders is not foretold, so that only the latter tells then. Where errors add up, one may stand
+    for another."""
+    explained = list(dict.fromkeys(e for e, _ in summary.causes))
+    if not explained or any(is_rounded(e) or e.segment.pace for e in explained):
+        return []
+    found, *others = (float(np.mean(summary.squares[k])) for k in ("explained", "as given", "refitted"))
+    without = min(others)
+    if len(explained) > 1 and not any(map(paths, explained)):
+        return explained if found > without else []
+    no_gap, above = summary.floor > NUMBERS.above**2 * without, without < NUMBERS.above**2 * found
+    return explained if no_gap and above else []
+
+
+def _no_closer(
+    rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations: Sequence[Explanation]
+) -> list[Explanation]:
+    """The last segment, where its effects fit its measured input but bring the whole chain's output no
+    closer: what they mend is that input. A rounding leaves more, by nature."""
+    last = explanations[-1]
+    if not last.causes or is_rounded(last):
+        return []
+    without = compose.compose(rig, _held(explanations, [last]), logs)
+    both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
+    found, bare = (compose.mean_square(logs, made) for made in both)
+    return [last] if found > bare else []
+
+
+def _held(explanations: Sequence[Explanation], left_out: Sequence[Explanation]) -> list[Explanation]:
+    """The explanations, those that are left out without their effects and what was fitted beside them."""
+    return [replace(e, best=e.nominal) if e in left_out else e for e in explanations]
