@@ -197,7 +197,8 @@ def explain_all(
         x = freed(segment, made, foretold, left, noise)
         ways = None
         if is_explained(left, noise):
-            ways = np.column_stack([input_covariance(e), slow_rest(segment, x, response)])
+            rest = slow_rest(segment, x, response, left)
+            ways = np.column_stack([input_covariance(e), rest])
         unsure = strays(segment, made, response, left, noise)
         x = x + problem.simulate(problem.level(e.best.vector)) - made
     return tuple(found)
