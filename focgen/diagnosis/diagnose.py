@@ -179,7 +179,7 @@ def explain_all(
     found: list[Explanation] = []
     roles, x, ways, unsure = cuts(logs), None, None, None
     for entry, exit in pairwise(roles):
-        segment = loosened(rig, make(logs, entry, exit, x, ways))
+        segment = loosened(rig, make(logs, entry, exit, x, ways), logs)
         step(f"{entry} to {exit}")
         e = explain(rig, segment, logs, threshold, only, unsure)
         if draws > 1 and e.causes and only is None:

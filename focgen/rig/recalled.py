@@ -71,19 +71,26 @@ def recalled(
     where that would not show, or come no ``closer``, or in a rig that integrates."""
     if len(logs) < 2 or not all(map(len, logs)) or integrations(rig):
         return tuple(logs)
-    past = _LONGEST * response_time(rig, logs[0].sample_time, longest(logs))
-    found = tuple(_recalled(log, [other for other in logs if _end(other) <= log.start], past) for log in logs)
+    past = memory(rig, logs)
+    found = tuple(
+        _recalled(log, [other for other in logs if ended(other) <= log.start], past) for log in logs
+    )
     return found if _shows(rig, placed, logs, found, closer) else tuple(logs)
 
 
-def _end(log: Experiment) -> float:
+def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
+    """How long ago, s, an input counts as 0."""
+    return _LONGEST * response_time(rig, logs[0].sample_time, longest(logs))
+
+
+def ended(log: Experiment) -> float:
     """When the last sample of an experiment was, on the session's clock, s."""
     return log.start + (len(log) - 1) * log.sample_time
 
 
 def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float) -> Experiment:
     roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
-    begins = {role: _begin(log, earlier, role, past) for role in roles if _idle(log, earlier, role)}
+    begins = {role: begin_after(log, earlier, role, past) for role in roles if _idle(log, earlier, role)}
     begins = {role: begin for role, begin in begins.items() if not begin.at_rest}
     return replace(log, begins=begins, notes=(*log.notes, NOTE)) if begins else log
 
@@ -100,7 +107,7 @@ def _starts_at_zero(log: Experiment, earlier: Sequence[Experiment], role: str) -
     return abs(float(log[role][0])) <= _NOTHING * largest
 
 
-def _begin(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Begin:
+def begin_after(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Begin:
     """An input's past, by the logs of the ``earlier`` experiments, up to so many s before this one."""
     ago = np.concatenate([np.zeros(0), *(_ago(log, other) for other in earlier)])
     x = np.concatenate([np.zeros(0), *(np.asarray(other[role], float) for other in earlier)])

@@ -97,3 +97,17 @@ def test_levels_of_a_finer_converter_behind_are_steps(monkeypatch):
     assert len(np.unique(np.concatenate([log["output"] for log in logs]))) < 40
     found = diagnose(HEATER, logs)
     assert [c.candidates[0].effect for c in found.causes] == ["sensor_quantization"]
+
+
+@pytest.mark.parametrize("dead", [3.0, 0.0])
+def test_steps_that_are_noise_beside_an_effect_are_no_second_one(dead):
+    """A pump that does nothing below 3 V, read in steps of 0.5 of 24."""
+    t = np.arange(840) * H
+    logs = []
+    for i, pump in enumerate((np.repeat(LEVELS, 60), 6.0 - 6.0 * np.cos(0.4 * t))):
+        read = 0.5 * np.round(answered(np.maximum(pump - dead, 0.0)) / 0.5)
+        logs.append(replace(Experiment(str(i), H, {"command": pump, "output": read}), start=60.0 * i))
+    found = diagnose(HEATER, logs, pictures=False)
+    names = [cause.candidates[0].effect for cause in found.causes]
+    assert names == (["dead_zone"] if dead else ["sensor_quantization"])
+    assert any("steps of 0.5" in note for note in found.notes) == bool(dead)

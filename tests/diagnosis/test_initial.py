@@ -10,7 +10,12 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.hypotheses.initial import begun_session, loosened
 from focgen.diagnosis.problem.segments import make
 from focgen.logs.begin import Begin
+from focgen.logs.experiment import Experiment
+from focgen.logs.read import in_session_order
+from focgen.rig.effects import Run
+from focgen.rig.engine import Chain
 from focgen.rig.initial import NOTE
+from focgen.rig.rig import Actuator, Rig, Signals
 from tests.diagnosis_rig import RIG, H, session
 
 CUTS = {"steps": 8.0 + 2.5, "stairs": 6.0 + 4.2, "hold": 2.0 + 1.3}  # s into the logs: after steps from rest
@@ -56,13 +61,13 @@ def test_a_session_at_rest_is_left_as_it_is():
     logs = session(4)
     assert all(a is b or not a.begins for a, b in zip(begun_session(RIG, logs), logs))
     segment = make(logs, "command", "pressure")
-    assert loosened(RIG, segment) is segment
+    assert loosened(RIG, segment, logs) is segment
 
 
 def test_a_begin_may_be_off_in_the_ways_that_show():
     log = session(2)[0].between(10.5, None)
     told = begun_session(RIG, [log])
-    segment = loosened(RIG, make(told, "pressure", "curvature"))
+    segment = loosened(RIG, make(told, "pressure", "curvature"), told)
     rows = segment.loose.T
     assert 1 <= len(rows) <= 3 and segment.thinned(4).loose.shape == (len(log) // 4, len(rows))
     gram = rows @ rows.T
@@ -76,3 +81,30 @@ def test_thinning_keeps_the_begins():
     segment = make(begun_session(RIG, [log]), "command", "pressure")
     assert segment.run.begins and segment.thinned(3).run.begins == segment.run.begins
     assert isinstance(segment.run.begins[0], Begin) and segment.run.h == H
+
+
+FINGER = Rig("finger", 0.02, Signals("t", "y", pressure="p"), Actuator(0.84, 0.6, (0.5, 0.0025)))
+
+
+def rested(seed, noise):
+    """Stairs, levels and a sine of a finger that remembers, each log with a clock of its own: it rested 10 s
+    before the second, and was held at its first level for 16 s, and rested 10 s before the third."""
+    rng, n = np.random.default_rng(seed), 3000
+    stairs = np.repeat([0.0, 20.0, 40.0, 60.0, 80.0, 95.0, 75.0, 55.0, 35.0, 15.0], 300)
+    levels = np.repeat(np.r_[47.5, rng.uniform(15.0, 70.0, 9)], 300)
+    sine = 47.5 - 47.5 * np.cos(2.0 * np.pi * np.arange(n) * 0.02 / 20.0)
+    rest, held = np.zeros(500), np.full(800, 47.5)
+    whole = np.concatenate([np.zeros(200), stairs, rest, held, levels, rest, sine])
+    run = Run.of([len(whole)], [0.0], 0.02)
+    y = Chain(FINGER).run(whole, "actuator", "actuator", run, False)
+    y += noise * rng.standard_normal(len(y))
+    parts = (slice(a, a + n) for a in (200, 200 + n + 1300, 200 + 2 * n + 1800))
+    logs = [Experiment(f"{k}", 0.02, {"pressure": whole[p], "output": y[p]}) for k, p in enumerate(parts)]
+    return in_session_order(logs)
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.05])
+def test_what_a_rest_of_unknown_length_left_is_no_drift(noise):
+    """Of 50: it was `sensor_drift`, and `unknown`."""
+    found = diagnose(FINGER, rested(1, noise), pictures=False)
+    assert found.verdict in ("none", "parameters") and not found.causes

@@ -8,7 +8,7 @@ that.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -17,12 +17,12 @@ import numpy as np
 from focgen.diagnosis.fitting.fit import WHITE, fit
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.segments import Segment, cuts, make
-from focgen.logs.begin import Begin
+from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.initial import begun
-from focgen.rig.recalled import with_recalled
+from focgen.rig.recalled import begin_after, ended, memory, with_recalled
 from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
@@ -71,21 +71,22 @@ def _refitted(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, float]:
     return rig, left
 
 
-def loosened(rig: Rig, segment: Segment) -> Segment:
+def loosened(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Segment:
     """The segment with the ways in which the begins of its experiments may be off."""
     if not segment.run.begins:
         return segment
     columns = []
-    for (first, last), begin in zip(segment.run.spans, segment.run.begins):
-        for way in () if begin.at_rest or begin.known else _ways(rig, segment, first, last, begin):
+    for number, ((first, last), begin) in enumerate(zip(segment.run.spans, segment.run.begins)):
+        for way in () if begin.at_rest else _ways(rig, segment, logs, number, begin):
             column = np.zeros(len(segment.x))
             column[first:last] = way
             columns.append(column)
     return replace(segment, loose=np.stack(columns, axis=1)) if columns else segment
 
 
-def _ways(rig: Rig, segment: Segment, first: int, last: int, begin: Begin) -> np.ndarray:
+def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], number: int, begin: Begin) -> np.ndarray:
     """Rows (k, n): what begins a little different would change of one experiment, uncorrelated."""
+    first, last = segment.run.spans[number]
     start, h = float(segment.run.clock[first]), segment.run.h
 
     def made(begin: Begin) -> np.ndarray:
@@ -94,11 +95,40 @@ def _ways(rig: Rig, segment: Segment, first: int, last: int, begin: Begin) -> np
             segment.x[first:last], segment.stages[0], segment.stages[-1], run, segment.between
         )
 
-    base = made(begin)
-    changed = np.stack([made(other) - base for other in _beside(begin, _LEVEL * segment.level_in)])
-    _, sizes, axes = np.linalg.svd(changed, full_matrices=False)
+    changed = []
+    if not begin.known:
+        changed += [made(other) - made(begin) for other in _beside(begin, _LEVEL * segment.level_in)]
+    if logs[number].paused:
+        changed += _rested(rig, segment, logs, number, made, begin.known)
+    if not changed:
+        return np.zeros((0, last - first))
+    _, sizes, axes = np.linalg.svd(np.stack(changed), full_matrices=False)
     found: np.ndarray = (sizes[:, None] * axes)[sizes > _SEEN * segment.level_out * np.sqrt(last - first)]
     return found
+
+
+def _rested(
+    rig: Rig,
+    segment: Segment,
+    logs: Sequence[Experiment],
+    number: int,
+    made: Callable[[Begin], np.ndarray],
+    known: bool,
+) -> list[np.ndarray]:
+    """What is left of earlier experiments, where no clock says how long the rig rested after them: as much
+    more, where it is not ``known`` to be there at all, and what a longer rest makes of it."""
+    log, earlier, past = logs[number], logs[:number], memory(rig, logs)
+    if not earlier or segment.entry not in log:
+        return []
+    pause = log.start - max(map(ended, earlier))
+
+    def left(longer: float) -> np.ndarray:
+        later = replace(log, start=log.start + longer * pause)
+        then: np.ndarray = made(begin_after(later, earlier, segment.entry, past)) - made(REST)
+        return then
+
+    now = left(0.0)
+    return [now * (_LEVEL if known else 1.0), *(left(longer) - now for longer in (_TIME - 1.0, 1.0))]
 
 
 def _beside(begin: Begin, step: float) -> Iterator[Begin]:

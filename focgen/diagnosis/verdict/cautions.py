@@ -48,6 +48,7 @@ def cautions(
     yield from _late(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
     yield from _uneven(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
     yield from _nominal(causes)
+    yield from _rounded(dict.fromkeys(e for e, _ in causes))
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
 
@@ -98,6 +99,14 @@ def paced(explanations: Iterable[Explanation]) -> Iterator[str]:
                 f"{_within(e)}: the {stage} seems to be {abs(by):.2g} % {'slower' if by > 0 else 'faster'} "
                 "at its highest level; that is within what its time may be off, and in no rig that is written"
             )
+
+
+def _rounded(explanations: Iterable[Explanation]) -> Iterator[str]:
+    """Where readings move in steps that are noise beside what was found."""
+    for e in explanations:
+        if e.converter is not None and e.converter.is_noise(e.nominal):
+            step = e.converter.step * e.segment.level_out
+            yield f"{_within(e)}: the readings move in steps of {step:.3g}, noise beside what was found"
 
 
 def _nominal(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
