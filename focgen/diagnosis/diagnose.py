@@ -15,7 +15,7 @@ from focgen.control.units import check_one_unit
 from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
 from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
-from focgen.diagnosis.hypotheses.explain import Explanation, candidates_for, explain, gained
+from focgen.diagnosis.hypotheses.explain import Explanation, candidates_for, explain, gained, remembering
 from focgen.diagnosis.hypotheses.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
 from focgen.diagnosis.model import Diagnosis
@@ -84,6 +84,7 @@ def diagnose(
     session = begun_session(nominal, session)
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
     nominal = explanations[0].with_intersample(nominal)
+    explanations, session = _lasting(nominal, explanations, session, only, bootstrap)
     rigs = compose.compose(nominal, explanations, session)
     explanations, rigs, session = _carried_on(nominal, explanations, rigs, session, only, bootstrap)
     session = begun_with(rigs.fitted, rigs.placed, session)
@@ -102,6 +103,26 @@ def diagnose(
 
         write(out, diagnosis, proposed[1] if proposed else None, pictures, given)
     return diagnosis
+
+
+def _lasting(
+    nominal: Rig,
+    explanations: tuple[Explanation, ...],
+    session: tuple[Experiment, ...],
+    only: Sequence[str] | None,
+    bootstrap: int,
+) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
+    """The findings and the session, made anew where a loop or a play lies, as a log begins, where the one
+    before left it. A refit of what remembers, without what it was found beside, shows first whether that is
+    worth a search: a drift makes up for it."""
+    if len(session) < 2:
+        return explanations, session
+    lasting = tuple(replace(log, lasts=True) for log in session)
+    if sum(gained(bare, lasting) for e in explanations if (bare := remembering(e))) < NUMBERS.nats:
+        return explanations, session
+    step("what is left where the last log ended")
+    again = explain_all(nominal, lasting, NUMBERS.nats, only, bootstrap)
+    return (again, lasting) if _left_by(again) < _left_by(explanations) else (explanations, session)
 
 
 def _carried_on(

@@ -26,7 +26,8 @@ class Experiment:
     before, in samples that are missing or cut out, so that the state in which it begins is unknown.
     ``begins``: by role, what a signal was before the first sample; others were at rest at 0. ``anew``:
     ahead of it the log's clock fell back. ``paused``: how long the rig rested before it is not known, and
-    ``start`` is as if no time had passed.
+    ``start`` is as if no time had passed. ``lasts``: a loop or a play lies where the experiment before left
+    it, and not at 0.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Experiment:
     begins: Mapping[str, Begin] = field(default_factory=dict)
     anew: bool = False
     paused: bool = False
+    lasts: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "begins", MappingProxyType(dict(self.begins)))

@@ -17,7 +17,7 @@ from focgen.rig.begun import past_of, with_past
 from focgen.rig.changeable import IN_STEPS
 from focgen.rig.delay import delayed
 from focgen.rig.dynamics import FREE, STEADY, UNCHANGED, Dynamics, Pace
-from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run
+from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run, library
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.weak import weakened
@@ -51,6 +51,8 @@ class Placed:
         return self.form.leaves(x, self.values, self._own(run)) if self.form.leaves else {}
 
     def _own(self, run: Run) -> Run:
+        if run.lasts and (family := library().get(self.effect)) and family.remembers:
+            run = run.unbroken
         return replace(run, carried=self.carried) if self.carried else run
 
     @property

@@ -71,7 +71,7 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
     given = rig_of(rig)
     session = experiments(given, logs, from_, to)
     told = told_between(given, session)
-    session = _with_past(told, session)
+    session = _lasting(told, _with_past(told, session))
     simulated = simulate_session(told, session)
     results = {log.name: _compared(log, made) for log, made in zip(session, simulated)}
     made = {log.name: made for log, made in zip(session, simulated)}
@@ -85,6 +85,16 @@ def _with_past(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     if not all("output" in log for log in logs):
         return found
     return with_recalled(rig, found, lambda session: _left(rig, session), placed_in(rig))
+
+
+def _lasting(rig: Rig, logs: tuple[Experiment, ...]) -> tuple[Experiment, ...]:
+    """The experiments with what remembers left where the one before left it, where that brings the output
+    closer."""
+    remembers = any(library()[p.effect].remembers for p in placed_in(rig))
+    if not remembers or len(logs) < 2 or not all("output" in log for log in logs):
+        return logs
+    lasting = tuple(replace(log, lasts=True) for log in logs)
+    return lasting if _left(rig, lasting) < _left(rig, logs) else logs
 
 
 def experiments(
@@ -114,7 +124,8 @@ def simulate_session(
     begin = min(log.start for log in logs)
     ahead = clock if begin < clock else 0.0
     starts, begins = [log.start + ahead for log in logs], [log.before(entry) for log in logs]
-    run = Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins)
+    lasts = any(log.lasts for log in logs)
+    run = Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins, lasts)
     tap: dict[str, Array] = {}
     x = np.concatenate([np.asarray(log[entry], float) for log in logs])
     first = "regulator" if entry == "command" else "actuator"

@@ -278,6 +278,16 @@ def gained(of: Explanation, logs: Sequence[Experiment]) -> float:
     return evidence(_moved_to(of.best, segment, Weighing(of.ar)), of.best)
 
 
+def remembering(of: Explanation) -> Explanation | None:
+    """An explanation with those of its effects alone that stay where the last experiment left them; None
+    where there are none."""
+    others = [c for c in of.best.problem.candidates if not (c.family and c.family.remembers)]
+    if len(others) == len(of.best.problem.candidates):
+        return None
+    best = left_out(of.best, others, Weighing(of.ar)) if others else of.best
+    return replace(of, best=best)
+
+
 def _in_the_end(rival: Rival, found: Fit, best: Fit) -> Rival:
     """A rival that is what was ``found``, with what that is in the end."""
     return replace(rival, fit=best) if rival.fit is found else rival

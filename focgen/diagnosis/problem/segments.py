@@ -150,7 +150,8 @@ def between(entry: str, exit: str) -> tuple[str, ...]:
 def session(logs: Sequence[Experiment], entry: str) -> Run:
     """The run that the logs are, where the signal ``entry`` is its input."""
     begins = [log.before(entry) for log in logs]
-    return Run.of([len(log) for log in logs], [log.start for log in logs], logs[0].sample_time, begins)
+    starts, lasts = [log.start for log in logs], any(log.lasts for log in logs)
+    return Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins, lasts)
 
 
 def joined(logs: Sequence[Experiment], role: str) -> np.ndarray:

@@ -7,7 +7,8 @@ name.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -79,6 +80,7 @@ class Run:
     0, 2 where it comes from equilibrium with that sample's input; ``clock`` (n,) is the session's time in s;
     ``duration`` of the longest experiment in s; ``carried``: what of an effect outlived an earlier session.
     ``begins``: what the input was before each experiment, in its order; none where all come from rest.
+    ``lasts``: what remembers lies, as an experiment begins at rest, where its last turn left it.
     ``rough``: what is integrated in steps may take them twice as long, for fits that are but compared.
     """
 
@@ -88,7 +90,16 @@ class Run:
     duration: float
     carried: Mapping[str, float] = field(default_factory=dict)
     begins: tuple[Begin, ...] = ()
+    lasts: bool = False
     rough: bool = False
+
+    @cached_property
+    def unbroken(self) -> Run:
+        """The run in which only the first experiment begins at 0, and those whose past is told."""
+        rest = self.rest.copy()
+        later = np.flatnonzero(rest)[1:]
+        rest[later[rest[later] == 1]] = 0
+        return replace(self, rest=rest)
 
     @property
     def spans(self) -> list[tuple[int, int]]:
@@ -98,14 +109,19 @@ class Run:
 
     @classmethod
     def of(
-        cls, lengths: Sequence[int], starts: Sequence[float], h: float, begins: Sequence[Begin] = ()
+        cls,
+        lengths: Sequence[int],
+        starts: Sequence[float],
+        h: float,
+        begins: Sequence[Begin] = (),
+        lasts: bool = False,
     ) -> Run:
         """The run of experiments of ``lengths`` samples beginning at ``starts`` s on the session's clock."""
         rest = np.zeros(sum(lengths), np.uint8)
         rest[np.cumsum([0, *lengths[:-1]])] = 1
         clock = np.concatenate([s + h * np.arange(n) for n, s in zip(lengths, starts)])
         begins = () if all(b.at_rest for b in begins) else tuple(begins)
-        return cls(h, rest, clock, max(lengths) * h, begins=begins)
+        return cls(h, rest, clock, max(lengths) * h, begins=begins, lasts=lasts)
 
 
 Values = tuple[float, ...]

@@ -1,0 +1,97 @@
+"""Loops that lie, as a log begins, where the log before left them, made here of plays and lags.
+
+Red when what a loop kept from the last log is taken for a drift, a dead zone or a folded reading, or when the
+rig that was found does not keep it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run, form_of
+from focgen.rig.engine import Chain, Placed
+from focgen.rig.replay import simulate_session
+from focgen.rig.rig import LinearActuator, Rig, Signals
+
+H, N, REST = 0.02, 1200, 400
+LAG = TransferFunction([(2.0, 0.0)], [(0.8, 1.0), (1.0, 0.0)])
+FAST = TransferFunction([(1.0, 0.0)], [(0.2, 1.0), (1.0, 0.0)])
+RIG = Rig("rig", H, Signals("t", "y", "u", pressure="p"), LinearActuator(LAG), FAST)
+
+
+def lagged(x, time, gain=1.0):
+    kept = np.exp(-H / time)
+    return lfilter([0.0, gain * (1.0 - kept)], [1.0, -kept], x)
+
+
+def loops(x, size):
+    """The mean of four plays of half and up to twice a size."""
+    found = np.zeros((4, len(x)))
+    for row, width in zip(found, size * np.array([0.5, 1.0, 1.5, 2.0])):
+        y = 0.0
+        for k, v in enumerate(x):
+            row[k] = y = min(max(y, v - width), v + width)
+    return found.mean(axis=0)
+
+
+def session(seed, where, size):
+    """Three logs of random holds that begin and end at 0, with rests between them that nobody logged."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for _ in range(3):
+        u = np.repeat(rng.uniform(0.0, 1.0, N // 100), 100)
+        u[:60] = u[-100:] = 0.0
+        parts += [u, np.zeros(REST)]
+    u = np.concatenate(parts)
+    p = lagged(u, 0.2)
+    y = lagged(0.4 * p + 0.6 * loops(p, size) if where == "actuator" else p, 0.8, 2.0)
+    y = 0.4 * y + 1.2 * loops(y / 2.0, size) if where == "sensor" else y
+    noisy = {
+        "pressure": p + 0.003 * rng.standard_normal(len(p)),
+        "output": y + 0.008 * rng.standard_normal(len(y)),
+    }
+    return [
+        Experiment(f"{k}", H, {"command": u[s], **{role: x[s] for role, x in noisy.items()}}, start=k * 32.0)
+        for k, s in enumerate(slice(a, a + N) for a in range(0, 3 * (N + REST), N + REST))
+    ]
+
+
+@pytest.mark.parametrize("where, effect", [("actuator", "hysteresis"), ("sensor", "sensor_hysteresis")])
+@pytest.mark.parametrize("size", [0.03, pytest.param(0.1, marks=pytest.mark.long)])
+def test_a_loop_left_by_the_last_log_is_that_and_no_more(where, effect, size):
+    """It had a folded reading beside it, or shared a set, or was `unknown`."""
+    found = diagnose(RIG, session(1, where, size), pictures=False)
+    (cause,) = found.causes
+    assert [c.effect for c in cause.candidates] == [effect]
+    assert cause.candidates[0].confidence > 0.9 and cause.stage == where
+
+
+def test_what_remembers_alone_lies_where_the_last_experiment_left_it():
+    """As one long run, whose rests are left out; a lag begins at 0 all the same."""
+    x = np.r_[np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.0, 50)]
+    play, late = form_of("hysteresis", "play"), form_of("slow_regulator", "one_lag")
+    run = Run.of([100, 100], [0.0, 10.0], H, lasts=True)
+    for form, effect, kept in ((play, "hysteresis", True), (late, "slow_regulator", False)):
+        placed = Placed(effect, form, "actuator", (0.1,))
+        made = placed.act(np.r_[x, x], run)
+        whole = placed.act(np.r_[x, x], Run.of([200], [0.0], H))
+        anew = placed.act(np.r_[x, x], Run.of([100, 100], [0.0, 10.0], H))
+        np.testing.assert_array_equal(made, whole if kept else anew)
+        assert np.max(np.abs(whole - anew)) > 0.01
+
+
+def test_a_session_is_simulated_as_its_experiments_say():
+    effects = (Placed("sensor_hysteresis", form_of("sensor_hysteresis", "play"), "sensor", (0.05,)),)
+    logs = session(2, "sensor", 0.03)
+    anew, lasting = (
+        simulate_session(RIG, [replace(log, lasts=k) for log in logs], effects) for k in (False, True)
+    )
+    np.testing.assert_array_equal(anew[0]["output"], lasting[0]["output"])
+    assert anew[1]["output"][0] == 0.0 and lasting[1]["output"][0] == pytest.approx(0.05)
+    alone = Chain(RIG, effects).run(logs[0]["command"], "regulator", "sensor", Run.of([N], [0.0], H), True)
+    np.testing.assert_array_equal(anew[0]["output"], alone)
