@@ -77,7 +77,6 @@ ONE_WAY = {
 }
 QUICK_ONE_WAY = {
     (("sensor", "falls late"), 1, "B"),
-    (("sensor", "rises late"), 2, "C"),
     (("regulator", "rises late"), 2, "B"),
     (("actuator", "rises late"), 1, "A"),
 }
@@ -96,8 +95,6 @@ UNEVEN = [(stage, by) for stage in ("actuator", "sensor") for by in ("level", "t
 QUICK_UNEVEN = {
     (("actuator", "level"), 2, "C"),
     (("actuator", "time"), 1, "B"),
-    (("actuator", "speed"), 1, "C"),
-    (("sensor", "level"), 1, "C"),
 }
 
 
