@@ -60,6 +60,7 @@ CONSTANTS = {
 
 COMPARED = {
     "controller/check.py": [0.0001, 0.002],  # of the range, of the command: limits and departures
+    "hypotheses/converter.py": [12.0],  # a step squared over 12 is what a rounding leaves
     "hypotheses/disturbance.py": [0.1, 8.0],  # ends of bands of frequency
     "problem/decimate.py": [3.0],  # samples
     "proposals/menu.py": [10.0],  # response times of a hold

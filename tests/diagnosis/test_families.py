@@ -21,7 +21,7 @@ from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.rivals import left_out
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.segments import make
-from focgen.diagnosis.verdict import conclude
+from focgen.diagnosis.verdict import summary
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import form_of, library
@@ -142,8 +142,8 @@ def test_effects_that_leave_more_than_they_close_stand_for_something_else(
     explained, more, rounded, monkeypatch
 ):
     """Steps of a rounding leave what they leave: no model has them where they fall."""
-    monkeypatch.setattr(conclude, "is_rounded", lambda e: rounded)
+    monkeypatch.setattr(summary, "is_rounded", lambda e: rounded)
     squares = {"refitted": np.array([1.0]), "explained": np.array([explained])}
-    made = conclude._Summary(None, [(None, None)], {}, squares, 0.1, None)
+    made = summary.Summary(None, [(None, None)], {}, squares, 0.1, None)
     assert made.more_is_left == more
     assert made.stands_for_more == (more and not rounded)
