@@ -16,9 +16,9 @@ from focgen.diagnosis.verdict.predicted_improvement import paths
 from focgen.diagnosis.verdict.uneven import unevenly_paced
 
 _AT = {
-    "level": "at its highest level as at none",
+    "level": "at its highest level as at 0",
     "time": "at the session's end as at its begin",
-    "speed": "at its greatest speed as at none",
+    "speed": "at its greatest speed as near rest",
 }
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
@@ -81,9 +81,11 @@ def _uneven(explanations: Iterable[Explanation]) -> Iterator[str]:
         if (pace := unevenly_paced(e)) and pace.sure > 1.0 - NUMBERS.held:
             named = " and ".join(sorted(pace.instead))
             instead = f"instead of {named}" if named else "beside no effect"
+            slower = pace.slowness >= 1.0
+            times = pace.slowness if slower else 1.0 / pace.slowness
             yield (
-                f"{_within(e)}: {instead} the {pace.stage} may be ({pace.sure:.0%}) "
-                f"{pace.slowness:.2g} times as slow {_AT[pace.by]}, which no effect of the library is"
+                f"{_within(e)}: {instead} the {pace.stage} may be ({pace.sure:.0%}) {times:.2g} times as "
+                f"{'slow' if slower else 'fast'} {_AT[pace.by]}, which no effect of the library is"
             )
 
 
