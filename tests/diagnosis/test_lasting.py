@@ -69,6 +69,8 @@ def test_a_loop_left_by_the_last_log_is_that_and_no_more(where, effect, size):
     (cause,) = found.causes
     assert [c.effect for c in cause.candidates] == [effect]
     assert cause.candidates[0].confidence > 0.9 and cause.stage == where
+    if size == 0.03:  # of noise of 0.008; from 0 at each begin 0.0122 and 0.0143
+        assert found.gap.explained < 0.0116
 
 
 def test_what_remembers_alone_lies_where_the_last_experiment_left_it():
