@@ -8,7 +8,7 @@ that.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -76,17 +76,20 @@ def loosened(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Segment:
     if not segment.run.begins:
         return segment
     columns = []
+    past = memory(rig, logs) if any(log.paused for log in logs) else 0.0
     for number, ((first, last), begin) in enumerate(zip(segment.run.spans, segment.run.begins)):
-        for way in () if begin.at_rest else _ways(rig, segment, logs, number, begin):
+        for way in () if begin.at_rest else _ways(rig, segment, logs[: number + 1], past):
             column = np.zeros(len(segment.x))
             column[first:last] = way
             columns.append(column)
     return replace(segment, loose=np.stack(columns, axis=1)) if columns else segment
 
 
-def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], number: int, begin: Begin) -> np.ndarray:
-    """Rows (k, n): what begins a little different would change of one experiment, uncorrelated."""
-    first, last = segment.run.spans[number]
+def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -> np.ndarray:
+    """Rows (k, n): what begins a little different would change of the last of the ``logs`` so far,
+    uncorrelated; ``past``: s that the rig remembers."""
+    *earlier, log = logs
+    first, last = segment.run.spans[len(earlier)]
     start, h = float(segment.run.clock[first]), segment.run.h
 
     def made(begin: Begin) -> np.ndarray:
@@ -95,11 +98,13 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], number: int, b
             segment.x[first:last], segment.stages[0], segment.stages[-1], run, segment.between
         )
 
-    changed = []
+    begin, changed = segment.run.begins[len(earlier)], []
     if not begin.known:
-        changed += [made(other) - made(begin) for other in _beside(begin, _LEVEL * segment.level_in)]
-    if logs[number].paused:
-        changed += _rested(rig, segment, logs, number, made, begin.known)
+        base = made(begin)
+        changed += [made(other) - base for other in _beside(begin, _LEVEL * segment.level_in)]
+    if earlier and log.paused:
+        now, *longer = (made(b) for b in _rested(log, earlier, segment.entry, past))
+        changed += [(now - made(REST)) * (_LEVEL if begin.known else 1.0), *(left - now for left in longer)]
     if not changed:
         return np.zeros((0, last - first))
     _, sizes, axes = np.linalg.svd(np.stack(changed), full_matrices=False)
@@ -107,28 +112,12 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], number: int, b
     return found
 
 
-def _rested(
-    rig: Rig,
-    segment: Segment,
-    logs: Sequence[Experiment],
-    number: int,
-    made: Callable[[Begin], np.ndarray],
-    known: bool,
-) -> list[np.ndarray]:
-    """What is left of earlier experiments, where no clock says how long the rig rested after them: as much
-    more, where it is not ``known`` to be there at all, and what a longer rest makes of it."""
-    log, earlier, past = logs[number], logs[:number], memory(rig, logs)
-    if not earlier or segment.entry not in log:
-        return []
+def _rested(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Iterator[Begin]:
+    """What earlier experiments left of a signal, where no clock says how long the rig rested after them: by
+    the rest that is taken, and by longer ones."""
     pause = log.start - max(map(ended, earlier))
-
-    def left(longer: float) -> np.ndarray:
-        later = replace(log, start=log.start + longer * pause)
-        then: np.ndarray = made(begin_after(later, earlier, segment.entry, past)) - made(REST)
-        return then
-
-    now = left(0.0)
-    return [now * (_LEVEL if known else 1.0), *(left(longer) - now for longer in (_TIME - 1.0, 1.0))]
+    for longer in (0.0, _TIME - 1.0, 1.0):
+        yield begin_after(replace(log, start=log.start + longer * pause), earlier, role, past)
 
 
 def _beside(begin: Begin, step: float) -> Iterator[Begin]:
