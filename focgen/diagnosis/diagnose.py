@@ -121,8 +121,8 @@ def _lasting(
     if sum(gained(bare, lasting) for e in explanations if (bare := remembering(e))) < NUMBERS.nats:
         return explanations, session
     step("what is left where the last log ended")
-    again = explain_all(nominal, lasting, NUMBERS.nats, only, bootstrap)
-    return (again, lasting) if _left_by(again) < _left_by(explanations) else (explanations, session)
+    again = _better(nominal, explanations, lasting, only, bootstrap)
+    return (again, lasting) if again else (explanations, session)
 
 
 def _carried_on(
@@ -143,11 +143,23 @@ def _carried_on(
         if sum(gained(e, carried) for e in explanations) < NUMBERS.nats:
             break
         step("what carries on from one log to the next")
-        again = explain_all(nominal, carried, NUMBERS.nats, only, bootstrap)
-        if _left_by(again) >= _left_by(explanations):
+        again = _better(nominal, explanations, carried, only, bootstrap)
+        if again is None:
             break
         explanations, rigs, session = again, compose.compose(nominal, again, carried), carried
     return explanations, rigs, session
+
+
+def _better(
+    nominal: Rig,
+    explanations: tuple[Explanation, ...],
+    session: tuple[Experiment, ...],
+    only: Sequence[str] | None,
+    bootstrap: int,
+) -> tuple[Explanation, ...] | None:
+    """The findings of the session as it is now, where they leave less than those so far."""
+    again = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
+    return again if _left_by(again) < _left_by(explanations) else None
 
 
 def _left_by(explanations: Sequence[Explanation]) -> float:

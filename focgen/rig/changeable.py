@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig import linear, uneven
+from focgen.rig import linear
 from focgen.rig import plant as plants
 from focgen.rig.dynamics import UNCHANGED
 from focgen.rig.effects import EQUATIONS, Form
@@ -50,7 +50,7 @@ def _changeable_in(stage: str, rig: Rig) -> frozenset[str]:
 
 def _paced(transfer: TransferFunction) -> frozenset[str]:
     """What effects may change of any stage that has a pace."""
-    return frozenset({"pace"} if uneven.can_be_uneven(transfer) else ())
+    return frozenset({"pace"} if linear.holds_level(transfer) else ())
 
 
 def _is_lag(transfer: TransferFunction) -> bool:
@@ -72,10 +72,7 @@ def _own_of(regulator: TransferFunction) -> frozenset[str]:
 
 def _has_spring(actuator: Actuator | LinearActuator) -> bool:
     """Whether a spring pulls it back, and what drives it pulls at that."""
-    if isinstance(actuator, Actuator):
-        return True
-    num, den = actuator.dynamics.num, actuator.dynamics.den
-    return len(num) == 1 and num[0].order == 0.0 and len(den) > 1 and den[-1].order == 0.0
+    return isinstance(actuator, Actuator) or linear.holds_level(actuator.dynamics)
 
 
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:

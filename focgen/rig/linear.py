@@ -136,10 +136,15 @@ def _between(
     return settled(between(x, rest, h, modes, share), x, rest, _missing(transfer, modes))
 
 
+def holds_level(transfer: TransferFunction) -> bool:
+    """Whether it is a constant over dynamics that come to rest at a level: a force on what a spring holds."""
+    num, den = transfer.num, transfer.den
+    return len(num) == 1 and num[0].order == 0.0 and len(den) > 1 and den[-1].order == 0.0
+
+
 def is_spring(transfer: TransferFunction) -> bool:
-    """Whether it is a constant over whole orders, one of them 0: a force on what a spring holds."""
-    single = len(transfer.num) == 1 and transfer.num[0].order == 0.0
-    return single and transfer.is_integer and len(transfer.den) > 1 and transfer.den[-1].order == 0.0
+    """Whether it :func:`holds_level`, and all its orders are whole."""
+    return holds_level(transfer) and transfer.is_integer
 
 
 def run_bent(

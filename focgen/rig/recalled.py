@@ -17,11 +17,11 @@ import numpy as np
 from focgen.arrays import Array, Bools
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import Run
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import ENTERS, LEAVES
 from focgen.rig.response import integrations, longest, response_time
 from focgen.rig.rig import Rig
+from focgen.rig.session import run_of
 
 NOTE = "begins before the rig has come to rest: the experiments before are simulated ahead of it"
 _RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers
@@ -159,9 +159,8 @@ def _shows(
 def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry: str, leaves: str) -> Array:
     """What the rig makes (n,) of all experiments, from the input ``entry`` on."""
     x = np.concatenate([np.asarray(log[entry], float) for log in logs])
-    begins, starts = [log.before(entry) for log in logs], [log.start for log in logs]
-    run = Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins)
-    made: Array = Chain(rig, tuple(placed)).run(x, ENTERS[entry], leaves, run, between_of(rig, entry))
+    chain, run = Chain(rig, tuple(placed)), run_of(logs, entry)
+    made: Array = chain.run(x, ENTERS[entry], leaves, run, between_of(rig, entry))
     return made
 
 

@@ -20,13 +20,14 @@ from focgen.logs.read import Logs, read_logs
 from focgen.logs.still import check_moving
 from focgen.logs.table import LARGEST
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
-from focgen.rig.effects import Parameter, Run, library
+from focgen.rig.effects import Parameter, library
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import begun
 from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import with_recalled
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
+from focgen.rig.session import run_of
 from focgen.shown import Shown
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
@@ -122,10 +123,7 @@ def simulate_session(
         )
     clock = session_end(rig) if continues else 0.0
     begin = min(log.start for log in logs)
-    ahead = clock if begin < clock else 0.0
-    starts, begins = [log.start + ahead for log in logs], [log.before(entry) for log in logs]
-    lasts = any(log.lasts for log in logs)
-    run = Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins, lasts)
+    run = run_of(logs, entry, ahead=clock if begin < clock else 0.0)
     tap: dict[str, Array] = {}
     x = np.concatenate([np.asarray(log[entry], float) for log in logs])
     first = "regulator" if entry == "command" else "actuator"

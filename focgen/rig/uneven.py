@@ -22,12 +22,6 @@ _CLOSE = 1e-5  # of the largest input: two rounds that differ by less
 _ROUNDS = 40
 
 
-def can_be_uneven(transfer: TransferFunction) -> bool:
-    """Whether a stage has a pace: dynamics without zeros, which hold a level."""
-    num, den = transfer.num, transfer.den
-    return len(num) == 1 and num[0].order == 0.0 and len(den) > 1 and den[-1].order == 0.0
-
-
 def run(
     transfer: TransferFunction, x: Array, run: Run, pace: Pace, between: Between | bool, delay: float = 0.0
 ) -> Array:

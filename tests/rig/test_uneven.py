@@ -75,4 +75,4 @@ def test_a_fractional_stage_meets_its_equation():
     "num, den", [([(1.0, 0.0)], [(1.0, 1.0)]), ([(1.0, 1.0)], [(1.0, 1.0), (1.0, 0.0)]), ([(1.0, 0.0)],) * 2]
 )
 def test_what_holds_no_level_has_no_pace(num, den):
-    assert not uneven.can_be_uneven(TransferFunction(num, den))
+    assert not linear.holds_level(TransferFunction(num, den))

@@ -21,7 +21,7 @@ from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.hypotheses.two import two_at_once
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
-from focgen.diagnosis.problem.segments import Segment, is_single, owner, session
+from focgen.diagnosis.problem.segments import Segment, is_single, owner
 from focgen.diagnosis.problem.smooth import Strays
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
@@ -30,6 +30,7 @@ from focgen.rig.changeable import fits_in
 from focgen.rig.effects import Effect, library
 from focgen.rig.engine import between_of, slot_in
 from focgen.rig.rig import Actuator, Rig
+from focgen.rig.session import run_of
 
 _DEPTH = 4
 _KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
@@ -274,7 +275,7 @@ def _moved_to(of: Fit, segment: Segment, weighing: Weighing) -> Fit:
 
 def gained(of: Explanation, logs: Sequence[Experiment]) -> float:
     """Nats that an explanation gains, its numbers fitted anew, where its experiments begin as in ``logs``."""
-    segment = replace(of.best.problem.segment, run=session(logs, of.segment.entry))
+    segment = replace(of.best.problem.segment, run=run_of(logs, of.segment.entry))
     return evidence(_moved_to(of.best, segment, Weighing(of.ar)), of.best)
 
 

@@ -242,6 +242,11 @@ class Problem:
         made = made + segment.loose @ begun if np.any(begun) else made
         return made + self._uneven(zeros) if np.any(zeros) else made
 
+    def begun(self, vector: np.ndarray) -> np.ndarray:
+        """How far each of the segment's ``loose`` ways (k,) is there."""
+        end = self.head - self.zeros
+        return vector[end - self.segment.loose.shape[1] : end]
+
     def _uneven(self, zeros: np.ndarray) -> np.ndarray:
         """What the readings (n,) are off by where the zeros of experiments are."""
         lengths = [last - first for first, last in self.segment.run.spans]

@@ -13,6 +13,7 @@ from focgen.logs.experiment import Experiment
 from focgen.rig import kernels
 from focgen.rig.effects import Run
 from focgen.rig.rig import UNITY, Rig
+from focgen.rig.session import run_of
 
 _ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
 _LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
@@ -147,13 +148,6 @@ def between(entry: str, exit: str) -> tuple[str, ...]:
     return order[order.index(_ENTERS[entry]) : order.index(_LEAVES[exit]) + 1]
 
 
-def session(logs: Sequence[Experiment], entry: str) -> Run:
-    """The run that the logs are, where the signal ``entry`` is its input."""
-    begins = [log.before(entry) for log in logs]
-    starts, lasts = [log.start for log in logs], any(log.lasts for log in logs)
-    return Run.of([len(log) for log in logs], starts, logs[0].sample_time, begins, lasts)
-
-
 def joined(logs: Sequence[Experiment], role: str) -> np.ndarray:
     """A signal of all experiments, one after the other."""
     return np.concatenate([np.asarray(log[role], float) for log in logs])
@@ -181,7 +175,7 @@ def make(
         between(entry, exit),
         x,
         y,
-        session(logs, entry),
+        run_of(logs, entry),
         Between.HELD if entry == "command" else Between.STRAIGHT,
         names,
         trust,

@@ -95,8 +95,7 @@ def paced(explanations: Iterable[Explanation]) -> Iterator[str]:
         problem = e.best.problem
         rig, stage = problem.nominals.rig, paced_stage(problem.nominals.rig, problem.segment)
         if problem.segment.paced and stage is not None:
-            size = float(e.best.vector[problem.head - problem.zeros - 1])
-            by = 100.0 * slower_by(rig, stage, size)
+            by = 100.0 * slower_by(rig, stage, float(problem.begun(e.best.vector)[-1]))
             yield (
                 f"{_within(e)}: the {stage} seems to be {abs(by):.2g} % {'slower' if by > 0 else 'faster'} "
                 "at its highest level; that is within what its time may be off, and in no rig that is written"

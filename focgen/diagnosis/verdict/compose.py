@@ -12,13 +12,13 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.problem.segments import session
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
 from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.recalled import recalled, with_recalled
 from focgen.rig.replay import effect_tables, simulate_session
 from focgen.rig.rig import Rig
+from focgen.rig.session import run_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Rigs:
         entry = "command" if all("command" in log for log in logs) else "pressure"
         x = np.concatenate([np.asarray(log[entry], float) for log in logs])
         first = "regulator" if entry == "command" else "actuator"
-        run = session(logs, entry)
+        run = run_of(logs, entry)
         Chain(self.fitted, self.placed).run(
             x, first, "sensor", run, between_of(self.fitted, entry), left=left
         )

@@ -13,68 +13,49 @@ from functools import lru_cache
 
 import numpy as np
 
-from focgen.diagnosis.belief.standing import sureness
-from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, square_by
+from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.problem.segments import Segment
-from focgen.diagnosis.verdict.moments import bases, log_odds
-from focgen.rig.effects import library
+from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
 
 _LATEST = 16  # samples
 _ITERATIONS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Late:
-    """A command that came ``samples`` (``seconds``) before its log says, ``instead`` of these families, and
-    the log ``odds`` of that over what was found."""
+class Late(Instead):
+    """A command that came ``samples`` (``seconds``) before its log says."""
 
     samples: int
     seconds: float
-    instead: frozenset[str]
-    odds: float
-
-    @property
-    def sure(self) -> float:
-        """How likely it is, if it is that or what was found."""
-        return sureness(self.odds)
 
 
 @lru_cache(maxsize=16)
 def logged_late(e: Explanation) -> Late | None:
     """How likely the command was logged late, instead of an effect found where it enters; None where nothing
-    was found there, or a rounding, whose steps are no noise."""
-    families = e.best.problem.families
-    if e.segment.entry != "command" or not families or any(library()[f].rounds for f in families):
+    was found there, or a rounding."""
+    if e.segment.entry != "command" or not e.best.problem.families:
         return None
-    weighing = Weighing(e.ar)
-    found = [_judged(e, base, weighing) for base in bases(e)]
+    found = [_judged(e, base) for base in bases(e)]
     return max((late for late in found if late is not None), key=lambda late: late.odds, default=None)
 
 
 def is_late(e: Explanation) -> bool:
     """Whether that is likelier than what was found."""
-    late = logged_late(e)
-    return late is not None and late.odds > 0.0
+    return is_likelier(logged_late(e))
 
 
-def _judged(e: Explanation, base: Fit, weighing: Weighing) -> Late | None:
+def _judged(e: Explanation, base: Fit) -> Late | None:
     """The likeliest lateness beside what ``base`` has, None where an earlier command helps it nothing."""
     samples, best = 0, base
-    for n, tried in _earlier(base, weighing):
+    for n, tried in _earlier(base, Weighing(e.ar)):
         if tried.sse >= best.sse:
             break
         samples, best = n, tried
     if not samples:
         return None
-    before, after = (square_by(f, weighing) for f in (e.nominal, e.best))
-    floor = max(min(after * (1.0 - e.predictability.share), best.sse), 1e-300)
-    count, had = len(e.segment.y), e.best.problem.families
-    found = log_odds(before, after, floor, count, e.best.size, len(had))
-    things = len(base.problem.families) + 1
-    odds = log_odds(before, best.sse, floor, count, best.size + 1, things) - found
-    instead = frozenset(had) - frozenset(base.problem.families)
-    return Late(samples, samples * e.segment.run.h, instead, odds)
+    odds = odds_over(e, best.sse, best.size + 1, len(base.problem.families) + 1)
+    return Late(gone(e, base), odds, samples, samples * e.segment.run.h)
 
 
 def _earlier(base: Fit, weighing: Weighing) -> Iterator[tuple[int, Fit]]:

@@ -10,21 +10,17 @@ of them alone becomes another, or the gain as a whole, which takes fewer numbers
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
-from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
-from focgen.diagnosis.belief.standing import sureness
-from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
+from focgen.diagnosis.fitting.fit import Weighing
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.hypotheses.rivals import left_out, without
-from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.hypotheses.rivals import without
 from focgen.diagnosis.problem.segments import Segment
+from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
 from focgen.diagnosis.verdict.pieces import Pieces, pieces
-from focgen.rig.effects import library
 
 
 @dataclass(frozen=True)
@@ -41,13 +37,10 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False)
-class Changed:
-    """How a segment became another, ``cut`` into pieces, ``instead`` of these families, and the log ``odds``
-    of that over what was found."""
+class Changed(Instead):
+    """How a segment became another, ``cut`` into pieces."""
 
     cut: Pieces
-    instead: frozenset[str]
-    odds: float
 
     @cached_property
     def moments(self) -> tuple[Moment, ...]:
@@ -56,42 +49,20 @@ class Changed:
         changes = self.cut.changes()
         return tuple(_moment(segment, sample, segment.level_out * by) for sample, by in changes)
 
-    @property
-    def sure(self) -> float:
-        """How likely it is, if it is that or what was found."""
-        return sureness(self.odds)
-
 
 @lru_cache(maxsize=16)
 def changed_at_once(e: Explanation) -> Changed | None:
     """How likely the rig became another at up to three moments instead of what was found, or of one part of
-    it. None where its session is too short for that, or where a rounding was found: its steps are no noise,
-    and what is smaller than they are tells nothing."""
-    if any(library()[family].rounds for family in e.best.problem.families):
-        return None
+    it. None where its session is too short for that, or where a rounding was found."""
     weighing = Weighing(e.ar)
-    before, after = (square_by(f, weighing) for f in (e.nominal, e.best))
-    found = [_judged(e, before, after, cut) for fit in bases(e) for cut in pieces(fit, weighing)]
-    odds, best = max(found, key=lambda f: f[0], default=(0.0, None))
-    if best is None:
-        return None
-    instead = frozenset(e.best.problem.families) - frozenset(best.of_fit.problem.families)
-    return Changed(best, instead, odds)
-
-
-def bases(e: Explanation) -> Iterator[Fit]:
-    """The fits that may become others: without any effect, and without each of several."""
-    yield e.nominal
-    candidates = e.best.problem.candidates
-    families = {c.effect for c in candidates}
-    for effect in sorted(families) if len(families) > 1 else ():
-        yield left_out(e.best, [c for c in candidates if c.effect == effect], Weighing(e.ar))
+    found = [_judged(e, cut) for base in bases(e) for cut in pieces(base, weighing)]
+    return max(found, key=lambda changed: changed.odds, default=None)
 
 
 def another(e: Explanation) -> Changed | None:
     """What changed at once, where that is likelier than what was found."""
     changed = changed_at_once(e)
-    return changed if changed is not None and changed.odds > 0.0 else None
+    return changed if is_likelier(changed) else None
 
 
 def lasting_part(e: Explanation) -> Explanation:
@@ -106,26 +77,11 @@ def lasting_part(e: Explanation) -> Explanation:
     return replace(e, best=without(e.best, gone, Weighing(e.ar)), causes=kept) if kept else e
 
 
-def _judged(e: Explanation, before: float, after: float, cut: Pieces) -> tuple[float, Pieces]:
-    """The log odds of what is cut so over what was found, which leaves the sum of squares ``after`` of
-    ``before``."""
-    square = cut.square
-    floor = max(min(after * (1.0 - e.predictability.share), square), 1e-300)
-    count = len(e.segment.y)
-    families = len(e.best.problem.families)
-    others = len(cut.of_fit.problem.families) + cut.things
-    found = log_odds(before, after, floor, count, e.best.size, families)
-    at_once = log_odds(before, square, floor, count, cut.of_fit.size + cut.free, others)
-    return at_once - found, cut
-
-
-def log_odds(before: float, left: float, floor: float, count: int, free: int, things: int) -> float:
-    """Of ``things`` found, each as rare as any, that leave the sum of squares ``left`` of ``before``."""
-    unit = 0.5 * count / floor
-    misfit, gained = max(left - floor, 0.0) * unit, max(before - left, 0.0) * unit
-    scale = Scale(0.5 * count * NUMBERS.other).of(gained)
-    prior = things * float(np.log(NUMBERS.rare))
-    return log_likelihood(misfit, scale) - paid(free, gained, misfit, scale) + prior
+def _judged(e: Explanation, cut: Pieces) -> Changed:
+    """What is cut so, held against what was found."""
+    base = cut.of_fit
+    things = len(base.problem.families) + cut.things
+    return Changed(gone(e, base), odds_over(e, cut.square, base.size + cut.free, things), cut)
 
 
 def _moment(segment: Segment, sample: int, by: np.ndarray) -> Moment:

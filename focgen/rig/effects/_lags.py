@@ -105,10 +105,13 @@ def _paces(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, unloading=x.unloading * values[0])
 
 
+def _times_as_fast(name: str) -> Parameter:
+    return Parameter(name, lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True)
+
+
 def two_paced(slot: str, name: str) -> Form:
     """A stage whose own equation runs ``name`` times as fast while it falls back."""
-    speed = Parameter(name, lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True)
-    return Form("speed", slot, (speed,), _paces)
+    return Form("speed", slot, (_times_as_fast(name),), _paces)
 
 
 def _rises(x: Dynamics, values: Values, run: None) -> Dynamics:
@@ -118,8 +121,7 @@ def _rises(x: Dynamics, values: Values, run: None) -> Dynamics:
 def rising(form: str, slot: str, name: str) -> Form:
     """A stage whose own equation runs ``name`` times as fast while it rises: the time that was given may be
     that of its fall."""
-    speed = Parameter(name, lower=0.1, upper=10.0, starts=(0.7, 1.5), zero=1.0, log=True)
-    return Form(form, slot, (speed,), _rises)
+    return Form(form, slot, (_times_as_fast(name),), _rises)
 
 
 _ONE_WAY = Parameter("lag", time=1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0)

@@ -1,0 +1,68 @@
+"""What no effect is, held against what was found: as rare as an effect, and instead of one or of all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
+from focgen.diagnosis.belief.standing import sureness
+from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.rivals import left_out
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.rig.effects import library
+
+
+@dataclass(frozen=True, eq=False)
+class Instead:
+    """What no effect is, ``instead`` of these families, and the log ``odds`` of it over what was found."""
+
+    instead: frozenset[str]
+    odds: float
+
+    @property
+    def sure(self) -> float:
+        """How likely it is, if it is that or what was found."""
+        return sureness(self.odds)
+
+
+def is_likelier(other: Instead | None) -> bool:
+    """Whether it is likelier than what was found."""
+    return other is not None and other.odds > 0.0
+
+
+def bases(e: Explanation) -> Iterator[Fit]:
+    """The fits that it may stand beside: without any effect, and without each of several. None where a
+    rounding was found: its steps are no noise, and what is smaller than they are tells nothing."""
+    if any(library()[family].rounds for family in e.best.problem.families):
+        return
+    yield e.nominal
+    candidates = e.best.problem.candidates
+    families = {c.effect for c in candidates}
+    for effect in sorted(families) if len(families) > 1 else ():
+        yield left_out(e.best, [c for c in candidates if c.effect == effect], Weighing(e.ar))
+
+
+def gone(e: Explanation, base: Fit) -> frozenset[str]:
+    """The families found that are not in ``base``."""
+    return frozenset(e.best.problem.families) - frozenset(base.problem.families)
+
+
+def odds_over(e: Explanation, left: float, free: int, things: int) -> float:
+    """The log odds of ``things`` with so many ``free`` values, which leave the sum of squares ``left``, over
+    what was found; each is as rare as any."""
+    weighing = Weighing(e.ar)
+    before, after = (square_by(f, weighing) for f in (e.nominal, e.best))
+    floor = max(min(after * (1.0 - e.predictability.share), left), 1e-300)
+    unit = 0.5 * len(e.segment.y) / floor
+
+    def log_odds(left: float, free: int, things: int) -> float:
+        misfit, gained = max(left - floor, 0.0) * unit, max(before - left, 0.0) * unit
+        scale = Scale(0.5 * len(e.segment.y) * NUMBERS.other).of(gained)
+        prior = things * float(np.log(NUMBERS.rare))
+        return log_likelihood(misfit, scale) - paid(free, gained, misfit, scale) + prior
+
+    return log_odds(left, free, things) - log_odds(after, e.best.size, len(e.best.problem.families))

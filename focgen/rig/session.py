@@ -1,0 +1,16 @@
+"""The experiments of a session as one run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run
+
+
+def run_of(logs: Sequence[Experiment], entry: str, ahead: float = 0.0) -> Run:
+    """The run that the logs are, where the signal ``entry`` is its input; ``ahead``: s by which its clock is
+    later than theirs."""
+    lengths, starts = [len(log) for log in logs], [log.start + ahead for log in logs]
+    begins, lasts = [log.before(entry) for log in logs], any(log.lasts for log in logs)
+    return Run.of(lengths, starts, logs[0].sample_time, begins, lasts)
