@@ -45,16 +45,19 @@ class Converter:
         """Whether the residual is no larger than what a converter's steps leave."""
         return rms(of.weighed) < NUMBERS.uneven * self.step
 
-    def is_noise(self, nominal: Fit) -> bool:
-        """Whether an error of q/√12 is next to nothing of what is left without any effect."""
-        return self.step**2 / 12.0 < NUMBERS.vain * float(np.mean(nominal.weighed**2))
+    def is_noise(self, nominal: Fit, alone: bool) -> bool:
+        """Whether an error of q/√12 is next to nothing of what is left without any effect; where nothing else
+        was found (``alone``) that is noise, and every converter has steps: whether it is less than half."""
+        most = NUMBERS.stays if alone else NUMBERS.vain
+        return self.step**2 / 12.0 < most * float(np.mean(nominal.weighed**2))
 
     def beside(
         self, best: Fit, nominal: Fit, causes: tuple[Cause, ...], weighing: Weighing
     ) -> tuple[Fit, tuple[Cause, ...]]:
         """With the rounding put to what was found without it: a cause, and where it brings the model closer
-        a part of it. Where it is next to nothing of the gap beside what was found, it is noise."""
-        if causes and self.is_noise(nominal):
+        a part of it. Where it is next to nothing of the gap beside what was found, or less than the noise by
+        itself, it is noise."""
+        if self.is_noise(nominal, alone=not causes):
             return best, causes
         problem = best.problem.with_candidates([*best.problem.candidates, self.candidate])
         both = self._refitted(problem, best.vector, weighing)

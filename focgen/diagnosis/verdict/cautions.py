@@ -48,7 +48,6 @@ def cautions(
     yield from _late(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
     yield from _uneven(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
     yield from _nominal(causes)
-    yield from _rounded(dict.fromkeys(e for e, _ in causes))
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
 
@@ -102,12 +101,13 @@ def paced(explanations: Iterable[Explanation]) -> Iterator[str]:
             )
 
 
-def _rounded(explanations: Iterable[Explanation]) -> Iterator[str]:
-    """Where readings move in steps that are noise beside what was found."""
+def rounded(explanations: Iterable[Explanation]) -> Iterator[str]:
+    """Where readings move in steps that are noise, or noise beside what was found."""
     for e in explanations:
-        if e.converter is not None and e.converter.is_noise(e.nominal):
+        if e.converter is not None and e.converter.is_noise(e.nominal, alone=not e.causes):
             step = e.converter.step * e.segment.level_out
-            yield f"{_within(e)}: the readings move in steps of {step:.3g}, noise beside what was found"
+            noise = "noise beside what was found" if e.causes else "part of the noise"
+            yield f"{_within(e)}: the readings move in steps of {step:.3g}, which are {noise}"
 
 
 def _nominal(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:

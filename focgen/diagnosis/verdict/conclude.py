@@ -15,7 +15,7 @@ from focgen.diagnosis.hypotheses.search import evidence as nats
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
-from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges, lesser, paced
+from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges, lesser, paced, rounded
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
@@ -73,6 +73,7 @@ def conclude(
             *cautions(summary.causes, unknown, list(changed)),
             *lesser(stands.beside),
             *paced(explanations),
+            *rounded(explanations),
             *gauges(stands.at_odds),
             *another_command(controller),
         ),
