@@ -92,6 +92,14 @@ class Numbers:
         _SAME,
         _SAME,
     )
+    behind: float = _number(
+        0.5,
+        "odds, before the data, that a loop behind all dynamics is the actuator's, over the sensor's",
+        "odds",
+        "assumed; on rigs of other physics it was the actuator's in three of four",
+        "the actuator's in one of five instead of one of three",
+        "either's as likely, and first whichever comes first",
+    )
     elsewhere: float = _number(
         0.045,
         "probability that a cause is none of the families",

@@ -178,7 +178,7 @@ class Chain:
         if stage == "actuator" and self.rig.actuator is not None and self.rig.actuator.offset:
             offset = self.rig.actuator.offset
             steps.append((("offset", offset), lambda x, run: x + offset, None))
-        return steps
+        return steps + [_effect(p) for p in here if p.slot == "place"]
 
     def _core(self, stage: str, here: Sequence[Placed], between: Between | bool) -> list[Step]:
         delay = getattr(self.rig.delays, stage)

@@ -47,9 +47,11 @@ class Converter:
 
     def is_noise(self, nominal: Fit, alone: bool) -> bool:
         """Whether an error of q/√12 is next to nothing of what is left without any effect; where nothing else
-        was found (``alone``) that is noise, and every converter has steps: whether it is less than half."""
-        most = NUMBERS.stays if alone else NUMBERS.vain
-        return self.step**2 / 12.0 < most * float(np.mean(nominal.weighed**2))
+        was found (``alone``), whether it is less than half of what no input predicts: every converter has
+        steps."""
+        left = float(np.mean(nominal.weighed**2))
+        asked = NUMBERS.stays * (1.0 - nominal.predictable_share) if alone else NUMBERS.vain
+        return self.step**2 / 12.0 < asked * left
 
     def beside(
         self, best: Fit, nominal: Fit, causes: tuple[Cause, ...], weighing: Weighing

@@ -35,6 +35,7 @@ from focgen.rig.session import run_of
 _DEPTH = 4
 _KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
 # force the path shows more above the sensor's noise the longer it is kept
+_COMPARED = 3  # rivals that experiments are to tell apart
 _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
 
 
@@ -123,7 +124,8 @@ def _placed_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
             if fits_in(form, stage, rig):
                 anywhere = form.response and not (form.leads and bent)
                 slot = None if anywhere else slot_in(form, stage)
-                found.setdefault((form.act, form.begun, slot), CandidateEffect(effect.name, form, stage))
+                alike = (form.act, form.begun, form.rarer, slot)
+                found.setdefault(alike, CandidateEffect(effect.name, form, stage))
     return list(found.values())
 
 
@@ -224,7 +226,7 @@ def _explained(
         best, causes = converter.beside(best, nominal, causes, weighing)
     found, (best, nominal) = best, map(settled, _between_anew(rig, best, nominal, weighing))
     segment = best.problem.segment
-    causes = tuple(replace(c, rivals=tuple(_in_the_end(r, found, best) for r in c.rivals)) for c in causes)
+    causes = tuple(replace(c, rivals=_in_the_end(c.rivals, found, best, weighing)) for c in causes)
     response = problem.references.clocks["response"]
     return Explanation(
         segment,
@@ -289,9 +291,19 @@ def remembering(of: Explanation) -> Explanation | None:
     return replace(of, best=best)
 
 
-def _in_the_end(rival: Rival, found: Fit, best: Fit) -> Rival:
-    """A rival that is what was ``found``, with what that is in the end."""
-    return replace(rival, fit=best) if rival.fit is found else rival
+def _in_the_end(rivals: Sequence[Rival], found: Fit, best: Fit, weighing: Weighing) -> tuple[Rival, ...]:
+    """Rivals with what was ``found`` as that is in the end, and the first of the others on the same account
+    of what the command does between samples: experiments are chosen by what these would show."""
+
+    def now(rival: Rival, near: bool) -> Rival:
+        if rival.fit is found:
+            return replace(rival, fit=best)
+        segment = best.problem.segment
+        if not near or rival.fit.problem.segment.between == segment.between:
+            return rival
+        return replace(rival, fit=_moved_to(rival.fit, segment, weighing))
+
+    return tuple(now(r, i < _COMPARED) for i, r in enumerate(rivals))
 
 
 def _or_two(

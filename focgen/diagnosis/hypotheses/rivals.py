@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from focgen.diagnosis.belief.choice import prior
+from focgen.diagnosis.belief.choice import place, prior
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.standing import any_of, behind, holds, nominal_off
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
@@ -99,17 +100,29 @@ def _causes(best: Fit, beside: Beside) -> tuple[Cause, ...]:
 
 def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     """One effect of ``best`` and its rivals, the best first. Of a rival that the experiments are not made to
-    show, no more free values are counted than of the effect: they were not to be seen."""
+    show, no more free values are counted than of the effect: they were not to be seen. Twins are one to any
+    log, but for the actuator's offset, and as likely as they are beforehand."""
     own = [c for c in best.problem.candidates if c.effect == name]
     without = without_family(best, name, beside.weighing, beside.known)
     ranking = _ranking(name, without, beside)
-    fits = {name: best} | dict(_rivals(best, ranking, beside, len(own) > 1))
-    ground = Ground.of(beside.nominal, without, list(fits.values()), beside.weighing, beside.surroundings)
-    most = {n: best.size - without.size if best.problem.lacks(n) and n != name else None for n in fits}
-    odds = {n: ground.odds(f, most[n]) for n, f in fits.items()}
+    fits, twin = {name: best} | dict(_rivals(best, ranking, beside, len(own) > 1)), _twin(name, best, beside)
+    tried = [*fits.values(), *twin.values()]
+    ground = Ground.of(beside.nominal, without, tried, beside.weighing, beside.surroundings)
+    unseen = {n for n in (*fits, *twin) if n != name and best.problem.lacks(n)}
+
+    def speaks(of: Fit, family: str) -> float:
+        acts = [c for c in of.problem.candidates if c.effect == family]
+        return ground.odds(of, best.size - without.size if family in unseen else None) + place(acts)
+
+    fits |= {n: _foremost(f, fits.get(n), partial(speaks, family=n)) for n, f in twin.items()}
+    odds = {n: speaks(f, n) for n, f in fits.items()}
     for other in _near(odds) if len(own) == 1 else ():
         forms = [fits[other], *_other_forms(other, fits[other], best, ranking, beside)]
-        odds[other] = any_of([ground.odds(f, most[other]) for f in forms])
+        odds[other] = any_of([speaks(f, other) for f in forms])
+    for n in [n for n, f in twin.items() if fits[n] is f]:
+        ours, theirs = (place(of.problem.candidates) for of in (best, fits[n]))
+        either = max(odds[name] - ours, odds[n] - theirs)
+        odds |= {name: either + ours, n: either + theirs}
     odds = {n: o + prior(n, without) for n, o in odds.items()}
     rivals = [
         Rival(
@@ -125,6 +138,13 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     ]
     share = share_of(beside.nominal, without, best)
     return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), evidence(best, without), share)
+
+
+def _foremost(twin: Fit, ranked: Fit | None, speaks: Callable[[Fit], float]) -> Fit:
+    """A twin, or what its family was ``ranked`` by, where that acts elsewhere and more speaks for it."""
+    if ranked is None or ranked.problem.candidates[-1].form.rarer == twin.problem.candidates[-1].form.rarer:
+        return twin
+    return max(twin, ranked, key=speaks)
 
 
 def _near(odds: Mapping[str, float]) -> list[str]:
@@ -188,6 +208,21 @@ def _rivals(best: Fit, ranking: Ranking, beside: Beside, mended: bool) -> list[t
         if is_itself(again):
             found.append((other, again))
     return found
+
+
+def _twin(name: str, best: Fit, beside: Beside) -> dict[str, Fit]:
+    """The family of another stage whose forms act alike, in the place of one of ``best``, where there is one:
+    a loop behind all dynamics may be of what moves, or of what reads it."""
+    problem, found = best.problem, list(best.problem.candidates)
+    for i, own in enumerate(found):
+        if own.effect == name:
+            like = [c for c in beside.candidates if c.form.act is own.form.act and c.effect != name]
+            like = [c for c in like if c.form.rarer != own.form.rarer and c.effect not in problem.families]
+            if not like:
+                return {}
+            found[i] = like[0]
+    other = next(c.effect for c, own in zip(found, problem.candidates) if c != own)
+    return {other: fit(problem.with_candidates(found), best.vector, beside.weighing, 6, leader=best)}
 
 
 def _second_form(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from focgen.diagnosis.belief.choice import place
 from focgen.diagnosis.belief.further import Ground
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
@@ -59,4 +60,5 @@ def _likelier(both: Fit, first: Ranking, found: Fit, weighing: Weighing, asked: 
 def _prior(problem: Problem) -> float:
     """Log odds, before the data, of the effects of a problem."""
     families, forms = len(problem.families), len(problem.candidates)
-    return float(families * np.log(NUMBERS.rare) + (forms - families) * np.log(NUMBERS.again))
+    odds = families * np.log(NUMBERS.rare) + (forms - families) * np.log(NUMBERS.again)
+    return float(odds) + place(problem.candidates)

@@ -20,14 +20,14 @@ from focgen.logs.begin import Begin
 STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
     "regulator": ("command", "chamber", "supply"),
-    "actuator": ("load", "drive", "spring", "dynamics", "response"),
+    "actuator": ("load", "drive", "spring", "dynamics", "response", "place"),
     "sensor": ("strain", "filter", "reading"),
 }
 """Where on the way a form acts. ``command``: into the regulator; ``chamber``: the regulator's own equation;
 ``supply``: what leaves it; ``load``: the pressure entering the actuator; ``drive``: K(p) p; ``spring``: how
 much further a spring that gives way is bent at rest, as a function of how far it was; ``dynamics``: the
-actuator's own equation; ``response``: what leaves it; ``strain``: into the sensor; ``filter``: the sensor's
-own equation; ``reading``: what leaves it."""
+actuator's own equation; ``response``: what leaves that; ``place``: the same with the offset; ``strain``: into
+the sensor; ``filter``: the sensor's own equation; ``reading``: what leaves it."""
 
 EQUATIONS = {"regulator": "chamber", "actuator": "dynamics", "sensor": "filter"}
 """The slots where no signal passes, by stage: what acts there changes the equation of its stage."""
@@ -141,6 +141,7 @@ class Form:
     predicts nothing of a later one. ``jumps``: what it gives changes in jumps as its parameters do.
     ``leads``: linear though it is, away from home it stays ahead of the actuator's gain, which may be bent.
     ``both_ways``: it is to be told from another form only where the input goes both ways.
+    ``rarer``: before the data, less likely than the like of another stage.
     ``bare``: only in a stage that the rig takes for 1: dynamics have the like in their own equation.
     ``itself(values, den)``: whether it is what its family says, in an actuator of this denominator.
     """
@@ -156,6 +157,7 @@ class Form:
     jumps: bool = False
     leads: bool = False
     both_ways: bool = False
+    rarer: bool = False
     bare: bool = False
     itself: Callable[[Values, Polynomial], bool] = lambda values, den: True
 

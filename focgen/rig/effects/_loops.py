@@ -1,5 +1,7 @@
 """Rate-independent memory, shared by the families that have it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from focgen.arrays import Array
@@ -54,6 +56,13 @@ def _widening(x: Array, values: Values, run: Run) -> Array:
 
 def _pressed(x: Array, values: Values, run: Run) -> Array:
     return kernels.pressed(x, run.rest, *values)
+
+
+def behind(slot: str) -> list[Form]:
+    """The same behind dynamics, but for a play: of an alloy that is heated first, of a wall that moves last.
+    A sensor has them there as well, and more often."""
+    found = (form for form in forms(slot) if form.act is not _play)
+    return [replace(form, name=f"{form.name}_behind", rarer=True) for form in found]
 
 
 def forms(slot: str) -> list[Form]:

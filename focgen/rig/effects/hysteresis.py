@@ -50,6 +50,7 @@ EFFECT = Effect(
         *_loops.forms("drive"),
         Form("spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, LARGEST), _spring),
         Form("sharp_spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, _POWER, LARGEST), _sharp_spring),
+        *_loops.behind("place"),
         # what is seen is taken along with play by what moves
         Form("lost_motion", "response", (_LOST,), _lost_motion),
     ],

@@ -1,0 +1,80 @@
+"""A loop behind an actuator's dynamics, as of an alloy that is heated first, made of relays.
+
+Red when it passes for the sensor's because the library has loops ahead of the dynamics only, or when without
+a gauge between the two either of them is sure.
+"""
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import LinearActuator, Rig, Signals
+
+H, HEATS, READS = 0.02, 0.8, 0.05
+RIG = Rig(
+    "alloy",
+    H,
+    Signals("t", "y", pressure="p", curvature="q"),
+    LinearActuator(TransferFunction([(2.0, 0.0)], [(HEATS, 1.0), (1.0, 0.0)])),
+    sensor=TransferFunction([(1.0, 0.0)], [(READS, 1.0), (1.0, 0.0)]),
+)
+LEVELS = (0.5, 0.2, 0.9, 0.4, 0.7, 0.0, 1.0, 0.3, 0.6, 0.1)
+
+
+def relays(x, share):
+    """Preisach's sum of relays, evenly over all thresholds: a ``share`` of the signal."""
+    up, down = (v.ravel() for v in np.meshgrid(np.linspace(0.0, 2.0, 41)[1:], np.linspace(0.0, 2.0, 41)[:-1]))
+    up, down = up[up > down], down[up > down]
+    state, found = np.zeros(len(up)), []
+    for value in x:
+        state = np.where(value >= up, 1.0, np.where(value <= down, 0.0, state))
+        found.append(state.mean())
+    return (1.0 - share) * x + share * 2.0 * np.array(found)
+
+
+def lagged(x, time):
+    kept, y = np.exp(-H / time), np.zeros(len(x))
+    for i in range(1, len(x)):
+        y[i] = kept * y[i - 1] + (1.0 - kept) * x[i - 1]
+    return y
+
+
+def logs(seed, of, share=0.25):
+    """Steps and a triangle with smaller ones inside, with the relays behind the heat or in the reading."""
+    rng = np.random.default_rng(seed)
+    slow = np.interp(
+        np.arange(3000) * H, np.r_[0, 12, 20, 26, 36, 42, 48, 60], [0, 1, 0.3, 0.7, 0, 0.6, 0.2, 1]
+    )
+    made = []
+    for number, drive in enumerate((np.repeat(LEVELS, 300), slow)):
+        moved = lagged(2.0 * drive, HEATS)
+        moved = relays(moved, share) if of == "actuator" else moved
+        read = lagged(moved, READS)
+        read = relays(read, share) if of == "sensor" else read
+        noise = 0.006 * rng.standard_normal((2, len(drive)))
+        signals = {"pressure": drive, "curvature": moved + noise[0], "output": read + noise[1]}
+        made.append(Experiment(str(number), H, signals, start=70.0 * number))
+    return made
+
+
+def without_curvature(log):
+    return Experiment(
+        log.name, H, {k: v for k, v in log.signals.items() if k != "curvature"}, start=log.start
+    )
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.parametrize("of, name", [("actuator", "hysteresis"), ("sensor", "sensor_hysteresis")])
+def test_a_loop_behind_the_dynamics_is_whose_the_curvature_shows(seed, of, name):
+    (cause,) = diagnose(RIG, logs(seed, of), pictures=False).causes
+    assert [c.effect for c in cause.candidates] == [name]
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.parametrize("of", ["actuator", "sensor"])
+def test_without_the_curvature_it_is_either_s(seed, of):
+    (cause,) = diagnose(RIG, [without_curvature(log) for log in logs(seed, of)], pictures=False).causes
+    assert {c.effect for c in cause.candidates} >= {"hysteresis", "sensor_hysteresis"}
+    assert max(c.confidence for c in cause.candidates) < 0.9
