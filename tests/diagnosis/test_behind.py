@@ -65,16 +65,24 @@ def without_curvature(log):
     )
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
-@pytest.mark.parametrize("of, name", [("actuator", "hysteresis"), ("sensor", "sensor_hysteresis")])
-def test_a_loop_behind_the_dynamics_is_whose_the_curvature_shows(seed, of, name):
+QUICK = {("actuator", 1)}
+CASES = [
+    pytest.param(of, seed, marks=() if (of, seed) in QUICK else pytest.mark.long)
+    for of in ("actuator", "sensor")
+    for seed in (1, 2)
+]
+
+
+@pytest.mark.parametrize("of, seed", CASES)
+def test_a_loop_behind_the_dynamics_is_whose_the_curvature_shows(of, seed):
     (cause,) = diagnose(RIG, logs(seed, of), pictures=False).causes
-    assert [c.effect for c in cause.candidates] == [name]
+    assert [c.effect for c in cause.candidates] == ["hysteresis" if of == "actuator" else "sensor_hysteresis"]
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
-@pytest.mark.parametrize("of", ["actuator", "sensor"])
-def test_without_the_curvature_it_is_either_s(seed, of):
-    (cause,) = diagnose(RIG, [without_curvature(log) for log in logs(seed, of)], pictures=False).causes
-    assert {c.effect for c in cause.candidates} >= {"hysteresis", "sensor_hysteresis"}
-    assert max(c.confidence for c in cause.candidates) < 0.9
+@pytest.mark.parametrize("of, seed", CASES)
+def test_without_the_curvature_it_is_either_s(of, seed):
+    found = diagnose(RIG, [without_curvature(log) for log in logs(seed, of)], pictures=False)
+    (cause,) = found.causes
+    assert [c.effect for c in cause.candidates[:2]] == ["sensor_hysteresis", "hysteresis"]
+    assert all(0.2 < c.confidence < 0.9 for c in cause.candidates[:2])
+    assert found.next_experiment.inputs["also_log"] == "curvature"
