@@ -65,14 +65,17 @@ def slot_in(form: Form, stage: str) -> str:
     """The slot of ``form`` in ``stage``: its own. Where it is not at home, the stage's own equation for what
     acts in one, the first for what is at home ahead of the actuator, the last for what is behind it, and for
     the actuator's own the one on the same side of the dynamics. What is linear may stand on either side:
-    behind, where a delay interpolates what is smooth, unless it leads. Of a regulator alone the output is
-    what its own gauge reads: behind it, the memory of a sensor of its own would stand for whatever fills and
-    vents at another pace."""
+    behind, where a delay interpolates what is smooth, unless it leads, and ahead of an actuator's offset.
+
+    Of a regulator alone the output is what its own gauge reads: behind it, the memory of a sensor of its own
+    would stand for whatever fills and vents at another pace.
+    """
     if form.slot in SLOTS[stage]:
         return form.slot
     if form.slot in EQUATIONS.values() and stage in EQUATIONS:
         return EQUATIONS[stage]
     first, *_, last = SLOTS[stage]
+    last = "response" if last == "place" and form.response else last
     ahead = form.slot in (*SLOTS["regulator"], "load", "drive")
     ahead = ahead or (form.slot == "strain" and stage == "regulator")
     return first if ahead and (form.leads or not form.response) else last

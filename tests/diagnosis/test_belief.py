@@ -42,7 +42,7 @@ class _Ground(Ground):
 
 def _fit(square, effects=(), predictable_share=0.0, size=None, **more):
     """A fit that leaves the mean square ``square``, in units of the noise's."""
-    candidates = tuple(SimpleNamespace(effect=name) for name in effects)
+    candidates = tuple(SimpleNamespace(effect=name, form=SimpleNamespace(rarer=False)) for name in effects)
     made = _Fit(
         innovations=np.zeros(_COUNT),
         sse=_COUNT * square,

@@ -67,8 +67,9 @@ def test_a_loop_left_by_the_last_log_is_that_and_no_more(where, effect, size):
     """It had a folded reading beside it, or shared a set, or was `unknown`."""
     found = diagnose(RIG, session(1, where, size), pictures=False)
     (cause,) = found.causes
-    assert [c.effect for c in cause.candidates] == [effect]
-    assert cause.candidates[0].confidence > 0.9 and cause.stage == where
+    behind = where == "sensor"  # without the curvature it may be the actuator's
+    assert [c.effect for c in cause.candidates] == [effect] + ["hysteresis"] * behind
+    assert cause.candidates[0].confidence > (0.6 if behind else 0.9) and cause.stage == where
     if size == 0.03:  # of noise of 0.008; from 0 at each begin 0.0122 and 0.0143
         assert found.gap.explained < 0.0116
 

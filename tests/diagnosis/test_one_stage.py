@@ -94,7 +94,7 @@ def test_a_lag_is_found_on_its_side_of_a_bent_gain(where, effect):
     "effect, form, slots",
     [
         ("supply_saturation", "hard", ("supply", "load", "strain")),
-        ("sensor_nonlinearity", "quadratic", ("command", "response", "strain")),
+        ("sensor_nonlinearity", "quadratic", ("command", "place", "strain")),
         ("gain_nonlinearity", "cubic", ("command", "drive", "strain")),
         ("transport_delay", "delay", ("supply", "response", "reading")),
         ("slow_regulator", "one_lag", ("supply", "load", "strain")),

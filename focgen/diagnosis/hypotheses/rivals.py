@@ -101,7 +101,7 @@ def _causes(best: Fit, beside: Beside) -> tuple[Cause, ...]:
 def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     """One effect of ``best`` and its rivals, the best first. Of a rival that the experiments are not made to
     show, no more free values are counted than of the effect: they were not to be seen. Twins are one to any
-    log, but for the actuator's offset, and as likely as they are beforehand."""
+    log, and stay as likely as they are beforehand."""
     own = [c for c in best.problem.candidates if c.effect == name]
     without = without_family(best, name, beside.weighing, beside.known)
     ranking = _ranking(name, without, beside)
