@@ -21,7 +21,7 @@ from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import ENTERS, LEAVES
 from focgen.rig.response import integrations, longest, response_time
 from focgen.rig.rig import Rig
-from focgen.rig.session import run_of
+from focgen.rig.session import joined, run_of
 
 NOTE = "begins before the rig has come to rest: the experiments before are simulated ahead of it"
 _RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers
@@ -144,7 +144,7 @@ def _shows(
     leaves = [s for s in STAGES[STAGES.index(ENTERS[entry]) :] if all(LEAVES[s] in log for log in logs)]
     if not leaves or not any(log.before(entry).known for log in found):
         return False
-    y = np.concatenate([np.asarray(log[LEAVES[leaves[-1]]], float) for log in logs])
+    y = joined(logs, LEAVES[leaves[-1]])
     before, after = (_made(rig, placed, of, entry, leaves[-1]) for of in (logs, found))
     if float(np.sqrt(np.mean((after - before) ** 2))) <= _SEEN * float(np.max(np.abs(before))):
         return False
@@ -158,7 +158,7 @@ def _shows(
 
 def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry: str, leaves: str) -> Array:
     """What the rig makes (n,) of all experiments, from the input ``entry`` on."""
-    x = np.concatenate([np.asarray(log[entry], float) for log in logs])
+    x = joined(logs, entry)
     chain, run = Chain(rig, tuple(placed)), run_of(logs, entry)
     made: Array = chain.run(x, ENTERS[entry], leaves, run, between_of(rig, entry))
     return made

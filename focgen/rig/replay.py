@@ -27,7 +27,7 @@ from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import with_recalled
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
-from focgen.rig.session import run_of
+from focgen.rig.session import joined, run_of
 from focgen.shown import Shown
 
 _LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
@@ -125,7 +125,7 @@ def simulate_session(
     begin = min(log.start for log in logs)
     run = run_of(logs, entry, ahead=clock if begin < clock else 0.0)
     tap: dict[str, Array] = {}
-    x = np.concatenate([np.asarray(log[entry], float) for log in logs])
+    x = joined(logs, entry)
     first = "regulator" if entry == "command" else "actuator"
     chain = Chain(rig, tuple(placed_in(rig) if placed is None else placed))
     chain.run(x, first, "sensor", run, between_of(rig, entry), tap)

@@ -13,7 +13,7 @@ from focgen.logs.experiment import Experiment
 from focgen.rig import kernels
 from focgen.rig.effects import Run
 from focgen.rig.rig import UNITY, Rig
-from focgen.rig.session import run_of
+from focgen.rig.session import joined, run_of
 
 _ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
 _LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
@@ -146,11 +146,6 @@ def between(entry: str, exit: str) -> tuple[str, ...]:
     """The stages between two signals."""
     order = ("regulator", "actuator", "sensor")
     return order[order.index(_ENTERS[entry]) : order.index(_LEAVES[exit]) + 1]
-
-
-def joined(logs: Sequence[Experiment], role: str) -> np.ndarray:
-    """A signal of all experiments, one after the other."""
-    return np.concatenate([np.asarray(log[role], float) for log in logs])
 
 
 def make(

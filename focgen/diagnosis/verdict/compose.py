@@ -18,7 +18,7 @@ from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.recalled import recalled, with_recalled
 from focgen.rig.replay import effect_tables, simulate_session
 from focgen.rig.rig import Rig
-from focgen.rig.session import run_of
+from focgen.rig.session import joined, run_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Rigs:
         at, and the share that they ``promise`` to explain."""
         left: list[dict[str, float]] = []
         entry = "command" if all("command" in log for log in logs) else "pressure"
-        x = np.concatenate([np.asarray(log[entry], float) for log in logs])
+        x = joined(logs, entry)
         first = "regulator" if entry == "command" else "actuator"
         run = run_of(logs, entry)
         Chain(self.fitted, self.placed).run(
