@@ -120,9 +120,7 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
         forms = [fits[other], *_other_forms(other, fits[other], best, ranking, beside)]
         odds[other] = any_of([speaks(f, other) for f in forms])
     for n in [n for n, f in twin.items() if fits[n] is f]:
-        ours, theirs = (place(of.problem.candidates) for of in (best, fits[n]))
-        either = max(odds[name] - ours, odds[n] - theirs)
-        odds |= {name: either + ours, n: either + theirs}
+        odds |= _alike_as_before(odds, {name: best, n: fits[n]})
     odds = {n: o + prior(n, without) for n, o in odds.items()}
     rivals = [
         Rival(
@@ -145,6 +143,13 @@ def _foremost(twin: Fit, ranked: Fit | None, speaks: Callable[[Fit], float]) -> 
     if ranked is None or ranked.problem.candidates[-1].form.rarer == twin.problem.candidates[-1].form.rarer:
         return twin
     return max(twin, ranked, key=speaks)
+
+
+def _alike_as_before(odds: Mapping[str, float], twins: Mapping[str, Fit]) -> dict[str, float]:
+    """The log odds of twins, which no log tells apart: as far apart as their places make them."""
+    places = {n: place(of.problem.candidates) for n, of in twins.items()}
+    best = max(odds[n] - places[n] for n in twins)
+    return {n: best + places[n] for n in twins}
 
 
 def _near(odds: Mapping[str, float]) -> list[str]:
