@@ -4,10 +4,14 @@ Red when it passes for the sensor's because the library has loops ahead of the d
 a gauge between the two either of them is sure.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.hypotheses import explain
+from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import LinearActuator, Rig, Signals
@@ -86,3 +90,17 @@ def test_without_the_curvature_it_is_either_s(of, seed):
     assert [c.effect for c in cause.candidates[:2]] == ["sensor_hysteresis", "hysteresis"]
     assert all(0.2 < c.confidence < 0.9 for c in cause.candidates[:2])
     assert found.next_experiment.inputs["also_log"] == "curvature"
+
+
+def test_the_first_rivals_take_over_how_the_command_runs_between_samples(monkeypatch):
+    """Else an experiment is chosen to tell apart what differs by nothing else."""
+
+    def fitted(way):
+        return SimpleNamespace(problem=SimpleNamespace(segment=SimpleNamespace(between=way)))
+
+    monkeypatch.setattr(explain, "_moved_to", lambda of, segment, weighing: fitted(segment.between))
+    found, best, others = fitted("held"), fitted("straight"), [fitted("held") for _ in range(4)]
+    rivals = [Rival(str(i), "actuator", 0.0, 0.0, fit) for i, fit in enumerate([found, *others])]
+    now = explain._in_the_end(rivals, found, best, None)
+    assert now[0].fit is best
+    assert [r.fit.problem.segment.between for r in now] == ["straight"] * 3 + ["held"] * 2

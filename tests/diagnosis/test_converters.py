@@ -7,6 +7,7 @@ levels are few, when a fit moves the steps that were seen, or when rests of a ri
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from scipy.signal import lfilter
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.hypotheses import converter
+from focgen.diagnosis.verdict.instead import bases
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import form_of
@@ -111,6 +113,14 @@ def test_steps_are_a_cause_where_they_make_most_of_the_noise(noise, seed):
     coarse = noise < 0.2
     assert [c.candidates[0].effect for c in found.causes] == ["sensor_quantization"] * coarse
     assert any("which are part of the noise" in note for note in found.notes) is not coarse
+
+
+def test_nothing_is_held_against_steps_that_the_best_fit_goes_without():
+    """A note said "instead of it may be (100 %) that at once it becomes another": steps are no noise."""
+    coarse = SimpleNamespace(rivals=[SimpleNamespace(effect="sensor_quantization")])
+    nothing = SimpleNamespace(problem=SimpleNamespace(families=(), candidates=()))
+    assert not list(bases(SimpleNamespace(causes=(coarse,), best=nothing, nominal=nothing)))
+    assert list(bases(SimpleNamespace(causes=(), best=nothing, nominal=nothing))) == [nothing]
 
 
 @pytest.mark.parametrize("dead", [3.0, 0.0])

@@ -142,8 +142,8 @@ def test_effects_that_leave_more_than_they_close_stand_for_something_else(
     explained, more, rounded, monkeypatch
 ):
     """Steps of a rounding leave what they leave: no model has them where they fall."""
-    monkeypatch.setattr(summary, "is_rounded", lambda e: rounded)
+    monkeypatch.setattr(summary, "is_rounded", lambda causes: rounded)
     squares = {"refitted": np.array([1.0]), "explained": np.array([explained])}
-    made = summary.Summary(None, [(None, None)], {}, squares, 0.1, None)
+    made = summary.Summary(None, [(SimpleNamespace(causes=()), None)], {}, squares, 0.1, None)
     assert made.more_is_left == more
     assert made.stands_for_more == (more and not rounded)

@@ -17,6 +17,7 @@ from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.rivals import Cause, Rival, share_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.rig.effects import library
 from focgen.rig.effects._effect import Run, Values
 from focgen.rig.engine import slot_in
 
@@ -79,6 +80,11 @@ class Converter:
             start = fit(soft, start, WHITE, _REFITTED).vector
             found.append(fit(problem, np.r_[start[: len(vector)], self.entries], weighing, 0))
         return min(found, key=lambda f: rms(f.weighed))
+
+
+def is_rounded(causes: Sequence[Cause]) -> bool:
+    """Whether a rounding is among the effects found: a cause even where the best fit goes without it."""
+    return any(library()[c.rivals[0].effect].rounds for c in causes)
 
 
 def _eased(width: float, x: np.ndarray, values: Values, run: Run) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from focgen.diagnosis.controller.check import ControllerCheck
+from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.level_pace import paced_stage, slower_by
 from focgen.diagnosis.hypotheses.rivals import Cause
@@ -104,7 +105,9 @@ def paced(explanations: Iterable[Explanation]) -> Iterator[str]:
 def rounded(explanations: Iterable[Explanation]) -> Iterator[str]:
     """Where readings move in steps that are noise, or noise beside what was found."""
     for e in explanations:
-        if e.converter is not None and e.converter.is_noise(e.nominal, alone=not e.causes):
+        if e.converter is None or is_rounded(e.causes):
+            continue
+        if e.converter.is_noise(e.nominal, alone=not e.causes):
             step = e.converter.step * e.segment.level_out
             noise = "noise beside what was found" if e.causes else "part of the noise"
             yield f"{_within(e)}: the readings move in steps of {step:.3g}, which are {noise}"

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.belief.standing import sureness
 from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
+from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import left_out
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.rig.effects import library
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ def is_likelier(other: Instead | None) -> bool:
 def bases(e: Explanation) -> Iterator[Fit]:
     """The fits that it may stand beside: without any effect, and without each of several. None where a
     rounding was found: its steps are no noise, and what is smaller than they are tells nothing."""
-    if any(library()[family].rounds for family in e.best.problem.families):
+    if is_rounded(e.causes):
         return
     yield e.nominal
     candidates = e.best.problem.candidates
@@ -54,8 +55,7 @@ def gone(e: Explanation, base: Fit) -> frozenset[str]:
 def odds_over(e: Explanation, left: float, free: int, things: int) -> float:
     """The log odds of ``things`` with so many ``free`` values, which leave the sum of squares ``left``, over
     what was found; each is as rare as any."""
-    weighing = Weighing(e.ar)
-    before, after = (square_by(f, weighing) for f in (e.nominal, e.best))
+    before, after = _squares(e)
     floor = max(min(after * (1.0 - e.predictability.share), left), 1e-300)
     unit = 0.5 * len(e.segment.y) / floor
 
@@ -66,3 +66,10 @@ def odds_over(e: Explanation, left: float, free: int, things: int) -> float:
         return log_likelihood(misfit, scale) - paid(free, gained, misfit, scale) + prior
 
     return log_odds(left, free, things) - log_odds(after, e.best.size, len(e.best.problem.families))
+
+
+@lru_cache(maxsize=16)
+def _squares(e: Explanation) -> tuple[float, float]:
+    """The sums of squares that are left without any effect, and with what was found."""
+    before, after = (square_by(f, Weighing(e.ar)) for f in (e.nominal, e.best))
+    return before, after

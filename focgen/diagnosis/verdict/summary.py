@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
@@ -16,7 +17,7 @@ from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.moments import lasting_part
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
-from focgen.diagnosis.verdict.unexplained import is_rounded, is_unknown
+from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Rig
 
@@ -41,7 +42,7 @@ class Summary:
             self.total is not None
             and self.total.value < NUMBERS.vain
             and self.floor < NUMBERS.above**2 * float(np.mean(self.squares["refitted"]))
-            and not any(is_rounded(e) or paths(e) for e, _ in self.causes)
+            and not any(is_rounded(e.causes) or paths(e) for e, _ in self.causes)
         )
 
     @property
@@ -54,7 +55,7 @@ class Summary:
     @property
     def stands_for_more(self) -> bool:
         """The same, but for steps of a rounding, which never fall where a model has them."""
-        return self.more_is_left and not any(is_rounded(e) for e, _ in self.causes)
+        return self.more_is_left and not any(is_rounded(e.causes) for e, _ in self.causes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ def _at_odds(summary: Summary) -> list[Explanation]:
     that one wanders is not foretold, so that only the latter tells then. Where errors add up, one may stand
     for another."""
     explained = list(dict.fromkeys(e for e, _ in summary.causes))
-    if not explained or any(is_rounded(e) or e.segment.pace for e in explained):
+    if not explained or any(is_rounded(e.causes) or e.segment.pace for e in explained):
         return []
     found, *others = (float(np.mean(summary.squares[k])) for k in ("explained", "as given", "refitted"))
     without = min(others)
@@ -166,7 +167,7 @@ def _no_closer(
     """The last segment, where its effects fit its measured input but bring the whole chain's output no
     closer: what they mend is that input. A rounding leaves more, by nature."""
     last = explanations[-1]
-    if not last.causes or is_rounded(last):
+    if not last.causes or is_rounded(last.causes):
         return []
     without = compose.compose(rig, _held(explanations, [last]), logs)
     both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from focgen.diagnosis.belief.unknown import is_none
+from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
@@ -24,7 +25,11 @@ def is_unknown(e: Explanation) -> bool:
     left = disturbed(e)
     if _is_disturbed(e, left) or (e.segment.closed and _hidden(e, left)):
         return True
-    if e.causes and not is_rounded(e) and (from_outside(e) or another(e) or is_late(e) or is_uneven(e)):
+    if (
+        e.causes
+        and not is_rounded(e.causes)
+        and (from_outside(e) or another(e) or is_late(e) or is_uneven(e))
+    ):
         return True
     if e.predictability.share < NUMBERS.left:
         return False
@@ -47,11 +52,6 @@ def is_noise(e: Explanation) -> bool:
     return not is_unknown(e) or (quiet and e.predictability.share <= NUMBERS.much)
 
 
-def is_rounded(e: Explanation) -> bool:
-    """Whether a rounding is among the effects found."""
-    return any(library()[c.rivals[0].effect].rounds for c in e.causes)
-
-
 def _is_disturbed(e: Explanation, left: Disturbance) -> bool:
     """Whether bursts, slow swings, a hum or what pushes the rig are there, and the effects found, if any,
     take hardly any of the residual away. What a rounding leaves comes in bursts by nature."""
@@ -59,13 +59,13 @@ def _is_disturbed(e: Explanation, left: Disturbance) -> bool:
     if not e.causes:
         return loud
     before, after = _squares(e)
-    return after > NUMBERS.stays * before and loud and not is_rounded(e)
+    return after > NUMBERS.stays * before and loud and not is_rounded(e.causes)
 
 
 def _hidden(e: Explanation, left: Disturbance) -> bool:
     """Whether the effects leave much that no noise is, in a closed loop, which moves the input against it, so
     that the reference predicts little of it."""
-    if not e.causes or is_rounded(e):
+    if not e.causes or is_rounded(e.causes):
         return False
     before, after = _squares(e)
     return after > NUMBERS.stays * before and (left.slow > NUMBERS.looped or left.bursts)
