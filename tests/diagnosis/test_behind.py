@@ -81,6 +81,7 @@ CASES = [
 def test_a_loop_behind_the_dynamics_is_whose_the_curvature_shows(of, seed):
     (cause,) = diagnose(RIG, logs(seed, of), pictures=False).causes
     assert [c.effect for c in cause.candidates] == ["hysteresis" if of == "actuator" else "sensor_hysteresis"]
+    assert cause.candidates[0].form.endswith("_behind") == (of == "actuator")
 
 
 @pytest.mark.parametrize("of, seed", CASES)

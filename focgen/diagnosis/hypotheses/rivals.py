@@ -100,8 +100,7 @@ def _causes(best: Fit, beside: Beside) -> tuple[Cause, ...]:
 
 def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     """One effect of ``best`` and its rivals, the best first. Of a rival that the experiments are not made to
-    show, no more free values are counted than of the effect: they were not to be seen. Twins are one to any
-    log, and stay as likely as they are beforehand."""
+    show, no more free values are counted than of the effect: they were not to be seen."""
     own = [c for c in best.problem.candidates if c.effect == name]
     without = without_family(best, name, beside.weighing, beside.known)
     ranking = _ranking(name, without, beside)
@@ -119,8 +118,6 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     for other in _near(odds) if len(own) == 1 else ():
         forms = [fits[other], *_other_forms(other, fits[other], best, ranking, beside)]
         odds[other] = any_of([speaks(f, other) for f in forms])
-    for n in [n for n, f in twin.items() if fits[n] is f]:
-        odds |= _alike_as_before(odds, {name: best, n: fits[n]})
     odds = {n: o + prior(n, without) for n, o in odds.items()}
     rivals = [
         Rival(
@@ -143,13 +140,6 @@ def _foremost(twin: Fit, ranked: Fit | None, speaks: Callable[[Fit], float]) -> 
     if ranked is None or ranked.problem.candidates[-1].form.rarer == twin.problem.candidates[-1].form.rarer:
         return twin
     return max(twin, ranked, key=speaks)
-
-
-def _alike_as_before(odds: Mapping[str, float], twins: Mapping[str, Fit]) -> dict[str, float]:
-    """The log odds of twins, which no log tells apart: as far apart as their places make them."""
-    places = {n: place(of.problem.candidates) for n, of in twins.items()}
-    best = max(odds[n] - places[n] for n in twins)
-    return {n: best + places[n] for n in twins}
 
 
 def _near(odds: Mapping[str, float]) -> list[str]:
