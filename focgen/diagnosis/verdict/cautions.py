@@ -27,10 +27,10 @@ _NEAR = 0.95  # of the error without any effect: with more a family is not near
 def cautions(
     causes: Sequence[tuple[Explanation, Cause]],
     unknown: Sequence[Explanation],
-    changed: Sequence[Explanation] = (),
+    doubted: Sequence[Explanation] = (),
 ) -> Iterator[str]:
     """What cannot be predicted, what may be there instead, and what is unexplained beside what is named.
-    ``changed``: of what becomes another at once instead of a part of what was found."""
+    ``doubted``: of what is likelier something that no effect is, instead of a part of what was found."""
     for candidate in (candidate for e, _ in causes for candidate in paths(e)):
         yield (
             f"the {candidate.effect} wanders: followed through this session, its next turn cannot be "
@@ -39,15 +39,15 @@ def cautions(
     for e in unknown:
         if at_once := another(e):
             yield f"{_within(e)}: not slowly, but at once it {_at_once(at_once)}"
-    for e in dict.fromkeys([*changed, *(e for e, _ in causes)]):
+    for e in dict.fromkeys([*doubted, *(e for e, _ in causes)]):
         if (at_once := changed_at_once(e)) and at_once.sure > 1.0 - NUMBERS.held:
             named = " and ".join(sorted(at_once.instead))
             yield (
                 f"{_within(e)}: instead of {named} it may be ({at_once.sure:.0%}) that at once it "
                 f"{_at_once(at_once)}"
             )
-    yield from _late(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
-    yield from _uneven(dict.fromkeys([*unknown, *(e for e, _ in causes)]))
+    yield from _late(dict.fromkeys([*unknown, *doubted, *(e for e, _ in causes)]))
+    yield from _uneven(dict.fromkeys([*unknown, *doubted, *(e for e, _ in causes)]))
     yield from _nominal(causes)
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"

@@ -23,7 +23,7 @@ from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import another, changed_at_once
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.sizes import estimates
-from focgen.diagnosis.verdict.summary import Summary, parts_that_last, sorted_out
+from focgen.diagnosis.verdict.summary import Summary, sorted_out, sound_parts
 from focgen.diagnosis.verdict.uneven import unevenly_paced
 from focgen.diagnosis.verdict.unexplained import disturbed
 from focgen.diagnosis.verdict.where import locate, stage_shares
@@ -43,9 +43,9 @@ def conclude(
 ) -> tuple[compose.Rigs, Diagnosis, Evidence]:
     """The rigs that the verdict stands for, the diagnosis without a next experiment, and what it rests on.
     ``granted``: the effects are there, however little they explain."""
-    changed = {} if granted else parts_that_last(explanations)
-    if changed:
-        explanations = [changed.get(e, e) for e in explanations]
+    doubted = {} if granted else sound_parts(explanations)
+    if doubted:
+        explanations = [doubted.get(e, e) for e in explanations]
         rigs = compose.compose(rig, explanations, logs)
     stands = sorted_out(rig, logs, rigs, explanations, granted)
     summary, unknown = stands.summary, stands.unknown
@@ -70,7 +70,7 @@ def conclude(
         notes=(
             *notes_of(logs),
             *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
-            *cautions(summary.causes, unknown, list(changed)),
+            *cautions(summary.causes, unknown, list(doubted)),
             *lesser(stands.beside),
             *paced(explanations),
             *rounded(explanations),

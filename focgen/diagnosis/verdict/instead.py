@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -13,7 +13,7 @@ from focgen.diagnosis.belief.standing import sureness
 from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
 from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.hypotheses.rivals import left_out
+from focgen.diagnosis.hypotheses.rivals import left_out, without
 from focgen.diagnosis.numbers import NUMBERS
 
 
@@ -50,6 +50,17 @@ def bases(e: Explanation) -> Iterator[Fit]:
 def gone(e: Explanation, base: Fit) -> frozenset[str]:
     """The families found that are not in ``base``."""
     return frozenset(e.best.problem.families) - frozenset(base.problem.families)
+
+
+def sound_part(e: Explanation, other: Instead | None) -> Explanation:
+    """The explanation without the families instead of which something else is likelier, where others are not
+    in question; else as it is. These stay as they were fitted beside them, and so does how much inputs
+    predict: a refit would make up for what is there instead."""
+    if other is None or not is_likelier(other) or not other.instead < frozenset(e.best.problem.families):
+        return e
+    kept = tuple(c for c in e.causes if c.rivals[0].effect not in other.instead)
+    gone = [c for c in e.best.problem.candidates if c.effect in other.instead]
+    return replace(e, best=without(e.best, gone, Weighing(e.ar)), causes=kept) if kept else e
 
 
 def odds_over(e: Explanation, left: float, free: int, things: int) -> float:

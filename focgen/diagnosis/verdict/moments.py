@@ -10,14 +10,13 @@ of them alone becomes another, or the gain as a whole, which takes fewer numbers
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import Weighing
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.hypotheses.rivals import without
 from focgen.diagnosis.problem.segments import Segment
 from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
 from focgen.diagnosis.verdict.pieces import Pieces, pieces
@@ -63,18 +62,6 @@ def another(e: Explanation) -> Changed | None:
     """What changed at once, where that is likelier than what was found."""
     changed = changed_at_once(e)
     return changed if is_likelier(changed) else None
-
-
-def lasting_part(e: Explanation) -> Explanation:
-    """The explanation without the families instead of which it became another at once, where others are not
-    in question; else as it is. These stay as they were fitted beside them, and so does how much inputs
-    predict: a refit would make up for the change."""
-    changed = another(e)
-    if changed is None or not changed.instead < frozenset(e.best.problem.families):
-        return e
-    kept = tuple(c for c in e.causes if c.rivals[0].effect not in changed.instead)
-    gone = [c for c in e.best.problem.candidates if c.effect in changed.instead]
-    return replace(e, best=without(e.best, gone, Weighing(e.ar)), causes=kept) if kept else e
 
 
 def _judged(e: Explanation, cut: Pieces) -> Changed:

@@ -15,8 +15,11 @@ from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
-from focgen.diagnosis.verdict.moments import lasting_part
+from focgen.diagnosis.verdict.instead import sound_part
+from focgen.diagnosis.verdict.late import logged_late
+from focgen.diagnosis.verdict.moments import changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
+from focgen.diagnosis.verdict.uneven import unevenly_paced
 from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Rig
@@ -122,11 +125,16 @@ def _summary(
     return Summary(rigs, causes, made, squares, floor, total)
 
 
-def parts_that_last(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:
-    """The explanations of which a part became another at once instead, each with the part that lasts, where
-    this explains its segment but for that."""
-    parts = ((e, lasting_part(e)) for e in explanations)
-    return {e: part for e, part in parts if part is not e and not is_unknown(part)}
+def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:
+    """The explanations of which a part is likelier something that no effect is, each with its other part,
+    where this explains its segment but for that."""
+    found = {}
+    for e in explanations:
+        if len(e.best.problem.families) > 1:
+            parts = (sound_part(e, of(e)) for of in (changed_at_once, logged_late, unevenly_paced))
+            if part := next((p for p in parts if p is not e and not is_unknown(p)), None):
+                found[e] = part
+    return found
 
 
 def _unaccounted(summary: Summary) -> bool:
