@@ -94,9 +94,9 @@ class Numbers:
     )
     behind: float = _number(
         0.5,
-        "odds, before the data, that a loop behind all dynamics is the actuator's, over the sensor's",
+        "odds, before the data, that a loop or curve behind all dynamics is the actuator's, not the sensor's",
         "odds",
-        "assumed; on rigs of other physics it was the actuator's in three of four",
+        "assumed; on rigs of other physics loops were the actuator's in three of four",
         "the actuator's in one of five instead of one of three",
         "either's as likely, and first whichever comes first",
     )

@@ -1,9 +1,11 @@
-"""A loop behind an actuator's dynamics, as of an alloy that is heated first, made of relays.
+"""A loop, or a curve, behind an actuator's dynamics, as of an alloy that is heated first or of a linkage:
+relays, and the angle of a crank.
 
-Red when it passes for the sensor's because the library has loops ahead of the dynamics only, or when without
-a gauge between the two either of them is sure.
+Red when it passes for the sensor's because the library has it ahead of the dynamics only, or when without a
+gauge between the two either of them is sure.
 """
 
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,6 +26,7 @@ RIG = Rig(
     LinearActuator(TransferFunction([(2.0, 0.0)], [(HEATS, 1.0), (1.0, 0.0)])),
     sensor=TransferFunction([(1.0, 0.0)], [(READS, 1.0), (1.0, 0.0)]),
 )
+SENSORS = {"hysteresis": "sensor_hysteresis", "gain_nonlinearity": "sensor_nonlinearity"}
 LEVELS = (0.5, 0.2, 0.9, 0.4, 0.7, 0.0, 1.0, 0.3, 0.6, 0.1)
 
 
@@ -38,6 +41,14 @@ def relays(x, share):
     return (1.0 - share) * x + share * 2.0 * np.array(found)
 
 
+def cranked(x, share):
+    """The angle of a crank by its height, as far as a ``share`` of its length goes."""
+    return 2.0 * np.arcsin(3.0 * share * x / 2.0) / (3.0 * share)
+
+
+BEHIND = {"hysteresis": relays, "gain_nonlinearity": cranked}
+
+
 def lagged(x, time):
     kept, y = np.exp(-H / time), np.zeros(len(x))
     for i in range(1, len(x)):
@@ -45,8 +56,8 @@ def lagged(x, time):
     return y
 
 
-def logs(seed, of, share=0.25):
-    """Steps and a triangle with smaller ones inside, with the relays behind the heat or in the reading."""
+def logs(seed, of, effect, share=0.25):
+    """Steps and a triangle with smaller ones inside, with the effect behind the heat or in the reading."""
     rng = np.random.default_rng(seed)
     slow = np.interp(
         np.arange(3000) * H, np.r_[0, 12, 20, 26, 36, 42, 48, 60], [0, 1, 0.3, 0.7, 0, 0.6, 0.2, 1]
@@ -54,9 +65,9 @@ def logs(seed, of, share=0.25):
     made = []
     for number, drive in enumerate((np.repeat(LEVELS, 300), slow)):
         moved = lagged(2.0 * drive, HEATS)
-        moved = relays(moved, share) if of == "actuator" else moved
+        moved = BEHIND[effect](moved, share) if of == "actuator" else moved
         read = lagged(moved, READS)
-        read = relays(read, share) if of == "sensor" else read
+        read = BEHIND[effect](read, share) if of == "sensor" else read
         noise = 0.006 * rng.standard_normal((2, len(drive)))
         signals = {"pressure": drive, "curvature": moved + noise[0], "output": read + noise[1]}
         made.append(Experiment(str(number), H, signals, start=70.0 * number))
@@ -69,26 +80,25 @@ def without_curvature(log):
     )
 
 
-QUICK = {("actuator", 1)}
+QUICK = {("actuator", "hysteresis", 1), ("actuator", "gain_nonlinearity", 1)}
 CASES = [
-    pytest.param(of, seed, marks=() if (of, seed) in QUICK else pytest.mark.long)
-    for of in ("actuator", "sensor")
-    for seed in (1, 2)
+    pytest.param(*case, marks=() if case in QUICK else pytest.mark.long)
+    for case in product(("actuator", "sensor"), SENSORS, (1, 2))
 ]
 
 
-@pytest.mark.parametrize("of, seed", CASES)
-def test_a_loop_behind_the_dynamics_is_whose_the_curvature_shows(of, seed):
-    (cause,) = diagnose(RIG, logs(seed, of), pictures=False).causes
-    assert [c.effect for c in cause.candidates] == ["hysteresis" if of == "actuator" else "sensor_hysteresis"]
+@pytest.mark.parametrize("of, effect, seed", CASES)
+def test_what_is_behind_the_dynamics_is_whose_the_curvature_shows(of, effect, seed):
+    (cause,) = diagnose(RIG, logs(seed, of, effect), pictures=False).causes
+    assert [c.effect for c in cause.candidates] == [effect if of == "actuator" else SENSORS[effect]]
     assert cause.candidates[0].form.endswith("_behind") == (of == "actuator")
 
 
-@pytest.mark.parametrize("of, seed", CASES)
-def test_without_the_curvature_it_is_either_s(of, seed):
-    found = diagnose(RIG, [without_curvature(log) for log in logs(seed, of)], pictures=False)
+@pytest.mark.parametrize("of, effect, seed", CASES)
+def test_without_the_curvature_it_is_either_s(of, effect, seed):
+    found = diagnose(RIG, [without_curvature(log) for log in logs(seed, of, effect)], pictures=False)
     (cause,) = found.causes
-    assert [c.effect for c in cause.candidates[:2]] == ["sensor_hysteresis", "hysteresis"]
+    assert [c.effect for c in cause.candidates[:2]] == [SENSORS[effect], effect]
     assert all(0.2 < c.confidence < 0.9 for c in cause.candidates[:2])
     assert found.next_experiment.inputs["also_log"] == "curvature"
 

@@ -12,22 +12,29 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect
 
 
-def prior(effect: str, base: Fit) -> float:
-    """Log odds, before the data, that ``base`` lacks ``effect``; of another form of a family that it has."""
-    if effect in base.problem.families:
-        return float(np.log(NUMBERS.again))
-    return float(np.log(NUMBERS.rare))
+def prior(candidate: CandidateEffect, beside: Sequence[CandidateEffect]) -> float:
+    """Log odds, before the data, of an effect ``beside`` others, or of another form of one that is there."""
+    again = any(_where(c) == _where(candidate) for c in beside)
+    return float(np.log(NUMBERS.again)) if again else rarity([candidate])
 
 
-def place(candidates: Sequence[CandidateEffect]) -> float:
-    """Log odds, before the data, that effects act where they do."""
-    return sum(c.form.rarer for c in candidates) * float(np.log(NUMBERS.behind))
+def rarity(candidates: Sequence[CandidateEffect]) -> float:
+    """Log odds, before the data, that effects are there, whatever forms of them. Ahead of the dynamics and
+    behind them, a family is there twice, which is as rare as two."""
+    places = {_where(c) for c in candidates}
+    behind = sum(rarer for _, rarer in places)
+    return float(len(places) * np.log(NUMBERS.rare) + behind * np.log(NUMBERS.behind))
+
+
+def _where(candidate: CandidateEffect) -> tuple[str, bool]:
+    """The family, and whether it acts behind the dynamics of its stage."""
+    return candidate.effect, candidate.form.rarer
 
 
 def likeliest(ground: Ground, tried: Sequence[Fit]) -> tuple[Fit, float]:
     """Of candidates the one of the highest posterior odds over nothing more, and those, in nats, by what it
     explains: nominal parameters that come closer to those given choose among effects, and ask for none."""
     last = [f.problem.candidates[-1] for f in tried]
-    odds = [ground.odds(f) + prior(c.effect, ground.base) + place([c]) for f, c in zip(tried, last)]
+    odds = [ground.odds(f) + prior(c, ground.base.problem.candidates) for f, c in zip(tried, last)]
     best = int(np.argmax(odds))
     return tried[best], odds[best] - ground.closer(tried[best])

@@ -148,7 +148,7 @@ def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
         for stage in e.also
         if stage in segment.stages and e.stage not in segment.stages
         for form in e.forms
-        if fits_in(form, stage, rig) and (segment.both_ways or not form.both_ways)
+        if fits_in(form, stage, rig) and not form.rarer and (segment.both_ways or not form.both_ways)
     ]
 
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from focgen.diagnosis.belief.choice import place, prior
+from focgen.diagnosis.belief.choice import rarity
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.standing import any_of, behind, holds, nominal_off
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
@@ -111,14 +111,13 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
 
     def speaks(of: Fit, family: str) -> float:
         acts = [c for c in of.problem.candidates if c.effect == family]
-        return ground.odds(of, best.size - without.size if family in unseen else None) + place(acts)
+        return ground.odds(of, best.size - without.size if family in unseen else None) + rarity(acts)
 
     fits |= {n: _foremost(f, fits.get(n), partial(speaks, family=n)) for n, f in twin.items()}
     odds = {n: speaks(f, n) for n, f in fits.items()}
     for other in _near(odds) if len(own) == 1 else ():
         forms = [fits[other], *_other_forms(other, fits[other], best, ranking, beside)]
         odds[other] = any_of([speaks(f, other) for f in forms])
-    odds = {n: o + prior(n, without) for n, o in odds.items()}
     rivals = [
         Rival(
             n,
@@ -223,7 +222,8 @@ def _twin(name: str, best: Fit, beside: Beside) -> dict[str, Fit]:
 def _second_form(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:
     """With the form of the same family beside it that helps most, where one does."""
     last = of.problem.candidates[-1]
-    forms = [c for c in candidates if c.effect == last.effect and c.stage == last.stage and c != last]
+    alike = (last.effect, last.stage, last.form.rarer)
+    forms = [c for c in candidates if (c.effect, c.stage, c.form.rarer) == alike and c != last]
     ranking = rank(of.problem, of.vector, forms)
     if ranking.winner is None:
         return of

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.belief.choice import place
+from focgen.diagnosis.belief.choice import prior
 from focgen.diagnosis.belief.further import Ground
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
@@ -59,6 +59,5 @@ def _likelier(both: Fit, first: Ranking, found: Fit, weighing: Weighing, asked: 
 
 def _prior(problem: Problem) -> float:
     """Log odds, before the data, of the effects of a problem."""
-    families, forms = len(problem.families), len(problem.candidates)
-    odds = families * np.log(NUMBERS.rare) + (forms - families) * np.log(NUMBERS.again)
-    return float(odds) + place(problem.candidates)
+    found = problem.candidates
+    return sum(prior(c, found[:i]) for i, c in enumerate(found))

@@ -1,13 +1,14 @@
 """Smooth static curves of any shape, shared by the families that bend."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from focgen.arrays import Array
-from focgen.rig.effects._effect import LARGEST, Form, Parameter, Run, Values
+from focgen.rig.effects._effect import LARGEST, Act, Form, Parameter, Run, Values
 
 _BEYOND = 1.2  # of the largest level seen: the bend grows no further there
 _KNOTS = np.linspace(0.0, 1.0, 6)  # of the largest level seen
@@ -65,19 +66,67 @@ def _bend(place: Array, sizes: Sequence[float]) -> Array:
     return made
 
 
-def spline(
-    slot: str,
-    place: Callable[[Array, Run], Array] = lambda x, run: np.abs(x),
-    leaves: Callable[[Array, Values, Run], dict[str, float]] | None = None,
-) -> Form:
-    """x (1 + S(q)), S a natural cubic spline from zero, q = ``place(x, run)`` over the largest level."""
+def _level(x: Array, run: Run) -> Array:
+    return np.abs(x)
+
+
+@lru_cache
+def _along(place: Callable[[Array, Run], Array]) -> Act:
+    """x (1 + S(q)): one function for every family that bends along the same place."""
 
     def act(x: Array, values: Values, run: Run) -> Array:
         *sizes, scale = values
-        return x * (1.0 + _bend(place(x, run) / scale, sizes))
+        made: Array = x * (1.0 + _bend(place(x, run) / scale, sizes))
+        return made
 
+    return act
+
+
+def spline(
+    slot: str,
+    place: Callable[[Array, Run], Array] = _level,
+    leaves: Callable[[Array, Values, Run], dict[str, float]] | None = None,
+) -> Form:
+    """x (1 + S(q)), S a natural cubic spline from zero, q = ``place(x, run)`` over the largest level."""
     sizes = (
         Parameter(n, lower=-2.0, upper=4.0, starts=(0.02,), zero=0.0)
         for n in ("at_20", "at_40", "at_60", "at_80", "at_100")
     )
-    return Form("spline", slot, (*sizes, LARGEST), act, leaves=leaves)
+    return Form("spline", slot, (*sizes, LARGEST), _along(place), leaves=leaves)
+
+
+def _quadratic(x: Array, values: Values, run: Run) -> Array:
+    return x * (1.0 + values[0] * x)
+
+
+def exponential(x: Array, values: Values, run: Run) -> Array:
+    """(exp(b x) − 1)/b."""
+    y = np.clip(values[0] * x, -30.0, 30.0)
+    made: Array = x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
+    return made
+
+
+def _cubic(x: Array, values: Values, run: Run) -> Array:
+    first, second = values
+    return x * (1.0 + first * x + second * x * x)
+
+
+def _bent(name: str, level: int, *starts: float) -> Parameter:
+    return Parameter(name, level=level, lower=-2.0, upper=2.0, starts=starts, zero=0.0)
+
+
+def calibration(slot: str) -> list[Form]:
+    """The curves of a reading at ``slot``, behind all dynamics."""
+    return [
+        Form("quadratic", slot, (_bent("bend", -1, 0.1),), _quadratic),
+        Form("exponential", slot, (_bent("bend", -1, 0.1, -0.3),), exponential),
+        Form("cubic", slot, (_bent("bend", -1, 0.1), _bent("twist", -2, 0.05)), _cubic),
+        quartic(slot),
+        spline(slot),
+    ]
+
+
+def behind(slot: str) -> list[Form]:
+    """The same of what moves: of a linkage, of a finger that points elsewhere the further it bends. A reading
+    is bent more often."""
+    return [replace(form, name=f"{form.name}_behind", rarer=True) for form in calibration(slot)]

@@ -20,13 +20,6 @@ def _gent(x: Array, values: Values, run: Run) -> Array:
     return made
 
 
-def _exponential(x: Array, values: Values, run: Run) -> Array:
-    bend = values[0]
-    y = np.clip(bend * x, -30.0, 30.0)
-    made: Array = x * np.where(np.abs(y) < 1e-6, 1.0 + y / 2, np.expm1(y) / np.where(y == 0, 1.0, y))
-    return made
-
-
 def _stiffening(x: Dynamics, values: Values, run: None) -> Dynamics:
     size, scale = values
     return replace(x, bend=Bend(0.0, size, scale))
@@ -78,7 +71,7 @@ EFFECT = Effect(
             "exponential",
             "drive",
             (Parameter("bend", level=-1, lower=-5.0, upper=5.0, starts=(0.2, -0.2), zero=0.0),),
-            _exponential,
+            _curves.exponential,
         ),
         Form(
             "locking",
@@ -100,5 +93,6 @@ EFFECT = Effect(
         Form("power", "dynamics", (_LOST, _POWER_OF, LARGEST), _power),
         _curves.quartic("drive"),
         _curves.spline("drive"),
+        *_curves.behind("place"),
     ],
 )
