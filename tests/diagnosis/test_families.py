@@ -22,6 +22,7 @@ from focgen.diagnosis.hypotheses.rivals import left_out
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict import summary
+from focgen.diagnosis.verdict.cautions import the_rest
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import form_of, library
@@ -147,3 +148,7 @@ def test_effects_that_leave_more_than_they_close_stand_for_something_else(
     made = summary.Summary(None, [(SimpleNamespace(causes=()), None)], {}, squares, 0.1, None)
     assert made.more_is_left == more
     assert made.stands_for_more == (more and not rounded)
+    notes = list(the_rest(made))
+    assert [f"leaves, {made.loudness:.2g} times the noise" in note for note in notes] == [True] * (
+        more and not rounded
+    )

@@ -14,6 +14,7 @@ from focgen.diagnosis.verdict.confidence import nominal_instead
 from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths
+from focgen.diagnosis.verdict.summary import Summary
 from focgen.diagnosis.verdict.uneven import unevenly_paced
 
 _AT = {
@@ -58,6 +59,15 @@ def lesser(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
     for e, cause in causes:
         first = cause.rivals[0].effect
         yield f"{_within(e)}: {first} may be there as well, but more of the gap is what no effect explains"
+
+
+def the_rest(summary: Summary) -> Iterator[str]:
+    """Where what was found closes less of the gap than it leaves above the noise."""
+    if summary.stands_for_more:
+        yield (
+            f"what was found closes less of the gap than it leaves, {summary.loudness:.2g} times the noise: "
+            "something else is missing, which it may stand for"
+        )
 
 
 def _within(e: Explanation) -> str:

@@ -15,7 +15,15 @@ from focgen.diagnosis.hypotheses.search import evidence as nats
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
-from focgen.diagnosis.verdict.cautions import another_command, cautions, gauges, lesser, paced, rounded
+from focgen.diagnosis.verdict.cautions import (
+    another_command,
+    cautions,
+    gauges,
+    lesser,
+    paced,
+    rounded,
+    the_rest,
+)
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
@@ -72,6 +80,7 @@ def conclude(
             *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
             *cautions(summary.causes, unknown, list(doubted)),
             *lesser(stands.beside),
+            *the_rest(summary),
             *paced(explanations),
             *rounded(explanations),
             *gauges(stands.at_odds),

@@ -56,6 +56,11 @@ class Summary:
         return bool(self.causes) and refitted - explained < explained - self.floor
 
     @property
+    def loudness(self) -> float:
+        """The root mean square that the effects leave, over the noise's."""
+        return float(np.sqrt(np.mean(self.squares["explained"]) / max(self.floor, 1e-300)))
+
+    @property
     def stands_for_more(self) -> bool:
         """The same, but for steps of a rounding, which never fall where a model has them."""
         return self.more_is_left and not any(is_rounded(e.causes) for e, _ in self.causes)
