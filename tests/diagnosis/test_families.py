@@ -114,7 +114,7 @@ def test_what_asks_for_both_ways_is_tried_where_the_input_goes_both(shift, there
     logs = [replace(log, signals={k: v + shift for k, v in log.signals.items()}) for log in turned(0.0)]
     tried = {c.form for c in candidates_for(make(logs, "command", "output"), MOTOR)}
     asking = [f for e in library().values() for f in e.forms if f.both_ways]
-    assert len(asking) == 4 and [f in tried for f in asking] == [there] * 4
+    assert len(asking) == 6 and [f in tried for f in asking] == [there] * 6
 
 
 def passed(num: float, den: tuple[float, ...], x: np.ndarray) -> np.ndarray:
@@ -123,18 +123,34 @@ def passed(num: float, den: tuple[float, ...], x: np.ndarray) -> np.ndarray:
     return lfilter(up.ravel(), down, x)
 
 
+def powered(lags: tuple[float, ...], limit: float = np.inf) -> list[Experiment]:
+    """The motor behind a drive whose current is logged, and ends softly either way."""
+    rng, logs = np.random.default_rng(7), []
+    for log in turned(0.0):
+        current = passed(0.5, lags, log["command"])
+        current = current / (1.0 + np.abs(current / limit) ** 7) ** (1.0 / 7.0)
+        made = {"pressure": current, "output": passed(1.9, (0.63, 1.0), current)}
+        noisy = {k: v + 0.004 * np.ptp(v) * rng.normal(size=len(v)) for k, v in made.items()}
+        logs.append(replace(log, signals={"command": log["command"], **noisy}))
+    return logs
+
+
+def driven(*den: tuple[float, float]) -> Rig:
+    drive = TransferFunction([(0.5, 0.0)], [*den, (1.0, 0.0)])
+    return replace(MOTOR, regulator=drive, signals=Signals("t", "w", "u", pressure="p"))
+
+
+def test_a_limit_that_is_rounded_either_way_is_no_bent_gain():
+    (cause,) = diagnose(driven((0.12, 1.0)), powered((0.12, 1.0), 1.8), pictures=False).causes
+    first = cause.candidates[0]
+    assert (first.effect, first.form) == ("supply_saturation", "soft_both_ways") and first.confidence > 0.9
+
+
 @pytest.mark.parametrize("damping", [0.85, 0.9, 1.1])
 def test_a_damping_a_tenth_off_is_no_effect(damping):
     """What gives a regulator's bandwidth gives its damping no better."""
-    drive = TransferFunction([(0.5, 0.0)], [(0.01, 2.0), (0.12 * damping, 1.0), (1.0, 0.0)])
-    rig = replace(MOTOR, regulator=drive, signals=Signals("t", "w", "u", pressure="p"))
-    rng, logs = np.random.default_rng(7), []
-    for log in turned(0.0):
-        pressure = passed(0.5, (0.01, 0.12, 1.0), log["command"])
-        made = {"pressure": pressure, "output": passed(1.9, (0.63, 1.0), pressure)}
-        noisy = {k: v + 0.004 * np.ptp(v) * rng.normal(size=len(v)) for k, v in made.items()}
-        logs.append(replace(log, signals={"command": log["command"], **noisy}))
-    assert diagnose(rig, logs).verdict in ("none", "parameters")
+    rig = driven((0.01, 2.0), (0.12 * damping, 1.0))
+    assert diagnose(rig, powered((0.01, 0.12, 1.0))).verdict in ("none", "parameters")
 
 
 @pytest.mark.parametrize("rounded", [False, True])

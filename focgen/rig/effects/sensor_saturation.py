@@ -3,10 +3,11 @@
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.rig.effects._curves import softly_beyond
+from focgen.rig.effects._curves import softly_beyond, softly_clipped
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _LIMIT = Parameter("limit", level=1, lower=0.1, upper=1.3, starts=(0.9, 0.6), zero=1.3)
+_WIDTH = Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.02, 0.05), log=True)
 
 
 def _hard(x: Array, values: Values, run: Run) -> Array:
@@ -33,14 +34,7 @@ EFFECT = Effect(
         Form("hard", "reading", (_LIMIT,), _hard),
         # a converter ends on both sides of its zero
         Form("both_ways", "reading", (_LIMIT,), _both_ways, both_ways=True),
-        Form(
-            "soft",
-            "reading",
-            (
-                _LIMIT,
-                Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.02, 0.05), log=True),
-            ),
-            _soft,
-        ),
+        Form("soft", "reading", (_LIMIT, _WIDTH), _soft),
+        Form("soft_both_ways", "reading", (_LIMIT, _WIDTH), softly_clipped, both_ways=True),
     ],
 )

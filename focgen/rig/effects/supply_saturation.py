@@ -6,10 +6,11 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.rig.dynamics import Dynamics
-from focgen.rig.effects._curves import softly_beyond
+from focgen.rig.effects._curves import softly_beyond, softly_clipped
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _CEILING = Parameter("ceiling", level=1, lower=0.1, upper=1.3, starts=(0.95, 0.75), zero=1.3)
+_WIDTH = Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.03, 0.05), log=True)
 
 
 def _hard(x: Array, values: Values, run: Run) -> Array:
@@ -48,14 +49,7 @@ EFFECT = Effect(
         Form("relieved", "chamber", (_CEILING,), _stops),
         # an amplifier clips what goes either way
         Form("both_ways", "supply", (_CEILING,), _both_ways, both_ways=True),
-        Form(
-            "soft",
-            "supply",
-            (
-                _CEILING,
-                Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.03, 0.05), log=True),
-            ),
-            _soft,
-        ),
+        Form("soft", "supply", (_CEILING, _WIDTH), _soft),
+        Form("soft_both_ways", "supply", (_CEILING, _WIDTH), softly_clipped, both_ways=True),
     ],
 )
