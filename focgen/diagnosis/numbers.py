@@ -43,6 +43,14 @@ class Numbers:
         "2 more false effects, 2 more wrong above 0.9",
         "3 fewer right first, sets larger by a tenth",
     )
+    right: float = _number(
+        0.1,
+        "forms that are as good as right: a third as wrong; each free value of theirs is independent",
+        "probability",
+        "steps of 52 pairs, 36 singles, and 45 singles of other physics: 4 of the pairs more, nothing false",
+        "1 of these pairs fewer",
+        _SAME,
+    )
     free: float = _number(
         0.33,
         "independent values for each free one of a form",

@@ -86,6 +86,25 @@ def test_a_second_effect_is_more_than_the_misfit_of_the_first(closed, there):
     assert likeliest(_ground(alone, [only]), [only])[1] > 0.0
 
 
+@pytest.mark.parametrize(
+    "left, values, there", [(1.0, 1, True), (1.0, 5, False), (1.5, 1, False), (1.0, 2, True)]
+)
+def test_what_leaves_nothing_by_few_values_is_no_misfit_of_the_first(left, values, there):
+    """It closes a fortieth of the gap, which a form may well be wrong by; but then it would leave as much."""
+    base, second = _fit(1.0 + 2.5, ["leak"]), _fit(left, ["leak", "resonance"], size=1 + values)
+    best = min([second, _fit(1.0, ["leak", "resonance"])], key=lambda f: f.sse)
+    ground = _ground(base, [best], 100.0)
+    assert (likeliest(ground, [second])[1] > 0.0) == there
+
+
+def test_the_likeliest_is_one_that_something_is_explained_by():
+    """What owes its odds to nominal parameters alone does not keep out what closes the gap."""
+    base, strained = _fit(20.0, ["leak"], prior_penalty=30.0), _fit(20.0, ["leak", "creep"])
+    closes = _fit(2.0, ["leak", "resonance"], prior_penalty=30.0)
+    best, odds = likeliest(_ground(base, [strained, closes], 100.0), [strained, closes])
+    assert best is closes and odds > 0.0
+
+
 def test_a_refit_that_is_strained_asks_for_no_effect():
     """Own parameters closer to those given choose among two effects, and are no reason for either."""
     base, tried = _fit(1.002), [_fit(1.0, ["leak"]), _fit(1.0, ["creep"])]
@@ -110,7 +129,7 @@ def test_so_is_what_was_found_without_it():
     second = _fit(1.0, ["leak", "resonance"])
     odds = [
         _ground(base, [second], 100.0).odds(second)
-        for base in (strained, _fit(2.0, ["leak"], prior_penalty=40.0, kept=_fit(2.1, ["leak"])))
+        for base in (strained, _fit(2.0, ["leak"], prior_penalty=40.0, kept=_fit(1.5, ["leak"])))
     ]
     assert odds[0] > 30.0 and odds[1] < 10.0
 

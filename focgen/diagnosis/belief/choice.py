@@ -33,8 +33,10 @@ def _where(candidate: CandidateEffect) -> tuple[str, bool]:
 
 def likeliest(ground: Ground, tried: Sequence[Fit]) -> tuple[Fit, float]:
     """Of candidates the one of the highest posterior odds over nothing more, and those, in nats, by what it
-    explains: nominal parameters that come closer to those given choose among effects, and ask for none."""
-    last = [f.problem.candidates[-1] for f in tried]
-    odds = [ground.odds(f) + prior(c, ground.base.problem.candidates) for f, c in zip(tried, last)]
-    best = int(np.argmax(odds))
-    return tried[best], odds[best] - ground.closer(tried[best])
+    explains: nominal parameters that come closer to those given choose among effects, and ask for none. So
+    the likeliest of those that something is explained by, where there is one."""
+    last, beside = [f.problem.candidates[-1] for f in tried], ground.base.problem.candidates
+    odds = [ground.odds(f) + prior(c, beside) for f, c in zip(tried, last)]
+    asked = [o - ground.closer(f) for f, o in zip(tried, odds)]
+    best = max(range(len(tried)), key=lambda i: (asked[i] > 0.0, odds[i]))
+    return tried[best], asked[best]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
+from focgen.diagnosis.belief.likelihood import Scale, speaks
 from focgen.diagnosis.fitting.fit import Fit, Weighing, answer, fit, square_by
 from focgen.diagnosis.numbers import NUMBERS
 
@@ -114,11 +114,9 @@ class Ground:
 
     def _speaks(self, of: Fit, most: int | None) -> float:
         """What speaks for a fit, nats."""
-        gained, better = self._gained(of), self.misfit(of)
-        scale = self.scale.of(self.changed + gained)
-        free = of.size - self.base.size
-        cost = paid(free if most is None else min(free, most), gained, better, scale)
-        return log_likelihood(better, scale) - cost - of.prior_penalty
+        gained, free = self._gained(of), of.size - self.base.size
+        count = free if most is None else min(free, most)
+        return speaks(count, gained, self.misfit(of), self.scale, self.changed + gained) - of.prior_penalty
 
     def _kept(self, of: Fit) -> Fit:
         """A fit made anew that keeps nominal parameters closer to those given: as if each nat against them

@@ -9,6 +9,9 @@ grows like the likelihood; beyond, only with the logarithm. So two good forms st
 and D. B. Dunson, Robust Bayesian inference via coarsening, Journal of the American Statistical Association
 114 (2019).
 
+How wrong forms are is not one number either: one in several is as good as right. Then it is no wonder that
+next to nothing is left. But no free value is excused then, so that each costs what the data tell of it.
+
 Everything is in nats of the noise: a mean square m over n samples of noise σ² is n m/(2 σ²).
 """
 
@@ -28,9 +31,9 @@ class Scale:
 
     other: float = 0.0
 
-    def of(self, changed: float) -> float:
-        """The scale, nats, of a hypothesis whose effects change ``changed`` nats."""
-        return 0.5 * NUMBERS.turns + self.other + NUMBERS.form**2 * max(changed, 0.0)
+    def of(self, changed: float, form: float = NUMBERS.form) -> float:
+        """The scale, nats, of a hypothesis whose effects change ``changed`` nats, wrong by ``form``."""
+        return 0.5 * NUMBERS.turns + self.other + form**2 * max(changed, 0.0)
 
 
 def log_likelihood(misfit: float, scale: float) -> float:
@@ -48,3 +51,15 @@ def paid(count: int, gained: float, misfit: float, scale: float) -> float:
     """
     told = NUMBERS.turns * max(gained, 0.0) / (scale + max(misfit, 0.0))
     return float(0.5 * NUMBERS.free * count * np.log1p(told))
+
+
+def speaks(count: int, gained: float, misfit: float, scale: Scale, changed: float) -> float:
+    """What speaks for a hypothesis, nats, up to a constant: of effects that change ``changed`` nats,
+    ``gained`` of them by ``count`` free values, and leave ``misfit``.
+
+    A form that is right is wrong by a third of what others are. Its values are told to within the noise.
+    """
+    usual, right = scale.of(changed), scale.of(changed, NUMBERS.form / 3.0)
+    mostly = log_likelihood(misfit, usual) - paid(count, gained, misfit, usual)
+    seldom = log_likelihood(misfit, right) - 0.5 * count * np.log1p(2.0 * max(gained, 0.0))
+    return float(np.logaddexp(np.log1p(-NUMBERS.right) + mostly, np.log(NUMBERS.right) + seldom))
