@@ -85,12 +85,12 @@ class Numbers:
         "not measured",
     )
     rare: float = _number(
-        1e-4,
+        3e-4,
         "odds, before the data, that an effect of a family is there",
         "odds",
-        "fitted",
-        _SAME,
-        _SAME,
+        "fitted; the same steps",
+        "1 of these pairs fewer",
+        "3 of these pairs more, 1 false effect more",
     )
     again: float = _number(
         0.1,
