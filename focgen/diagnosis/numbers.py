@@ -47,8 +47,8 @@ class Numbers:
         0.1,
         "forms that are as good as right: a third as wrong; each free value of theirs is independent",
         "probability",
-        "steps of 52 pairs, 36 singles, and 45 singles of other physics: 4 of the pairs more, nothing false",
-        "1 of these pairs fewer",
+        "of the steps of 52 pairs and 81 singles: 4 of the pairs more, nothing false more",
+        _SAME,
         _SAME,
     )
     free: float = _number(
@@ -88,9 +88,9 @@ class Numbers:
         3e-4,
         "odds, before the data, that an effect of a family is there",
         "odds",
-        "fitted; the same steps",
-        "1 of these pairs fewer",
-        "3 of these pairs more, 1 false effect more",
+        "fitted; of the steps of 52 pairs and 81 singles",
+        "1 of the pairs fewer",
+        "3 of the pairs more, 1 false effect more",
     )
     again: float = _number(
         0.1,

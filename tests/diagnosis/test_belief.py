@@ -126,10 +126,10 @@ def test_a_fit_that_strains_nominal_parameters_is_asked_whether_it_has_to(left, 
 def test_so_is_what_was_found_without_it():
     """Kept close, what was found without the effect leaves hardly more: an effect has nothing to mend."""
     strained = _fit(2.0, ["leak"], prior_penalty=40.0)
-    second = _fit(1.0, ["leak", "resonance"])
+    second = _fit(1.2, ["leak", "resonance"], predictable_share=0.2 / 1.2 + NUMBERS.chance)
     odds = [
         _ground(base, [second], 100.0).odds(second)
-        for base in (strained, _fit(2.0, ["leak"], prior_penalty=40.0, kept=_fit(1.5, ["leak"])))
+        for base in (strained, _fit(2.0, ["leak"], prior_penalty=40.0, kept=_fit(2.1, ["leak"])))
     ]
     assert odds[0] > 30.0 and odds[1] < 10.0
 

@@ -18,6 +18,11 @@ def prior(candidate: CandidateEffect, beside: Sequence[CandidateEffect]) -> floa
     return float(np.log(NUMBERS.again)) if again else rarity([candidate])
 
 
+def beforehand(candidates: Sequence[CandidateEffect]) -> float:
+    """Log odds, before the data, of effects with all their forms."""
+    return sum(prior(c, candidates[:i]) for i, c in enumerate(candidates))
+
+
 def rarity(candidates: Sequence[CandidateEffect]) -> float:
     """Log odds, before the data, that effects are there, whatever forms of them. Ahead of the dynamics and
     behind them, a family is there twice, which is as rare as two."""

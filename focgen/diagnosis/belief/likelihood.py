@@ -57,7 +57,8 @@ def speaks(count: int, gained: float, misfit: float, scale: Scale, changed: floa
     """What speaks for a hypothesis, nats, up to a constant: of effects that change ``changed`` nats,
     ``gained`` of them by ``count`` free values, and leave ``misfit``.
 
-    A form that is right is wrong by a third of what others are. Its values are told to within the noise.
+    A form that is as good as right is wrong by a third of what others are. Its values are told to within the
+    noise: by √(2 ``gained``) of them, which a signal of so many nats is over it.
     """
     usual, right = scale.of(changed), scale.of(changed, NUMBERS.form / 3.0)
     mostly = log_likelihood(misfit, usual) - paid(count, gained, misfit, usual)

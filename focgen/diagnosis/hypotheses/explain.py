@@ -43,7 +43,8 @@ _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyo
 class Explanation:
     """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects. Each has
     a ``predictability`` of its residual from the inputs. ``errors``: by family, the root-mean-square
-    residual with that effect alone, as a share of the refitted nominal's; ``converter``: the coarse one.
+    residual with that effect alone, as a share of the refitted nominal's; ``converter``: the coarse one;
+    ``whole``: what this is the part of that is not in question.
     """
 
     segment: Segment
@@ -56,6 +57,7 @@ class Explanation:
     nominal_predictability: Predictability
     errors: dict[str, float]
     converter: Converter | None = None
+    whole: Explanation | None = None
 
     @property
     def strained(self) -> bool:
@@ -139,7 +141,7 @@ def _place(effect: Effect, segment: Segment) -> str | None:
 
 def guests_in(segment: Segment, rig: Rig) -> list[CandidateEffect]:
     """Forms that are at home in another stage and may sit in this one: tried where those at home leave
-    much."""
+    much. What acts behind the dynamics of its own stage is not among them: it would be the gauge's."""
     if _is_whole(segment, rig):
         return []
     return [

@@ -110,10 +110,10 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     unseen = {n for n in (*fits, *twin) if n != name and best.problem.lacks(n)}
 
     def speaks(of: Fit, family: str) -> float:
-        acts = [c for c in of.problem.candidates if c.effect == family]
+        acts = [c for c in of.problem.candidates if c not in without.problem.candidates]
         return ground.odds(of, best.size - without.size if family in unseen else None) + rarity(acts)
 
-    fits |= {n: _foremost(f, fits.get(n), partial(speaks, family=n)) for n, f in twin.items()}
+    fits |= {n: _foremost(n, f, fits.get(n), partial(speaks, family=n)) for n, f in twin.items()}
     odds = {n: speaks(f, n) for n, f in fits.items()}
     for other in _near(odds) if len(own) == 1 else ():
         forms = [fits[other], *_other_forms(other, fits[other], best, ranking, beside)]
@@ -121,7 +121,7 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     rivals = [
         Rival(
             n,
-            own[0].stage if n == name else f.problem.candidates[-1].stage,
+            _acting(f, n).stage,
             behind(odds[n], odds[name]),
             evidence(f, without),
             f,
@@ -134,9 +134,14 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     return Cause(tuple(sorted(rivals, key=lambda r: r.separation)), evidence(best, without), share)
 
 
-def _foremost(twin: Fit, ranked: Fit | None, speaks: Callable[[Fit], float]) -> Fit:
+def _acting(of: Fit, family: str) -> CandidateEffect:
+    """The first form of a family that a fit has."""
+    return next(c for c in of.problem.candidates if c.effect == family)
+
+
+def _foremost(family: str, twin: Fit, ranked: Fit | None, speaks: Callable[[Fit], float]) -> Fit:
     """A twin, or what its family was ``ranked`` by, where that acts elsewhere and more speaks for it."""
-    if ranked is None or ranked.problem.candidates[-1].form.rarer == twin.problem.candidates[-1].form.rarer:
+    if ranked is None or _acting(ranked, family).form.rarer == _acting(twin, family).form.rarer:
         return twin
     return max(twin, ranked, key=speaks)
 
@@ -206,16 +211,16 @@ def _rivals(best: Fit, ranking: Ranking, beside: Beside, mended: bool) -> list[t
 
 def _twin(name: str, best: Fit, beside: Beside) -> dict[str, Fit]:
     """The family of another stage whose forms act alike, in the place of one of ``best``, where there is one:
-    a loop behind all dynamics may be of what moves, or of what reads it."""
+    what is behind all dynamics may be of what moves, or of what reads it. A form without the like stays."""
     problem, found = best.problem, list(best.problem.candidates)
     for i, own in enumerate(found):
         if own.effect == name:
             like = [c for c in beside.candidates if c.form.act is own.form.act and c.effect != name]
             like = [c for c in like if c.form.rarer != own.form.rarer and c.effect not in problem.families]
-            if not like:
-                return {}
-            found[i] = like[0]
-    other = next(c.effect for c, own in zip(found, problem.candidates) if c != own)
+            found[i] = like[0] if like else own
+    other = next((c.effect for c, own in zip(found, problem.candidates) if c != own), None)
+    if other is None:
+        return {}
     return {other: fit(problem.with_candidates(found), best.vector, beside.weighing, 6, leader=best)}
 
 

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.belief.choice import prior
+from focgen.diagnosis.belief.choice import beforehand
 from focgen.diagnosis.belief.further import Ground
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
 from focgen.diagnosis.hypotheses.search import Ranking, rank
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.problem import CandidateEffect
 
 _TRIED = 4  # families that are taken for granted
 
@@ -53,11 +53,5 @@ def _likelier(both: Fit, first: Ranking, found: Fit, weighing: Weighing, asked: 
     """Whether two effects are likelier than what was found, and than none."""
     fits = [fit(f.problem, f.vector, weighing, 0) for f in (first.base, found, both)]
     ground = Ground.of(fits[0], fits[0], fits[1:], weighing, asked.surroundings)
-    odds = [ground.odds(f) + _prior(f.problem) for f in fits[1:]]
+    odds = [ground.odds(f) + beforehand(f.problem.candidates) for f in fits[1:]]
     return odds[1] > max(odds[0], 0.0)
-
-
-def _prior(problem: Problem) -> float:
-    """Log odds, before the data, of the effects of a problem."""
-    found = problem.candidates
-    return sum(prior(c, found[:i]) for i, c in enumerate(found))

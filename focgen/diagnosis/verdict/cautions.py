@@ -65,8 +65,8 @@ def the_rest(summary: Summary) -> Iterator[str]:
     """Where what was found closes less of the gap than it leaves above the noise."""
     if summary.stands_for_more:
         yield (
-            f"what was found closes less of the gap than it leaves, {summary.loudness:.2g} times the noise: "
-            "something else is missing, which it may stand for"
+            "what was found closes less than half of the gap, and the error stays "
+            f"{summary.loudness:.1f} times the noise: something else is missing, which it may stand for"
         )
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
+from focgen.diagnosis.belief.choice import beforehand
+from focgen.diagnosis.belief.likelihood import Scale, speaks
 from focgen.diagnosis.belief.standing import sureness
 from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
 from focgen.diagnosis.hypotheses.converter import is_rounded
@@ -37,8 +38,9 @@ def is_likelier(other: Instead | None) -> bool:
 
 def bases(e: Explanation) -> Iterator[Fit]:
     """The fits that it may stand beside: without any effect, and without each of several. None where a
-    rounding was found: its steps are no noise, and what is smaller than they are tells nothing."""
-    if is_rounded(e.causes):
+    rounding was found: its steps are no noise, and what is smaller than they are tells nothing. None where
+    this is what is not in question of a whole that was asked."""
+    if is_rounded(e.causes) or e.whole is not None:
         return
     yield e.nominal
     candidates = e.best.problem.candidates
@@ -52,31 +54,31 @@ def gone(e: Explanation, base: Fit) -> frozenset[str]:
     return frozenset(e.best.problem.families) - frozenset(base.problem.families)
 
 
-def sound_part(e: Explanation, other: Instead | None) -> Explanation:
-    """The explanation without the families instead of which something else is likelier, where others are not
-    in question; else as it is. These stay as they were fitted beside them, and so does how much inputs
-    predict: a refit would make up for what is there instead."""
-    if other is None or not is_likelier(other) or not other.instead < frozenset(e.best.problem.families):
-        return e
-    kept = tuple(c for c in e.causes if c.rivals[0].effect not in other.instead)
-    gone = [c for c in e.best.problem.candidates if c.effect in other.instead]
-    return replace(e, best=without(e.best, gone, Weighing(e.ar)), causes=kept) if kept else e
+def sound_part(e: Explanation, others: Sequence[Instead | None]) -> Explanation | None:
+    """The explanation without the families instead of which ``others`` are likelier; None where none is, or
+    all are in question. What stays, stays as it was fitted beside them, and so does how much inputs predict:
+    a refit would make up for what is there instead."""
+    out = frozenset[str]().union(*(other.instead for other in others if other and is_likelier(other)))
+    kept = tuple(c for c in e.causes if c.rivals[0].effect not in out)
+    if not out or not kept:
+        return None
+    left = [c for c in e.best.problem.candidates if c.effect in out]
+    return replace(e, best=without(e.best, left, Weighing(e.ar)), causes=kept, whole=e)
 
 
-def odds_over(e: Explanation, left: float, free: int, things: int) -> float:
-    """The log odds of ``things`` with so many ``free`` values, which leave the sum of squares ``left``, over
-    what was found; each is as rare as any."""
+def odds_over(e: Explanation, base: Fit, left: float, free: int, things: int = 1) -> float:
+    """The log odds, over what was found, of so many ``things`` with ``free`` values beside ``base``, which
+    leave the sum of squares ``left``; each is as rare as an effect."""
     before, after = _squares(e)
     floor = max(min(after * (1.0 - e.predictability.share), left), 1e-300)
-    unit = 0.5 * len(e.segment.y) / floor
+    unit, scale = 0.5 * len(e.segment.y) / floor, Scale(0.5 * len(e.segment.y) * NUMBERS.other)
 
-    def log_odds(left: float, free: int, things: int) -> float:
+    def of(beside: Fit, left: float, free: int) -> float:
         misfit, gained = max(left - floor, 0.0) * unit, max(before - left, 0.0) * unit
-        scale = Scale(0.5 * len(e.segment.y) * NUMBERS.other).of(gained)
-        prior = things * float(np.log(NUMBERS.rare))
-        return log_likelihood(misfit, scale) - paid(free, gained, misfit, scale) + prior
+        count = beside.size - e.nominal.size + free
+        return speaks(count, gained, misfit, scale, gained) + beforehand(beside.problem.candidates)
 
-    return log_odds(left, free, things) - log_odds(after, e.best.size, len(e.best.problem.families))
+    return of(base, left, free) + things * float(np.log(NUMBERS.rare)) - of(e.best, after, 0)
 
 
 @lru_cache(maxsize=16)

@@ -54,7 +54,7 @@ def _judged(e: Explanation, base: Fit) -> Late | None:
         samples, best = n, tried
     if not samples:
         return None
-    odds = odds_over(e, best.sse, best.size + 1, len(base.problem.families) + 1)
+    odds = odds_over(e, base, best.sse, 1)
     return Late(gone(e, base), odds, samples, samples * e.segment.run.h)
 
 

@@ -67,8 +67,7 @@ def another(e: Explanation) -> Changed | None:
 def _judged(e: Explanation, cut: Pieces) -> Changed:
     """What is cut so, held against what was found."""
     base = cut.of_fit
-    things = len(base.problem.families) + cut.things
-    return Changed(gone(e, base), odds_over(e, cut.square, base.size + cut.free, things), cut)
+    return Changed(gone(e, base), odds_over(e, base, cut.square, cut.free, cut.things), cut)
 
 
 def _moment(segment: Segment, sample: int, by: np.ndarray) -> Moment:

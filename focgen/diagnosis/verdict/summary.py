@@ -136,8 +136,8 @@ def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explan
     found = {}
     for e in explanations:
         if len(e.best.problem.families) > 1:
-            parts = (sound_part(e, of(e)) for of in (changed_at_once, logged_late, unevenly_paced))
-            if part := next((p for p in parts if p is not e and not is_unknown(p)), None):
+            part = sound_part(e, (changed_at_once(e), logged_late(e), unevenly_paced(e)))
+            if part is not None and not is_unknown(part):
                 found[e] = part
     return found
 

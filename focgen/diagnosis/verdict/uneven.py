@@ -54,6 +54,6 @@ def _judged(e: Explanation, base: Fit) -> Uneven | None:
     first = ranking.best[ranking.winner]
     weighing = Weighing(e.ar)
     best = fit(first.problem, first.vector, weighing, _ITERATIONS)
-    odds = odds_over(e, square_by(best, weighing), best.size, len(base.problem.families) + 1)
+    odds = odds_over(e, base, square_by(best, weighing), best.size - base.size)
     pace, (rate,) = best.problem.candidates[-1], best.problem.values(best.vector)[-1]
     return Uneven(gone(e, base), odds, pace.stage, pace.form.name, float(np.exp(rate)))

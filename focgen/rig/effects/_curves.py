@@ -20,11 +20,6 @@ def softly_beyond(x: Array, place: float, width: float) -> Array:
     return made
 
 
-def softly_clipped(x: Array, values: Values, run: Run) -> Array:
-    """``x`` (n,) that stops at ± a limit, with both knees rounded."""
-    return x - np.sign(x) * softly_beyond(np.abs(x), *values)
-
-
 def _limited(x: Array, values: Values, run: Run) -> Array:
     share, place, width = values
     return x - share * softly_beyond(x, place, width)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.rig.effects._curves import softly_beyond, softly_clipped
+from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _LIMIT = Parameter("limit", level=1, lower=0.1, upper=1.3, starts=(0.9, 0.6), zero=1.3)
@@ -22,6 +22,10 @@ def _soft(x: Array, values: Values, run: Run) -> Array:
     return x - softly_beyond(x, *values)
 
 
+def _soft_both_ways(x: Array, values: Values, run: Run) -> Array:
+    return x - np.sign(x) * softly_beyond(np.abs(x), *values)
+
+
 EFFECT = Effect(
     name="sensor_saturation",
     stage="sensor",
@@ -35,6 +39,6 @@ EFFECT = Effect(
         # a converter ends on both sides of its zero
         Form("both_ways", "reading", (_LIMIT,), _both_ways, both_ways=True),
         Form("soft", "reading", (_LIMIT, _WIDTH), _soft),
-        Form("soft_both_ways", "reading", (_LIMIT, _WIDTH), softly_clipped, both_ways=True),
+        Form("soft_both_ways", "reading", (_LIMIT, _WIDTH), _soft_both_ways, both_ways=True),
     ],
 )

@@ -6,7 +6,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.rig.dynamics import Dynamics
-from focgen.rig.effects._curves import softly_beyond, softly_clipped
+from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _CEILING = Parameter("ceiling", level=1, lower=0.1, upper=1.3, starts=(0.95, 0.75), zero=1.3)
@@ -23,6 +23,10 @@ def _both_ways(x: Array, values: Values, run: Run) -> Array:
 
 def _soft(x: Array, values: Values, run: Run) -> Array:
     return x - softly_beyond(x, *values)
+
+
+def _soft_both_ways(x: Array, values: Values, run: Run) -> Array:
+    return x - np.sign(x) * softly_beyond(np.abs(x), *values)
 
 
 def _stops(x: Dynamics, values: Values, run: None) -> Dynamics:
@@ -50,6 +54,6 @@ EFFECT = Effect(
         # an amplifier clips what goes either way
         Form("both_ways", "supply", (_CEILING,), _both_ways, both_ways=True),
         Form("soft", "supply", (_CEILING, _WIDTH), _soft),
-        Form("soft_both_ways", "supply", (_CEILING, _WIDTH), softly_clipped, both_ways=True),
+        Form("soft_both_ways", "supply", (_CEILING, _WIDTH), _soft_both_ways, both_ways=True),
     ],
 )
