@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from focgen.diagnosis.belief.likelihood import Scale, speaks
+from focgen.diagnosis.belief.likelihood import Scale, speaks, speaks_or_is_right
 from focgen.diagnosis.fitting.fit import Fit, Weighing, answer, fit, square_by
 from focgen.diagnosis.numbers import NUMBERS
 
 _STEPS = 6  # iterations of the fit that asks
+_NEAR = 2.0  # nats: nominal parameters that are closer to those given are not asked again
+
+Rule = Callable[[int, float, float, Scale, float], float]
 
 
 @dataclass(frozen=True)
@@ -92,31 +95,37 @@ class Ground:
             self._answers[of] = answer(of, noise, self.weighing)
         return self._answers[of]
 
-    def odds(self, of: Fit, most: int | None = None) -> float:
+    def odds(self, of: Fit, most: int | None = None, rule: Rule = speaks_or_is_right) -> float:
         """Log odds, before any prior, of a fit with one more effect over ``base``; at most ``most`` of its
         free values are counted. Own parameters closer to those given speak for it."""
-        return self._speaks(self._best(of), most) - self._speaks(self._best(self.base), None)
+        without = self._speaks(self._best(self.base, rule), None, rule)
+        return self._speaks(self._best(of, rule), most, rule) - without
+
+    def compared(self, of: Fit, most: int | None = None) -> float:
+        """The same where fits are to be held against one another: that one of them is right by chance does
+        not choose it."""
+        return self.odds(of, most, speaks)
 
     def closer(self, of: Fit) -> float:
         """The nats of its odds that a fit has for nominal parameters closer to those given."""
         return max(self._best(self.base).prior_penalty - self._best(of).prior_penalty, 0.0)
 
-    def _best(self, of: Fit) -> Fit:
+    def _best(self, of: Fit, rule: Rule = speaks_or_is_right) -> Fit:
         """A fit, or the same with its nominal parameters kept closer to those given, if that speaks more."""
-        if of.prior_penalty < NUMBERS.nats:
+        if of.prior_penalty < _NEAR:
             return of
         if of not in self._found:
-            self._found[of] = max(of, self._kept(of), key=lambda f: self._speaks(f, None))
-        return self._found[of]
+            self._found[of] = self._kept(of)
+        return max(of, self._found[of], key=lambda f: self._speaks(f, None, rule))
 
     def _gained(self, of: Fit) -> float:
         return max(self.misfit(self.base) - self.misfit(of), 0.0)
 
-    def _speaks(self, of: Fit, most: int | None) -> float:
+    def _speaks(self, of: Fit, most: int | None, rule: Rule) -> float:
         """What speaks for a fit, nats."""
         gained, free = self._gained(of), of.size - self.base.size
         count = free if most is None else min(free, most)
-        return speaks(count, gained, self.misfit(of), self.scale, self.changed + gained) - of.prior_penalty
+        return rule(count, gained, self.misfit(of), self.scale, self.changed + gained) - of.prior_penalty
 
     def _kept(self, of: Fit) -> Fit:
         """A fit made anew that keeps nominal parameters closer to those given: as if each nat against them

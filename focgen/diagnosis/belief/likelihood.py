@@ -54,13 +54,19 @@ def paid(count: int, gained: float, misfit: float, scale: float) -> float:
 
 
 def speaks(count: int, gained: float, misfit: float, scale: Scale, changed: float) -> float:
-    """What speaks for a hypothesis, nats, up to a constant: of effects that change ``changed`` nats,
-    ``gained`` of them by ``count`` free values, and leave ``misfit``.
+    """What speaks for a hypothesis, nats, up to a constant, of which no form is quite right: of effects that
+    change ``changed`` nats, ``gained`` of them by ``count`` free values, and leave ``misfit``."""
+    usual = scale.of(changed)
+    return log_likelihood(misfit, usual) - paid(count, gained, misfit, usual)
+
+
+def speaks_or_is_right(count: int, gained: float, misfit: float, scale: Scale, changed: float) -> float:
+    """The same where one in ten is as good as right.
 
     A form that is as good as right is wrong by a third of what others are. Its values are told to within the
     noise: by √(2 ``gained``) of them, which a signal of so many nats is over it.
     """
-    usual, right = scale.of(changed), scale.of(changed, NUMBERS.form / 3.0)
-    mostly = log_likelihood(misfit, usual) - paid(count, gained, misfit, usual)
-    seldom = log_likelihood(misfit, right) - 0.5 * count * np.log1p(2.0 * max(gained, 0.0))
+    mostly = speaks(count, gained, misfit, scale, changed)
+    seldom = log_likelihood(misfit, scale.of(changed, NUMBERS.form / 3.0))
+    seldom -= 0.5 * count * np.log1p(2.0 * max(gained, 0.0))
     return float(np.logaddexp(np.log1p(-NUMBERS.right) + mostly, np.log(NUMBERS.right) + seldom))

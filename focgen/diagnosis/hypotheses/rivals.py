@@ -111,13 +111,16 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
 
     def speaks(of: Fit, family: str) -> float:
         acts = [c for c in of.problem.candidates if c not in without.problem.candidates]
-        return ground.odds(of, best.size - without.size if family in unseen else None) + rarity(acts)
+        return ground.compared(of, best.size - without.size if family in unseen else None) + rarity(acts)
 
     fits |= {n: _foremost(n, f, fits.get(n), partial(speaks, family=n)) for n, f in twin.items()}
     odds = {n: speaks(f, n) for n, f in fits.items()}
     for other in _near(odds) if len(own) == 1 else ():
         forms = [fits[other], *_other_forms(other, fits[other], best, ranking, beside)]
         odds[other] = any_of([speaks(f, other) for f in forms])
+    first = fits[max(odds, key=lambda n: odds[n])]
+    there = ground.odds(first) - ground.compared(first)
+    odds = {n: o + there for n, o in odds.items()}
     rivals = [
         Rival(
             n,

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from focgen.diagnosis.belief.choice import beforehand
-from focgen.diagnosis.belief.likelihood import Scale, speaks
+from focgen.diagnosis.belief.likelihood import Scale, speaks_or_is_right
 from focgen.diagnosis.belief.standing import sureness
 from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
 from focgen.diagnosis.hypotheses.converter import is_rounded
@@ -76,7 +76,9 @@ def odds_over(e: Explanation, base: Fit, left: float, free: int, things: int = 1
     def of(beside: Fit, left: float, free: int) -> float:
         misfit, gained = max(left - floor, 0.0) * unit, max(before - left, 0.0) * unit
         count = beside.size - e.nominal.size + free
-        return speaks(count, gained, misfit, scale, gained) + beforehand(beside.problem.candidates)
+        return speaks_or_is_right(count, gained, misfit, scale, gained) + beforehand(
+            beside.problem.candidates
+        )
 
     return of(base, left, free) + things * float(np.log(NUMBERS.rare)) - of(e.best, after, 0)
 
