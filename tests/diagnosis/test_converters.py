@@ -119,8 +119,8 @@ def test_nothing_is_held_against_steps_that_the_best_fit_goes_without():
     """A note said "instead of it may be (100 %) that at once it becomes another": steps are no noise."""
     coarse = SimpleNamespace(rivals=[SimpleNamespace(effect="sensor_quantization")])
     nothing = SimpleNamespace(problem=SimpleNamespace(families=(), candidates=()))
-    assert not list(bases(SimpleNamespace(causes=(coarse,), best=nothing, nominal=nothing)))
-    assert list(bases(SimpleNamespace(causes=(), best=nothing, nominal=nothing))) == [nothing]
+    assert not list(bases(SimpleNamespace(causes=(coarse,), best=nothing, nominal=nothing, whole=None)))
+    assert list(bases(SimpleNamespace(causes=(), best=nothing, nominal=nothing, whole=None))) == [nothing]
 
 
 @pytest.mark.parametrize("dead", [3.0, 0.0])
