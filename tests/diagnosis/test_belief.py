@@ -97,6 +97,22 @@ def test_what_leaves_nothing_by_few_values_is_no_misfit_of_the_first(left, value
     assert (likeliest(ground, [second])[1] > 0.0) == there
 
 
+def test_what_is_right_by_chance_is_there_and_not_chosen_for_it():
+    """Of two forms one leaves nothing but noise, the other a five-hundredth of the gap more."""
+    base, exact, near = _fit(50.0), _fit(1.0, ["leak"]), _fit(1.1, ["creep"])
+    ground = _ground(base, [exact, near])
+    assert ground.odds(exact) - ground.odds(near) > 3.0
+    assert 0.0 < ground.compared(exact) - ground.compared(near) < 1.0
+
+
+def test_nominal_parameters_a_little_off_are_asked_whether_they_have_to_be():
+    """With 11 nats of them a delay paid for all, and a lag beside it with 14 for none."""
+    kept = _fit(1.01, ["leak", "resonance"], prior_penalty=1.0)
+    fits = [_fit(1.0, ["leak", "resonance"], prior_penalty=11.0, **more) for more in ({}, {"kept": kept})]
+    as_moved, asked = (_ground(_fit(16.0, ["leak"]), [f], 100.0).odds(f) for f in fits)
+    assert asked == pytest.approx(as_moved + 10.0, abs=0.5)
+
+
 def test_the_likeliest_is_one_that_something_is_explained_by():
     """What owes its odds to nominal parameters alone does not keep out what closes the gap."""
     base, strained = _fit(20.0, ["leak"], prior_penalty=30.0), _fit(20.0, ["leak", "creep"])
