@@ -47,7 +47,7 @@ class Numbers:
         0.1,
         "forms that are as good as right: a third as wrong; each free value of theirs is independent",
         "probability",
-        "of the steps of 52 pairs and 81 singles: 4 of the pairs more, nothing false more",
+        "fitted, on steps of 52 pairs and 81 singles: 4 more pairs found, no more false effects",
         _SAME,
         _SAME,
     )
@@ -88,9 +88,9 @@ class Numbers:
         3e-4,
         "odds, before the data, that an effect of a family is there",
         "odds",
-        "fitted; of the steps of 52 pairs and 81 singles",
-        "1 of the pairs fewer",
-        "3 of the pairs more, 1 false effect more",
+        "fitted, on steps of 52 pairs and 81 singles",
+        "1 pair fewer found",
+        "3 more pairs found, 1 more false effect",
     )
     again: float = _number(
         0.1,

@@ -64,7 +64,7 @@ def speaks_or_is_right(count: int, gained: float, misfit: float, scale: Scale, c
     """The same where one in ten is as good as right.
 
     A form that is as good as right is wrong by a third of what others are. Its values are told to within the
-    noise: by √(2 ``gained``) of them, which a signal of so many nats is over it.
+    noise; a signal of ``gained`` nats is √(2 ``gained``) times that.
     """
     mostly = speaks(count, gained, misfit, scale, changed)
     seldom = log_likelihood(misfit, scale.of(changed, NUMBERS.form / 3.0))

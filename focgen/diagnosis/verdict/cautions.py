@@ -47,8 +47,9 @@ def cautions(
                 f"{_within(e)}: instead of {named} it may be ({at_once.sure:.0%}) that at once it "
                 f"{_at_once(at_once)}"
             )
-    yield from _late(dict.fromkeys([*unknown, *doubted, *(e for e, _ in causes)]))
-    yield from _uneven(dict.fromkeys([*unknown, *doubted, *(e for e, _ in causes)]))
+    asked = dict.fromkeys([*unknown, *doubted, *(e for e, _ in causes)])
+    yield from _late(asked)
+    yield from _uneven(asked)
     yield from _nominal(causes)
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"

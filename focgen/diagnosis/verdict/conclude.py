@@ -27,12 +27,10 @@ from focgen.diagnosis.verdict.cautions import (
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
-from focgen.diagnosis.verdict.late import logged_late
-from focgen.diagnosis.verdict.moments import another, changed_at_once
+from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.sizes import estimates
-from focgen.diagnosis.verdict.summary import Summary, sorted_out, sound_parts
-from focgen.diagnosis.verdict.uneven import unevenly_paced
+from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
 from focgen.diagnosis.verdict.unexplained import disturbed
 from focgen.diagnosis.verdict.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
@@ -164,8 +162,7 @@ def _found(
 def _lasting(e: Explanation, cause: Cause) -> float:
     """How likely a cause was there all along, and neither did the rig become another at once instead, nor was
     the command logged late, nor a pace uneven."""
-    e = e.whole or e
-    found = [f for f in (changed_at_once(e), logged_late(e), unevenly_paced(e)) if f is not None]
+    found = [f for f in doubts(e.whole or e) if f is not None]
     first = cause.rivals[0].effect
     return float(np.prod([1.0 - f.sure for f in found if first in f.instead]))
 

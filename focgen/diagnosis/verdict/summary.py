@@ -15,7 +15,7 @@ from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
-from focgen.diagnosis.verdict.instead import sound_part
+from focgen.diagnosis.verdict.instead import Instead, sound_part
 from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
@@ -130,13 +130,18 @@ def _summary(
     return Summary(rigs, causes, made, squares, floor, total)
 
 
+def doubts(e: Explanation) -> tuple[Instead | None, ...]:
+    """What no effect is, and may be there instead of what was found."""
+    return changed_at_once(e), logged_late(e), unevenly_paced(e)
+
+
 def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:
     """The explanations of which a part is likelier something that no effect is, each with its other part,
     where this explains its segment but for that."""
     found = {}
     for e in explanations:
         if len(e.best.problem.families) > 1:
-            part = sound_part(e, (changed_at_once(e), logged_late(e), unevenly_paced(e)))
+            part = sound_part(e, doubts(e))
             if part is not None and not is_unknown(part):
                 found[e] = part
     return found

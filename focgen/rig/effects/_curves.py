@@ -1,7 +1,6 @@
 """Smooth static curves of any shape, shared by the families that bend."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -129,4 +128,4 @@ def calibration(slot: str) -> list[Form]:
 def behind(slot: str) -> list[Form]:
     """The same of what moves: of a linkage, of a finger that points elsewhere the further it bends. A reading
     is bent more often."""
-    return [replace(form, name=f"{form.name}_behind", rarer=True) for form in calibration(slot)]
+    return [form.behind for form in calibration(slot)]

@@ -166,6 +166,11 @@ class Form:
         """Whether it says where something lay when an experiment began elsewhere than at rest."""
         return self.has(PLACE)
 
+    @property
+    def behind(self) -> Form:
+        """The same of what moves, behind the dynamics, where a sensor has it more often."""
+        return replace(self, name=f"{self.name}_behind", rarer=True)
+
     def has(self, name: str) -> bool:
         """Whether a parameter has this name."""
         return any(p.name == name for p in self.parameters)

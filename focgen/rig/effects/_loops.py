@@ -1,7 +1,5 @@
 """Rate-independent memory, shared by the families that have it."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from focgen.arrays import Array
@@ -61,8 +59,7 @@ def _pressed(x: Array, values: Values, run: Run) -> Array:
 def behind(slot: str) -> list[Form]:
     """The same behind dynamics, but for a play: of an alloy that is heated first, of a wall that moves last.
     A sensor has them there as well, and more often."""
-    found = (form for form in forms(slot) if form.act is not _play)
-    return [replace(form, name=f"{form.name}_behind", rarer=True) for form in found]
+    return [form.behind for form in forms(slot) if form.act is not _play]
 
 
 def forms(slot: str) -> list[Form]:
