@@ -6,7 +6,7 @@ Society B 36, 1974.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,9 +37,24 @@ def fitted_to(best: Fit, weighing: Weighing, seen: np.ndarray) -> Fit:
 
 def foreseen(best: Fit, weighing: Weighing) -> float:
     """The mean square error of a segment whose every part is simulated by a fit to the others."""
+    return _foreseen(best, weighing, lambda made: made.weighed)
+
+
+def foretold(best: Fit, weighing: Weighing) -> float:
+    """The same of what fits make least: the innovations, or of a rig that integrates the error itself. A fit
+    foretells no other square: what a colour counts for little it leaves far off."""
+    return _foreseen(best, weighing, left)
+
+
+def left(of: Fit) -> np.ndarray:
+    """What a fit made least (n,)."""
+    return of.weighed if of.problem.segment.pace else of.innovations
+
+
+def _foreseen(best: Fit, weighing: Weighing, error_of: Callable[[Fit], np.ndarray]) -> float:
     fold = folds([last - first for first, last in best.problem.segment.run.spans])
     error = np.empty(len(fold))
     for part in np.unique(fold):
         vector = fitted_to(best, weighing, fold != part).vector
-        error[fold == part] = best.problem.weighed(vector)[fold == part]
+        error[fold == part] = error_of(fit(best.problem, vector, weighing, 0))[fold == part]
     return float(np.mean(error**2))

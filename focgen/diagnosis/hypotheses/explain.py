@@ -213,7 +213,7 @@ def _explained(
     asked = AcceptanceCriteria(threshold, carried, noise, converter, only is not None)
     rankings, candidates = _grown([], problem, given, candidates, guests, asked)
     rankings = _or_two(rankings, candidates, asked)
-    weighing = Weighing(rankings[-1].ar)
+    weighing = rankings[-1].weighing
     known = [f for r in rankings for f in (r.base, *r.best.values())]
     best = _dropped(rankings[-1].base, weighing, threshold, known)
     best = realigned(best if asked.granted else foretelling(best, weighing), weighing)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import Fit, Weighing
-from focgen.diagnosis.fitting.folds import foreseen
+from focgen.diagnosis.fitting.folds import foretold, left
 from focgen.diagnosis.hypotheses.rivals import without_family
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.rig.effects import library
@@ -19,9 +19,9 @@ def foretelling(best: Fit, weighing: Weighing) -> Fit:
     first, and one is kept. What a rounding or a wander does is foretold by nothing."""
     if not _asked(best):
         return best
-    error = foreseen(best, weighing)
+    error = foretold(best, weighing)
     while names := _asked(best):
-        vainest = min((_Left.of(name, best, error, weighing) for name in names), key=lambda left: left.share)
+        vainest = min((_Left.of(name, best, error, weighing) for name in names), key=lambda each: each.share)
         if vainest.share >= 1.0 - NUMBERS.stays:
             break
         best, error = vainest.without, vainest.error
@@ -38,7 +38,7 @@ def _asked(best: Fit) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _Left:
-    """What is left ``without`` a family: a fit, the mean square ``error`` it foresees, and the ``share`` of
+    """What is left ``without`` a family: a fit, the mean square ``error`` it foretells, and the ``share`` of
     what the family closes beside the others that it closes where it is not fitted, too."""
 
     without: Fit
@@ -47,8 +47,8 @@ class _Left:
 
     @classmethod
     def of(cls, name: str, best: Fit, error: float, weighing: Weighing) -> _Left:
-        """``error``: the mean square that is foreseen with the family."""
+        """``error``: the mean square that is foretold with the family."""
         without = without_family(best, name, weighing)
-        fitted = float(np.mean(without.weighed**2)) - float(np.mean(best.weighed**2))
-        alone = foreseen(without, weighing)
+        fitted = float(np.mean(left(without) ** 2)) - float(np.mean(left(best) ** 2))
+        alone = foretold(without, weighing)
         return cls(without, alone, (alone - error) / fitted if fitted > 0.0 else 0.0)
