@@ -213,10 +213,8 @@ def _explained(
     asked = AcceptanceCriteria(threshold, carried, noise, converter, only is not None)
     rankings, candidates = _grown([], problem, given, candidates, guests, asked)
     rankings = _or_two(rankings, candidates, asked)
-    weighing = rankings[-1].weighing
     known = [f for r in rankings for f in (r.base, *r.best.values())]
-    best = _dropped(rankings[-1].base, weighing, threshold, known)
-    best = realigned(best if asked.granted else foretelling(best, weighing), weighing)
+    best, weighing = _sifted(rankings[-1], asked, known)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     errors = rankings[0].errors
     if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
@@ -364,6 +362,22 @@ def _worth_trying(
 ) -> list[CandidateEffect]:
     """All candidate effects where there seems to be more than noise; else none."""
     return candidates if may_be_more(base, vector) else []
+
+
+def _sifted(last: Ranking, asked: AcceptanceCriteria, known: Sequence[Fit]) -> tuple[Fit, Weighing]:
+    """What was found, without what turns out needless or vain, and how it is judged: in the colour of the
+    noise, but not in that of what is left by an effect that is not there, where inputs predict much without
+    it."""
+
+    def sifted(weighing: Weighing) -> Fit:
+        best = _dropped(last.base, weighing, asked.threshold, known)
+        return realigned(best if asked.granted else foretelling(best, weighing), weighing)
+
+    if _much_left(last.base):
+        return sifted(WHITE), WHITE
+    best, weighing = sifted(Weighing(last.ar)), Weighing(last.ar)
+    fewer = len(best.problem.candidates) < len(last.base.problem.candidates)
+    return (sifted(WHITE), WHITE) if fewer and _much_left(best) else (best, weighing)
 
 
 def _dropped(best: Fit, weighing: Weighing, threshold: float, known: Sequence[Fit] = ()) -> Fit:

@@ -52,12 +52,6 @@ class Ranking:
     left: tuple[Fit, ...] = ()
 
     @property
-    def weighing(self) -> Weighing:
-        """How what was found is judged where nothing more is: in the colour of the noise, but not in that of
-        what a further effect leaves, which is not there, where inputs predict much without it."""
-        return WHITE if self.base.predictable_share > NUMBERS.much else Weighing(self.ar)
-
-    @property
     def winner(self) -> str | None:
         """The family of highest evidence."""
         return next(iter(self.best), None)
