@@ -24,6 +24,7 @@ from focgen.rig.engine import slot_in
 _SHARP = 20_000  # parts of the range: what readings may lie off a level that is one
 _READINGS = 2  # of one level at most, in the mean: then there is little between the levels
 _PINNED = 0.25 * FIXED  # of a reference: what is held may move either way
+_LEFT = 1.0 / 3.0  # of what uneven steps make is left where even ones are simulated
 _REFITTED = 6  # iterations
 _EASED = (0.2, 0.06)  # of a step: what it rises in, as it is fitted
 
@@ -41,6 +42,11 @@ class Converter:
     def uneven(self) -> float:
         """Root mean square, as a share of the output's level, that real steps miss the ideal ones by."""
         return NUMBERS.uneven * self.step
+
+    @property
+    def left(self) -> float:
+        """The same where the steps are simulated."""
+        return _LEFT * NUMBERS.uneven * self.step
 
     def explains(self, of: Fit) -> bool:
         """Whether the residual is no larger than what a converter's steps leave."""
@@ -62,16 +68,16 @@ class Converter:
         itself, it is noise."""
         if self.is_noise(nominal, alone=not causes):
             return best, causes
-        problem = best.problem.with_candidates([*best.problem.candidates, self.candidate])
-        both = self._refitted(problem, best.vector, weighing)
+        both = self.stepped(best, weighing)
         rival = Rival(self.candidate.effect, self.candidate.stage, 0.0, 0.0, both)
         closer = rms(both.weighed) < rms(best.weighed)
         return both if closer else best, (*causes, Cause((rival,), 0.0, share_of(nominal, best, both)))
 
-    def _refitted(self, problem: Problem, vector: np.ndarray, weighing: Weighing) -> Fit:
-        """``problem``, whose last effect is the rounding, from ``vector`` without it: what was fitted to
-        coarse steps as if they were the reading lies off by part of a step. Steps have no slope, so they are
-        rounded off, first much and then little."""
+    def stepped(self, of: Fit, weighing: Weighing = WHITE) -> Fit:
+        """A fit with the rounding behind it, made again: what was fitted to coarse steps as if they were the
+        reading lies off by part of a step. Steps have no slope, so they are rounded off, first much and then
+        little."""
+        problem, vector = of.problem.with_candidates([*of.problem.candidates, self.candidate]), of.vector
         start = np.r_[vector, self.entries]
         found = [fit(problem, start, weighing, 0)]
         for width in _EASED:

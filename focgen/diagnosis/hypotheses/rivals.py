@@ -129,7 +129,7 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
             evidence(f, without),
             f,
             odds[n],
-            _change(f, without),
+            change_of(f, without),
         )
         for n, f in fits.items()
     ]
@@ -167,7 +167,7 @@ def _other_forms(name: str, of: Fit, best: Fit, ranking: Ranking, beside: Beside
     return found
 
 
-def _change(of: Fit, without: Fit) -> float:
+def change_of(of: Fit, without: Fit) -> float:
     """The root mean square of what a fit's output is another by than ``without``, over that of what it
     leaves."""
     left = problem_residual(of)
