@@ -13,11 +13,14 @@ from dataclasses import dataclass
 from focgen.diagnosis.belief.choice import rarity
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.standing import behind, holds
-from focgen.diagnosis.fitting.fit import WHITE, Fit
+from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.converter import Converter
 from focgen.diagnosis.hypotheses.rivals import Cause, Rival, change_of, share_of
-from focgen.diagnosis.hypotheses.search import Ranking, evidence, family, rank
+from focgen.diagnosis.hypotheses.search import Ranking, evidence, family, is_itself, on_all, rank
+from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect
+
+_STEPS = 6  # iterations
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +41,12 @@ def seen_through(
     threshold: float,
 ) -> SeenThrough | None:
     """The likeliest effect beside those of ``best`` with the steps of the ``converter`` simulated; None where
-    none is likelier than none. ``nominal``: the fit without any effect; ``surroundings``: what else makes a
-    misfit; ``threshold``: nats that noise does not reach."""
-    plain = {family(f): f for f in _ranked(best, rankings, candidates).best.values()}
+    inputs predict little of what is left, or none is likelier than none. ``nominal``: the fit without any
+    effect; ``surroundings``: what else makes a misfit; ``threshold``: nats that noise does not reach."""
     base = converter.stepped(best)
+    if base.predictable_share < NUMBERS.left:
+        return None
+    plain = _every_family(_ranked(best, rankings, candidates))
     tried = {n: s for n, f in plain.items() if evidence(s := converter.stepped(f), base) > threshold}
     if not tried:
         return None
@@ -64,6 +69,17 @@ def seen_through(
         return None
     share = share_of(nominal, best, tried[first])
     return SeenThrough(plain[first], Cause(rivals, rivals[0].gain, share))
+
+
+def _every_family(ranking: Ranking) -> dict[str, Fit]:
+    """A fit of each family, the foremost of its forms: what is far behind without the steps need not be with
+    them."""
+    problem, found = ranking.base.problem, dict(ranking.best)
+    for left in sorted(ranking.left, key=lambda f: f.sse / len(f.innovations)):
+        if family(left) not in found:
+            whole = on_all(left, problem, round(problem.slack / left.problem.slack))
+            found[family(left)] = fit(whole.problem, whole.vector, WHITE, _STEPS)
+    return {name: f for name, f in found.items() if is_itself(f)}
 
 
 def _ranked(best: Fit, rankings: Sequence[Ranking], candidates: Sequence[CandidateEffect]) -> Ranking:
