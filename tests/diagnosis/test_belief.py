@@ -17,6 +17,7 @@ from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.belief.standing import behind, least_set, nominal_off, probabilities, tied_within
 from focgen.diagnosis.belief.unknown import is_none
 from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.hypotheses import explain
 from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.hypotheses.rivals import Rival, _needed
 from focgen.diagnosis.numbers import NUMBERS
@@ -281,3 +282,22 @@ def test_what_the_nominal_chain_as_good_as_surely_is_leaves_the_effects():
     assert nominal_instead(_rival("contact", 300.0, NUMBERS.bent)) == pytest.approx(0.5)
     assert nominal_instead(_rival("sensor_quantization", 300.0, faint)) == 0.0
     assert nominal_off(np.inf, True) == -np.inf
+
+
+@pytest.mark.parametrize(
+    "first, after, judged", [(0.1, 0.1, "noise"), (0.3, 0.3, "white"), (0.1, 0.3, "white")]
+)
+def test_a_colour_goes_with_the_effects_that_it_was_made_with(monkeypatch, first, after, judged):
+    """What a third effect leaves, which is not there, is no noise: judged in its colour, a softening that
+    halved what is left was worth nothing beside a slow release."""
+    found = {"all": 2, "fewer": 1}
+    of = {n: SimpleNamespace(problem=SimpleNamespace(candidates=[0] * c)) for n, c in found.items()}
+    of["all"].predictable_share, of["fewer"].predictable_share = first, after
+    kept = of["fewer"] if first != after else of["all"]
+    monkeypatch.setattr(explain, "_dropped", lambda best, weighing, *_: kept)
+    monkeypatch.setattr(explain, "foretelling", lambda best, weighing: best)
+    monkeypatch.setattr(explain, "realigned", lambda best, weighing: best)
+    last = SimpleNamespace(base=of["all"], ar=np.array([1.0, -0.9]))
+    best, weighing = explain._sifted(last, SimpleNamespace(threshold=12.0, granted=False), ())
+    assert best is kept
+    assert (weighing is WHITE) == (judged == "white")

@@ -135,3 +135,31 @@ def test_steps_that_are_noise_beside_an_effect_are_no_second_one(dead):
     names = [cause.candidates[0].effect for cause in found.causes]
     assert names == (["dead_zone"] if dead else ["sensor_quantization"])
     assert any("steps of 0.5" in note for note in found.notes) == bool(dead)
+
+
+def behind_steps(half: float, dead: float, seed: int) -> list[Experiment]:
+    """Steps and two sines behind a pump that does nothing below ``dead`` volts, read through a play of
+    ``half`` a width each way, in steps of 6 of 24."""
+    rng, t, logs = np.random.default_rng(seed), np.arange(840) * H, []
+    for i, pump in enumerate((np.repeat(LEVELS, 60), *(6.0 - 6.0 * np.cos(w * t) for w in (0.4, 1.1)))):
+        at, moved = 0.0, np.empty(840)
+        for k, heat in enumerate(answered(np.maximum(pump - dead, 0.0))):
+            moved[k] = at = min(max(at, heat - half), heat + half)
+        read = 6.0 * np.round((moved + 0.1 * rng.normal(size=840)) / 6.0)
+        logs.append(replace(Experiment(str(i), H, {"command": pump, "output": read}), start=60.0 * i))
+    return logs
+
+
+@pytest.mark.parametrize("seed", (1, 2))
+@pytest.mark.parametrize(
+    "half, dead, right",
+    [(4.0, 0.0, {"hysteresis", "sensor_hysteresis"}), (0.0, 3.0, {"dead_zone"}), (0.0, 0.0, None)],
+)
+def test_what_moves_the_times_of_the_steps_is_seen_through_them(half, dead, right, seed):
+    """It changes less than half a step, and was held to be the steps' own."""
+    found = diagnose(HEATER, behind_steps(half, dead, seed), pictures=False)
+    names = [cause.candidates[0].effect for cause in found.causes]
+    beside = [name for name in names if name != "sensor_quantization"]
+    assert "sensor_quantization" in names and len(beside) == bool(right)
+    assert not right or beside[0] in right
+    assert found.shrink > 0.6

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
-from focgen.diagnosis.fitting.folds import folds
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
+from focgen.diagnosis.fitting.folds import folds, foreseen, foretold
 from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.search import evidence
@@ -82,3 +82,19 @@ def test_two_effects_that_are_there_stay(seed):
 def test_parts_are_neighbouring_experiments_or_quarters():
     assert folds([5, 5, 5, 5]).tolist() == [0] * 5 + [1] * 5 + [2] * 5 + [3] * 5
     assert folds([8]).tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fit_foretells_what_it_made_least(seed):
+    """Noise that wanders leaves a level of each run that no other run tells. Its innovations do not."""
+    logs = steps(seed, 6.0, 6.0, 6.0, 6.0, 6.0)
+    walk = np.cumsum(np.random.default_rng(seed).normal(size=(5, 600)), axis=1)
+    noisy = [
+        replace(log, signals=log.signals | {"output": log["output"] + 0.02 * w}) for log, w in zip(logs, walk)
+    ]
+    plain = fitted(problem_for(noisy, ("dead_zone", "soft")))
+    assert foretold(plain, WHITE) == foreseen(plain, WHITE)
+    colour = Weighing(np.array([1.0, -0.999]))
+    best = fit(plain.problem, plain.vector, colour, 12)
+    assert foretold(best, colour) < 1.05 * np.mean(best.innovations**2)
+    assert foreseen(best, colour) > 1.2 * np.mean(best.weighed**2)
