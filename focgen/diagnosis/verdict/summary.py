@@ -13,6 +13,7 @@ from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
+from focgen.diagnosis.verdict.crossed import crossed
 from focgen.diagnosis.verdict.floor import floor as noise_floor
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.instead import Instead, sound_part
@@ -89,7 +90,8 @@ def sorted_out(
     def summary_without(unknown: Sequence[Explanation]) -> Summary:
         return _summary(rig, logs, rigs, explanations, unknown)
 
-    unknown = [e for e in explanations if is_unknown(e)]
+    out = crossed(explanations)
+    unknown = [e for e in explanations if e in out or is_unknown(e)]
     summary = summary_without([*unknown, *_no_closer(rig, logs, rigs, explanations)])
     if granted:
         return SortedOut(summary, unknown, [], [])
