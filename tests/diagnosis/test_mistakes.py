@@ -57,7 +57,7 @@ def exchanged(_, signals):
 
 @pytest.mark.parametrize("time", (1.0 / 6.0, 0.6))
 def test_a_reading_ahead_of_what_it_reads_is_no_effect(time):
-    """A relaxation that overshoots comes closest, and was sure at 0.95 beside a warning of the two columns."""
+    """A relaxation that overshoots comes closest, and was sure at 0.95 beside a warning of the columns."""
     rig = replace(RIG, sensor=TransferFunction([(1.0, 0.0)], [(time, 1.0), (1.0, 0.0)]))
     found = diagnose(rig, altered(session(1, sensor=(1.0, time)), exchanged), pictures=False)
     assert found.verdict == "unknown" and not found.causes

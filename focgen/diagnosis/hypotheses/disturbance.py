@@ -18,6 +18,7 @@ from focgen.logs.between import white_level
 
 SLOWEST = 100.0  # samples: slower than that, and than four responses, is no tone
 _LONG = 400  # samples of an experiment in which a line stands out
+_STRETCH = 256  # samples
 _PERIODS = 8  # of a tone in an experiment: fewer are as broad as what any slow noise does
 
 
@@ -25,8 +26,8 @@ _PERIODS = 8  # of a tone in an experiment: fewer are as broad as what any slow 
 class Disturbance:
     """``kurtosis`` and ``loudest`` of the innovations, ``slow``: the ratio of slow power to that about the
     response; ``line``: the part of the power by which the strongest line stands out of what is about it, in
-    the median of the long experiments; ``above``: the root mean square over that of what is white;
-    ``paced``: the power at the pace of the rig over that of what is faster."""
+    the median of the long experiments, ``astray`` in that of short stretches; ``above``: the root mean square
+    over that of what is white; ``paced``: the power at the pace of the rig over that of what is faster."""
 
     kurtosis: float
     loudest: float
@@ -34,11 +35,12 @@ class Disturbance:
     line: float
     above: float = 1.0
     paced: float = 1.0
+    astray: float = 0.0
 
     @property
     def tonal(self) -> bool:
-        """Whether it is a tone."""
-        return self.line > NUMBERS.tonal
+        """Whether it is a tone, or one that strays: a pump's ripple goes with its load."""
+        return max(self.line, self.astray) > NUMBERS.tonal
 
     @property
     def bursts(self) -> bool:
@@ -74,6 +76,7 @@ def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturban
         _line(parts, h, response),
         _above(parts),
         _paced(parts, h, response),
+        _line([stretch for p in parts for stretch in _stretches(p)], h, response, _STRETCH),
     )
 
 
@@ -97,13 +100,20 @@ def _paced(parts: list[np.ndarray], h: float, response: float) -> float:
     return float(power[0] / count[0] / (power[1] / count[1]))
 
 
-def _line(parts: list[np.ndarray], h: float, response: float) -> float:
+def _stretches(part: np.ndarray) -> list[np.ndarray]:
+    """Stretches of an experiment so short that a tone which goes with the load keeps its frequency."""
+    whole = len(part) // _STRETCH
+    return list(part[: whole * _STRETCH].reshape(whole, _STRETCH))
+
+
+def _line(parts: list[np.ndarray], h: float, response: float, long: int = _LONG) -> float:
     """The part of the power within two bins of the strongest line, less what its surroundings have there,
-    slow ones left out; the median over experiments. Slow is a period beyond four responses, whatever the
-    samples, or beyond a hundred samples where these are more, and one of which an experiment holds few."""
+    slow ones left out; the median over parts of at least ``long`` samples. Slow is a period beyond four
+    responses, whatever the samples, or beyond a hundred samples where these are more, and one of which a part
+    holds few."""
     shares, slow = [], max(SLOWEST, 4.0 * response / h)
     for p in parts:
-        if len(p) >= _LONG:
+        if len(p) >= long:
             power = np.abs(np.fft.rfft((p - p.mean()) * np.hanning(len(p)))) ** 2
             near = np.convolve(power, np.ones(5), "same")
             first = max(math.ceil(len(p) / slow), _PERIODS)

@@ -29,9 +29,11 @@ def cautions(
     causes: Sequence[tuple[Explanation, Cause]],
     unknown: Sequence[Explanation],
     doubted: Sequence[Explanation] = (),
+    off: Sequence[tuple[Explanation, Cause]] = (),
 ) -> Iterator[str]:
     """What cannot be predicted, what may be there instead, and what is unexplained beside what is named.
-    ``doubted``: of what is likelier something that no effect is, instead of a part of what was found."""
+    ``doubted``: of what is likelier something that no effect is, instead of a part of what was found;
+    ``off``: what is likelier the nominal chain."""
     for candidate in (candidate for e, _ in causes for candidate in paths(e)):
         yield (
             f"the {candidate.effect} wanders: followed through this session, its next turn cannot be "
@@ -50,7 +52,7 @@ def cautions(
     asked = dict.fromkeys([*unknown, *doubted, *(e for e, _ in causes)])
     yield from _late(asked)
     yield from _uneven(asked)
-    yield from _nominal(causes)
+    yield from _nominal([*causes, *off])
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
 

@@ -29,6 +29,7 @@ from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import far_moves
+from focgen.diagnosis.verdict.nominal import likelier_nominal, without
 from focgen.diagnosis.verdict.sizes import estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
 from focgen.diagnosis.verdict.unexplained import disturbed
@@ -53,6 +54,10 @@ def conclude(
     if doubted:
         explanations = [doubted.get(e, e) for e in explanations]
         rigs = compose.compose(rig, explanations, logs)
+    off = [] if granted else likelier_nominal(explanations)
+    if off:
+        explanations = [without(e, [c for of, c in off if of is e]) for e in explanations]
+        rigs = compose.compose(rig, explanations, logs)
     stands = sorted_out(rig, logs, rigs, explanations, granted)
     summary, unknown = stands.summary, stands.unknown
     made, squares, floor, total = summary.made, summary.squares, summary.floor, summary.total
@@ -76,7 +81,7 @@ def conclude(
         notes=(
             *notes_of(logs),
             *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
-            *cautions(summary.causes, unknown, list(doubted)),
+            *cautions(summary.causes, unknown, list(doubted), off),
             *lesser(stands.beside),
             *the_rest(summary),
             *paced(explanations),

@@ -1,0 +1,35 @@
+"""Effects beside others that are likelier the nominal chain, off by itself: these are not named.
+
+A chain that was fitted to a rig's logs is off by part of the noise. Alone, what looks like an effect of that
+size is all that there is to say. Beside an effect that is there it would be a second fault to look for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from focgen.diagnosis.fitting.fit import Weighing
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.rivals import Cause, without_family
+from focgen.diagnosis.verdict.confidence import nominal_instead
+from focgen.diagnosis.verdict.unexplained import is_unknown
+
+
+def likelier_nominal(explanations: Sequence[Explanation]) -> list[tuple[Explanation, Cause]]:
+    """The causes, of several in all, that are likelier the nominal chain; the one that is so least stays, and
+    so does what is in a segment that is unknown with it."""
+    every = [(e, c) for e in explanations for c in e.causes]
+    every.sort(key=lambda each: nominal_instead(each[1].rivals[0]))
+    return [(e, c) for e, c in every[1:] if nominal_instead(c.rivals[0]) > 0.5 and not is_unknown(e)]
+
+
+def without(e: Explanation, causes: Sequence[Cause]) -> Explanation:
+    """``e`` without these of its causes. What inputs predict stays as it was with them, and so does what may
+    be there instead: they are explained."""
+    if not causes:
+        return e
+    best, rest = e.best, tuple(c for c in e.causes if c not in causes)
+    for cause in causes:
+        best = without_family(best, cause.rivals[0].effect, Weighing(e.ar))
+    return replace(e, best=best, causes=rest, whole=e.whole or e)
