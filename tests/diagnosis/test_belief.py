@@ -22,7 +22,9 @@ from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.hypotheses.rivals import Rival, _needed
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
+from focgen.diagnosis.verdict import nominal
 from focgen.diagnosis.verdict.confidence import nominal_instead, tied
+from focgen.diagnosis.verdict.nominal import likelier_nominal
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Actuator, Rig, Signals
@@ -301,3 +303,18 @@ def test_a_colour_goes_with_the_effects_that_it_was_made_with(monkeypatch, first
     best, weighing = explain._sifted(last, SimpleNamespace(threshold=12.0, granted=False), ())
     assert best is kept
     assert (weighing is WHITE) == (judged == "white")
+
+
+def test_beside_an_effect_what_is_likelier_the_nominal_chain_is_not_named(monkeypatch):
+    """Alone it stays, for it is all there is to say; of several the surest stays."""
+    monkeypatch.setattr(nominal, "is_unknown", lambda e: e.unknown)
+    faint, fainter, clear = (
+        SimpleNamespace(rivals=[_rival("contact", 300.0, part * NUMBERS.bent)]) for part in (0.8, 0.7, 3.0)
+    )
+
+    def left_out(*causes, unknown=False):
+        return [c for _, c in likelier_nominal([SimpleNamespace(causes=causes, unknown=unknown)])]
+
+    assert left_out(faint) == left_out(clear) == []
+    assert left_out(faint, clear) == [faint] and left_out(fainter, faint) == [fainter]
+    assert left_out(faint, clear, unknown=True) == []

@@ -63,6 +63,17 @@ def test_a_tone_as_slow_as_the_rig_is_heard_however_fast_the_samples():
     assert not disturbance(noise, h, 1.0).tonal and disturbance(tone, h, 1.0).tonal
 
 
+def test_a_tone_that_goes_with_the_load_is_heard():
+    """A pump's ripple has no line in the whole of an experiment. It passed for noise, at nine times that."""
+    rng, t = np.random.default_rng(0), np.arange(4000) * H
+    noise = [_noise(rng, 4000) for _ in range(3)]
+    turns = np.cumsum(2.0 + 0.7 * np.sin(0.1 * t)) * H
+    ripple = [p + 1.5 * np.sin(2 * np.pi * (turns + 0.3 * i)) for i, p in enumerate(noise)]
+    assert not disturbance(noise, H, 1.0).tonal
+    heard = disturbance(ripple, H, 1.0)
+    assert heard.tonal and heard.line < 0.5 * heard.astray
+
+
 def test_ringing_is_predictable_and_noise_is_not():
     logs, rng = session(3), np.random.default_rng(5)
     segment = make(logs, "command", "output")
