@@ -78,7 +78,8 @@ class Numbers:
     )
     uneven: float = _number(
         0.5,
-        "by what the steps of a coarse converter are uneven or sluggish, at most",
+        "by what the steps of a coarse converter are uneven or sluggish, at most; where they are simulated, a "
+        "third of it is left",
         "of a step, root mean square",
         "converters simulated",
         "1 false effect of 3 coarse converters",
@@ -211,12 +212,19 @@ class Numbers:
     )
     unlikely: float = _number(
         0.7,
-        "left at most by an actuator far from the one given; "
-        "how sure a cause beside it, or beside a larger one, may be",
+        "left at most by an actuator far from the one given; how sure a cause beside it may be",
         "of the mean square, of the confidence",
-        "tuning cases; rigs of other physics",
+        "tuning cases",
         _SAME,
         _SAME,
+    )
+    smaller: float = _number(
+        0.9,
+        "how sure a cause beside a larger one of its segment may be, of what it would be alone",
+        "of the confidence",
+        "85 such causes of rigs not seen before: 80 right",
+        "not measured",
+        "–",
     )
     vain: float = _number(
         0.2,

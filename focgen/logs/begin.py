@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -34,12 +35,19 @@ class Begin:
 
         A step between two samples is a ramp of ``h`` about its time, so that the samples move with it evenly.
         """
-        count = int(np.ceil(max(self.ago, default=0.0) / h + 0.5))
-        before = np.arange(count, 0, -1, dtype=float)
-        found = np.full(count, float(self.levels[-1]))
-        for earlier, later, ago in zip(self.levels, self.levels[1:], self.ago):
-            found += (earlier - later) * np.clip(before - ago / h + 0.5, 0.0, 1.0)
-        return found
+        return _samples(self, h)
+
+
+@lru_cache(maxsize=64)
+def _samples(begin: Begin, h: float) -> Array:
+    """Kept, for fits simulate from the same past again and again; read only."""
+    count = int(np.ceil(max(begin.ago, default=0.0) / h + 0.5))
+    before = np.arange(count, 0, -1, dtype=float)
+    found = np.full(count, float(begin.levels[-1]))
+    for earlier, later, ago in zip(begin.levels, begin.levels[1:], begin.ago):
+        found += (earlier - later) * np.clip(before - ago / h + 0.5, 0.0, 1.0)
+    found.setflags(write=False)
+    return found
 
 
 REST = Begin()

@@ -393,6 +393,6 @@ def test_a_cause_beside_a_larger_one_is_less_sure():
     large, small, wander = cause(0.8), cause(0.2), cause(0.9, wanders=True)
     both, alone = SimpleNamespace(causes=(large, small)), SimpleNamespace(causes=(small,))
     assert _beside(both, large) == _beside(alone, small) == 1.0
-    assert _beside(both, small) == NUMBERS.unlikely
+    assert _beside(both, small) == NUMBERS.smaller
     followed = SimpleNamespace(causes=(wander, small))
-    assert _beside(followed, small) == 1.0 and _beside(followed, wander) == NUMBERS.unlikely
+    assert _beside(followed, small) == 1.0 and _beside(followed, wander) == NUMBERS.smaller

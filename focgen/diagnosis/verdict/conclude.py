@@ -180,7 +180,7 @@ def _beside(e: Explanation, cause: Cause) -> float:
     def size(c: Cause) -> float:
         return 0.0 if _wanders(c) else c.share
 
-    return 1.0 if size(cause) >= max(size(c) for c in e.causes) else NUMBERS.unlikely
+    return 1.0 if size(cause) >= max(size(c) for c in e.causes) else NUMBERS.smaller
 
 
 def _wanders(cause: Cause) -> bool:
