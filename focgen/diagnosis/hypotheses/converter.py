@@ -24,7 +24,6 @@ from focgen.rig.engine import slot_in
 _SHARP = 20_000  # parts of the range: what readings may lie off a level that is one
 _READINGS = 2  # of one level at most, in the mean: then there is little between the levels
 _PINNED = 0.25 * FIXED  # of a reference: what is held may move either way
-_LEFT = 1.0 / 3.0  # of what uneven steps make is left where even ones are simulated
 _REFITTED = 6  # iterations
 _EASED = (0.2, 0.06)  # of a step: what it rises in, as it is fitted
 
@@ -46,7 +45,7 @@ class Converter:
     @property
     def left(self) -> float:
         """The same where the steps are simulated."""
-        return _LEFT * NUMBERS.uneven * self.step
+        return NUMBERS.stepped * self.step
 
     def explains(self, of: Fit) -> bool:
         """Whether the residual is no larger than what a converter's steps leave."""
