@@ -229,7 +229,7 @@ class Numbers:
         0.9,
         "how sure a cause beside a larger one of its segment may be, of what it would be alone",
         "of the confidence",
-        "85 such causes of rigs not seen before: 80 right",
+        "50 such causes of rigs not seen before: 48 right",
         "not measured",
         "–",
     )
