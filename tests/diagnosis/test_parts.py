@@ -290,6 +290,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
     return SimpleNamespace(
         segment=SimpleNamespace(pace=0.0, closed=closed),
         converter=None,
+        whole=None,
         predictability=SimpleNamespace(share=share),
         nominal=nominal,
         best=best,
@@ -380,19 +381,22 @@ def _later(signals, roles, samples):
     }
 
 
-def cause(share, wanders=False):
+def cause(share, wanders=False, effect="leak"):
     """A cause that closes ``share``, of one form."""
     form = SimpleNamespace(wanders=wanders)
-    problem = SimpleNamespace(candidates=[SimpleNamespace(effect="one", form=form)])
-    rival = SimpleNamespace(effect="one", fit=SimpleNamespace(problem=problem))
+    problem = SimpleNamespace(candidates=[SimpleNamespace(effect=effect, form=form)])
+    rival = SimpleNamespace(effect=effect, fit=SimpleNamespace(problem=problem))
     return Cause((rival,), 0.0, share)
 
 
 def test_a_cause_beside_a_larger_one_is_less_sure():
-    """What the larger one's form lacks looks like it on rigs of others. A wander is never the larger one."""
+    """What the larger one's form lacks looks like it on rigs of others. A wander is never the larger one, and
+    steps are seen in the readings."""
     large, small, wander = cause(0.8), cause(0.2), cause(0.9, wanders=True)
     both, alone = SimpleNamespace(causes=(large, small)), SimpleNamespace(causes=(small,))
     assert _beside(both, large) == _beside(alone, small) == 1.0
     assert _beside(both, small) == NUMBERS.smaller
+    steps = cause(0.1, effect="sensor_quantization")
+    assert _beside(SimpleNamespace(causes=(large, steps)), steps) == 1.0
     followed = SimpleNamespace(causes=(wander, small))
     assert _beside(followed, small) == 1.0 and _beside(followed, wander) == NUMBERS.smaller

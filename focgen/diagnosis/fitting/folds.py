@@ -41,13 +41,14 @@ def foreseen(best: Fit, weighing: Weighing) -> float:
 
 
 def foretold(best: Fit, weighing: Weighing) -> float:
-    """The same of what fits make least: the innovations, or of a rig that integrates the error itself. A fit
-    foretells no other square: what a colour counts for little it leaves far off."""
-    return _foreseen(best, weighing, left)
+    """The same of what effects are judged by. A fit foretells no other square: what a colour counts for
+    little it leaves far off."""
+    return _foreseen(best, weighing, judged_error)
 
 
-def left(of: Fit) -> np.ndarray:
-    """What a fit made least (n,)."""
+def judged_error(of: Fit) -> np.ndarray:
+    """The innovations (n,), which a fit made least; of a rig that integrates the error itself, which its
+    effects were fitted to in the end."""
     return of.weighed if of.problem.segment.pace else of.innovations
 
 

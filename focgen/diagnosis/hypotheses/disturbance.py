@@ -18,7 +18,7 @@ from focgen.logs.between import white_level
 
 SLOWEST = 100.0  # samples: slower than that, and than four responses, is no tone
 _LONG = 400  # samples of an experiment in which a line stands out
-_STRETCH = 256  # samples
+_STRETCH, _STRETCHES = 256, 8  # samples; how many there are to be at least
 _PERIODS = 8  # of a tone in an experiment: fewer are as broad as what any slow noise does
 
 
@@ -39,8 +39,9 @@ class Disturbance:
 
     @property
     def tonal(self) -> bool:
-        """Whether it is a tone, or one that strays: a pump's ripple goes with its load."""
-        return max(self.line, self.astray) > NUMBERS.tonal
+        """Whether it is a tone, or one that strays: a pump's ripple goes with its load. In a short stretch
+        noise has lines, too: there it is to be twice as much of the power."""
+        return max(self.line, 0.5 * self.astray) > NUMBERS.tonal
 
     @property
     def bursts(self) -> bool:
@@ -68,6 +69,7 @@ def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturban
     variance = max(float(np.mean(joined**2)), 1e-300)
     count = max(10, int(response / h))
     local = np.array([np.mean(s**2) for p in quiet for s in np.array_split(p, max(1, len(p) // count))])
+    stretches = [stretch for p in parts if len(p) >= _LONG for stretch in _stretches(p)]
     loudest = float(np.max(local) / max(np.median(local), 1e-300))
     return Disturbance(
         float(np.mean(joined**4) / variance**2),
@@ -76,7 +78,7 @@ def disturbance(parts: list[np.ndarray], h: float, response: float) -> Disturban
         _line(parts, h, response),
         _above(parts),
         _paced(parts, h, response),
-        _line([stretch for p in parts for stretch in _stretches(p)], h, response, _STRETCH),
+        _line(stretches, h, response, _STRETCH) if len(stretches) >= _STRETCHES else 0.0,
     )
 
 

@@ -18,7 +18,7 @@ from focgen.diagnosis.hypotheses.left import remembers, unleft
 from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain, ways
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
-from focgen.diagnosis.hypotheses.seen_through import SeenThrough, seen_through
+from focgen.diagnosis.hypotheses.seen_through import with_steps
 from focgen.diagnosis.hypotheses.two import two_at_once
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
@@ -224,10 +224,7 @@ def _explained(
     beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted, known)
     best, causes = reexamined(best, beside)
     if converter is not None:
-        through = _seen_through(converter, best, nominal, rankings, candidates, asked)
-        if through is not None:
-            best, causes = through.best, (*causes, through.cause)
-        best, causes = converter.beside(best, nominal, causes, weighing)
+        best, causes = with_steps(converter, best, causes, beside, asked)
     found, (best, nominal) = best, map(settled, _between_anew(rig, best, nominal, weighing))
     segment = best.problem.segment
     causes = tuple(replace(c, rivals=_in_the_end(c.rivals, found, best, weighing)) for c in causes)
@@ -244,21 +241,6 @@ def _explained(
         errors,
         converter,
     )
-
-
-def _seen_through(
-    converter: Converter,
-    best: Fit,
-    nominal: Fit,
-    rankings: list[Ranking],
-    candidates: list[CandidateEffect],
-    asked: AcceptanceCriteria,
-) -> SeenThrough | None:
-    """What is there beside the steps of a converter that make more than noise, if anything is."""
-    if asked.granted or converter.is_noise(nominal, alone=not best.problem.candidates):
-        return None
-    beside = replace(asked.surroundings, hidden=converter.left**2)
-    return seen_through(converter, best, nominal, rankings, candidates, beside, asked.threshold)
 
 
 def _unsure(problem: Problem, vector: np.ndarray, unsure: Strays | None) -> tuple[float, np.ndarray | None]:
@@ -386,7 +368,7 @@ def _worth_trying(
 def _sifted(last: Ranking, asked: AcceptanceCriteria, known: Sequence[Fit]) -> tuple[Fit, Weighing]:
     """What was found, without what turns out needless or vain, and how it is judged: in the colour of the
     noise, but not in that of what is left by an effect that is not there, where inputs predict much without
-    it."""
+    it; and in none where they predict much of what all of them leave."""
 
     def sifted(weighing: Weighing) -> Fit:
         best = _dropped(last.base, weighing, asked.threshold, known)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import Fit, Weighing
-from focgen.diagnosis.fitting.folds import foretold, left
+from focgen.diagnosis.fitting.folds import foretold, judged_error
 from focgen.diagnosis.hypotheses.rivals import without_family
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.rig.effects import library
@@ -49,6 +49,6 @@ class _Left:
     def of(cls, name: str, best: Fit, error: float, weighing: Weighing) -> _Left:
         """``error``: the mean square that is foretold with the family."""
         without = without_family(best, name, weighing)
-        fitted = float(np.mean(left(without) ** 2)) - float(np.mean(left(best) ** 2))
+        fitted = float(np.mean(judged_error(without) ** 2)) - float(np.mean(judged_error(best) ** 2))
         alone = foretold(without, weighing)
         return cls(without, alone, (alone - error) / fitted if fitted > 0.0 else 0.0)

@@ -178,7 +178,7 @@ def change_of(of: Fit, without: Fit) -> float:
 def _ranking(name: str, without: Fit, beside: Beside) -> Ranking:
     """The families tried where an effect of this name is left out."""
     for ranking in beside.rankings:
-        if _alike(ranking.base.problem, without.problem):
+        if alike(ranking.base.problem, without.problem):
             return ranking
     families = without.problem.families
     untried = [c for c in without.problem.untried(beside.candidates) if c.effect not in families]
@@ -186,7 +186,7 @@ def _ranking(name: str, without: Fit, beside: Beside) -> Ranking:
     return beside.rankings[-1]
 
 
-def _alike(a: Problem, b: Problem) -> bool:
+def alike(a: Problem, b: Problem) -> bool:
     """Whether two problems of a segment are the same."""
     return a.candidates == b.candidates and a.nominals.wide == b.nominals.wide
 

@@ -7,50 +7,53 @@ moves the times at which the levels change.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 from focgen.diagnosis.belief.choice import rarity
-from focgen.diagnosis.belief.further import Ground, Surroundings
+from focgen.diagnosis.belief.further import Ground
 from focgen.diagnosis.belief.standing import behind, holds
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
+from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
 from focgen.diagnosis.hypotheses.converter import Converter
-from focgen.diagnosis.hypotheses.rivals import Cause, Rival, change_of, share_of
+from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, alike, change_of, share_of
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, family, is_itself, on_all, rank
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect
 
 _STEPS = 6  # iterations
 
 
-@dataclass(frozen=True, eq=False)
-class SeenThrough:
-    """An effect found with the steps simulated: a fit without them, and the ``cause`` that it is."""
+def with_steps(
+    converter: Converter, best: Fit, causes: tuple[Cause, ...], beside: Beside, asked: AcceptanceCriteria
+) -> tuple[Fit, tuple[Cause, ...]]:
+    """What was found, with what is there beside the steps of a ``converter`` that make more than noise, and
+    with the steps. ``beside``: what every effect is doubted with; ``asked``: what it has to show."""
+    nominal, weighing = beside.nominal, beside.weighing
+    if asked.granted or converter.is_noise(nominal, alone=not best.problem.candidates):
+        return converter.beside(best, nominal, causes, weighing)
+    seen = _seen_through(converter, best, beside, asked)
+    if seen is None:
+        return converter.beside(best, nominal, causes, weighing)
+    plain, cause = seen
+    best, every = converter.beside(plain, nominal, (*causes, cause), weighing)
+    first = replace(cause.rivals[0], fit=best)
+    now = replace(cause, rivals=(first, *cause.rivals[1:]))
+    return best, tuple(now if c is cause else c for c in every)
 
-    best: Fit
-    cause: Cause
 
-
-def seen_through(
-    converter: Converter,
-    best: Fit,
-    nominal: Fit,
-    rankings: Sequence[Ranking],
-    candidates: Sequence[CandidateEffect],
-    surroundings: Surroundings,
-    threshold: float,
-) -> SeenThrough | None:
-    """The likeliest effect beside those of ``best`` with the steps of the ``converter`` simulated; None where
-    inputs predict little of what is left, or none is likelier than none. ``nominal``: the fit without any
-    effect; ``surroundings``: what else makes a misfit; ``threshold``: nats that noise does not reach."""
+def _seen_through(
+    converter: Converter, best: Fit, beside: Beside, asked: AcceptanceCriteria
+) -> tuple[Fit, Cause] | None:
+    """The likeliest effect beside those of ``best`` with the steps simulated: a fit without the steps, and
+    the cause that it is. None where inputs predict little of what is left, or none is likelier than none."""
     base = converter.stepped(best)
     if base.predictable_share < NUMBERS.left:
         return None
-    plain = _every_family(_ranked(best, rankings, candidates))
-    tried = {n: s for n, f in plain.items() if evidence(s := converter.stepped(f), base) > threshold}
+    plain = _every_family(_ranked(best, beside))
+    tried = {n: s for n, f in plain.items() if evidence(s := converter.stepped(f), base) > asked.threshold}
     if not tried:
         return None
-    ground = Ground.of(converter.stepped(nominal), base, [*tried.values()], WHITE, surroundings)
+    surroundings = replace(asked.surroundings, hidden=converter.left**2)
+    ground = Ground.of(converter.stepped(beside.nominal), base, [*tried.values()], WHITE, surroundings)
     rare = {n: rarity([plain[n].problem.candidates[-1]]) for n in tried}
     odds = {n: ground.compared(f) + rare[n] for n, f in tried.items()}
     first = max(odds, key=lambda n: odds[n])
@@ -67,8 +70,8 @@ def seen_through(
     rivals = tuple(sorted((rival(n, f) for n, f in tried.items()), key=lambda r: r.separation))
     if holds(rivals[0].off):
         return None
-    share = share_of(nominal, best, tried[first])
-    return SeenThrough(plain[first], Cause(rivals, rivals[0].gain, share))
+    found = fit(plain[first].problem, plain[first].vector, beside.weighing, _STEPS)
+    return found, Cause(rivals, rivals[0].gain, share_of(beside.nominal, best, tried[first]))
 
 
 def _every_family(ranking: Ranking) -> dict[str, Fit]:
@@ -79,13 +82,14 @@ def _every_family(ranking: Ranking) -> dict[str, Fit]:
         if family(left) not in found:
             whole = on_all(left, problem, round(problem.slack / left.problem.slack))
             found[family(left)] = fit(whole.problem, whole.vector, WHITE, _STEPS)
-    return {name: f for name, f in found.items() if is_itself(f)}
+    return {n: f for n, f in found.items() if is_itself(f) and n not in problem.families}
 
 
-def _ranked(best: Fit, rankings: Sequence[Ranking], candidates: Sequence[CandidateEffect]) -> Ranking:
-    """What each further family does beside ``best``, without the steps."""
+def _ranked(best: Fit, beside: Beside) -> Ranking:
+    """What each further family does beside ``best``, without the steps. Where a search saw no more than noise
+    it tried none."""
     problem = best.problem
-    for ranking in rankings:
-        if ranking.base.problem.candidates == problem.candidates:
+    for ranking in beside.rankings:
+        if alike(ranking.base.problem, problem) and (ranking.best or ranking.left):
             return ranking
-    return rank(problem, best.vector, problem.untried(candidates))
+    return rank(problem, best.vector, problem.untried(beside.candidates))

@@ -42,14 +42,15 @@ def cautions(
     for e in unknown:
         if at_once := another(e):
             yield f"{_within(e)}: not slowly, but at once it {_at_once(at_once)}"
-    for e in dict.fromkeys([*doubted, *(e for e, _ in causes)]):
+    named = [e.whole or e for e, _ in causes]
+    for e in dict.fromkeys([*doubted, *named]):
         if (at_once := changed_at_once(e)) and at_once.sure > 1.0 - NUMBERS.held:
-            named = " and ".join(sorted(at_once.instead))
+            families = " and ".join(sorted(at_once.instead))
             yield (
-                f"{_within(e)}: instead of {named} it may be ({at_once.sure:.0%}) that at once it "
+                f"{_within(e)}: instead of {families} it may be ({at_once.sure:.0%}) that at once it "
                 f"{_at_once(at_once)}"
             )
-    asked = dict.fromkeys([*unknown, *doubted, *(e for e, _ in causes)])
+    asked = dict.fromkeys([*unknown, *doubted, *named])
     yield from _late(asked)
     yield from _uneven(asked)
     yield from _nominal([*causes, *off])

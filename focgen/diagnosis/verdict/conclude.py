@@ -36,6 +36,7 @@ from focgen.diagnosis.verdict.unexplained import disturbed
 from focgen.diagnosis.verdict.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
+from focgen.rig.effects import library
 from focgen.rig.replay import goodness
 from focgen.rig.rig import Rig
 
@@ -175,12 +176,14 @@ def _lasting(e: Explanation, cause: Cause) -> float:
 def _beside(e: Explanation, cause: Cause) -> float:
     """How sure a cause can be beside another one of its segment that closes more: what looks like it may be
     what the other one's form lacks of this rig. A wander follows whatever is left, so it is never the larger.
+    Steps are seen in the readings.
     """
 
     def size(c: Cause) -> float:
         return 0.0 if _wanders(c) else c.share
 
-    return 1.0 if size(cause) >= max(size(c) for c in e.causes) else NUMBERS.smaller
+    seen = library()[cause.rivals[0].effect].rounds
+    return 1.0 if seen or size(cause) >= max(size(c) for c in e.causes) else NUMBERS.smaller
 
 
 def _wanders(cause: Cause) -> bool:

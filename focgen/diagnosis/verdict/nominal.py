@@ -17,11 +17,11 @@ from focgen.diagnosis.verdict.unexplained import is_unknown
 
 
 def likelier_nominal(explanations: Sequence[Explanation]) -> list[tuple[Explanation, Cause]]:
-    """The causes, of several in all, that are likelier the nominal chain; the one that is so least stays, and
-    so does what is in a segment that is unknown with it."""
-    every = [(e, c) for e in explanations for c in e.causes]
+    """The causes, of several in all, that are likelier the nominal chain; the one that is so least stays.
+    What is in a segment that is unknown with it does not count."""
+    every = [(e, c) for e in explanations if e.causes and not is_unknown(e) for c in e.causes]
     every.sort(key=lambda each: nominal_instead(each[1].rivals[0]))
-    return [(e, c) for e, c in every[1:] if nominal_instead(c.rivals[0]) > 0.5 and not is_unknown(e)]
+    return [(e, c) for e, c in every[1:] if nominal_instead(c.rivals[0]) > 0.5]
 
 
 def without(e: Explanation, causes: Sequence[Cause]) -> Explanation:

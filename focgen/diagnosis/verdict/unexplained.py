@@ -19,7 +19,10 @@ from focgen.rig.effects import library
 def is_unknown(e: Explanation) -> bool:
     """Whether much of what inputs predict of the nominal residual is still there after the effects, or what
     hardly any of them explains is not just noise, or what moves with time moves at once, or the command was
-    logged late or a pace is uneven instead; unless a coarse converter explains it."""
+    logged late or a pace is uneven instead; unless a coarse converter explains it, or the nominal chain that
+    is off by itself does."""
+    if e.whole is not None and not e.causes:
+        return False
     if e.converter is not None and e.converter.explains(e.best):
         return False
     left = disturbed(e)
