@@ -150,7 +150,7 @@ def behind_steps(half: float, dead: float, seed: int) -> list[Experiment]:
     return logs
 
 
-@pytest.mark.parametrize("seed", (1, 2))
+@pytest.mark.parametrize("seed", (1, pytest.param(2, marks=pytest.mark.long)))
 @pytest.mark.parametrize(
     "half, dead, right",
     [(4.0, 0.0, {"hysteresis", "sensor_hysteresis"}), (0.0, 3.0, {"dead_zone"}), (0.0, 0.0, None)],
