@@ -41,7 +41,11 @@ def doubts(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
     response = partial(links, rig, experiments)
     found = plausibility.doubts(experiments, limits, _units(rig), response)
-    return found or _exchanged(rig, experiments) or _late(experiments)
+    if found:
+        return found
+    if exchanged(rig, experiments):
+        return ("curvature lags behind output; the columns of curvature and output exchanged?",)
+    return _late(experiments)
 
 
 def links(
@@ -142,19 +146,17 @@ def _responds_better(rig: Rig, experiments: Sequence[Experiment], faster: float)
     return not pairs or sum(abs(b) - abs(a) for a, b in pairs) > 0.0
 
 
-def _exchanged(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """Camera and sensor change places where the camera would lag behind the sensor."""
+def exchanged(rig: Rig, experiments: Sequence[Experiment]) -> bool:
+    """Whether camera and sensor have changed places: the camera would lag behind the sensor."""
     signals = _signals(experiments)
     if rig.sensor == UNITY or not {"curvature", "output"} <= set(signals):
-        return ()
+        return False
     camera, sensor = signals["curvature"], signals["output"]
-    as_it_is, exchanged = (
+    as_it_is, other = (
         _misfit(_simulated(rig, experiments, x, ("sensor",), False), y)
         for x, y in ((camera, sensor), (sensor, camera))
     )
-    if exchanged > _EXCHANGED * as_it_is:
-        return ()
-    return ("curvature lags behind output; the columns of curvature and output exchanged?",)
+    return other <= _EXCHANGED * as_it_is
 
 
 def _late(experiments: Sequence[Experiment]) -> tuple[str, ...]:

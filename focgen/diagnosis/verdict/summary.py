@@ -90,7 +90,7 @@ def sorted_out(
     def summary_without(unknown: Sequence[Explanation]) -> Summary:
         return _summary(rig, logs, rigs, explanations, unknown)
 
-    out = crossed(explanations)
+    out = [] if granted else crossed(rig, logs, explanations)
     unknown = [e for e in explanations if e in out or is_unknown(e)]
     summary = summary_without([*unknown, *_no_closer(rig, logs, rigs, explanations)])
     if granted:
