@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
+from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, innovations
 from focgen.diagnosis.fitting.integrating import settled
 
 _FOLDS = 4
@@ -37,13 +37,16 @@ def fitted_to(best: Fit, weighing: Weighing, seen: np.ndarray) -> Fit:
 
 def foreseen(best: Fit, weighing: Weighing) -> float:
     """The mean square error of a segment whose every part is simulated by a fit to the others."""
-    return _foreseen(best, weighing, lambda made: made.weighed)
+    return _foreseen(best, weighing, best.problem.weighed)
 
 
 def foretold(best: Fit, weighing: Weighing) -> float:
     """The same of what effects are judged by. A fit foretells no other square: what a colour counts for
     little it leaves far off."""
-    return _foreseen(best, weighing, judged_error)
+    problem = best.problem
+    if problem.segment.pace:
+        return foreseen(best, weighing)
+    return _foreseen(best, weighing, lambda vector: innovations(problem, vector, weighing))
 
 
 def judged_error(of: Fit) -> np.ndarray:
@@ -52,10 +55,10 @@ def judged_error(of: Fit) -> np.ndarray:
     return of.weighed if of.problem.segment.pace else of.innovations
 
 
-def _foreseen(best: Fit, weighing: Weighing, error_of: Callable[[Fit], np.ndarray]) -> float:
+def _foreseen(best: Fit, weighing: Weighing, error_of: Callable[[np.ndarray], np.ndarray]) -> float:
     fold = folds([last - first for first, last in best.problem.segment.run.spans])
     error = np.empty(len(fold))
     for part in np.unique(fold):
         vector = fitted_to(best, weighing, fold != part).vector
-        error[fold == part] = error_of(fit(best.problem, vector, weighing, 0))[fold == part]
+        error[fold == part] = error_of(vector)[fold == part]
     return float(np.mean(error**2))

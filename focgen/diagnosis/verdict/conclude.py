@@ -29,7 +29,7 @@ from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import far_moves
-from focgen.diagnosis.verdict.nominal import likelier_nominal, without
+from focgen.diagnosis.verdict.nominal import likelier_nominal, unnamed
 from focgen.diagnosis.verdict.sizes import estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
 from focgen.diagnosis.verdict.unexplained import disturbed
@@ -52,12 +52,10 @@ def conclude(
     """The rigs that the verdict stands for, the diagnosis without a next experiment, and what it rests on.
     ``granted``: the effects are there, however little they explain."""
     doubted = {} if granted else sound_parts(explanations)
-    if doubted:
-        explanations = [doubted.get(e, e) for e in explanations]
-        rigs = compose.compose(rig, explanations, logs)
+    explanations = [doubted.get(e, e) for e in explanations]
     off = [] if granted else likelier_nominal(explanations)
-    if off:
-        explanations = [without(e, [c for of, c in off if of is e]) for e in explanations]
+    explanations = [unnamed(e, [c for of, c in off if of is e]) for e in explanations]
+    if doubted or off:
         rigs = compose.compose(rig, explanations, logs)
     stands = sorted_out(rig, logs, rigs, explanations, granted)
     summary, unknown = stands.summary, stands.unknown

@@ -24,9 +24,9 @@ def likelier_nominal(explanations: Sequence[Explanation]) -> list[tuple[Explanat
     return [(e, c) for e, c in every[1:] if nominal_instead(c.rivals[0]) > 0.5]
 
 
-def without(e: Explanation, causes: Sequence[Cause]) -> Explanation:
-    """``e`` without these of its causes. What inputs predict stays as it was with them, and so does what may
-    be there instead: they are explained."""
+def unnamed(e: Explanation, causes: Sequence[Cause]) -> Explanation:
+    """``e`` without these of its causes, which are not named. What inputs predict stays as it was with them,
+    and so does what may be there instead: they are explained."""
     if not causes:
         return e
     best, rest = e.best, tuple(c for c in e.causes if c not in causes)
