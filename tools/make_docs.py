@@ -39,6 +39,8 @@ NAV = {
         "closed-loop",
         "memory",
         "diagnosis",
+        "blind-trials",
+        "other-rigs",
         "effects",
         "proofs",
         "kernels",
