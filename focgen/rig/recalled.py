@@ -119,7 +119,8 @@ def begin_after(log: Experiment, earlier: Sequence[Experiment], role: str, past:
         edges.append(edges[-1] * (1.0 + _WIDTH) + log.sample_time)
     sums, _ = np.histogram(ago[seen], edges, weights=x[seen])
     means = sums * log.sample_time / np.diff(edges)
-    return Begin((0.0, *map(float, means[::-1]), 0.0), tuple(edges[::-1]), known=True)
+    after = log.start - max(map(ended, earlier))
+    return Begin((0.0, *map(float, means[::-1]), 0.0), tuple(edges[::-1]), known=True, after=after)
 
 
 def _ago(log: Experiment, other: Experiment) -> Array:

@@ -88,6 +88,24 @@ def test_what_was_before_is_simulated_ahead_of_an_experiment(tmp_path: Path) -> 
     assert _left(rig, list(told)) < 1.2 * NOISE
 
 
+def test_experiments_in_a_row_go_on_from_one_another(tmp_path: Path) -> None:
+    """As the rig did, sample for sample: it knows of no logs. One of them without the others, and the same in
+    another order, have windows of the past instead."""
+    rig, logs = _rig(tmp_path), _logs(rest=10.0)
+    x, _, spans = _session(rest=10.0)
+    whole = Experiment("whole", H, {"pressure": x, "output": x})
+    unbroken = simulate_session(rig, [whole])[0]["output"]
+    told = list(recalled(rig, logs))
+    for (a, b), made in zip(spans, simulate_session(rig, told)):
+        assert np.array_equal(made["output"], unbroken[a:b])
+    (alone,) = simulate_session(rig, told[2:])
+    turned = simulate_session(rig, told[::-1])
+    a, b = spans[2]
+    for made in (alone, turned[0]):
+        off = float(np.sqrt(np.mean((made["output"] - unbroken[a:b]) ** 2)))
+        assert 0.0 < off < 0.1 * NOISE
+
+
 def test_replay_does_the_same(tmp_path: Path) -> None:
     frame = {key: np.concatenate(parts) for key, parts in _columns(_logs(rest=10.0)).items()}
     found = replay(_rig(tmp_path), frame)
