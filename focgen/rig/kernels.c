@@ -168,6 +168,20 @@ void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, d
     }
 }
 
+/* What a tank lets through that gives `draw` of every rise of the pressure, and is refilled by `refill` a second up to `full`:
+ * they meet where the tank has as much left as the pressure it made, and the valve lets nothing back. At rest the tank is
+ * full. */
+void focgen_drawn(int n, const double *x, double *y, const unsigned char *rest, double h, double full, double draw, double refill)
+{
+    double tank = full, now = 0.0;
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) tank = full, now = rest[k] == BALANCED ? fmin(x[k], full) : 0.0;
+        double most = (tank + draw * now) / (1.0 + draw), next = fmin(x[k], fmax(most, now));
+        tank = fmin(tank - draw * fmax(next - now, 0.0) + refill * h, full);
+        y[k] = now = next;
+    }
+}
+
 /* Play (backlash) of half width `width`, starting in the middle of its slack at `start`. */
 void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double start)
 {

@@ -34,6 +34,8 @@ void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest
     double vent, double scale, int sub);
 void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, double h, double rate,
     double tau, int soft, int sub);
+void focgen_drawn(int n, const double *x, double *y, const unsigned char *rest, double h, double full,
+    double draw, double refill);
 void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double
     start);
 void focgen_pressed(int n, const double *x, double *y, const unsigned char *rest, double even, double
@@ -170,6 +172,12 @@ def orifice(x: Array, rest: Bytes, h: float, fill: float, vent: float, scale: fl
 def rate_limit(x: Array, rest: Bytes, h: float, rate: float, tau: float = 0.0, soft: bool = False) -> Array:
     """Follow ``x`` with |dy/dt| ≤ ``rate`` (units of x per s), through a lag ``tau`` in s."""
     return _call("focgen_rate", x, rest, h, float(rate), float(tau), int(soft), 4 if soft else 1)
+
+
+def drawn(x: Array, rest: Bytes, h: float, full: float, draw: float, refill: float) -> Array:
+    """Follow ``x`` as far as a tank allows: it holds ``full``, units of x, gives ``draw`` of every rise, and
+    is refilled by ``refill``, units of x per s."""
+    return _call("focgen_drawn", x, rest, h, float(full), float(draw), float(refill))
 
 
 def play(x: Array, rest: Bytes, width: float, start: float = 0.0) -> Array:

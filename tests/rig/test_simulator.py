@@ -253,6 +253,27 @@ def test_a_throat_empties_a_chamber_to_the_last(T):
     assert np.all(np.isfinite(y)) and np.all(np.diff(y[54:]) <= 0.0) and 0.0 <= y[-1] < 1e-9
 
 
+def test_a_tank_gives_what_it_has_and_a_pump_refills_it():
+    """As two volumes with a wide valve between them, in steps of a millisecond. The valve opens while more is
+    asked for than there is, and the tank has more; it vents to what is asked for."""
+    h, full, draw, refill, fine = 0.05, 2.0, 0.4, 0.15, 50
+    u = np.repeat([0.0, 1.5, 2.5, 0.5, 1.9, 0.0, 2.5], 80)
+    exact, p, tank = [], 0.0, full
+    for asked in u:
+        for _ in range(fine):
+            flow = max(min(400.0 * min(asked - p, tank - p), (asked - p) * fine / h), 0.0)
+            p, tank = p + flow * h / fine, min(tank + (refill - draw * flow) * h / fine, full)
+            p = min(p, asked)
+        exact.append(p)
+    placed = Placed(
+        "supply_saturation", form_of("supply_saturation", "drawn"), "regulator", (full, draw, refill)
+    )
+    rig, run = Rig("tank", h, Signals("u", "p"), None), Run.of([len(u)], [0.0], h)
+    made = Chain(rig, (placed,)).run(u, "regulator", "regulator", run, Between.HELD)
+    np.testing.assert_allclose(made, exact, atol=0.01)
+    assert made[161] < 0.97 * full < made[239] <= full  # it sags, and comes back
+
+
 def test_a_highest_rate_holds_beside_whatever_else_a_lag_has():
     """In its equation alone or at another pace; behind it, where friction is in the equation, too."""
     h, u = 0.05, np.repeat([0.0, 5.0, 2.0, 6.0], 100)

@@ -5,12 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.rig import kernels
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
 _CEILING = Parameter("ceiling", level=1, lower=0.1, upper=1.3, starts=(0.95, 0.75), zero=1.3)
 _WIDTH = Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.03, 0.05), log=True)
+
+# of a rise of the pressure: the chamber's volume over the tank's
+_DRAW = Parameter("draw", lower=0.0, upper=2.0, starts=(0.1, 0.1, 0.3, 0.3), zero=0.0)
+_REFILL = Parameter(
+    "refill", level=1, time=-1, lower=1e-4, upper=1.0, starts=(0.01, 0.05, 0.01, 0.05), log=True
+)
 
 
 def _hard(x: Array, values: Values, run: Run) -> Array:
@@ -37,6 +44,10 @@ def _fed(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, supply=min(x.supply, values[0]))
 
 
+def _drawn(x: Array, values: Values, run: Run) -> Array:
+    return kernels.drawn(x, run.rest, run.h, *values)
+
+
 EFFECT = Effect(
     name="supply_saturation",
     stage="regulator",
@@ -53,6 +64,8 @@ EFFECT = Effect(
         Form("relieved", "chamber", (_CEILING,), _stops),
         # an amplifier clips what goes either way
         Form("both_ways", "supply", (_CEILING,), _both_ways, both_ways=True),
+        # a tank gives what it has, and a pump takes its time to refill it
+        Form("drawn", "supply", (replace(_CEILING, starts=(0.95, 0.95, 1.1, 1.1)), _DRAW, _REFILL), _drawn),
         Form("soft", "supply", (_CEILING, _WIDTH), _soft),
         Form("soft_both_ways", "supply", (_CEILING, _WIDTH), _soft_both_ways, both_ways=True),
     ],
