@@ -25,12 +25,13 @@ _STEPS = 6  # iterations
 def with_steps(
     converter: Converter, best: Fit, causes: tuple[Cause, ...], beside: Beside, asked: AcceptanceCriteria
 ) -> tuple[Fit, tuple[Cause, ...]]:
-    """What was found, with what is there beside the steps of a ``converter`` that make more than noise, and
-    with the steps. ``beside``: what every effect is doubted with; ``asked``: what it has to show."""
+    """What was found, with what is there beside the steps of a ``converter``, and with the steps where they
+    make more than noise. Steps that are noise hide an effect from the search all the same. ``beside``: what
+    every effect is doubted with; ``asked``: what it has to show."""
     nominal, weighing = beside.nominal, beside.weighing
-    if asked.granted or converter.is_noise(nominal, alone=not best.problem.candidates):
-        return converter.beside(best, nominal, causes, weighing)
-    seen = _seen_through(converter, best, beside, asked)
+    noise = converter.is_noise(nominal, alone=not best.problem.candidates)
+    nothing = asked.granted or (noise and best.predictable_share < NUMBERS.left)
+    seen = None if nothing else _seen_through(converter, best, beside, asked)
     if seen is None:
         return converter.beside(best, nominal, causes, weighing)
     plain, cause = seen

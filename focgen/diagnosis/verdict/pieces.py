@@ -23,20 +23,35 @@ from focgen.diagnosis.problem.problem import Problem
 _CELLS = 200  # of a session, between which a moment may lie
 _MOST = 3  # moments
 _SHORTEST = 4  # cells between two of them
+_PARTS = (1.0, 0.5, 0.25)  # of the way that a linear equation goes
+_FACTOR = 1.0  # a gain's or a time's logarithm: as far as a piece's may be from that of the fit
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Parameters that become others at ``samples`` (m,), each time ``by`` (m, parameters) less. ``square``:
-    the sum of squares that is left; ``free``: how many numbers the changes take, the moments among them;
-    ``things``: how many happened."""
+    """Parameters that become others at ``samples`` (m,): in each piece they are ``less`` (m + 1, parameters)
+    than those of the fit. ``square``: the sum of squares that a linear equation leaves; ``free``: how many
+    numbers the changes take, the moments among them; ``things``: how many happened."""
 
     of_fit: Fit
     samples: tuple[int, ...]
-    by: np.ndarray
+    less: np.ndarray
     square: float
     free: int
     things: int
+
+    def simulated(self, weighing: Weighing) -> float:
+        """The sum of squares that is left where each piece is simulated with parameters of its own: as far on
+        the way to those of the linear equation as leaves least, for the rig need not be linear so far off."""
+        problem, vector = self.of_fit.problem, self.of_fit.vector
+        low, high = _reach(problem, vector)
+        now, left = innovations(problem, vector, weighing), 0.0
+        for less, (first, last) in zip(self.less, pairwise([0, *self.samples, len(now)])):
+            trials = (np.clip(vector - part * less, low, high) for part in _PARTS)
+            made = [now, *(innovations(problem, trial, weighing, probe=True) for trial in trials)]
+            squares = [float(m[first:last] @ m[first:last]) for m in made]
+            left += min(s for s in squares if np.isfinite(s))
+        return left
 
     def changes(self) -> Iterator[tuple[int, np.ndarray]]:
         """Each moment's sample, and by how much more leaves the segment from there on until the next (n,), of
@@ -45,8 +60,9 @@ class Pieces:
         problem, vector = self.of_fit.problem, self.of_fit.vector
         low, high = problem.bounds()
         rows = jacobian(problem, vector, innovations(problem, vector, WHITE), WHITE, low, high)
-        for by, (first, last) in zip(self.by, pairwise([*self.samples, rows.shape[1]])):
-            yield first, by @ rows[:, first:last]
+        by = np.diff(self.less, axis=0)
+        for change, (first, last) in zip(by, pairwise([*self.samples, rows.shape[1]])):
+            yield first, change @ rows[:, first:last]
 
 
 def pieces(fit: Fit, weighing: Weighing) -> Iterator[Pieces]:
@@ -114,7 +130,7 @@ class _Cells:
             if np.isfinite(least[-1]):
                 edges = np.array([0, *places[-1], count])
                 moved = self._piece(edges[:-1], edges[1:])[0]
-                yield self._made(places[-1], np.diff(moved, axis=0) @ self.ways, least[-1], len(self.ways))
+                yield self._made(places[-1], moved @ self.ways, least[-1], len(self.ways))
 
     def _piece(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of pieces from cells ``a`` to cells ``b`` (m,): what their parameters are less (m, k), and the sums
@@ -136,8 +152,10 @@ class _Cells:
                 held = tuple(c for c in cuts if c != cut)
                 cuts = (*held, self._one_more(way, held) or cut)
             cuts = tuple(sorted(cuts))
-            by, square = self._shared(way, np.array([cuts]))
-            yield self._made(cuts, by[0][:, None] * (way @ self.ways), float(square[0]), 1)
+            shared, by, square = self._shared(way, np.array([cuts]))
+            steps = np.cumsum([0.0, *by[0]])
+            less = (shared[0] + steps[:, None] * way) @ self.ways
+            yield self._made(cuts, less, float(square[0]), 1)
 
     def _one_more(self, way: np.ndarray, held: tuple[int, ...]) -> int | None:
         """The cell at whose beginning one more moment leaves least beside those ``held``; None where there is
@@ -148,7 +166,7 @@ class _Cells:
         if not len(free):
             return None
         cuts = np.column_stack([np.broadcast_to(held, (len(free), len(held))), free]).astype(int)
-        return int(free[np.argmin(self._shared(way, cuts)[1])])
+        return int(free[np.argmin(self._shared(way, cuts)[2])])
 
     def one_experiment(self, way: np.ndarray, spans: Sequence[tuple[int, int]]) -> Iterator[Pieces]:
         """Only along ``way`` (k,) another, and only within one of ``spans``, in samples."""
@@ -157,19 +175,22 @@ class _Cells:
         if not wide.any():
             return
         first, last = first[wide], last[wide]
-        moved, square = self._apart(way, first[:, None], last[:, None])
+        shared, moved, square = self._apart(way, first[:, None], last[:, None])
         k = int(np.argmin(square))
-        by = np.array([moved[k], -moved[k]]) * (way @ self.ways)
-        yield replace(self._made((first[k], last[k]), by, square[k], 1), free=2, things=1)
+        less = (shared[k] + np.array([[0.0], moved[k], [0.0]]) * way) @ self.ways
+        yield replace(self._made((first[k], last[k]), less, square[k], 1), free=2, things=1)
 
-    def _shared(self, way: np.ndarray, cuts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """For rows of ``cuts`` (r, m): by what the parameters become less along ``way`` at each (r, m), and
-        the sums of squares that are left (r,)."""
+    def _shared(self, way: np.ndarray, cuts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For rows of ``cuts`` (r, m): what all parameters are less (r, k), by what they become less along
+        ``way`` at each (r, m), and the sums of squares that are left (r,)."""
         return self._apart(way, cuts, np.full_like(cuts, len(self.ends) - 1))
 
-    def _apart(self, way: np.ndarray, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """For rows of stretches from cells ``first`` to cells ``last`` (r, m): by what the parameters are
-        less along ``way`` in each (r, m), and the sums of squares that are left (r,)."""
+    def _apart(
+        self, way: np.ndarray, first: np.ndarray, last: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For rows of stretches from cells ``first`` to cells ``last`` (r, m): what all parameters are less
+        (r, k), by what they are less along ``way`` in each (r, m), and the sums of squares that are left
+        (r,)."""
         (r, m), k = first.shape, len(self.slope[-1])
         begin = np.maximum(first[:, :, None], first[:, None, :])
         end = np.maximum(np.minimum(last[:, :, None], last[:, None, :]), begin)
@@ -184,11 +205,11 @@ class _Cells:
         any_more = np.full(m, np.inf)
         moved = _bounded(normal, slope, np.r_[self.least, -any_more], np.r_[self.most, any_more])
         left = np.einsum("ri,rij,rj->r", moved, normal, moved) - 2.0 * np.sum(moved * slope, axis=1)
-        return moved[:, k:], self.square[-1] + left
+        return moved[:, :k], moved[:, k:], self.square[-1] + left
 
-    def _made(self, cuts: tuple[int, ...], by: np.ndarray, square: float, each: int) -> Pieces:
+    def _made(self, cuts: tuple[int, ...], less: np.ndarray, square: float, each: int) -> Pieces:
         samples = tuple(int(self.ends[c]) for c in cuts)
-        return Pieces(self.of_fit, samples, by, float(square), len(cuts) * (each + 1), len(cuts))
+        return Pieces(self.of_fit, samples, less, float(square), len(cuts) * (each + 1), len(cuts))
 
 
 def _bounded(normal: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -215,6 +236,17 @@ def _ends(problem: Problem, count: int) -> np.ndarray:
     begun = [first for first, _ in problem.segment.run.spans if first < count]
     made: np.ndarray = np.union1d(even, begun) if len(begun) <= len(even) else even
     return made
+
+
+def _reach(problem: Problem, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper bounds of what a piece is simulated with: what was known of the rig's own parameters
+    holds no more behind a moment."""
+    far = replace(problem, nominals=replace(problem.nominals, far=True), memory={})
+    low, high = far.bounds()
+    own = len(problem.nominal_start)
+    factors = slice(own - len(problem.nominals.factors), own)
+    low[factors], high[factors] = vector[factors] - _FACTOR, vector[factors] + _FACTOR
+    return low, high
 
 
 def _known(problem: Problem) -> np.ndarray:

@@ -49,6 +49,10 @@ def _worn(x: Array, values: Values, run: Run) -> Array:
     return _saturating(x, values, run)
 
 
+def _returning(x: Array, values: Values, run: Run) -> Array:
+    return _reloading(x, values, run)
+
+
 def _worked(x: Array, values: Values, run: Run) -> Array:
     return _work(x, values, run)
 
@@ -81,6 +85,8 @@ EFFECT = Effect(
         Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
         # the spring itself gives way, and what it pulls back is the slower
         Form("worn", "spring", (_GROWTH, _scale(0.3, 1.0)), _worn, leaves=_leaves_peak),
+        # rubber is as stiff as new at strains that it has not seen (Ogden and Roxburgh 1999)
+        Form("pseudo_elastic", "spring", (_GROWTH, _scale(0.1, 0.5)), _returning, leaves=_leaves_peak),
         Form("worn_by_work", "spring", (_GROWTH, _scale(1.0, 5.0)), _worked, leaves=_leaves_work),
         _curves.spline("drive", _peak, _leaves_peak),
     ],
