@@ -163,3 +163,33 @@ def test_what_moves_the_times_of_the_steps_is_seen_through_them(half, dead, righ
     assert "sensor_quantization" in names and len(beside) == bool(right)
     assert not right or beside[0] in right
     assert found.shrink > 0.6
+
+
+def rubbed(force: np.ndarray, rub: float) -> np.ndarray:
+    """m y'' + c y' + k y + Coulomb's friction = force, in steps of a hundredth of a sample."""
+    y, v, found, h = 0.0, 0.0, [], H / 100.0
+    for u in force:
+        found.append(y)
+        for _ in range(100):
+            free = v + h * (u - 0.5 * v - 4.0 * y) / 0.2
+            held = h * rub / 0.2
+            v = free - float(np.clip(free, -held, held))
+            y += h * v
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_steps_that_are_noise_hide_no_friction(seed):
+    """The friction moves the reading by half a step, of twice the noise. It was seen, and was unknown."""
+    rng, step = np.random.default_rng(seed), 0.1
+    steps = np.r_[np.zeros(10), np.repeat((2.0, -2.0, 4.0, 0.0, -4.0, 1.0, -1.0, 3.0, 0.0), 60)]
+    sine = 4.0 * np.sin(0.5 * H * np.arange(900))
+    logs = []
+    for i, force in enumerate((steps, sine)):
+        y = rubbed(force, 0.2) + 0.05 * rng.normal(size=len(force))
+        roles = {"command": force, "output": step * np.round(y / step)}
+        logs.append(replace(Experiment(str(i), H, roles), start=100.0 * i))
+    given = LinearActuator(TransferFunction([(0.255, 0.0)], [(0.05, 2.0), (0.13, 1.0), (1.0, 0.0)]))
+    found = diagnose(Rig("flexure", H, Signals("t", "y", "u"), given), logs)
+    assert [c.candidates[0].effect for c in found.causes] == ["friction"]
+    assert found.shrink is not None and found.shrink > 0.8

@@ -1,7 +1,9 @@
 """A spring that yields without memory, or an outflow by the root, is a bent gain, and nothing beside it.
 
+And rubber softens in its own spring, and is stiff again beyond the strains it has seen.
+
 Red when the hysteretic spring, which may lose its loop in a fit, is named for what has none, or a seat for a
-root's steepness at 0.
+root's steepness at 0; when softened rubber keeps an eighth of the gap.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import erf
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
@@ -77,6 +80,33 @@ def test_a_tank_of_one_lag_that_drains_by_the_root_has_no_dead_zone(seed, lamina
     lag = LinearActuator(TransferFunction([(1.9, 0.0)], [(3.2, 1.0), (1.0, 0.0)]))
     found = diagnose(Rig("tank", H, TANKS.signals, lag), logs)
     assert [c.candidates[0].effect for c in found.causes] == ["gain_nonlinearity"]
+    assert found.shrink is not None and found.shrink > 0.9
+
+
+def pulled(load: np.ndarray, sample: float) -> np.ndarray:
+    """T y' + stiffness y = 2 load. The stiffness is less by the distance of the energy from the largest one
+    there was, by an error function, and whole beyond (Ogden and Roxburgh, 1999)."""
+    y, most, found = 0.0, 0.0, []
+    for u in load:
+        found.append(y)
+        for _ in range(10):
+            most = max(most, y * y)
+            y += sample / 10.0 / 0.5 * (2.0 * u - (1.0 - 0.35 * erf((most - y * y) / 9.0)) * y)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", (1, pytest.param(2, marks=pytest.mark.long)))
+def test_rubber_that_is_stiff_again_beyond_what_it_has_seen_is_softening(seed):
+    sample, rng = 0.05, np.random.default_rng(seed)
+    steps = np.r_[np.zeros(10), np.repeat((0.8, 0.0, 1.5, 0.8, 2.4, 0.8, 1.5, 0.0, 2.4, 0.4, 0.0), 60)]
+    triangle = 1.2 * (1.0 - np.cos(0.3 * sample * np.arange(900)))
+    logs, made = [], np.split(pulled(np.r_[steps, triangle], sample), [len(steps)])
+    for i, (load, y) in enumerate(zip((steps, triangle), made)):
+        roles = {"command": load, "output": y + 0.02 * rng.normal(size=len(y))}
+        logs.append(Experiment(str(i), sample, roles, start=i * len(steps) * sample))
+    lag = LinearActuator(TransferFunction([(2.08, 0.0)], [(0.53, 1.0), (1.0, 0.0)]))
+    found = diagnose(Rig("rubber", sample, TANKS.signals, lag), logs)
+    assert [c.candidates[0].effect for c in found.causes] == ["softening"]
     assert found.shrink is not None and found.shrink > 0.9
 
 
