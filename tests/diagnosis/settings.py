@@ -45,6 +45,7 @@ CONSTANTS = {
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],
+    "verdict/pieces.py": ["_PARTS"],
     "verdict/improvement.py": [
         "_AHEAD",
         "_FITTED",
