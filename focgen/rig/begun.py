@@ -19,12 +19,23 @@ from focgen.rig.effects import Run
 from focgen.rig.kernels import BALANCED
 
 _ALIKE = 2.0  # samples: a log in means of several ends and begins within one of its own
+_SLACK = 1e-6  # samples: rounding of a clock
+_WIDER = 1.1  # times as long ago as it is, the earliest window of a past may begin
 _EXTENDED: WeakKeyDictionary[Run, tuple[Run, Array]] = WeakKeyDictionary()
 
 
 def with_past(x: Array, run: Run) -> Array:
     """The input (n,) of a run with what was before each experiment ahead of it."""
-    return np.concatenate([part for a, b in zip(_pasts(run), _parts(x, run)) for part in (a, b)])
+    parts, made, before = _parts(x, run), [], 0.0
+    for begin, gap, part in zip(run.begins, _gaps(run), parts):
+        past = _past(begin, gap, run.h)
+        # the last level lasts for what a pause has less than whole samples
+        lasts = 0.0 if gap is None else len(past) + 1 - gap / run.h
+        if lasts > _SLACK and len(past):
+            past[0] += lasts * (before - past[0])
+        made += [past, part]
+        before = part[-1]
+    return np.concatenate(made)
 
 
 def past_of(run: Run) -> tuple[Run, Array]:
@@ -36,12 +47,13 @@ def past_of(run: Run) -> tuple[Run, Array]:
 
 
 def _extended(run: Run) -> tuple[Run, Array]:
-    pasts, h = _pasts(run), run.h
+    gaps, h = _gaps(run), run.h
+    pasts = [_past(begin, gap, h) for begin, gap in zip(run.begins, gaps)]
     lengths = [b - a for a, b in run.spans]
     whole = [len(past) + length for past, length in zip(pasts, lengths)]
     starts = np.cumsum([0, *whole[:-1]])
     rest = np.zeros(sum(whole), np.uint8)
-    rest[starts] = [_rests(begin, gap, h) for begin, gap in zip(run.begins, _gaps(run))]
+    rest[starts] = [_rests(begin, gap) for begin, gap in zip(run.begins, gaps)]
     clock = [
         part
         for past, t in zip(pasts, _parts(run.clock, run))
@@ -53,30 +65,30 @@ def _extended(run: Run) -> tuple[Run, Array]:
     return replace(long, duration=duration), np.concatenate(kept)
 
 
-def _gaps(run: Run) -> list[float]:
-    """By experiment: how long, s, its first sample is after the last one of that ahead of it in the run."""
-    return [np.inf, *(float(run.clock[a] - run.clock[a - 1]) for a, _ in run.spans[1:])]
+def _gaps(run: Run) -> list[float | None]:
+    """By experiment: how long, s, its first sample is after the last one of that ahead of it in the run,
+    where it goes on from there; None where it has a past of its own."""
+    spans, clock = run.spans, run.clock
+    found: list[float | None] = [None]
+    for (a, _), begin, (ahead, _), earlier in zip(spans[1:], run.begins[1:], spans, run.begins):
+        gap, since = float(clock[a] - clock[a - 1]), float(clock[a] - clock[ahead])
+        followed = begin.after is not None and abs(gap - begin.after) < _ALIKE * run.h
+        # all that was before is in the one ahead, or has been put ahead of that
+        whole = earlier.known or max(begin.ago, default=0.0) <= _WIDER * since + _ALIKE * run.h
+        found.append(gap if followed and whole else None)
+    return found
 
 
-def _goes_on(begin: Begin, gap: float, h: float) -> bool:
-    """Whether what is ahead of an experiment in the run is what came before it."""
-    return begin.after is not None and abs(gap - begin.after) < _ALIKE * h
-
-
-def _rests(begin: Begin, gap: float, h: float) -> int:
+def _rests(begin: Begin, gap: float | None) -> int:
     """How an experiment's past begins, as in :class:`Run`."""
-    if _goes_on(begin, gap, h):
+    if gap is not None:
         return 0
     return 1 if begin == REST else BALANCED
 
 
-def _pasts(run: Run) -> list[Array]:
-    return [_past(begin, gap, run.h) for begin, gap in zip(run.begins, _gaps(run))]
-
-
-def _past(begin: Begin, gap: float, h: float) -> Array:
-    if _goes_on(begin, gap, h):
-        return np.full(max(round(gap / h) - 1, 0), begin.levels[-1])
+def _past(begin: Begin, gap: float | None, h: float) -> Array:
+    if gap is not None:
+        return np.full(max(int(np.ceil(gap / h - _SLACK)) - 1, 0), begin.levels[-1])
     return np.zeros(0) if begin == REST else begin.samples(h)
 
 

@@ -178,7 +178,7 @@ void focgen_drawn(int n, const double *x, double *y, const unsigned char *rest, 
         if (rest[k]) tank = full, now = rest[k] == BALANCED ? fmin(x[k], full) : 0.0;
         double most = (tank + draw * now) / (1.0 + draw), next = fmin(x[k], fmax(most, now));
         tank = fmin(tank - draw * fmax(next - now, 0.0) + refill * h, full);
-        y[k] = now = next;
+        y[k] = now = isnan(x[k]) ? x[k] : next;
     }
 }
 

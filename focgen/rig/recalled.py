@@ -3,8 +3,9 @@
 The clock of the session says how long ago each earlier experiment was, and what the input was then is in the
 logs. Between two logs it counts as 0. Where each has a clock of its own, the pause ahead of it is the one of
 several that suits the logs best. A fractional actuator forgets by a power of time only: after a rest of
-five response times its output is still off by some per cent. The input's past is given as levels, means over
-windows that are the longer, the longer they are ago: what is left of it changes no faster.
+five response times its output is still off by some per cent. Experiments that are simulated in a row go on
+from one another. For one by itself the input's past is given as levels, means over windows that are the
+longer, the longer they are ago: what is left of it changes no faster.
 """
 
 from __future__ import annotations

@@ -1,14 +1,18 @@
 """What least squares leave where parameters become others at a moment, against every moment tried by itself.
 
-Red when a better moment is missed, when a bound is passed, or when what is shared differs between the pieces.
+Red when a better moment is missed, when a bound is passed, when what is shared differs between the pieces, or
+when a step beyond what is linear counts as kept.
 """
 
 from __future__ import annotations
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from focgen.diagnosis.verdict import pieces
 from focgen.diagnosis.verdict.pieces import _bounded, _Cells, _summed
 
 N, WIDE, K = 300, 10, 3
@@ -73,7 +77,8 @@ def test_two_moments_of_one_parameter_there_and_back(seed):
     there = cells_of(rows, now - 0.8 * rows[0] * back, made)
     two = list(there.one_other(way))[1]
     assert two.samples == (8 * WIDE, 20 * WIDE)
-    assert np.allclose(two.by[:, 0], [0.8, -0.8], atol=0.1) and np.all(two.by[:, 1:] == 0.0)
+    by = np.diff(two.less, axis=0)
+    assert np.allclose(by[:, 0], [0.8, -0.8], atol=0.1) and np.all(by[:, 1:] == 0.0)
 
 
 def cells_of(rows, now, like):
@@ -119,4 +124,60 @@ def test_the_best_experiment_of_another_parameter_is_found(seed):
     ]
     assert one.samples == spans[1] and (one.free, one.things) == (2, 1)
     assert one.square == pytest.approx(min(left), rel=1e-9)
-    assert np.allclose(one.by[:, 1], [0.5, -0.5], atol=0.1)
+    assert np.allclose(np.diff(one.less, axis=0)[:, 1], [0.5, -0.5], atol=0.1)
+
+
+class _Bent:
+    """Samples that a parameter moves by its sine, and another one by itself; and what they are fitted to."""
+
+    nominal_start = np.zeros(2)
+
+    def __init__(self, rows, y):
+        self.rows, self.y = rows, y
+
+    def made(self, vector):
+        return np.sin(vector[0]) * self.rows[0] + vector[1] * self.rows[1]
+
+
+@pytest.fixture
+def bent(monkeypatch):
+    """A fit at 0, its second parameter bounded by 0.4."""
+    rng = np.random.default_rng(2)
+    rows = rng.normal(size=(2, N))
+    problem = _Bent(rows, np.zeros(N))
+    monkeypatch.setattr(pieces, "innovations", lambda p, v, w, probe=False: p.y - p.made(v))
+    monkeypatch.setattr(pieces, "_reach", lambda p, v: (np.array([-9.0, -0.4]), np.array([9.0, 0.4])))
+    problem.simulate = lambda v, probe=False: problem.made(v)
+    return problem
+
+
+def _cut(problem, less, free):
+    of = SimpleNamespace(problem=problem, vector=np.zeros(2), innovations=problem.y)
+    return pieces.Pieces(of, (100, 200), np.array(less), 0.0, free, 2)
+
+
+def test_what_a_linear_equation_promises_is_what_a_simulation_keeps_of_it(bent):
+    """A step of 2 on a sine that is 1 at most: half of it comes closest, and none of one of 3."""
+    bent.y = np.where(np.arange(N) // 100 == 1, 0.85, 0.0) * bent.rows[0]
+    kept = _cut(bent, [[0.0, 0.0], [-2.0, 0.0], [3.0, 0.0]], free=9).simulated(None)
+    assert np.allclose(kept.less, [[0.0, 0.0], [-1.0, 0.0], [0.0, 0.0]])
+    part = bent.rows[0, 100:200]
+    assert kept.square == pytest.approx((np.sin(1.0) - 0.85) ** 2 * float(part @ part))
+    (first, there), (second, back) = kept.changes()
+    assert (first, second) == (100, 200) and np.allclose(there, np.sin(1.0) * part)
+    assert np.allclose(back, -np.sin(1.0) * bent.rows[0, 200:])
+
+
+def test_pieces_that_share_the_others_go_one_way_together(bent):
+    """Each by itself, the first and the third would be two rigs."""
+    bent.y = np.where(np.arange(N) // 100 == 1, 0.85, 0.9) * bent.rows[0]
+    less = [[-0.3, 0.0], [-2.0, 0.0], [-0.3, 0.0]]
+    kept = _cut(bent, less, free=2).simulated(None)
+    assert any(np.allclose(kept.less, part * np.array(less)) for part in (1.0, 0.5, 0.25, 0.0))
+    assert kept.square > _cut(bent, less, free=9).simulated(None).square
+
+
+def test_a_piece_is_within_reach(bent):
+    bent.y = 2.0 * bent.rows[1]
+    kept = _cut(bent, [[0.0, -2.0]] * 3, free=9).simulated(None)
+    assert np.allclose(kept.less, [[0.0, -0.4]] * 3) and kept.square > 0.0

@@ -106,6 +106,34 @@ def test_experiments_in_a_row_go_on_from_one_another(tmp_path: Path) -> None:
         assert 0.0 < off < 0.1 * NOISE
 
 
+def test_nobody_goes_on_from_a_log_whose_own_past_is_not_known(tmp_path: Path) -> None:
+    """The second log begins at a level, so that nothing says what was before it. The third one keeps both."""
+    rig, logs = _rig(tmp_path), _logs(rest=10.0)
+    late = 60  # samples of the second log are lost: it begins within its first step
+    second = replace(
+        logs[1], signals={k: v[late:] for k, v in logs[1].signals.items()}, start=logs[1].start + late * H
+    )
+    cut = [logs[0], second, logs[2]]
+    told = recalled(rig, cut)
+    assert [log.before("pressure").known for log in told] == [False, False, True]
+    row, alone = simulate_session(rig, told)[2]["output"], simulate_session(rig, told[2:])[0]["output"]
+    assert np.array_equal(row, alone)
+
+
+@pytest.mark.parametrize("samples", [0.5, 1.5, 2.3, 20.5])
+def test_a_pause_that_is_no_whole_number_of_samples(tmp_path: Path, samples: float) -> None:
+    """The exact decay of a lag, from the middle of the straight line on which the input falls."""
+    held = {"pressure": np.full(100, 2.0), "output": np.zeros(100)}
+    later = {"pressure": np.r_[0.0, np.zeros(99)], "output": np.zeros(100)}
+    start = 99 * H + samples * H + H
+    logs = [Experiment("a", H, held), Experiment("b", H, later, start=start)]
+    rig = _rig(tmp_path, TEXT.format(T=T, alpha=1.0))
+    made = simulate_session(rig, recalled(rig, logs, closer=False))[1]["output"]
+    since = (samples + 0.5 + np.arange(100)) * H
+    exact = GAIN * 2.0 * (1.0 - np.exp(-100 * H / T)) * np.exp(-since / T)
+    assert np.max(np.abs(made - exact)) < 0.002 * GAIN * 2.0
+
+
 def test_replay_does_the_same(tmp_path: Path) -> None:
     frame = {key: np.concatenate(parts) for key, parts in _columns(_logs(rest=10.0)).items()}
     found = replay(_rig(tmp_path), frame)

@@ -35,17 +35,21 @@ def with_steps(
     if seen is None:
         return converter.beside(best, nominal, causes, weighing)
     plain, cause = seen
-    best, every = converter.beside(plain, nominal, (*causes, cause), weighing)
-    first = replace(cause.rivals[0], fit=best)
-    now = replace(cause, rivals=(first, *cause.rivals[1:]))
+    first, *others = cause.rivals
+    found = fit(plain[first.effect].problem, plain[first.effect].vector, weighing, _STEPS)
+    best, every = converter.beside(found, nominal, (*causes, cause), weighing)
+    if best is found:  # experiments are chosen by what rivals would show: all with the steps, or none
+        others = [replace(r, fit=plain[r.effect]) for r in others]
+    now = replace(cause, rivals=(replace(first, fit=best), *others))
     return best, tuple(now if c is cause else c for c in every)
 
 
 def _seen_through(
     converter: Converter, best: Fit, beside: Beside, asked: AcceptanceCriteria
-) -> tuple[Fit, Cause] | None:
-    """The likeliest effect beside those of ``best`` with the steps simulated: a fit without the steps, and
-    the cause that it is. None where inputs predict little of what is left, or none is likelier than none."""
+) -> tuple[dict[str, Fit], Cause] | None:
+    """Families beside those of ``best``, each fitted without the steps, and the cause that the likeliest of
+    them is with the steps simulated. None where inputs predict little of what is left, or none is likelier
+    than none."""
     base = converter.stepped(best)
     if base.predictable_share < NUMBERS.left:
         return None
@@ -71,8 +75,7 @@ def _seen_through(
     rivals = tuple(sorted((rival(n, f) for n, f in tried.items()), key=lambda r: r.separation))
     if holds(rivals[0].off):
         return None
-    found = fit(plain[first].problem, plain[first].vector, beside.weighing, _STEPS)
-    return found, Cause(rivals, rivals[0].gain, share_of(beside.nominal, best, tried[first]))
+    return plain, Cause(rivals, rivals[0].gain, share_of(beside.nominal, best, tried[first]))
 
 
 def _every_family(ranking: Ranking) -> dict[str, Fit]:

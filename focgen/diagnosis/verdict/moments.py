@@ -21,7 +21,7 @@ from focgen.diagnosis.problem.segments import Segment
 from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
 from focgen.diagnosis.verdict.pieces import Pieces, pieces
 
-_TRIED = 12  # of what a linear equation promises most of, that are simulated at most
+_NO_MATTER = -5  # log odds: of what is promised less, nothing hangs on a simulation
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Changed(Instead):
         """What becomes another at each of the cuts."""
         segment = self.cut.of_fit.problem.segment
         changes = self.cut.changes()
-        return tuple(_moment(segment, sample, segment.level_out * by) for sample, by in changes)
+        return tuple(_moment(segment, sample, by) for sample, by in changes)
 
 
 @lru_cache(maxsize=16)
@@ -56,12 +56,12 @@ def changed_at_once(e: Explanation) -> Changed | None:
     """How likely the rig became another at up to three moments instead of what was found, or of one part of
     it. None where its session is too short for that, or where a rounding was found."""
     weighing = Weighing(e.ar)
-    promised = [_judged(e, cut, cut.square) for base in bases(e) for cut in pieces(base, weighing)]
+    promised = [_judged(e, cut) for base in bases(e) for cut in pieces(base, weighing)]
     best: Changed | None = None
-    for changed in sorted(promised, key=lambda c: -c.odds)[:_TRIED]:
-        if best is not None and changed.odds <= best.odds:
+    for changed in sorted(promised, key=lambda c: -c.odds):
+        if best is not None and changed.odds <= max(best.odds, _NO_MATTER):
             break
-        kept = _judged(e, changed.cut, max(changed.cut.square, changed.cut.simulated(weighing)))
+        kept = _judged(e, changed.cut.simulated(weighing)) if changed.odds > _NO_MATTER else changed
         best = max(kept, best or kept, key=lambda c: c.odds)
     return best
 
@@ -72,10 +72,10 @@ def another(e: Explanation) -> Changed | None:
     return changed if is_likelier(changed) else None
 
 
-def _judged(e: Explanation, cut: Pieces, left: float) -> Changed:
-    """What is cut so and leaves the sum of squares ``left``, held against what was found."""
+def _judged(e: Explanation, cut: Pieces) -> Changed:
+    """What is cut so, held against what was found."""
     base = cut.of_fit
-    return Changed(gone(e, base), odds_over(e, base, left, cut.free, cut.things), cut)
+    return Changed(gone(e, base), odds_over(e, base, cut.square, cut.free, cut.things), cut)
 
 
 def _moment(segment: Segment, sample: int, by: np.ndarray) -> Moment:

@@ -17,13 +17,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, innovations, jacobian
+from focgen.diagnosis.fitting.fit import FIXED, Fit, Weighing, innovations, jacobian
 from focgen.diagnosis.problem.problem import Problem
 
 _CELLS = 200  # of a session, between which a moment may lie
 _MOST = 3  # moments
 _SHORTEST = 4  # cells between two of them
-_PARTS = (1.0, 0.5, 0.25)  # of the way that a linear equation goes
+_PARTS = (1.0, 0.5, 0.25, 0.0)  # of the way that a linear equation goes
 _FACTOR = 1.0  # a gain's or a time's logarithm: as far as a piece's may be from that of the fit
 
 
@@ -40,29 +40,38 @@ class Pieces:
     free: int
     things: int
 
-    def simulated(self, weighing: Weighing) -> float:
-        """The sum of squares that is left where each piece is simulated with parameters of its own: as far on
-        the way to those of the linear equation as leaves least, for the rig need not be linear so far off."""
+    @property
+    def together(self) -> bool:
+        """Whether pieces share all parameters but one, or but the gain as a whole."""
+        return self.free <= 2 * len(self.samples)
+
+    def simulated(self, weighing: Weighing) -> Pieces:
+        """The same, each piece simulated with parameters of its own: as far on the way to those of the linear
+        equation as leaves least, for the rig need not be linear so far off. What pieces share, they share."""
         problem, vector = self.of_fit.problem, self.of_fit.vector
         low, high = _reach(problem, vector)
-        now, left = innovations(problem, vector, weighing), 0.0
-        for less, (first, last) in zip(self.less, pairwise([0, *self.samples, len(now)])):
-            trials = (np.clip(vector - part * less, low, high) for part in _PARTS)
-            made = [now, *(innovations(problem, trial, weighing, probe=True) for trial in trials)]
-            squares = [float(m[first:last] @ m[first:last]) for m in made]
-            left += min(s for s in squares if np.isfinite(s))
-        return left
+        ends = list(pairwise([0, *self.samples, len(self.of_fit.innovations)]))
+        ways = [vector - np.clip(vector - part * self.less, low, high) for part in _PARTS]
+
+        def left(less: np.ndarray, first: int, last: int) -> float:
+            made = innovations(problem, vector - less, weighing, probe=True)[first:last]
+            return float(made @ made) if np.all(np.isfinite(made)) else np.inf
+
+        squares = np.array([[left(less, *end) for less, end in zip(way, ends)] for way in ways])
+        best = np.argmin(squares, axis=0)
+        if self.together:
+            best = np.full(len(ends), np.argmin(np.sum(squares, axis=1)))
+        kept = np.stack([ways[k][i] for i, k in enumerate(best)])
+        square = float(np.sum(squares[best, np.arange(len(ends))]))
+        return replace(self, less=kept, square=max(self.square, square))
 
     def changes(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Each moment's sample, and by how much more leaves the segment from there on until the next (n,), of
-        its level. A residual is what was measured less what is simulated: it grows by what a parameter less
-        takes from the output."""
+        """Each moment's sample, and by how much more leaves the segment from there on until the next (n,), in
+        its unit, than would without the change."""
         problem, vector = self.of_fit.problem, self.of_fit.vector
-        low, high = problem.bounds()
-        rows = jacobian(problem, vector, innovations(problem, vector, WHITE), WHITE, low, high)
-        by = np.diff(self.less, axis=0)
-        for change, (first, last) in zip(by, pairwise([*self.samples, rows.shape[1]])):
-            yield first, change @ rows[:, first:last]
+        made = [problem.simulate(vector - less, probe=True) for less in self.less]
+        for (before, after), (first, last) in zip(pairwise(made), pairwise([*self.samples, len(made[0])])):
+            yield first, after[first:last] - before[first:last]
 
 
 def pieces(fit: Fit, weighing: Weighing) -> Iterator[Pieces]:
