@@ -201,3 +201,13 @@ def test_a_reading_relaxes_from_what_is_there_or_to_it():
         assert read[name][0] == pytest.approx(1.0, abs=0.01) and read[name][-1] == pytest.approx(
             0.7, abs=1e-3
         )
+
+
+def test_a_reading_that_is_but_flat_is_no_fold():
+    """A dead zone ahead of the dynamics makes it as flat."""
+    folded = form_of("sensor_nonlinearity", "folded")
+    flat, back = (0.5, 2.0), (0.7, 2.0)
+    x = np.linspace(0.0, 2.0, 5)
+    run = Run.of([5], [0.0], 0.1)
+    assert np.ptp(folded.act(x, flat, run)) < 1e-12 and not folded.itself(flat, ())
+    assert np.all(np.diff(folded.act(x, back, run)) < 0.0) and folded.itself(back, ())

@@ -3,6 +3,7 @@
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.fractional.transfer import Polynomial
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 
@@ -13,6 +14,12 @@ def _folded(x: Array, values: Values, run: Run) -> Array:
     share, centre = values
     made: Array = x + 2.0 * share * (np.maximum(centre - x, 0.0) - max(centre, 0.0))
     return made
+
+
+def _turns(values: Values, den: Polynomial) -> bool:
+    """Whether the reading goes back below the fold: one that is but flat there is no fold, and a dead zone
+    ahead of the dynamics makes as flat a one."""
+    return values[0] > 0.5
 
 
 EFFECT = Effect(
@@ -34,6 +41,7 @@ EFFECT = Effect(
                 Parameter("centre", level=1, lower=-0.5, upper=1.0, starts=(0.0, 0.3, 0.6)),
             ),
             _folded,
+            itself=_turns,
         ),
     ],
 )

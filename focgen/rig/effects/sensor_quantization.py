@@ -45,11 +45,14 @@ def _blurred(y: Array) -> Values | None:
     jumps = np.count_nonzero(np.diff(clump[held]))
     if len(centres) < _LEVELS or np.count_nonzero(~held) > _PASSES * jumps:
         return None
-    step = float(np.min(np.diff(centres)))
+    gaps = np.diff(centres)
     about = np.abs(y[held] - centres[clump[held]]) < _WIDE * noise
-    if step < _APART * noise or np.mean(about) < _COVERED_BY_TWO:
+    if np.min(gaps) < _APART * noise or np.mean(about) < _COVERED_BY_TWO:
         return None
-    number = np.round((centres - centres[0]) / step)
+    step = float(np.median(gaps[gaps < 1.5 * np.min(gaps)]))
+    number = np.r_[
+        0.0, np.cumsum(np.round(gaps / step))
+    ]  # one by one: of many levels a step is not known so well
     step, phase = np.polyfit(number, centres, 1)
     if np.max(np.abs(centres - step * number - phase)) > _EVEN * step:
         return None
