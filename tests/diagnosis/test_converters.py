@@ -15,6 +15,10 @@ from scipy.signal import lfilter
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.hypotheses import converter
+from focgen.diagnosis.hypotheses.converter import converter_of
+from focgen.diagnosis.hypotheses.explain import candidates_for
+from focgen.diagnosis.hypotheses.nuisances import problem_of
+from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict.instead import bases
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
@@ -98,7 +102,7 @@ def test_rests_of_a_rig_that_answers_within_a_sample_are_no_steps():
 def test_levels_of_a_finer_converter_behind_are_steps(monkeypatch):
     """Each level is read as its nearest of 4096, so that none is where even steps would have it. That they
     are steps needs no model that comes closer by them."""
-    monkeypatch.setattr(converter, "_is_closer", lambda problem, found: False)
+    monkeypatch.setattr(converter, "_is_read", lambda *given: False)
     rng, step, fine = np.random.default_rng(6), 1.0, 24.0 / 4095
     logs = []
     for log in session(step, 0.0, 4):
@@ -202,3 +206,19 @@ def test_steps_that_are_noise_hide_no_friction(seed):
     found = diagnose(Rig("flexure", H, Signals("t", "y", "u"), given), logs)
     assert [c.candidates[0].effect for c in found.causes] == ["friction"]
     assert found.shrink is not None and found.shrink > 0.8
+
+
+def test_levels_that_the_model_passes_between_are_read_though_another_effect_hides_them():
+    """A spring presses on from a place on: the steps alone bring the model hardly closer."""
+    rng, step, t = np.random.default_rng(8), 0.5, np.arange(1600) * H
+    drives = (np.repeat((2.0, -2.0, 4.0, 0.0, -4.0, 1.0, -1.0, 3.0), 200), 4.0 * np.sin(0.4 * t))
+    logs = []
+    for i, drive in enumerate(drives):
+        y = answered(drive)
+        y = y - 0.5 * np.maximum(y - 2.0, 0.0)
+        read = step * np.round(y / step) + 0.02 * rng.normal(size=1600)
+        logs.append(replace(Experiment(str(i), H, {"command": drive, "output": read}), start=100.0 * i))
+    problem = problem_of(HEATER, make(logs, "command", "output"), logs)
+    found = converter_of(problem, candidates_for(problem.segment, HEATER))
+    assert found is not None
+    assert found.step * problem.segment.level_out == pytest.approx(step, rel=0.01)

@@ -109,7 +109,8 @@ def rms(values: np.ndarray) -> float:
 
 def converter_of(problem: Problem, candidates: Sequence[CandidateEffect]) -> Converter | None:
     """The one whose levels the segment's output shows, if any. Levels that noise has widened may be rests of
-    the rig as well: then rounding has to bring its refitted model closer."""
+    the rig as well: then its refitted model has to move on while the reading stays on one, or rounding has to
+    bring it closer."""
     for candidate in candidates:
         values = candidate.form.seen(problem.segment.y) if candidate.form.seen else None
         if values is not None:
@@ -118,7 +119,9 @@ def converter_of(problem: Problem, candidates: Sequence[CandidateEffect]) -> Con
             entries = tuple(v / s for v, s in zip(values, scales))
             held = _held(candidate, entries)
             found = Converter(held, entries, values[0] / problem.segment.level_out)
-            return found if _is_sharp(problem, candidate, values) or _is_closer(problem, found) else None
+            return (
+                found if _is_sharp(problem, candidate, values) or _is_read(problem, found, values) else None
+            )
     return None
 
 
@@ -139,8 +142,20 @@ def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> b
     return few or bool(_SHARP * np.median(np.abs(y - levels)) < np.ptp(y))
 
 
-def _is_closer(problem: Problem, found: Converter) -> bool:
-    """Whether a rounding leaves less of what the rig's nominal parameters do not explain."""
+def _is_read(problem: Problem, found: Converter, values: Values) -> bool:
+    """Whether the levels are the reading's and no rests of the rig."""
     nominal = fit(problem, problem.nominal(), WHITE, _REFITTED)
     both, _ = found.beside(nominal, nominal, (), WHITE)
-    return rms(both.weighed) < NUMBERS.unlikely * rms(nominal.weighed)
+    closer = rms(both.weighed) < NUMBERS.unlikely * rms(nominal.weighed)
+    return closer or _moves_on(nominal, found.candidate, values)
+
+
+def _moves_on(nominal: Fit, candidate: CandidateEffect, values: Values) -> bool:
+    """Whether the model moves, while the reading stays on a level, by more than the reading does. A second
+    effect may hide that its steps bring the model closer."""
+    segment = nominal.problem.segment
+    levels = candidate.form.act(segment.y, values, segment.run)
+    stay = np.cumsum((np.diff(levels, prepend=levels[0]) != 0.0) | (segment.run.rest != 0)) - 1
+    made, count = nominal.problem.simulate(nominal.vector), np.bincount(stay)
+    middle = np.bincount(stay, made) / count
+    return rms(made - middle[stay]) > rms(segment.y - levels)
