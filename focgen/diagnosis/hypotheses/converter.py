@@ -119,9 +119,8 @@ def converter_of(problem: Problem, candidates: Sequence[CandidateEffect]) -> Con
             entries = tuple(v / s for v, s in zip(values, scales))
             held = _held(candidate, entries)
             found = Converter(held, entries, values[0] / problem.segment.level_out)
-            return (
-                found if _is_sharp(problem, candidate, values) or _is_read(problem, found, values) else None
-            )
+            read = _is_sharp(problem, candidate, values) or _is_read(problem, found, values)
+            return found if read else None
     return None
 
 
@@ -145,9 +144,10 @@ def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> b
 def _is_read(problem: Problem, found: Converter, values: Values) -> bool:
     """Whether the levels are the reading's and no rests of the rig."""
     nominal = fit(problem, problem.nominal(), WHITE, _REFITTED)
+    if _moves_on(nominal, found.candidate, values):
+        return True
     both, _ = found.beside(nominal, nominal, (), WHITE)
-    closer = rms(both.weighed) < NUMBERS.unlikely * rms(nominal.weighed)
-    return closer or _moves_on(nominal, found.candidate, values)
+    return rms(both.weighed) < NUMBERS.unlikely * rms(nominal.weighed)
 
 
 def _moves_on(nominal: Fit, candidate: CandidateEffect, values: Values) -> bool:

@@ -30,8 +30,9 @@ _FACTOR = 1.0  # a gain's or a time's logarithm: as far as a piece's may be from
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """Parameters that become others at ``samples`` (m,): in each piece they are ``less`` (m + 1, parameters)
-    than those of the fit. ``square``: the sum of squares that a linear equation leaves; ``free``: how many
-    numbers the changes take, the moments among them; ``things``: how many happened."""
+    than those of the fit. ``square``: the sum of squares that a linear equation leaves, or a simulation where
+    that leaves more; ``free``: how many numbers the changes take, the moments among them; ``things``: how
+    many happened."""
 
     of_fit: Fit
     samples: tuple[int, ...]
@@ -53,11 +54,15 @@ class Pieces:
         ends = list(pairwise([0, *self.samples, len(self.of_fit.innovations)]))
         ways = [vector - np.clip(vector - part * self.less, low, high) for part in _PARTS]
 
-        def left(less: np.ndarray, first: int, last: int) -> float:
-            made = innovations(problem, vector - less, weighing, probe=True)[first:last]
-            return float(made @ made) if np.all(np.isfinite(made)) else np.inf
+        rows, places = np.unique(np.concatenate(ways), axis=0, return_inverse=True)
+        made = [innovations(problem, vector - less, weighing, probe=True) for less in rows]
 
-        squares = np.array([[left(less, *end) for less, end in zip(way, ends)] for way in ways])
+        def left(row: int, first: int, last: int) -> float:
+            part = made[row][first:last]
+            return float(part @ part) if np.all(np.isfinite(part)) else np.inf
+
+        each = places.reshape(len(ways), len(ends))  # what pieces share is simulated once
+        squares = np.array([[left(row, *end) for row, end in zip(way, ends)] for way in each])
         best = np.argmin(squares, axis=0)
         if self.together:
             best = np.full(len(ends), np.argmin(np.sum(squares, axis=1)))

@@ -50,9 +50,8 @@ def _blurred(y: Array) -> Values | None:
     if np.min(gaps) < _APART * noise or np.mean(about) < _COVERED_BY_TWO:
         return None
     step = float(np.median(gaps[gaps < 1.5 * np.min(gaps)]))
-    number = np.r_[
-        0.0, np.cumsum(np.round(gaps / step))
-    ]  # one by one: of many levels a step is not known so well
+    # counted one by one: a step is not known well enough to count many levels by their distance
+    number = np.r_[0.0, np.cumsum(np.round(gaps / step))]
     step, phase = np.polyfit(number, centres, 1)
     if np.max(np.abs(centres - step * number - phase)) > _EVEN * step:
         return None

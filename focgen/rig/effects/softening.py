@@ -45,18 +45,6 @@ def _reloading(x: Array, values: Values, run: Run) -> Array:
     return made
 
 
-def _worn(x: Array, values: Values, run: Run) -> Array:
-    return _saturating(x, values, run)
-
-
-def _returning(x: Array, values: Values, run: Run) -> Array:
-    return _reloading(x, values, run)
-
-
-def _worked(x: Array, values: Values, run: Run) -> Array:
-    return _work(x, values, run)
-
-
 def _leaves_peak(x: Array, values: Values, run: Run) -> dict[str, float]:
     return {"largest": float(_peak(x, run)[-1])}
 
@@ -84,10 +72,10 @@ EFFECT = Effect(
         Form("reloading", "drive", (_GROWTH, _scale(0.1, 0.5)), _reloading, leaves=_leaves_peak),
         Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
         # the spring itself gives way, and what it pulls back is the slower
-        Form("worn", "spring", (_GROWTH, _scale(0.3, 1.0)), _worn, leaves=_leaves_peak),
+        Form("worn", "spring", (_GROWTH, _scale(0.3, 1.0)), _saturating, leaves=_leaves_peak),
         # rubber is as stiff as new at strains that it has not seen (Ogden and Roxburgh 1999)
-        Form("pseudo_elastic", "spring", (_GROWTH, _scale(0.1, 0.5)), _returning, leaves=_leaves_peak),
-        Form("worn_by_work", "spring", (_GROWTH, _scale(1.0, 5.0)), _worked, leaves=_leaves_work),
+        Form("pseudo_elastic", "spring", (_GROWTH, _scale(0.1, 0.5)), _reloading, leaves=_leaves_peak),
+        Form("worn_by_work", "spring", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
         _curves.spline("drive", _peak, _leaves_peak),
     ],
 )
