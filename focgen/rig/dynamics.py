@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 
@@ -134,7 +135,13 @@ class Dynamics:
     @property
     def changed(self) -> frozenset[str]:
         """What of it differs from the nominal equation."""
-        return frozenset(name for name, value in vars(self).items() if value != getattr(UNCHANGED, name))
+        return frozenset() if self is UNCHANGED else frozenset(self._changes())
+
+    def _changes(self) -> Iterator[str]:
+        for name, value in vars(self).items():
+            usual = getattr(UNCHANGED, name)
+            if value is not usual and value != usual:
+                yield name
 
     def bending(self, gain: float = 1.0) -> tuple[float, ...]:
         """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, of

@@ -3,9 +3,23 @@
  * or, where it is BALANCED, in equilibrium with x[k] as if that had been held for ever; a loop of friction comes to it from 0.
  */
 #include <math.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include "modes.h"
 
 enum { BALANCED = 2 };
+
+/* A session's signals are made and left again thousands of times a second. The C library gives memory of their size back to the system
+ * each time, and has it cleared page by page when it asks anew, which takes longer than most loops here: it keeps some instead. */
+void focgen_keep_memory(void)
+{
+#ifdef __GLIBC__
+    enum { SIGNAL = 8 << 20, KEPT = 64 << 20 }; /* bytes: a million samples, and eight of them */
+    mallopt(M_MMAP_THRESHOLD, SIGNAL);
+    mallopt(M_TRIM_THRESHOLD, KEPT);
+#endif
+}
 
 /* Sum of first-order modes, input linear between samples (first-order hold), and one complex mode pair.
  * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
@@ -257,34 +271,56 @@ void focgen_power_creep(int n, const double *x, double *y, const unsigned char *
     }
 }
 
-/* Rational filter of order `m` in direct form: y = sum b_i x[k-i] - sum a_i y[k-i], a_0 = 1; w holds the delays.
- * One that integrates (the sum of a is no more than rounding) is in equilibrium with 0 only. */
+/* The delays w of a rational filter where an experiment begins, at rest at 0 or in equilibrium with x. One that integrates (the sum of
+ * a is no more than rounding) is in equilibrium with 0 only. */
+static void begun(int balanced, double x, int m, const double *b, const double *a, double *w)
+{
+    double up = 0.0, down = 0.0, size = 0.0;
+    for (int i = 0; i <= m; i++) w[i] = 0.0, up += b[i], down += a[i], size += fabs(a[i]);
+    double still = balanced && fabs(down) > 1e-14 * size ? up / down * x : 0.0;
+    for (int i = m; i >= 1 && still != 0.0; i--) w[i - 1] = b[i] * x - a[i] * still + (i < m ? w[i] : 0.0);
+}
+
+/* Rational filter of order `m` in direct form: y = sum b_i x[k-i] - sum a_i y[k-i], a_0 = 1; w holds the delays. Those of order 2,
+ * which most stages are, fit in registers. */
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b, const double *a,
                    double *w)
 {
-    for (int k = 0; k < n; k++) {
-        if (rest[k]) for (int i = 0; i <= m; i++) w[i] = 0.0;
-        if (rest[k] == BALANCED) {
-            double up = 0.0, down = 0.0, size = 0.0;
-            for (int i = 0; i <= m; i++) up += b[i], down += a[i], size += fabs(a[i]);
-            double still = fabs(down) > 1e-14 * size ? up / down * x[k] : 0.0;
-            for (int i = m; i >= 1 && still != 0.0; i--) w[i - 1] = b[i] * x[k] - a[i] * still + (i < m ? w[i] : 0.0);
-        }
+    for (int k = 0; k < n && m != 2; k++) {
+        if (rest[k]) begun(rest[k] == BALANCED, x[k], m, b, a, w);
         double out = b[0] * x[k] + w[0];
         for (int i = 1; i <= m; i++) w[i - 1] = b[i] * x[k] - a[i] * out + (i < m ? w[i] : 0.0);
         y[k] = out;
     }
+    double next = 0.0, later = 0.0;
+    for (int k = 0; k < n && m == 2; k++) {
+        if (rest[k]) {
+            begun(rest[k] == BALANCED, x[k], m, b, a, w);
+            next = w[0], later = w[1];
+        }
+        double out = b[0] * x[k] + next;
+        next = b[1] * x[k] - a[1] * out + later;
+        later = b[2] * x[k] - a[2] * out;
+        y[k] = out;
+    }
 }
 
-/* m[i][j] = sum over samples of r[i] r[j], for the k rows of n samples; one thread, for the rows are few and the calls many. */
+/* m[i][j] = sum over samples of r[i] r[j], for the k rows of n samples, a few of them at a time, which stay in the processor's cache;
+ * one thread, for the rows are few and the calls many. */
 void focgen_products(int n, int k, const double *r, double *m)
 {
-    for (int i = 0; i < k; i++) for (int j = 0; j <= i; j++) {
-        const double *a = r + (long)i * n, *b = r + (long)j * n;
-        double sum = 0.0;
-        for (int t = 0; t < n; t++) sum += a[t] * b[t];
-        m[i * k + j] = m[j * k + i] = sum;
+    enum { AT_ONCE = 1024 };
+    for (int i = 0; i < k * k; i++) m[i] = 0.0;
+    for (int first = 0; first < n; first += AT_ONCE) {
+        int count = n - first < AT_ONCE ? n - first : AT_ONCE;
+        for (int i = 0; i < k; i++) for (int j = 0; j <= i; j++) {
+            const double *a = r + (long)i * n + first, *b = r + (long)j * n + first;
+            double sum = 0.0;
+            for (int t = 0; t < count; t++) sum += a[t] * b[t];
+            m[i * k + j] += sum;
+        }
     }
+    for (int i = 0; i < k; i++) for (int j = 0; j < i; j++) m[j * k + i] = m[i * k + j];
 }
 
 /* Innovations of the residual (y - made) weight, experiment by experiment: means of `coarse` neighbours (what does not fill the

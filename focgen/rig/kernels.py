@@ -1,4 +1,5 @@
-"""The compiled loops of the chain simulator (``kernels.c``, ``bending.c``, ``plant.c``) as functions.
+"""The compiled loops of the chain simulator (``kernels.c``, ``bending.c``, ``plant.c``,
+``pace.c``) as functions.
 
 The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
 behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), 1 where an experiment begins
@@ -21,8 +22,10 @@ from focgen.errors import BuildError
 from focgen.scratch import temporary_folder
 
 BALANCED = 2
-_SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c")]
+_REGISTERS = 3  # a filter of order 2 is the quickest: one of order 1 is run as such
+_SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c", "pace.c")]
 _DECLARATIONS = """
+void focgen_keep_memory(void);
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
     const double *b0, const double *b1, const double *pair, double through, int switching, double place,
     double stiffness, double slide, double stick, double *z);
@@ -58,6 +61,11 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
     *spring, double *z);
 void focgen_bent_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
     const double *c, const double *a, const double *spring, double *w);
+void focgen_paced_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
+    const double *b0, const double *b1, const double *pair, double through, int by, const double *pace, const
+    double *share, double *z);
+void focgen_paced_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
+    const double *c, const double *a, int by, const double *pace, const double *share, double *w);
 """
 _FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
 
@@ -74,7 +82,9 @@ def _library() -> tuple[Any, Any]:
             compile_shared(_SOURCES, target, [*_FLAGS, "-march=native"])
         except BuildError:
             compile_shared(_SOURCES, target, _FLAGS)
-        return ffi, ffi.dlopen(target)
+        library = ffi.dlopen(target)
+    library.focgen_keep_memory()
+    return ffi, library
 
 
 def _call(name: str, x: Array, rest: Bytes, *others: Any) -> Array:
@@ -212,7 +222,7 @@ def power_creep(x: Array, rest: Bytes, h: float, tau: float, scale: float, power
 
 def rational(x: Array, rest: Bytes, b: Array, a: Array) -> Array:
     """A discrete filter with numerator ``b`` and denominator ``a`` (a[0] = 1), of any length."""
-    order = max(len(a), len(b)) - 1
+    order = max(len(a), len(b), _REGISTERS) - 1
     scratch, *tables = np.zeros((3, order + 1))
     for table, values in zip(tables, (b, a)):
         table[: len(values)] = values
@@ -270,6 +280,31 @@ def bent_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, spring: S
         table[: len(values)] = values
     pointers = _doubles(*tables, np.array(spring, float), scratch)
     return _call("focgen_bent_filter", x, rest, order, *pointers)
+
+
+Slowness = tuple[int, Sequence[float], Array]
+"""What an uneven pace depends on, {gain, fast, rate, scale}, and the share (n,) of time: see ``pace.c``."""
+
+
+def paced_modes(
+    x: Array, rest: Bytes, a: Array, b0: Array, b1: Array, pair: Array, through: float, slowness: Slowness
+) -> Array:
+    """As :func:`modes` of a row (m,) or (6,) each, of a stage whose pace is not even."""
+    by, pace, share = slowness
+    *pointers, own, shares, room = _doubles(a, b0, b1, pair, np.array(pace, float), share, np.empty(len(a)))
+    return _call("focgen_paced_modes", x, rest, len(a), *pointers, float(through), by, own, shares, room)
+
+
+def paced_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, slowness: Slowness) -> Array:
+    """As :func:`rational`, of a stage whose pace is not even, with ``c`` the numerator for what of the
+    response enters."""
+    by, pace, share = slowness
+    order = max(len(a), len(b), len(c)) - 1
+    scratch, *tables = np.zeros((4, order + 1))
+    for table, values in zip(tables, (b, c, a)):
+        table[: len(values)] = values
+    *pointers, own, shares, room = _doubles(*tables, np.array(pace, float), share, scratch)
+    return _call("focgen_paced_filter", x, rest, order, *pointers, by, own, shares, room)
 
 
 def products(rows: Array) -> Array:

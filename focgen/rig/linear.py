@@ -16,7 +16,7 @@ from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
 from focgen.rig.dynamics import Dynamics
-from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled
+from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled, tables
 from focgen.rig.rig import UNITY
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
@@ -164,6 +164,35 @@ def run_bent(
     c, _ = _discrete(transfer, h, False)
     made = kernels.bent_rational(x, rest, b, c, a, dynamics.bending(transfer.dc_gain))
     return delayed(made, rest, h, delay) if delay else made
+
+
+def run_paced(
+    transfer: TransferFunction,
+    x: Array,
+    rest: Bytes,
+    h: float,
+    duration: float,
+    between: Between | bool,
+    slowness: kernels.Slowness,
+) -> Array:
+    """As :func:`run` of a stage that :func:`holds_level`, at its fastest, whose pace ``slowness`` tells."""
+    if between == Between.SMOOTH:
+        x = sharpened(np.ascontiguousarray(x, float), rest)
+    if transfer.is_integer:
+        b, a = _discrete(transfer, h, between == Between.HELD)
+        c, _ = _discrete(transfer, h, False)
+        return kernels.paced_rational(x, rest, b, c, a, slowness)
+    longest, lag = 2.0 ** np.ceil(np.log2(duration)), single_lag(transfer)
+    if lag:
+        gain, T, alpha = lag
+        by, (_, *pace), share = slowness
+        *rows, through = tables(T, alpha, h, longest, 1.0)
+        unit = by, (1.0, *pace), share
+        made = kernels.paced_modes(x, rest, *(row[0] for row in rows), through, unit)
+        return gain * settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
+    rows, pair, through = _tables(transfer, h, longest)
+    made = kernels.paced_modes(x, rest, *(row[0] for row in (*rows, pair)), through, slowness)
+    return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
 
 
 def oscillator(x: Array, rest: Bytes, h: float, period: float, damping: float, speed: bool = False) -> Array:

@@ -9,9 +9,10 @@ of it. One formula then holds for all α, α = 1 included, where the pole alone 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class Modes:
     residue: complex
     through: float
 
-    @property
+    @cached_property
     def gain(self) -> float:
         """Of what is held for as long as the slowest mode takes."""
         return self.through + float(np.sum(self.weights / self.rates)) - (self.residue / self.pole).real
@@ -86,12 +87,12 @@ def respond(
     if delay and dynamics == UNCHANGED:
         whole, part = split_delay(delay, h)
         if part:
-            modes = fractional_lag(T, alpha, h, 2.0 ** np.ceil(np.log2(duration)))
+            modes = fractional_lag(T, alpha, h, _longest(duration))
             made = settled(between(x, rest, h, modes, 1.0 - part), x, rest, 1.0 - modes.gain)
             return shifted(made, rest, whole)
     if delay:
         return delayed(respond(x, rest, h, T, alpha, duration, dynamics), rest, h, delay)
-    unloading, longest = dynamics.unloading, 2.0 ** np.ceil(np.log2(duration))
+    unloading, longest = dynamics.unloading, _longest(duration)
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
     if dynamics.changed & {"bend", "loss", "preload"} or dynamics.place < 0.0:
@@ -102,10 +103,15 @@ def respond(
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
 
 
+def _longest(duration: float) -> float:
+    """The next power of two, s: runs of about as long share their modes."""
+    return 2.0 ** math.ceil(math.log2(duration))
+
+
 def settled(made: Array, x: Array, rest: Bytes, missing: float) -> Array:
     """The response (n,) with what modes too slow to move, of gain ``missing``, keep of an input held for ever
     before an experiment."""
-    if not np.any(rest == kernels.BALANCED):
+    if not missing or rest.max() != kernels.BALANCED:
         return made
     firsts = np.flatnonzero(rest)
     kept = missing * x[firsts] * (rest[firsts] == kernels.BALANCED)

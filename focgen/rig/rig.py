@@ -64,7 +64,11 @@ class Actuator:
 
     def K(self, pressure: Any) -> Any:
         """The static gain K(p) at ``pressure``, any shape."""
-        return np.polynomial.polynomial.polyval(pressure, self.gain)
+        pressure = np.asarray(pressure, float)
+        made = np.full_like(pressure, self.gain[-1])
+        for coefficient in reversed(self.gain[:-1]):  # Horner's rule
+            made = made * pressure + coefficient
+        return made
 
     def drive(self, pressure: Any) -> Any:
         """K(p) p: what the dynamics settle at, any shape."""

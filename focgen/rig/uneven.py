@@ -6,8 +6,6 @@ stage gain/(1 + Q), as T s^α of a lag, Q is then multiplied by a pace that is n
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from focgen.arrays import Array
@@ -18,8 +16,7 @@ from focgen.rig.delay import delayed
 from focgen.rig.dynamics import Pace
 from focgen.rig.effects import Run
 
-_CLOSE = 1e-5  # of the largest input: two rounds that differ by less
-_ROUNDS = 40
+_BY = {"time": 0, "level": 1, "speed": 2}  # as pace.c has them
 
 
 def run(
@@ -27,44 +24,31 @@ def run(
 ) -> Array:
     """The response (n,) of a stage whose pace is not even.
 
-    With (1 + m Q) y = x and m no less than f, (1 + f Q) y = x f/m + y (1 − f/m): of that y is found anew
-    until it changes no more. The part that x has may jump between samples, that of y runs in lines.
+    With (1 + m Q) y = x and m no less than f, (1 + f Q) y = x f/m + y (1 − f/m): of that y is solved for at
+    every sample. The part that x has may jump between samples, that of y runs in lines.
     """
     fastest = float(np.exp(min(pace.rate, 0.0)))
-    fast = _at(transfer, fastest)
-
-    def passed(v: Array, way: Between | bool) -> Array:
-        return linear.run(fast, v, run.rest, run.h, run.duration, way)
-
-    gain = transfer.dc_gain
-    y = linear.run(transfer, x, run.rest, run.h, run.duration, between)
-    slowness = _slowness(pace, x, y / gain, run)
-    largest = float(np.max(np.abs(x))) or 1.0
-    for _ in range(_ROUNDS):
-        share = fastest / slowness(y / gain)
-        then = passed(x * share, between) + passed(y / gain * (1.0 - share), Between.STRAIGHT)
-        close = np.max(np.abs(then - y)) < _CLOSE * largest * abs(gain)
-        y = then
-        if close:
-            break
+    even = linear.run(transfer, x, run.rest, run.h, run.duration, between) / transfer.dc_gain
+    scale, share = 1.0, np.empty(0)
+    if pace.by == "time":
+        share = fastest / np.exp(pace.rate * _moment(run))
+    else:
+        scale = float(np.max(np.abs(even if pace.by == "level" else x - even))) or 1.0
+    slowness = _BY[pace.by], (transfer.dc_gain, fastest, pace.rate, scale), share
+    y = linear.run_paced(
+        _at(transfer, fastest), x, run.rest, run.h, run.duration, between, slowness
+    )
     return delayed(y, run.rest, run.h, delay) if delay else y
+
+
+def _moment(run: Run) -> Array:
+    """Each sample's moment (n,) as a share of the session."""
+    began = run.clock - run.clock.min()
+    made: Array = began / (float(began.max()) or 1.0)
+    return made
 
 
 def _at(transfer: TransferFunction, factor: float) -> TransferFunction:
     """The stage as many times as slow throughout."""
     slower = [(c * (factor if order else 1.0), order) for c, order in transfer.den]
     return TransferFunction(transfer.num, slower)
-
-
-def _slowness(pace: Pace, x: Array, y: Array, run: Run) -> Callable[[Array], Array]:
-    """How many times as slow a stage is, as a function of its response over its gain, (n,), whose levels and
-    speeds are about those of ``y``."""
-    if pace.by == "time":
-        began = run.clock - run.clock.min()
-        made = np.exp(pace.rate * began / (float(began.max()) or 1.0))
-        return lambda now: made
-    if pace.by == "speed":
-        fastest = float(np.max(np.abs(x - y))) or 1.0
-        return lambda now: np.exp(pace.rate * np.minimum(np.abs(x - now) / fastest, 1.0))
-    highest = float(np.max(np.abs(y))) or 1.0
-    return lambda now: np.exp(pace.rate * np.clip(now / highest, -1.0, 1.0))

@@ -116,8 +116,8 @@ def fit(
     cost, (expected, precision) = _cost(problem, vector, sse, len(now)), problem.known
     normal, kept, age = np.eye(len(vector)), known, 0
     for _ in range(iterations):
-        rows = jacobian(problem, vector, now, weighing, low, high, kept)
-        product = products(np.vstack([rows, now]))
+        rows = _rows(problem, vector, now, weighing, low, high, kept)
+        product = products(rows)
         unit = sse / max(len(now), 1)  # a nat's worth of squares, twice
         normal = product[:-1, :-1] + unit * np.diag(precision)
         slope = product[:-1, -1] + unit * precision * (vector - expected)
@@ -160,16 +160,32 @@ def jacobian(
     known: np.ndarray | None = None,
 ) -> np.ndarray:
     """Rows (k, n): the innovations' derivatives, by differences; 0 for what cannot move."""
-    rows = [] if known is None else list(known)
-    for i in range(len(rows), len(vector)):
+    return _rows(problem, vector, now, weighing, low, high, known)[:-1]
+
+
+def _rows(
+    problem: Problem,
+    vector: np.ndarray,
+    now: np.ndarray,
+    weighing: Weighing,
+    low: np.ndarray,
+    high: np.ndarray,
+    known: np.ndarray | None,
+) -> np.ndarray:
+    """Those of the :func:`jacobian`, and last the innovations themselves: (k + 1, n)."""
+    rows = np.empty((len(vector) + 1, len(now)))
+    first = 0 if known is None else len(known)
+    rows[:first], rows[-1] = known if first else 0.0, now
+    for i in range(first, len(vector)):
         if high[i] - low[i] < FIXED:
-            rows.append(np.zeros_like(now))
+            rows[i] = 0.0
             continue
         step = STEP if vector[i] + STEP <= high[i] else -STEP
         moved = vector.copy()
         moved[i] += step
-        rows.append((innovations(problem, moved, weighing, probe=True) - now) / step)
-    return np.stack(rows)
+        np.subtract(innovations(problem, moved, weighing, probe=True), now, out=rows[i])
+        rows[i] /= step
+    return rows
 
 
 def _step(

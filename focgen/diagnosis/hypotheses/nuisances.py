@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -126,9 +127,17 @@ def may_be_more(base: Problem, vector: np.ndarray) -> bool:
 
 
 def _ground(base: Problem, vector: np.ndarray) -> Fit:
-    return fit(base, vector, Weighing(np.ones(1), max(1, len(base.segment.y) // 5000)), 6)
+    return _fitted(base, vector.tobytes())
 
 
+@lru_cache(maxsize=4)
+def _fitted(base: Problem, start: bytes) -> Fit:
+    """Every nuisance asks for the same fit first."""
+    weighing = Weighing(np.ones(1), max(1, len(base.segment.y) // 5000))
+    return fit(base, np.frombuffer(start), weighing, 6)
+
+
+@lru_cache(maxsize=4)
 def _shows_more(ground: Fit) -> bool:
     base = ground.problem
     left, response = ground.residual(), base.references.clocks["response"]

@@ -70,15 +70,7 @@ def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffec
     samples, then on every sample and with the colour of the noise.
     """
     factor = coarseness(problem)
-    thin = problem.thinned(factor)
-    ground = fit(thin, problem.stretched(base, 1.0 / factor), WHITE)
-    from_ = footings(thin, ground.vector) if candidates else []
-    tried = [t for t in _started(thin, from_, candidates) if t is not None]
-    tried = without_hearsay(ground, tried)
-    errors = _errors(tried, ground)
-    tried = _promising(tried, ground)
-    rough, ground = _coloured(ground, min([ground, *tried], key=lambda t: t.sse), 6)
-    tried = sorted(raced(tried, rough, 10, 0.05), key=lambda t: -evidence(t, ground))
+    ground, tried, errors = _coarse(problem, base, candidates, factor)
     top = evidence(tried[0], ground) if tried else 0.0
     kept = (
         tried[:2]
@@ -88,6 +80,30 @@ def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffec
     full = [on_all(t, problem, factor) for t in (ground, *kept)]
     found = finish(full[0], full[1:], errors)
     return replace(found, left=(*found.left, *(t for t in tried if t not in kept)))
+
+
+def likeliest_on_all(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffect]) -> Fit | None:
+    """The candidate effect that is the likeliest on top of ``base`` on means of samples, as the start of a
+    fit to all of them; None where there is none."""
+    factor = coarseness(problem)
+    _, tried, _ = _coarse(problem, base, candidates, factor)
+    return on_all(tried[0], problem, factor) if tried else None
+
+
+def _coarse(
+    problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffect], factor: int
+) -> tuple[Fit, list[Fit], dict[str, float]]:
+    """``base`` and the candidates worth it fitted to means of ``factor`` samples, likeliest first, and each
+    family's error."""
+    thin = problem.thinned(factor)
+    ground = fit(thin, problem.stretched(base, 1.0 / factor), WHITE)
+    from_ = footings(thin, ground.vector) if candidates else []
+    tried = [t for t in _started(thin, from_, candidates) if t is not None]
+    tried = without_hearsay(ground, tried)
+    errors = _errors(tried, ground)
+    tried = _promising(tried, ground)
+    rough, ground = _coloured(ground, min([ground, *tried], key=lambda t: t.sse), 6)
+    return ground, sorted(raced(tried, rough, 10, 0.05), key=lambda t: -evidence(t, ground)), errors
 
 
 def _started(

@@ -234,13 +234,18 @@ class Problem:
         follow, which go on from another vector."""
         chain = Chain(self.rig(vector), self.placed(vector), self.memory, probe)
         own, segment = len(self.nominal_start), self.segment
-        ends = np.cumsum([len(self.gauges), segment.input_modes.shape[1], segment.loose.shape[1]])
-        gauges, off, begun, zeros = np.split(vector[own + 1 : self.head], ends)
+        gauges, off, begun, zeros = self._parted(vector[own + 1 : self.head])
         x = self._entered(float(vector[own]), off)
         made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.between)
         made = self._read(made, *gauges)
-        made = made + segment.loose @ begun if np.any(begun) else made
-        return made + self._uneven(zeros) if np.any(zeros) else made
+        made = made + segment.loose @ begun if begun.any() else made
+        return made + self._uneven(zeros) if zeros.any() else made
+
+    def _parted(self, nuisances: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The nuisances behind the alignment: of gauges, of the input's ways, of begins, and of zeros."""
+        gauges, ways = len(self.gauges), self.segment.input_modes.shape[1]
+        begun, end = gauges + ways, len(nuisances) - self.zeros
+        return nuisances[:gauges], nuisances[gauges:begun], nuisances[begun:end], nuisances[end:]
 
     def begun(self, vector: np.ndarray) -> np.ndarray:
         """How far each of the segment's ``loose`` ways (k,) is there."""
@@ -266,16 +271,15 @@ class Problem:
         """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where
         nothing changed, by which a chain remembers what it made of it."""
         x = self.segment.bent
-        if shift == 0.0 and not np.any(off):
+        if shift == 0.0 and not off.any():
             return x
         key = (shift, *off)
         kept: list[tuple[tuple[float, ...], np.ndarray]] = self.memory.setdefault("entered", [])
         for old, y in kept:
             if old == key:
                 return y
-        made: np.ndarray = (
-            x + abs(shift) * (self.segment.neighbours[shift < 0] - x) + self.segment.input_modes @ off
-        )
+        made: np.ndarray = x + abs(shift) * self.segment.moves[shift < 0] if shift else x
+        made = made + self.segment.input_modes @ off if off.any() else made
         kept.insert(0, (key, made))
         del kept[2:]
         return made

@@ -77,9 +77,10 @@ class Segment:
         return self.trust / self.level_out
 
     @cached_property
-    def neighbours(self) -> tuple[np.ndarray, np.ndarray]:
-        """The input a sample earlier and a sample later (n,)."""
-        return _neighbours(self.bent, self.run.rest)
+    def moves(self) -> tuple[np.ndarray, np.ndarray]:
+        """What the input (n,) was more a sample earlier, and is more a sample later."""
+        before, after = _neighbours(self.bent, self.run.rest)
+        return before - self.bent, after - self.bent
 
     @cached_property
     def bent(self) -> np.ndarray:

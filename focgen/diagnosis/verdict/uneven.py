@@ -14,11 +14,11 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, square_by
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.hypotheses.search import rank
+from focgen.diagnosis.hypotheses.search import likeliest_on_all
 from focgen.diagnosis.hypotheses.uneven_pace import uneven_paces
 from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
 
-_ITERATIONS = 8
+_ITERATIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +47,12 @@ def is_uneven(e: Explanation) -> bool:
 
 
 def _judged(e: Explanation, base: Fit) -> Uneven | None:
-    """The likeliest uneven pace beside what ``base`` has."""
-    ranking = rank(base.problem, base.vector, uneven_paces(base.problem))
-    if ranking.winner is None:
+    """The likeliest uneven pace beside what ``base`` has, fitted as long as it may reach what was found."""
+    first = likeliest_on_all(base.problem, base.vector, uneven_paces(base.problem))
+    if first is None:
         return None
-    first = ranking.best[ranking.winner]
     weighing = Weighing(e.ar)
-    best = fit(first.problem, first.vector, weighing, _ITERATIONS)
+    best = fit(first.problem, first.vector, weighing, _ITERATIONS, leader=e.best)
     odds = odds_over(e, base, square_by(best, weighing), best.size - base.size)
     pace, (rate,) = best.problem.candidates[-1], best.problem.values(best.vector)[-1]
     return Uneven(gone(e, base), odds, pace.stage, pace.form.name, float(np.exp(rate)))
