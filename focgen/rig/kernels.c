@@ -21,6 +21,31 @@ void focgen_keep_memory(void)
 #endif
 }
 
+/* focgen_modes where nothing but the input moves them and they are no more than SEVERAL: less b1_i x[k], what is left of a mode goes
+ * with past inputs alone, z_i <- a_i z_i + (a_i b1_i + b0_i) x[k-1], and so many numbers stay in the processor's registers. */
+enum { SEVERAL = 32 };
+static void undisturbed(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
+                        const double *b1, const double *pair, double through)
+{
+    double keeps[SEVERAL] = {0.0}, takes[SEVERAL] = {0.0}, begins[SEVERAL] = {0.0}, z[SEVERAL] = {0.0};
+    double zr = 0.0, zi = 0.0, past = 0.0, gr, gi, at_once = through;
+    gain_at_rest(m, a, b0, b1, pair, through, &gr, &gi);
+    settle(m, a, b0, b1, 1.0, begins);
+    for (int i = 0; i < m; i++) keeps[i] = a[i], takes[i] = a[i] * b1[i] + b0[i], begins[i] -= b1[i], at_once += b1[i];
+    for (int k = 0; k < n; k++) {
+        if (rest[k]) {
+            past = rest[k] == BALANCED ? x[k] : 0.0;
+            for (int i = 0; i < SEVERAL; i++) z[i] = begins[i] * past;
+            zr = gr * past, zi = gi * past;
+        }
+        double sum = 0.0;
+        for (int i = 0; i < SEVERAL; i++) z[i] = keeps[i] * z[i] + takes[i] * past, sum += z[i];
+        turn(pair, past, x[k], &zr, &zi);
+        past = x[k];
+        y[k] = at_once * past + sum + zr;
+    }
+}
+
 /* Sum of first-order modes, input linear between samples (first-order hold), and one complex mode pair.
  * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
  * Coefficients come twice, for loading (first m) and unloading (next m): unloading is x[k] < y[k-1] where x > 0.
@@ -33,6 +58,10 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
 {
     double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0;
     int moving = 0;
+    if (!switching && stiffness <= 0.0 && stick <= 0.0 && m <= SEVERAL) {
+        undisturbed(n, x, y, rest, m, a, b0, b1, pair, through);
+        return;
+    }
     for (int k = 0; k < n; k++) {
         if (rest[k]) {
             for (int i = 0; i < m; i++) z[i] = 0.0;
@@ -306,21 +335,20 @@ void focgen_filter(int n, const double *x, double *y, const unsigned char *rest,
 }
 
 /* m[i][j] = sum over samples of r[i] r[j], for the k rows of n samples, a few of them at a time, which stay in the processor's cache;
- * one thread, for the rows are few and the calls many. */
-void focgen_products(int n, int k, const double *r, double *m)
+ * one thread, for the rows are few and the calls many. `m` is 0 but for the products of the first rows, which are known. */
+void focgen_products(int n, int k, int known, const double *r, double *m)
 {
     enum { AT_ONCE = 1024 };
-    for (int i = 0; i < k * k; i++) m[i] = 0.0;
     for (int first = 0; first < n; first += AT_ONCE) {
         int count = n - first < AT_ONCE ? n - first : AT_ONCE;
-        for (int i = 0; i < k; i++) for (int j = 0; j <= i; j++) {
+        for (int i = known; i < k; i++) for (int j = 0; j <= i; j++) {
             const double *a = r + (long)i * n + first, *b = r + (long)j * n + first;
             double sum = 0.0;
             for (int t = 0; t < count; t++) sum += a[t] * b[t];
             m[i * k + j] += sum;
         }
     }
-    for (int i = 0; i < k; i++) for (int j = 0; j < i; j++) m[j * k + i] = m[i * k + j];
+    for (int i = known; i < k; i++) for (int j = 0; j < i; j++) m[j * k + i] = m[i * k + j];
 }
 
 /* Innovations of the residual (y - made) weight, experiment by experiment: means of `coarse` neighbours (what does not fill the

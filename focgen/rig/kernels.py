@@ -52,7 +52,7 @@ void focgen_filter(int n, const double *x, double *y, const unsigned char *rest,
     const double *a, double *w);
 int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double
     *made, const double *weight, int coarse, int order, const double *ar, double *mean);
-void focgen_products(int n, int k, const double *r, double *m);
+void focgen_products(int n, int k, int known, const double *r, double *m);
 void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const
     double *bend, const double *twist, int order, int base, int last, const double *numbers, const double
     *tables);
@@ -307,12 +307,15 @@ def paced_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, slowness
     return _call("focgen_paced_filter", x, rest, order, *pointers, by, own, shares, room)
 
 
-def products(rows: Array) -> Array:
-    """Every row's product with every other, (k, k), of ``rows`` (k, n); unlike ``rows @ rows.T`` in one
-    thread."""
+def products(rows: Array, known: Array | None = None) -> Array:
+    """Every row's product with every other, (k, k), of ``rows`` (k, n), the first of which are ``known``;
+    unlike ``rows @ rows.T`` in one thread."""
     _, library = _library()
-    found = np.empty((len(rows), len(rows)))
-    library.focgen_products(rows.shape[1], len(rows), *_doubles(rows, found))
+    found, first = np.zeros((len(rows), len(rows))), 0
+    if known is not None:
+        first = len(known)
+        found[:first, :first] = known
+    library.focgen_products(rows.shape[1], len(rows), first, *_doubles(rows, found))
     return found
 
 

@@ -182,16 +182,16 @@ def run_paced(
         b, a = _discrete(transfer, h, between == Between.HELD)
         c, _ = _discrete(transfer, h, False)
         return kernels.paced_rational(x, rest, b, c, a, slowness)
-    longest, lag = 2.0 ** np.ceil(np.log2(duration)), single_lag(transfer)
+    lag, longest = single_lag(transfer), 2.0 ** np.ceil(np.log2(duration))
     if lag:
         gain, T, alpha = lag
         by, (_, *pace), share = slowness
-        *rows, through = tables(T, alpha, h, longest, 1.0)
+        a, b0, b1, pair, through = tables(T, alpha, h, longest, 1.0)
         unit = by, (1.0, *pace), share
-        made = kernels.paced_modes(x, rest, *(row[0] for row in rows), through, unit)
+        made = kernels.paced_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, unit)
         return gain * settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
-    rows, pair, through = _tables(transfer, h, longest)
-    made = kernels.paced_modes(x, rest, *(row[0] for row in (*rows, pair)), through, slowness)
+    (a, b0, b1), pair, through = _tables(transfer, h, longest)
+    made = kernels.paced_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, slowness)
     return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,7 @@ class Actuator:
         """K(p) p: what the dynamics settle at, any shape."""
         return self.K(pressure) * pressure
 
-    @property
+    @cached_property
     def dynamics(self) -> TransferFunction:
         """1/(T s^alpha + 1)."""
         return TransferFunction([(1.0, 0.0)], [(self.T, self.alpha), (1.0, 0.0)])

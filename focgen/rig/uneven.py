@@ -35,9 +35,7 @@ def run(
     else:
         scale = float(np.max(np.abs(even if pace.by == "level" else x - even))) or 1.0
     slowness = _BY[pace.by], (transfer.dc_gain, fastest, pace.rate, scale), share
-    y = linear.run_paced(
-        _at(transfer, fastest), x, run.rest, run.h, run.duration, between, slowness
-    )
+    y = linear.run_paced(_at(transfer, fastest), x, run.rest, run.h, run.duration, between, slowness)
     return delayed(y, run.rest, run.h, delay) if delay else y
 
 

@@ -71,6 +71,19 @@ class Weighing:
     coarse: int = 1
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The first ``rows`` (k, n) of a Jacobian, as they are taken, and their ``products`` (k, k) with one
+    another."""
+
+    rows: np.ndarray
+
+    @cached_property
+    def products(self) -> np.ndarray:
+        """Sums over the samples."""
+        return products(self.rows)
+
+
 WHITE = Weighing(np.ones(1))
 """Every sample by itself: noise without colour."""
 
@@ -98,14 +111,14 @@ def fit(
     weighing: Weighing,
     iterations: int = 12,
     tolerance: float = 1e-3,
-    known: np.ndarray | None = None,
+    known: Known | None = None,
     leader: Fit | None = None,
 ) -> Fit:
     """The likeliest vector within the problem's bounds, from ``start``: least squares, weighed against what
     is known beforehand; stops when the gain is below ``tolerance`` nats, or below a hundredth of those that
     it is behind ``leader``, a fit of the same innovations.
 
-    ``known``: rows (k, n) of the Jacobian's first k parameters, taken as they are: a quick fit that is a
+    ``known``: of the first parameters, taken as it is: a quick fit that is a
     little off. Otherwise the rows ahead of the candidates' own are made anew only every third time, for they
     change little, and the fit does not end on old ones.
     """
@@ -117,7 +130,7 @@ def fit(
     normal, kept, age = np.eye(len(vector)), known, 0
     for _ in range(iterations):
         rows = _rows(problem, vector, now, weighing, low, high, kept)
-        product = products(rows)
+        product = products(rows, None if kept is None else kept.products)
         unit = sse / max(len(now), 1)  # a nat's worth of squares, twice
         normal = product[:-1, :-1] + unit * np.diag(precision)
         slope = product[:-1, -1] + unit * precision * (vector - expected)
@@ -136,8 +149,16 @@ def fit(
         if ended and (kept is None or known is not None):
             break
         age = 0 if ended or age >= _STALE else age + 1
-        kept = known if known is not None else rows[: problem.head] if age else None
+        if known is None:
+            kept = _of(rows[: problem.head], product) if age else None
     return Fit(problem, vector, now, sse, normal)
+
+
+def _of(rows: np.ndarray, product: np.ndarray) -> Known:
+    """What is known of the first rows, whose products are the first of ``product``."""
+    found = Known(rows)
+    vars(found)["products"] = product[: len(rows), : len(rows)]
+    return found
 
 
 def _nats(count: int, cost: float, better: float) -> float:
@@ -157,7 +178,7 @@ def jacobian(
     weighing: Weighing,
     low: np.ndarray,
     high: np.ndarray,
-    known: np.ndarray | None = None,
+    known: Known | None = None,
 ) -> np.ndarray:
     """Rows (k, n): the innovations' derivatives, by differences; 0 for what cannot move."""
     return _rows(problem, vector, now, weighing, low, high, known)[:-1]
@@ -170,12 +191,14 @@ def _rows(
     weighing: Weighing,
     low: np.ndarray,
     high: np.ndarray,
-    known: np.ndarray | None,
+    known: Known | None,
 ) -> np.ndarray:
     """Those of the :func:`jacobian`, and last the innovations themselves: (k + 1, n)."""
     rows = np.empty((len(vector) + 1, len(now)))
-    first = 0 if known is None else len(known)
-    rows[:first], rows[-1] = known if first else 0.0, now
+    first = 0 if known is None else len(known.rows)
+    rows[-1] = now
+    if known is not None:
+        rows[:first] = known.rows
     for i in range(first, len(vector)):
         if high[i] - low[i] < FIXED:
             rows[i] = 0.0
@@ -202,9 +225,8 @@ def _step(
     step = np.zeros_like(vector)
     if free.any():
         scale = np.diag(normal)[free]
-        matrix = normal[np.ix_(free, free)] + damping * np.diag(
-            scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12
-        )
+        matrix = normal[np.ix_(free, free)]
+        matrix.flat[:: len(scale) + 1] += damping * (scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12)
         step[free] = np.linalg.lstsq(matrix, slope[free], rcond=1e-12)[0]
     made: np.ndarray = np.clip(step, -1.0, 1.0)
     return made

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit, innovations, jacobian
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Known, Weighing, fit, innovations, jacobian
 from focgen.diagnosis.fitting.jumps import by_trying
 from focgen.diagnosis.fitting.noise import fit_ar
 from focgen.diagnosis.fitting.repeats import without_hearsay
@@ -24,9 +24,10 @@ _QUICKEST = 4.0  # of them at least in a response
 _DEEP = 5  # how many forms are fitted to the end beside the families' best
 _QUICK = 0.3  # of the best quick fit's fall in the sum of squares: forms below are left at that
 _ADRIFT = 1.15  # of a fit's mean square without a colour
-_NOTHING = 2.0  # nats: when the coarse pass finds no more, nothing is there
+_NOTHING = 6.0  # nats, half of what is asked: when the coarse pass finds no more, nothing is there
 _FAR, _NEAR = 0.25, 10.0  # a form with less than this part of the best evidence, less these nats, is dropped
 _TRIED = 3  # start values of a form that are fitted, where it has more
+_FOREMOST = 2  # of those that a first iteration has brought furthest
 # iterations from each start value, beside nominal parameters as given, and from the best
 _FIRST, _FROM_GIVEN, _THEN = 2, 3, 3
 _BENT = 4.0  # nats against nominal parameters that make up for what is missing: then started as given, too
@@ -213,12 +214,12 @@ def is_itself(of: Fit) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """Where quick fits set out from: a ``vector``, its innovations ``now`` (n,), and the Jacobian's ``rows``
-    (k, n) there, which a quick fit takes as they are; ``first`` iterations from there."""
+    """Where quick fits set out from: a ``vector``, its innovations ``now`` (n,), and the Jacobian ``known``
+    there, which a quick fit takes as it is; ``first`` iterations from there."""
 
     vector: np.ndarray
     now: np.ndarray
-    rows: np.ndarray
+    known: Known
     first: int
 
 
@@ -233,22 +234,25 @@ def footings(problem: Problem, base: np.ndarray) -> list[Footing]:
 
 def _footing(problem: Problem, vector: np.ndarray, first: int) -> Footing:
     now = innovations(problem, vector, WHITE)
-    return Footing(vector, now, jacobian(problem, vector, now, WHITE, *problem.bounds()), first)
+    known = Known(jacobian(problem, vector, now, WHITE, *problem.bounds()))
+    return Footing(vector, now, known, first)
 
 
 def best_start(problem: Problem, from_: Sequence[Footing], candidate: CandidateEffect) -> Fit | None:
-    """The best of the fits from the candidate effect's start values beside each of the footings ``from_``, a
-    few iterations each, and a few more for the best of them.
+    """The best of the fits from the candidate effect's start values beside each of the footings ``from_``:
+    one iteration each, a few for the foremost, and a few more for the best of these.
     """
     extended = problem.with_candidates([*problem.candidates, candidate])
     starts, fits = extended.starts(candidate), []
     if candidate.form.jumps:
-        return by_trying(extended, from_[0].vector, starts, from_[0].rows)
+        return by_trying(extended, from_[0].vector, starts, from_[0].known.rows)
     if len(starts) > _TRIED:
         starts = _likeliest(extended, from_[0], starts)
     for start in starts:
         for at in from_:
-            fits.append((_quick(extended, np.r_[at.vector, start], at, at.first), at))
+            fits.append((_quick(extended, np.r_[at.vector, start], at, 1), at))
+    foremost = sorted(fits, key=lambda pair: pair[0].sse)[:_FOREMOST]
+    fits = [(_quick(extended, of.vector, at, at.first - 1), at) for of, at in foremost]
     best, at = min(fits, key=lambda pair: pair[0].sse)
     if not np.isfinite(best.sse):
         return None
@@ -256,7 +260,7 @@ def best_start(problem: Problem, from_: Sequence[Footing], candidate: CandidateE
 
 
 def _quick(problem: Problem, start: np.ndarray, at: Footing, iterations: int) -> Fit:
-    return fit(problem, start, WHITE, iterations, tolerance=0.1, known=at.rows)
+    return fit(problem, start, WHITE, iterations, tolerance=0.1, known=at.known)
 
 
 def raced(tried: Sequence[Fit], weighing: Weighing, iterations: int, tolerance: float) -> list[Fit]:
@@ -271,7 +275,8 @@ def raced(tried: Sequence[Fit], weighing: Weighing, iterations: int, tolerance: 
 def _likeliest(problem: Problem, at: Footing, starts: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Of many start values those whose direction, the parameters of the footing free to give way, goes
     furthest towards the data."""
-    own, _ = np.linalg.qr(at.rows[np.any(at.rows, axis=1)].T)
+    rows = at.known.rows
+    own, _ = np.linalg.qr(rows[np.any(rows, axis=1)].T)
     tried = np.stack([innovations(problem, np.r_[at.vector, start], WHITE) for start in starts]) - at.now
     tried -= (tried @ own) @ own.T
     reach = (tried @ at.now) ** 2 / np.maximum(np.sum(tried**2, axis=1), 1e-300)
