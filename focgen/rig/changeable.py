@@ -78,12 +78,14 @@ def _has_spring(actuator: Actuator | LinearActuator) -> bool:
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
     """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
     spring that bends where there is one; dry friction on what moves; of a mass on a spring also a hysteretic
-    one, an obstacle, a preload, its damper and its mass."""
+    one, an obstacle, a preload, its damper and its mass; of what else is a sum of lags, the pace each way."""
     lag = None if isinstance(actuator, Actuator) else linear.single_lag(actuator.dynamics)
     if isinstance(actuator, Actuator) or lag:
         return _OF_LAGS | ({"flow"} if lag and lag[2] == 1.0 else set())
     plant = plants.plant_of(actuator.dynamics)
     found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
+    if plant is None and linear.is_sum_of_lags(actuator.dynamics):
+        found |= {"loading", "unloading"}
     if plant is not None:
         found |= {"drag"} | ({"rise"} if plant.order == 2 else set())
         found |= IN_STEPS if plant.order == 2 and not plant.integrates else set()

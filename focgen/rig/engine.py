@@ -282,6 +282,8 @@ def _linear(
     if plant is not None and (changed == {"drag"} or (plant.order == 2 and changed & IN_STEPS)):
         return [_plant(plant, dynamics, between, delay)]
     lag = linear.single_lag(actuator.dynamics)
+    if not lag and changed <= {"loading", "unloading"}:
+        return [_two_paced(actuator.dynamics, (dynamics.loading, dynamics.unloading), delay)]
     if not lag:
         return [_bent(actuator.dynamics, dynamics, between, delay)]
     gain, T, alpha = lag
@@ -346,6 +348,14 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
     return (
         (transfer, dynamics, between, delay),
         lambda x, run: linear.run_bent(transfer, x, run.rest, run.h, between, dynamics, delay),
+        None,
+    )
+
+
+def _two_paced(transfer: TransferFunction, paces: tuple[float, float], delay: float) -> Step:
+    return (
+        (transfer, paces, delay),
+        lambda x, run: linear.run_paces(transfer, x, run.rest, run.h, paces, delay),
         None,
     )
 

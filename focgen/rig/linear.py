@@ -16,7 +16,7 @@ from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
 from focgen.rig.dynamics import Dynamics
-from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled, tables
+from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled, speeded, tables
 from focgen.rig.rig import UNITY
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
@@ -193,6 +193,46 @@ def run_paced(
     (a, b0, b1), pair, through = _tables(transfer, h, longest)
     made = kernels.paced_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, slowness)
     return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
+
+
+def is_sum_of_lags(transfer: TransferFunction) -> bool:
+    """Whether it is a stable sum of first-order lags and one complex pair at most, of whole orders, that
+    holds a level."""
+    if not (transfer.is_integer and transfer.is_proper) or transfer.den[0].order == 0.0:
+        return False
+    poles = np.roots(_coefficients(transfer.den)).astype(complex)
+    stable, pairs = bool(np.all(poles.real < 0.0)), int(np.sum(poles.imag > 0.0))
+    return stable and pairs <= 1 and not _coincide(poles) and bool(transfer.dc_gain)
+
+
+def run_paces(
+    transfer: TransferFunction,
+    x: Array,
+    rest: Bytes,
+    h: float,
+    paces: tuple[float, float],
+    delay: float = 0.0,
+) -> Array:
+    """As :func:`run` of a stage that :func:`is_sum_of_lags`, each of which runs so many times as fast while
+    the load exceeds the response, and while it falls short of it; the input counts as linear between samples,
+    and the delay is exact in whole samples only."""
+    modes, gain = _lags(transfer), transfer.dc_gain
+    rows = [speeded(modes, h, speed) for speed in paces]
+    a, b0, b1, pair = (np.stack(part) for part in zip(*rows))
+    made = gain * kernels.modes(x, rest, a, b0, b1, pair, modes.through, switching=True)
+    return delayed(made, rest, h, delay) if delay else made
+
+
+@lru_cache(maxsize=64)
+def _lags(transfer: TransferFunction) -> Modes:
+    """Its partial fractions, over its gain."""
+    num, den = _coefficients(transfer.num) / transfer.dc_gain, _coefficients(transfer.den)
+    poles = np.roots(den).astype(complex)
+    residues = _residues(num, den, poles)
+    real, pair = poles.imag == 0.0, np.flatnonzero(poles.imag > 0.0)
+    swings = (complex(poles[pair[0]]), complex(2.0 * residues[pair[0]])) if len(pair) else (-1.0 + 0j, 0j)
+    through = float(num[0] / den[0]) if len(num) == len(den) else 0.0
+    return Modes(-poles[real].real, residues[real].real, *swings, through)
 
 
 def oscillator(x: Array, rest: Bytes, h: float, period: float, damping: float, speed: bool = False) -> Array:

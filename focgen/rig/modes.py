@@ -146,13 +146,15 @@ def tables(
 ) -> tuple[Array, Array, Array, Array, float]:
     """What the compiled loop needs, rows loading and unloading."""
     modes = fractional_lag(T, alpha, h, duration)
-    loading = _tables(modes, h, 1.0)
-    rows = [loading, loading if unloading == 1.0 else _tables(modes, h, unloading)]
+    loading = speeded(modes, h, 1.0)
+    rows = [loading, loading if unloading == 1.0 else speeded(modes, h, unloading)]
     a, past, now, pair = (np.stack(part) for part in zip(*rows))
     return a, past, now, pair, modes.through
 
 
-def _tables(modes: Modes, h: float, speed: float) -> tuple[Array, Array, Array, Array]:
+def speeded(modes: Modes, h: float, speed: float) -> tuple[Array, Array, Array, Array]:
+    """What the compiled loop needs of ``modes`` that run ``speed`` times as fast: a, b0, b1 (m,), pair
+    (6,)."""
     a, b0, b1 = hold(-modes.rates * speed * h)
     gain = modes.weights / modes.rates
     pa, p0, p1 = hold(np.array([modes.pole * speed * h]))

@@ -4,6 +4,7 @@ Red when the compiled chain departs from the exact response.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import mpmath
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.signal import lsim
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.rig import kernels, linear
+from focgen.rig.changeable import fits_in
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects import Run, form_of
 from focgen.rig.engine import Chain, Placed
@@ -201,6 +203,42 @@ def test_unloading_speed_acts_only_when_unloading():
     plain = respond(x, rest(401), 0.05, 1.0, 0.8, 20.0)
     np.testing.assert_allclose(slow[:200], plain[:200], atol=1e-12)
     assert np.all(slow[205:300] > plain[205:300] + 0.01)
+
+
+PARALLEL = TransferFunction([(0.5 * 0.9 + 1.5 * 0.2, 1.0), (2.0, 0.0)], [(0.18, 2.0), (1.1, 1.0), (1.0, 0.0)])
+
+
+def test_chambers_side_by_side_run_at_another_pace_each_way():
+    """0.5/(0.2 s + 1) + 1.5/(0.9 s + 1), all of it slower while the load falls short of the response, against
+    Euler steps of a hundredth of a sample."""
+    t, fine = np.arange(800) * 0.02, 100
+    load = 1.0 - np.cos(2.0 * np.pi * t / 4.0) + 0.5 * (t > 8.0)
+    parts, exact = [0.0, 0.0], [0.0]
+    for before, after in pairwise(load):
+        for i in range(fine):
+            x = before + (after - before) * (i + 0.5) / fine
+            speed = 0.6 if abs(x) < abs(sum(parts)) / 2.0 else 1.0
+            parts = [
+                y + 0.02 / fine * speed * (gain * x - y) / T
+                for y, gain, T in zip(parts, (0.5, 1.5), (0.2, 0.9))
+            ]
+        exact.append(sum(parts))
+    made = linear.run_paces(PARALLEL, load, rest(800), 0.02, (1.0, 0.6))
+    even = linear.run(PARALLEL, load, rest(800), 0.02, 16.0)
+    change = np.max(np.abs(even - exact))
+    assert change > 0.1
+    assert np.max(np.abs(made - exact)) < 0.05 * change
+
+
+def test_which_plants_have_a_pace_each_way():
+    speed = form_of("unloading_asymmetry", "speed")
+    lead, unstable = ([(0.3, 1.0), (2.0, 0.0)], [(0.18, 2.0), (-1.1, 1.0), (1.0, 0.0)])
+    swings = [(0.01, 4.0), (0.05, 3.0), (1.0, 2.0), (0.3, 1.0), (1.0, 0.0)]
+    fits = lambda tf: fits_in(speed, "actuator", Rig("r", 0.02, Signals("t", "y", "u"), LinearActuator(tf)))
+    assert fits(PARALLEL)
+    assert not fits(TransferFunction(lead, unstable))
+    assert not fits(TransferFunction(lead, swings))  # two pairs
+    assert not fits(TransferFunction(lead, [(1.0, 2.0), (2.0, 1.0), (1.0, 0.0)]))  # two of one time
 
 
 def throttled(rate):
