@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, fit
+from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, fit, problem_residual
 from focgen.diagnosis.hypotheses.rivals import Cause, Rival, share_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
@@ -63,13 +63,13 @@ class Converter:
         self, best: Fit, nominal: Fit, causes: tuple[Cause, ...], weighing: Weighing
     ) -> tuple[Fit, tuple[Cause, ...]]:
         """With the rounding put to what was found without it: a cause, and where it brings the model closer
-        a part of it. Where it is next to nothing of the gap beside what was found, or less than the noise by
+        a part of it, by the samples' trust and by what users see. Where it is next to nothing of the gap beside what was found, or less than the noise by
         itself, it is noise."""
         if self.is_noise(nominal, alone=not causes):
             return best, causes
         both = self.stepped(best, weighing)
         rival = Rival(self.candidate.effect, self.candidate.stage, 0.0, 0.0, both)
-        closer = rms(both.weighed) < rms(best.weighed)
+        closer = rms(both.weighed) < rms(best.weighed) and _misses(both) < _misses(best)
         return both if closer else best, (*causes, Cause((rival,), 0.0, share_of(nominal, best, both)))
 
     def stepped(self, of: Fit, weighing: Weighing = WHITE) -> Fit:
@@ -85,6 +85,12 @@ class Converter:
             start = fit(soft, start, WHITE, _REFITTED).vector
             found.append(fit(problem, np.r_[start[: len(vector)], self.entries], weighing, 0))
         return min(found, key=lambda f: rms(f.weighed))
+
+
+def _misses(of: Fit) -> float:
+    """The root mean square of what a fit leaves, every sample alike: steps at a wrong time miss most where
+    the output moves, and there samples are trusted least."""
+    return rms(problem_residual(of))
 
 
 def is_rounded(causes: Sequence[Cause]) -> bool:
