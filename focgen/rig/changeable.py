@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig import linear
+from focgen.rig import lags, linear
 from focgen.rig import plant as plants
 from focgen.rig.dynamics import UNCHANGED
 from focgen.rig.effects import EQUATIONS, Form
@@ -84,7 +84,7 @@ def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
         return _OF_LAGS | ({"flow"} if lag and lag[2] == 1.0 else set())
     plant = plants.plant_of(actuator.dynamics)
     found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
-    if plant is None and linear.is_sum_of_lags(actuator.dynamics):
+    if plant is None and lags.is_sum_of_lags(actuator.dynamics):
         found |= {"loading", "unloading"}
     if plant is not None:
         found |= {"drag"} | ({"rise"} if plant.order == 2 else set())

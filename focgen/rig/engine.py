@@ -11,7 +11,7 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.present import present
-from focgen.rig import chamber, linear, uneven
+from focgen.rig import chamber, lags, linear, uneven
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.changeable import IN_STEPS
@@ -355,7 +355,7 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
 def _two_paced(transfer: TransferFunction, paces: tuple[float, float], delay: float) -> Step:
     return (
         (transfer, paces, delay),
-        lambda x, run: linear.run_paces(transfer, x, run.rest, run.h, paces, delay),
+        lambda x, run: lags.run_paces(transfer, x, run.rest, run.h, paces, delay),
         None,
     )
 

@@ -16,7 +16,7 @@ from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
 from focgen.rig.dynamics import Dynamics
-from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled, speeded, tables
+from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled, tables
 from focgen.rig.rig import UNITY
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
@@ -89,7 +89,7 @@ def _powers(transfer: TransferFunction, h: float, k: int, count: int) -> Array:
     from scipy.linalg import expm
     from scipy.signal import tf2ss
 
-    A, B, C, _ = tf2ss(_coefficients(transfer.num), _coefficients(transfer.den))
+    A, B, C, _ = tf2ss(coefficients(transfer.num), coefficients(transfer.den))
     n = len(A)
     whole = np.zeros((n + k + 1, n + k + 1))
     whole[:n, :n], whole[:n, n : n + 1] = A * h, B * h
@@ -195,46 +195,6 @@ def run_paced(
     return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
 
 
-def is_sum_of_lags(transfer: TransferFunction) -> bool:
-    """Whether it is a stable sum of first-order lags and one complex pair at most, of whole orders, that
-    holds a level."""
-    if not (transfer.is_integer and transfer.is_proper) or transfer.den[0].order == 0.0:
-        return False
-    poles = np.roots(_coefficients(transfer.den)).astype(complex)
-    stable, pairs = bool(np.all(poles.real < 0.0)), int(np.sum(poles.imag > 0.0))
-    return stable and pairs <= 1 and not _coincide(poles) and bool(transfer.dc_gain)
-
-
-def run_paces(
-    transfer: TransferFunction,
-    x: Array,
-    rest: Bytes,
-    h: float,
-    paces: tuple[float, float],
-    delay: float = 0.0,
-) -> Array:
-    """As :func:`run` of a stage that :func:`is_sum_of_lags`, each of which runs so many times as fast while
-    the load exceeds the response, and while it falls short of it; the input counts as linear between samples,
-    and the delay is exact in whole samples only."""
-    modes, gain = _lags(transfer), transfer.dc_gain
-    rows = [speeded(modes, h, speed) for speed in paces]
-    a, b0, b1, pair = (np.stack(part) for part in zip(*rows))
-    made = gain * kernels.modes(x, rest, a, b0, b1, pair, modes.through, switching=True)
-    return delayed(made, rest, h, delay) if delay else made
-
-
-@lru_cache(maxsize=64)
-def _lags(transfer: TransferFunction) -> Modes:
-    """Its partial fractions, over its gain."""
-    num, den = _coefficients(transfer.num) / transfer.dc_gain, _coefficients(transfer.den)
-    poles = np.roots(den).astype(complex)
-    residues = _residues(num, den, poles)
-    real, pair = poles.imag == 0.0, np.flatnonzero(poles.imag > 0.0)
-    swings = (complex(poles[pair[0]]), complex(2.0 * residues[pair[0]])) if len(pair) else (-1.0 + 0j, 0j)
-    through = float(num[0] / den[0]) if len(num) == len(den) else 0.0
-    return Modes(-poles[real].real, residues[real].real, *swings, through)
-
-
 def oscillator(x: Array, rest: Bytes, h: float, period: float, damping: float, speed: bool = False) -> Array:
     """The response of w²/(s² + 2 d w s + w²), w = 2π/``period`` (s), ``damping`` d < 1, input linear between
     samples; ``speed``: its rate of change over w instead."""
@@ -262,14 +222,14 @@ def single_lag(transfer: TransferFunction) -> tuple[float, float, float] | None:
 def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, Array]:
     """Numerator and denominator in powers of z^-1, exact at the samples: the modes one by one, put together
     again."""
-    num, den = _coefficients(transfer.num), _coefficients(transfer.den)
+    num, den = coefficients(transfer.num), coefficients(transfer.den)
     if len(den) == 1:
         return num / den[0], np.ones(1)
     through = num[0] / den[0] if len(num) == len(den) else 0.0
     poles = np.roots(den).astype(complex)
-    if _coincide(poles):
+    if coincide(poles):
         return _by_exponential(num, den, h, held)
-    a, past, now = _held(poles, _residues(num, den, poles), h, held)
+    a, past, now = _held(poles, residues(num, den, poles), h, held)
     whole = np.poly(a)
     b = through * whole.astype(complex)
     for i in range(len(poles)):
@@ -279,7 +239,8 @@ def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, 
     return b.real, whole.real
 
 
-def _residues(num: Array, den: Array, poles: Array) -> Array:
+def residues(num: Array, den: Array, poles: Array) -> Array:
+    """What each of the ``poles`` (k,), all different, counts in num/den, highest power first: (k,)."""
     made: Array = np.polyval(num, poles) / (
         den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)])
     )
@@ -297,14 +258,14 @@ def _held(poles: Array, residues: Array, h: float, held: bool) -> tuple[Array, A
 @lru_cache(maxsize=512)
 def _discrete_between(transfer: TransferFunction, h: float, held: bool, share: float) -> tuple[Array, Array]:
     """As :func:`_discrete`, but the response at the ``share`` of the way from the sample before to each."""
-    num, den = _coefficients(transfer.num), _coefficients(transfer.den)
+    num, den = coefficients(transfer.num), coefficients(transfer.den)
     through = num[0] / den[0] if len(num) == len(den) else 0.0
     poles = np.roots(den).astype(complex)
-    if _coincide(poles):
+    if coincide(poles):
         return _by_pulse(transfer, _by_exponential(num, den, h, held)[1], h, held, share)
-    residues = _residues(num, den, poles) if len(poles) else np.zeros(0)
-    a, past, now = _held(poles, residues, h, held)
-    decay, before, after = _held(poles, residues, share * h, held)
+    weights = residues(num, den, poles) if len(poles) else np.zeros(0)
+    a, past, now = _held(poles, weights, h, held)
+    decay, before, after = _held(poles, weights, share * h, held)
     whole, line = np.atleast_1d(np.poly(a)), after.sum() + through
     # the input on the way from the last sample: what it was there, or a share of the line to this one
     recent = [0.0, before.sum() + through] if held else [share * line, before.sum() + (1.0 - share) * line]
@@ -332,7 +293,7 @@ def _ramp(q: Array, a: Array) -> Array:
     return np.where(small, 0.5 + q / 3 + q * q / 8, (a * (safe - 1) + 1) / safe**2)
 
 
-def _coincide(poles: Array) -> bool:
+def coincide(poles: Array) -> bool:
     """Whether two poles are so close that their residues would cancel."""
     distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(len(poles), np.inf))
     return bool(np.any(distance < 1e-3 * np.maximum(np.abs(poles)[:, None], 1e-12)))
@@ -349,7 +310,8 @@ def _by_exponential(num: Array, den: Array, h: float, held: bool) -> tuple[Array
     return np.atleast_2d(b)[0], a
 
 
-def _coefficients(terms: Polynomial) -> Array:
+def coefficients(terms: Polynomial) -> Array:
+    """One for each power, the highest first."""
     return dense(terms) if terms else np.zeros(1)
 
 

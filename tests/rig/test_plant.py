@@ -268,7 +268,7 @@ def test_what_a_plant_can_bear():
         "mass": (True, True, True),
         "lag": (True, False, True),
         "finger": (True, False, True),
-        "third": (False, False, False),
+        "third": (False, False, True),
     }
     actuators = {
         "axis": AXIS.actuator,

@@ -15,7 +15,7 @@ from scipy.signal import lsim
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
-from focgen.rig import kernels, linear
+from focgen.rig import kernels, lags, linear
 from focgen.rig.changeable import fits_in
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects import Run, form_of
@@ -223,7 +223,7 @@ def test_chambers_side_by_side_run_at_another_pace_each_way():
                 for y, gain, T in zip(parts, (0.5, 1.5), (0.2, 0.9))
             ]
         exact.append(sum(parts))
-    made = linear.run_paces(PARALLEL, load, rest(800), 0.02, (1.0, 0.6))
+    made = lags.run_paces(PARALLEL, load, rest(800), 0.02, (1.0, 0.6))
     even = linear.run(PARALLEL, load, rest(800), 0.02, 16.0)
     change = np.max(np.abs(even - exact))
     assert change > 0.1

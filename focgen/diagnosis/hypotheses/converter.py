@@ -63,8 +63,8 @@ class Converter:
         self, best: Fit, nominal: Fit, causes: tuple[Cause, ...], weighing: Weighing
     ) -> tuple[Fit, tuple[Cause, ...]]:
         """With the rounding put to what was found without it: a cause, and where it brings the model closer
-        a part of it, by the samples' trust and by what users see. Where it is next to nothing of the gap beside what was found, or less than the noise by
-        itself, it is noise."""
+        a part of it, by the samples' trust and by what users see. Where it is next to nothing of the gap
+        beside what was found, or less than the noise by itself, it is noise."""
         if self.is_noise(nominal, alone=not causes):
             return best, causes
         both = self.stepped(best, weighing)

@@ -1,0 +1,54 @@
+"""Stages of whole orders as a sum of first-order lags, which may run at another pace each way: chambers side
+by side, all of which fill more slowly than they vent."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from focgen.arrays import Array, Bytes
+from focgen.fractional.transfer import TransferFunction
+from focgen.rig import kernels, linear
+from focgen.rig.delay import delayed
+from focgen.rig.modes import Modes, speeded
+
+
+def is_sum_of_lags(transfer: TransferFunction) -> bool:
+    """Whether it is a stable sum of first-order lags and one complex pair at most, of whole orders, that
+    holds a level."""
+    if not (transfer.is_integer and transfer.is_proper) or transfer.den[0].order == 0.0:
+        return False
+    poles = np.roots(linear.coefficients(transfer.den)).astype(complex)
+    stable, pairs = bool(np.all(poles.real < 0.0)), int(np.sum(poles.imag > 0.0))
+    return stable and pairs <= 1 and not linear.coincide(poles) and bool(transfer.dc_gain)
+
+
+def run_paces(
+    transfer: TransferFunction,
+    x: Array,
+    rest: Bytes,
+    h: float,
+    paces: tuple[float, float],
+    delay: float = 0.0,
+) -> Array:
+    """The response to ``x`` (n,) of a stage that :func:`is_sum_of_lags`. Each lag runs so many times as fast
+    while the load exceeds the response, and so many while it falls short of it. The input counts as linear
+    between samples, and the delay is exact in whole samples only."""
+    modes, gain = _lags(transfer), transfer.dc_gain
+    rows = [speeded(modes, h, speed) for speed in paces]
+    a, b0, b1, pair = (np.stack(part) for part in zip(*rows))
+    made = gain * kernels.modes(x, rest, a, b0, b1, pair, modes.through, switching=True)
+    return delayed(made, rest, h, delay) if delay else made
+
+
+@lru_cache(maxsize=64)
+def _lags(transfer: TransferFunction) -> Modes:
+    """Its partial fractions, over its gain."""
+    num, den = linear.coefficients(transfer.num) / transfer.dc_gain, linear.coefficients(transfer.den)
+    poles = np.roots(den).astype(complex)
+    residues = linear.residues(num, den, poles)
+    real, pair = poles.imag == 0.0, np.flatnonzero(poles.imag > 0.0)
+    swings = (complex(poles[pair[0]]), complex(2.0 * residues[pair[0]])) if len(pair) else (-1.0 + 0j, 0j)
+    through = float(num[0] / den[0]) if len(num) == len(den) else 0.0
+    return Modes(-poles[real].real, residues[real].real, *swings, through)
