@@ -334,11 +334,12 @@ void focgen_filter(int n, const double *x, double *y, const unsigned char *rest,
     }
 }
 
-/* m[i][j] = sum over samples of r[i] r[j], for the k rows of n samples, a few of them at a time, which stay in the processor's cache;
- * one thread, for the rows are few and the calls many. `m` is 0 but for the products of the first rows, which are known. */
+enum { AT_ONCE = 1024 }; /* samples that stay in the processor's cache while they are looked at many times */
+
+/* m[i][j] = sum over samples of r[i] r[j], for the k rows of n samples; one thread, for the rows are few and the calls many. `m` is 0 but
+ * for the products of the first rows, which are known. */
 void focgen_products(int n, int k, int known, const double *r, double *m)
 {
-    enum { AT_ONCE = 1024 };
     for (int first = 0; first < n; first += AT_ONCE) {
         int count = n - first < AT_ONCE ? n - first : AT_ONCE;
         for (int i = known; i < k; i++) for (int j = 0; j <= i; j++) {
@@ -367,9 +368,12 @@ int focgen_innovations(int n, const double *y, double *out, const unsigned char 
             mean[k] = sum / coarse;
         }
         double *to = out + total;
-        for (int k = 0; k < count; k++) to[k] = ar[0] * mean[k];
-        for (int i = 1; i <= order; i++) for (int k = i; k < count; k++) to[k] += ar[i] * mean[k - i];
-        for (int k = 0; k < count; k++) to[k] = to[k] < -1e3 ? -1e3 : to[k] < 1e3 ? to[k] : 1e3;
+        for (int a = 0, b; a < count; a = b) {
+            b = count - a < AT_ONCE ? count : a + AT_ONCE;
+            for (int k = a; k < b; k++) to[k] = ar[0] * mean[k];
+            for (int i = 1; i <= order; i++) for (int k = i > a ? i : a; k < b; k++) to[k] += ar[i] * mean[k - i];
+            for (int k = a; k < b; k++) to[k] = to[k] < -1e3 ? -1e3 : to[k] < 1e3 ? to[k] : 1e3;
+        }
         total += count;
     }
     return total;

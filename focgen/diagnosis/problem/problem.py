@@ -238,8 +238,8 @@ class Problem:
         x = self._entered(float(vector[own]), off)
         made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.between)
         made = self._read(made, *gauges)
-        made = made + segment.loose @ begun if begun.any() else made
-        return made + self._uneven(zeros) if zeros.any() else made
+        made = made + segment.loose @ begun if len(begun) and begun.any() else made
+        return made + self._uneven(zeros) if len(zeros) and zeros.any() else made
 
     def _parted(self, nuisances: np.ndarray) -> tuple[np.ndarray, ...]:
         """The nuisances behind the alignment: of gauges, of the input's ways, of begins, and of zeros."""
@@ -271,7 +271,8 @@ class Problem:
         """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where
         nothing changed, by which a chain remembers what it made of it."""
         x = self.segment.bent
-        if shift == 0.0 and not off.any():
+        is_off = bool(len(off)) and bool(off.any())
+        if shift == 0.0 and not is_off:
             return x
         key = (shift, *off)
         kept: list[tuple[tuple[float, ...], np.ndarray]] = self.memory.setdefault("entered", [])
@@ -279,7 +280,7 @@ class Problem:
             if old == key:
                 return y
         made: np.ndarray = x + abs(shift) * self.segment.moves[shift < 0] if shift else x
-        made = made + self.segment.input_modes @ off if off.any() else made
+        made = made + self.segment.input_modes @ off if is_off else made
         kept.insert(0, (key, made))
         del kept[2:]
         return made
