@@ -45,7 +45,7 @@ def _changeable_in(stage: str, rig: Rig) -> frozenset[str]:
         return _paced(own.dynamics) | _changeable(own) if own else frozenset()
     if stage == "regulator":
         return _paced(rig.regulator) | _own_of(rig.regulator)
-    return _paced(rig.sensor) | ({"loading", "unloading"} if _is_lag(rig.sensor) else set())
+    return _paced(rig.sensor) | ({"loading", "unloading"} if lags.is_filled(rig.sensor) else set())
 
 
 def _paced(transfer: TransferFunction) -> frozenset[str]:
@@ -53,20 +53,15 @@ def _paced(transfer: TransferFunction) -> frozenset[str]:
     return frozenset({"pace"} if linear.holds_level(transfer) else ())
 
 
-def _is_lag(transfer: TransferFunction) -> bool:
-    """Whether it is one lag of order 1."""
-    lag = linear.single_lag(transfer)
-    return lag is not None and lag[2] == 1.0
-
-
 def _own_of(regulator: TransferFunction) -> frozenset[str]:
     """What effects may change of a regulator's own equation: what it fills from where it has dynamics, and
-    of one that fills and vents through one lag, how fast it vents and through what, its highest flow, and
+    of one that is one lag after another, how fast the slowest vents and through what, its highest flow, and
     where it stops."""
     gain = regulator.dc_gain
     found = {"supply"} if len(regulator.den) > 1 and np.isfinite(gain) and gain else set()
     return frozenset(
-        found | ({"loading", "unloading", "flow", "ceiling", "throat"} if _is_lag(regulator) else set())
+        found
+        | ({"loading", "unloading", "flow", "ceiling", "throat"} if lags.is_filled(regulator) else set())
     )
 
 

@@ -5,13 +5,15 @@ The state is told by what the input was before the first sample. Tried are, from
 level; two steps from rest. A further unknown has to earn its place (Schwarz's criterion, on as many samples
 as the residual's correlation leaves). And none is tried where the first samples are those of a rig at rest:
 there it cannot have moved yet, whatever its parameters are, so that a past shows, and a misfit does not.
-But an input that rests a little off 0 was held there, where the rig shows no step to it.
+But an input that rests a little off 0 was held there, where the rig shows no step to it. At an input of 0 an
+offset holds a rig off as a past does, but no larger one than what is left for good.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -43,6 +45,8 @@ _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0
 _LITTLE = 0.01  # of it: less, held before a log, does not show
 _BEYOND = 0.2  # of it: by so much earlier levels may leave the input's range
 _SHOWN = 0.3  # of a response time at 0: what is shorter shows no decay
+_FORGOTTEN = 5.0  # response times after which the past shows no more,
+_MOSTLY = 0.9  # of what is left from there on an offset may be: a signal that comes back to 0 has none
 
 
 @dataclass(frozen=True)
@@ -164,6 +168,7 @@ class _Setting:
     ) -> None:
         self.chain, self.entry, self.h = Chain(rig, tuple(placed)), entry, log.sample_time
         pace, self.reach = scales.pace, scales.sizes[entry]
+        self.pace = pace
         self.range = [end / self.reach for end in scales.ranges[entry]]
         self.n = n = min(len(log), max(int(_SEEN * pace / self.h), _LEAST))
         self.longest = max(_LONGEST * pace, 20.0 * self.h)
@@ -193,14 +198,26 @@ class _Setting:
 
     def at(self, begin: Begin, free: int) -> _Try:
         """What a begin leaves, ``free`` numbers of which are fitted."""
+        raw = self._missed(begin)
+        return _Try(begin, free, raw, self._counted(raw, np.minimum(self.asked.offset, self.borne)))
+
+    def _missed(self, begin: Begin) -> Array:
+        """What is measured less what a begin makes (n, signals)."""
         run = Run.of([self.n], [self.start], self.h, [begin])
         tap: dict[str, Array] = {}
         self.chain.run(self.x, *self.stages, run, between_of(self.chain.rig, self.entry), tap)
         made = [tap[stage] / unit for stage, unit in zip(self.roles, self.units)]
-        raw = self.y - np.stack(made, axis=1)
-        return _Try(begin, free, raw, self._counted(raw, self.asked.offset))
+        missed: Array = self.y - np.stack(made, axis=1)
+        return missed
 
-    def _counted(self, raw: Array, offset: float) -> Array:
+    @cached_property
+    def borne(self) -> Array:
+        """How large an offset is (signals,) at most: what a rest leaves for good, once the past is
+        forgotten."""
+        later = self._missed(REST)[int(_FORGOTTEN * self.pace / self.h) :]
+        return np.quantile(np.abs(later), _MOSTLY, axis=0) if len(later) else np.full(len(self.units), np.inf)
+
+    def _counted(self, raw: Array, offset: float | Array) -> Array:
         """What is left (n, signals) less an offset of so much at most, the later the less it counts."""
         mean = (raw * self.counts**2).sum(axis=0) / (self.counts**2).sum()
         made: Array = (raw - np.clip(mean, -offset, offset)) * self.counts

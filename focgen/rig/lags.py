@@ -7,11 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from focgen.arrays import Array, Bytes
+from focgen.arrays import Array, Bytes, Complex
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import kernels, linear
 from focgen.rig.delay import delayed
 from focgen.rig.modes import Modes, speeded
+
+_REAL = 1e-6  # of a pole: what rounding makes of two that are one
 
 
 def is_sum_of_lags(transfer: TransferFunction) -> bool:
@@ -19,7 +21,7 @@ def is_sum_of_lags(transfer: TransferFunction) -> bool:
     holds a level."""
     if not (transfer.is_integer and transfer.is_proper) or transfer.den[0].order == 0.0:
         return False
-    poles = np.roots(linear.coefficients(transfer.den)).astype(complex)
+    poles = _poles(transfer)
     stable, pairs = bool(np.all(poles.real < 0.0)), int(np.sum(poles.imag > 0.0))
     return stable and pairs <= 1 and not linear.coincide(poles) and bool(transfer.dc_gain)
 
@@ -40,6 +42,35 @@ def run_paces(
     a, b0, b1, pair = (np.stack(part) for part in zip(*rows))
     made = gain * kernels.modes(x, rest, a, b0, b1, pair, modes.through, switching=True)
     return delayed(made, rest, h, delay) if delay else made
+
+
+def is_filled(transfer: TransferFunction) -> bool:
+    """Whether it is one lag after another: a valve that is driven, and what it fills."""
+    num, den = transfer.num, transfer.den
+    if not transfer.is_integer or len(num) != 1 or num[0].order or not den[0].order or den[-1].order:
+        return False
+    poles = _poles(transfer)
+    return bool(np.all(poles.real < 0.0) and np.all(np.abs(poles.imag) <= _REAL * np.abs(poles)))
+
+
+@lru_cache(maxsize=256)
+def parted(transfer: TransferFunction) -> tuple[TransferFunction, TransferFunction]:
+    """What is ahead of the slowest lag of a stage that :func:`is_filled`, and that lag with the gain: a valve
+    is quicker than what it fills. A fit may make two lags a pair that swings: then what is ahead leads."""
+    poles, den = _poles(transfer), transfer.den
+    slowest = int(np.argmax(poles.real))
+    lag = [(-1.0 / float(poles[slowest].real), 1.0), (1.0, 0.0)]
+    chamber = TransferFunction([(transfer.dc_gain, 0.0)], lag)
+    if abs(poles[slowest].imag) > _REAL * abs(poles[slowest]):
+        return TransferFunction(lag, [(c / den[-1].coefficient, order) for c, order in den]), chamber
+    ahead = np.atleast_1d(np.poly(np.delete(poles, slowest))).real
+    orders = range(len(ahead) - 1, -1, -1)
+    return TransferFunction([(1.0, 0.0)], [(c / ahead[-1], n) for c, n in zip(ahead, orders)]), chamber
+
+
+def _poles(transfer: TransferFunction) -> Complex:
+    made: Complex = np.roots(linear.coefficients(transfer.den)).astype(complex)
+    return made
 
 
 @lru_cache(maxsize=64)

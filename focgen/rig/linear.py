@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from focgen.arrays import Array, Bytes
+from focgen.arrays import Array, Bytes, Complex
 from focgen.fractional.decomposition import dense
 from focgen.fractional.delay import split_delay
 from focgen.fractional.simulation import Convolution
@@ -239,15 +239,15 @@ def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, 
     return b.real, whole.real
 
 
-def residues(num: Array, den: Array, poles: Array) -> Array:
+def residues(num: Array, den: Array, poles: Complex) -> Complex:
     """What each of the ``poles`` (k,), all different, counts in num/den, highest power first: (k,)."""
-    made: Array = np.polyval(num, poles) / (
+    made: Complex = np.polyval(num, poles) / (
         den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)])
     )
     return made
 
 
-def _held(poles: Array, residues: Array, h: float, held: bool) -> tuple[Array, Array, Array]:
+def _held(poles: Complex, residues: Complex, h: float, held: bool) -> tuple[Complex, Complex, Complex]:
     """What is left of each mode after ``h`` s, and what the past and the present input count."""
     a = np.exp(poles * h)
     gain = np.where(poles == 0, h, (a - 1) / np.where(poles == 0, 1, poles))  # of a step over one sample
@@ -263,7 +263,7 @@ def _discrete_between(transfer: TransferFunction, h: float, held: bool, share: f
     poles = np.roots(den).astype(complex)
     if coincide(poles):
         return _by_pulse(transfer, _by_exponential(num, den, h, held)[1], h, held, share)
-    weights = residues(num, den, poles) if len(poles) else np.zeros(0)
+    weights = residues(num, den, poles) if len(poles) else np.zeros(0, complex)
     a, past, now = _held(poles, weights, h, held)
     decay, before, after = _held(poles, weights, share * h, held)
     whole, line = np.atleast_1d(np.poly(a)), after.sum() + through
@@ -286,14 +286,14 @@ def _by_pulse(
     return np.convolve(a, pulse)[: len(a) + 1], a
 
 
-def _ramp(q: Array, a: Array) -> Array:
+def _ramp(q: Complex, a: Complex) -> Complex:
     """∫ (1 − t) e^{q (1 − t)} dt over 0 … 1: what the past sample of a linear input counts."""
     small = np.abs(q) < 1e-3
     safe = np.where(small, 1.0, q)
     return np.where(small, 0.5 + q / 3 + q * q / 8, (a * (safe - 1) + 1) / safe**2)
 
 
-def coincide(poles: Array) -> bool:
+def coincide(poles: Complex) -> bool:
     """Whether two poles are so close that their residues would cancel."""
     distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(len(poles), np.inf))
     return bool(np.any(distance < 1e-3 * np.maximum(np.abs(poles)[:, None], 1e-12)))

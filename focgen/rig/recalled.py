@@ -20,6 +20,7 @@ from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import STAGES, Chain, Placed, between_of
 from focgen.rig.initial import ENTERS, LEAVES
+from focgen.rig.initial import NOTE as ESTIMATED
 from focgen.rig.response import integrations, longest, response_time
 from focgen.rig.rig import Rig
 from focgen.rig.session import joined, run_of
@@ -93,19 +94,29 @@ def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float) -> Ex
     roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
     begins = {role: begin_after(log, earlier, role, past) for role in roles if _idle(log, earlier, role)}
     begins = {role: begin for role, begin in begins.items() if not begin.at_rest}
-    return replace(log, begins=begins, notes=(*log.notes, NOTE)) if begins else log
+    if not begins:
+        return log
+    notes = (note for note in log.notes if note != ESTIMATED)
+    return replace(log, begins=begins, notes=(*notes, NOTE))
 
 
 def _idle(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
     """Whether an input was 0 until the experiment begins: it is at first, or what it moves still is, as where
-    a log begins with its first step."""
+    a log begins with its first step; or its first samples tell of a step then, from next to nothing."""
     inputs = [r for r in ENTERS if r in log and all(r in other for other in earlier)]
-    return any(_starts_at_zero(log, earlier, r) for r in inputs[inputs.index(role) :])
+    moved = [*inputs[inputs.index(role) :], *([] if log.begins else ["output"])]
+    if any(_starts_at_zero(log, earlier, r) for r in moved if r in log):
+        return True
+    begin, least = log.before(role), _NOTHING * _largest(log, earlier, role)
+    return bool(begin.ago) and begin.ago[-1] <= log.sample_time and abs(begin.levels[-2]) <= least
 
 
 def _starts_at_zero(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
-    largest = max(float(np.max(np.abs(each[role]))) for each in (log, *earlier))
-    return abs(float(log[role][0])) <= _NOTHING * largest
+    return abs(float(log[role][0])) <= _NOTHING * _largest(log, earlier, role)
+
+
+def _largest(log: Experiment, earlier: Sequence[Experiment], role: str) -> float:
+    return max(float(np.max(np.abs(each[role]))) for each in (log, *earlier))
 
 
 def begin_after(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Begin:

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.hypotheses import converter
-from focgen.diagnosis.hypotheses.converter import converter_of
+from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.explain import candidates_for
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.segments import make
@@ -222,3 +222,22 @@ def test_levels_that_the_model_passes_between_are_read_though_another_effect_hid
     found = converter_of(problem, candidates_for(problem.segment, HEATER))
     assert found is not None
     assert found.step * problem.segment.level_out == pytest.approx(step, rel=0.01)
+
+
+@pytest.mark.parametrize("plain, part", [(0.9, True), (1.1, False)])
+def test_a_rounding_is_part_of_the_rig_only_where_users_see_it_come_closer(monkeypatch, plain, part):
+    """By trust it is closer; by every sample alike it may be farther, and would promise less than nothing."""
+
+    def left(weighed, every):
+        problem = SimpleNamespace(residual=lambda vector: np.full(50, every))
+        return SimpleNamespace(
+            weighed=np.full(50, weighed), problem=problem, vector=None, predictable_share=0.0
+        )
+
+    nominal, both = left(1.0, 1.0), left(0.8, plain)
+    monkeypatch.setattr(Converter, "stepped", lambda self, of, weighing: both)
+    monkeypatch.setattr(Converter, "is_noise", lambda self, nominal, alone: False)
+    found = Converter(SimpleNamespace(effect="sensor_quantization", stage="sensor"), (), 1.0)
+    best, (cause,) = found.beside(nominal, nominal, (), None)
+    assert (best is both) == part
+    assert cause.rivals[0].effect == "sensor_quantization"

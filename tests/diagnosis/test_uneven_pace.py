@@ -93,7 +93,6 @@ def test_a_stage_that_is_slower_one_way_keeps_its_name(case, seed, signals):
 
 UNEVEN = [(stage, by) for stage in ("actuator", "sensor") for by in ("level", "time", "speed")]
 QUICK_UNEVEN = {
-    (("actuator", "level"), 2, "C"),
     (("actuator", "time"), 1, "B"),
 }
 

@@ -13,7 +13,7 @@ import focgen
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import Run, library
+from focgen.rig.effects import Run, form_of, library
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.initial import NOTE, begun
 from focgen.rig.rig import Actuator, Delays, LinearActuator, Rig, Signals
@@ -195,6 +195,21 @@ def test_an_offset_or_a_drift_is_no_past():
 
 def shifted(log, by):
     return replace(log, signals={**log.signals, "output": log["output"] + by})
+
+
+@pytest.mark.parametrize("rate", [0.25, 0.4])
+def test_a_fall_that_the_rig_makes_more_slowly_is_no_offset(rate):
+    """A log that begins as the regulator vents, no faster than a limit, and rests a moment at a command of 0.
+    An offset would not have gone later."""
+    limit = Placed("flow_limit", form_of("flow_limit", "choked"), "regulator", (rate,))
+    u = np.r_[np.zeros(100), np.full(200, 1.0), np.zeros(20), np.repeat([0.4, 0.9, 0.2], 150)]
+    y = Chain(RIG, (limit,)).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], H), True)[303:]
+    y = y + 0.004 * y.max() * np.random.default_rng(6).normal(size=len(y))
+    (told,) = begun(RIG, [Experiment("vents", H, {"command": u[303:], "output": y})])
+    assert not told.before("command").at_rest
+    at_rest = Chain(RIG).run(u[303:], "regulator", "sensor", Run.of([len(u) - 303], [0.0], H), True)
+    (held,) = begun(RIG, [Experiment("off", H, {"command": u[303:], "output": at_rest + 0.5 * y[0]})])
+    assert held.before("command").at_rest
 
 
 def test_a_moment_at_zero_tells_nothing():

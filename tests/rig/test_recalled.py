@@ -50,10 +50,10 @@ def _fractional(x: np.ndarray) -> np.ndarray:
     return y[::10]
 
 
-def _session(rest: float) -> tuple[np.ndarray, np.ndarray, list[tuple[int, int]]]:
+def _session(rest: float, first: float = 0.6) -> tuple[np.ndarray, np.ndarray, list[tuple[int, int]]]:
     """Three experiments on one clock, with rests that no log shows: input, reading, spans."""
     held = int(8.0 / H)
-    one = np.concatenate([np.zeros(20), *(np.full(held, v) for v in (0.6, 0.0, 1.0, 0.3))])
+    one = np.concatenate([np.zeros(20), *(np.full(held, v) for v in (first, 0.0, 1.0, 0.3))])
     gap = np.zeros(int(rest / H))
     x = np.concatenate([one, gap, one * 0.8, gap, one])
     noise = np.random.default_rng(4).normal(0.0, NOISE, len(x))
@@ -61,8 +61,8 @@ def _session(rest: float) -> tuple[np.ndarray, np.ndarray, list[tuple[int, int]]
     return x, _fractional(x) + noise, [(s, s + len(one)) for s in starts]
 
 
-def _logs(rest: float) -> list[Experiment]:
-    x, y, spans = _session(rest)
+def _logs(rest: float, first: float = 0.6) -> list[Experiment]:
+    x, y, spans = _session(rest, first)
     x = x.copy()
     return [
         Experiment(f"run {k}", H, {"pressure": x[a:b], "output": y[a:b]}, start=a * H)
@@ -191,6 +191,22 @@ def test_how_long_it_rested_is_told_where_every_log_has_a_clock_of_its_own(
     assert second.start - first.start - len(first) * H == pytest.approx(rest, rel=0.2)
     assert _left(rig, list(logs)) > 1.5 * NOISE
     assert _left(rig, list(told)) < 1.2 * NOISE
+
+
+def test_a_log_that_begins_with_its_first_step_was_at_rest_or_recalls(tmp_path: Path) -> None:
+    """The input is not 0 at any sample ahead of the first step; that the output is near 0 says it was."""
+    rig = _rig(tmp_path)
+    logs = [_from(log, 20) for log in _logs(8.0, first=0.3)]
+    told = begun_session(rig, logs)
+    assert [bool(log.before("pressure").known) for log in told] == [False, True, True]
+    assert _left(rig, told) < 0.5 * _left(rig, logs)
+    amid = [logs[0], _from(logs[1], 60)]  # in the middle of a hold
+    assert not begun_session(rig, amid)[1].before("pressure").known
+
+
+def _from(log: Experiment, first: int) -> Experiment:
+    signals = {role: values[first:] for role, values in log.signals.items()}
+    return replace(log, signals=signals, start=log.start + first * log.sample_time)
 
 
 def test_rigs_that_each_began_at_rest_have_no_pauses(tmp_path: Path) -> None:

@@ -279,6 +279,47 @@ def test_a_regulator_fills_and_vents_by_its_own_equation(effect, form, value, si
     np.testing.assert_allclose(made, exact, atol=4e-3 if between == Between.STRAIGHT else 2e-4)
 
 
+@pytest.mark.parametrize("between", [Between.HELD, Between.STRAIGHT])
+@pytest.mark.parametrize("lags_ahead", [(0.06,), (0.1, 0.03)])
+@pytest.mark.parametrize("effect, form, value", OWN)
+def test_what_fills_and_vents_is_the_slowest_lag(effect, form, value, lags_ahead, between):
+    """The valve's lags, one after another, and then T p' = u - p with what the effect makes of it, in steps
+    of a five-hundredth of a sample; against what the effect changes."""
+    h, gain = 0.02, 0.3
+    u = np.repeat(np.random.default_rng(5).uniform(0.0, 5.0, 12), 60)
+    u = u if between == Between.HELD else np.convolve(u, np.ones(8) / 8.0)[: len(u)]
+    den = np.polynomial.polynomial.polyfromroots([-1.0 / T for T in (*lags_ahead, 0.4)])
+    transfer = TransferFunction([(gain, 0)], [(c / den[0], n) for n, c in enumerate(den)])
+    rig = Rig("valve", h, Signals("u", "p"), None, regulator=transfer)
+    placed = Placed(effect, form_of(effect, form), "regulator", tuple(np.ravel(value)))
+    run = Run.of([len(u)], [0.0], h)
+    made, plain = (Chain(rig, p).run(u, "regulator", "regulator", run, between) for p in ((placed,), ()))
+    flow, most = OWN[effect, form, value]
+    exact, driven, p, parts = [], [0.0] * len(lags_ahead), 0.0, 500
+    for before, now in zip(np.r_[0.0, u], u):
+        for j in range(parts):
+            entering = before if between == Between.HELD else before + (now - before) * (j + 0.5) / parts
+            for i, T in enumerate(lags_ahead):
+                driven[i] += h / parts * (entering - driven[i]) / T
+                entering = driven[i]
+            p = min(p + h / parts * flow((gain * entering - p) / 0.4), most)
+        exact.append(p)
+    changed = np.sqrt(np.mean((plain - exact) ** 2))
+    assert changed > 0.02
+    assert np.sqrt(np.mean((made - exact) ** 2)) < 0.03 * changed
+
+
+def test_a_fit_that_makes_two_lags_swing_finds_no_gap_there():
+    """Two lags of nearly one time, and a pair that swings a little: what the parts do together is the
+    same."""
+    u = np.repeat([0.0, 1.0, 0.2, 0.7], 100)
+    for damping in (1.001, 1.0, 0.999, 0.8):
+        transfer = TransferFunction([(2.0, 0)], [(0.09, 2), (0.6 * damping, 1), (1.0, 0)])
+        ahead, chamber = lags.parted(transfer)
+        direct, parted = (linear.run(t, u, rest(400), 0.02, 8.0) for t in (transfer, ahead * chamber))
+        np.testing.assert_allclose(parted, direct, atol=1e-6)
+
+
 @pytest.mark.parametrize("T", [1e-9, 0.01, 3.0])
 def test_a_throat_empties_a_chamber_to_the_last(T):
     """In samples of many lags and of a sixtieth of one, for long: nothing left is too small, or too quick."""

@@ -34,9 +34,9 @@ def cautions(
     """What cannot be predicted, what may be there instead, and what is unexplained beside what is named.
     ``doubted``: of what is likelier something that no effect is, instead of a part of what was found;
     ``off``: what is likelier the nominal chain."""
-    for candidate in (candidate for e, _ in causes for candidate in paths(e)):
+    for effect in dict.fromkeys(candidate.effect for e, _ in causes for candidate in paths(e)):
         yield (
-            f"the {candidate.effect} wanders: followed through this session, its next turn cannot be "
+            f"the {effect} wanders: followed through this session, its next turn cannot be "
             "predicted, and nothing of it is promised"
         )
     for e in unknown:
