@@ -14,6 +14,7 @@ from focgen.rig.delay import delayed
 from focgen.rig.modes import Modes, speeded
 
 _REAL = 1e-6  # of a pole: what rounding makes of two that are one
+_APART = 1.5e-3  # of a pole: what two that are one are kept apart by
 
 
 def is_sum_of_lags(transfer: TransferFunction) -> bool:
@@ -77,7 +78,9 @@ def _poles(transfer: TransferFunction) -> Complex:
 def _lags(transfer: TransferFunction) -> Modes:
     """Its partial fractions, over its gain."""
     num, den = linear.coefficients(transfer.num) / transfer.dc_gain, linear.coefficients(transfer.den)
-    poles = np.roots(den).astype(complex)
+    poles = _poles(transfer)
+    if linear.coincide(poles):  # as a fit may have it: a little apart, for each counts by itself
+        poles = poles.real * (1.0 + _APART * np.arange(len(poles))) + 0j
     residues = linear.residues(num, den, poles)
     real, pair = poles.imag == 0.0, np.flatnonzero(poles.imag > 0.0)
     swings = (complex(poles[pair[0]]), complex(2.0 * residues[pair[0]])) if len(pair) else (-1.0 + 0j, 0j)

@@ -74,14 +74,15 @@ class Weighing:
 @dataclass(frozen=True, eq=False)
 class Known:
     """The first ``rows`` (k, n) of a Jacobian, as they are taken, and their ``products`` (k, k) with one
-    another."""
+    another: sums over the samples."""
 
     rows: np.ndarray
+    products: np.ndarray
 
-    @cached_property
-    def products(self) -> np.ndarray:
-        """Sums over the samples."""
-        return products(self.rows)
+    @classmethod
+    def of(cls, rows: np.ndarray) -> Known:
+        """Rows with their products."""
+        return cls(rows, products(rows))
 
 
 WHITE = Weighing(np.ones(1))
@@ -118,16 +119,16 @@ def fit(
     is known beforehand; stops when the gain is below ``tolerance`` nats, or below a hundredth of those that
     it is behind ``leader``, a fit of the same innovations.
 
-    ``known``: of the first parameters, taken as it is: a quick fit that is a
-    little off. Otherwise the rows ahead of the candidates' own are made anew only every third time, for they
-    change little, and the fit does not end on old ones.
+    ``known``: the Jacobian of the first parameters, taken as it is: a quick fit that is a little off.
+    Otherwise the rows ahead of the candidates' own are made anew only every third time, for they change
+    little, and the fit does not end on old ones.
     """
     low, high = problem.bounds()
     vector = np.clip(start, low, high)
     now = innovations(problem, vector, weighing)
     sse, damping = float(now @ now), 1e-3
     cost, (expected, precision) = _cost(problem, vector, sse, len(now)), problem.known
-    normal, kept, age = np.eye(len(vector)), known, 0
+    normal, kept, age, head = np.eye(len(vector)), known, 0, problem.head
     for _ in range(iterations):
         rows = _rows(problem, vector, now, weighing, low, high, kept)
         product = products(rows, None if kept is None else kept.products)
@@ -150,15 +151,8 @@ def fit(
             break
         age = 0 if ended or age >= _STALE else age + 1
         if known is None:
-            kept = _of(rows[: problem.head], product) if age else None
+            kept = Known(rows[:head], product[:head, :head]) if age else None
     return Fit(problem, vector, now, sse, normal)
-
-
-def _of(rows: np.ndarray, product: np.ndarray) -> Known:
-    """What is known of the first rows, whose products are the first of ``product``."""
-    found = Known(rows)
-    vars(found)["products"] = product[: len(rows), : len(rows)]
-    return found
 
 
 def _nats(count: int, cost: float, better: float) -> float:
