@@ -55,7 +55,8 @@ def test_a_unit_is_not_moved_for_its_derivative(problem, monkeypatch):
     rows = jacobian(whole, vector, now, WHITE, *whole.bounds())
     low, high = whole.bounds()
     assert len(simulated) == np.sum(high - low > 1e-6) < len(vector)
-    assert not np.any(rows[-1]) and np.any(rows[-2])
+    assert not np.any(rows[-2]) and np.any(rows[-3])
+    np.testing.assert_array_equal(rows[-1], now)
 
 
 def test_a_fit_far_behind_is_left_early_within_a_hundredth_of_what_it_is_behind(problem, monkeypatch):

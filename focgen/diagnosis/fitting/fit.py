@@ -130,7 +130,7 @@ def fit(
     cost, (expected, precision) = _cost(problem, vector, sse, len(now)), problem.known
     normal, kept, age, head = np.eye(len(vector)), known, 0, problem.head
     for _ in range(iterations):
-        rows = _rows(problem, vector, now, weighing, low, high, kept)
+        rows = jacobian(problem, vector, now, weighing, low, high, kept)
         product = products(rows, None if kept is None else kept.products)
         unit = sse / max(len(now), 1)  # a nat's worth of squares, twice
         normal = product[:-1, :-1] + unit * np.diag(precision)
@@ -174,20 +174,8 @@ def jacobian(
     high: np.ndarray,
     known: Known | None = None,
 ) -> np.ndarray:
-    """Rows (k, n): the innovations' derivatives, by differences; 0 for what cannot move."""
-    return _rows(problem, vector, now, weighing, low, high, known)[:-1]
-
-
-def _rows(
-    problem: Problem,
-    vector: np.ndarray,
-    now: np.ndarray,
-    weighing: Weighing,
-    low: np.ndarray,
-    high: np.ndarray,
-    known: Known | None,
-) -> np.ndarray:
-    """Those of the :func:`jacobian`, and last the innovations themselves: (k + 1, n)."""
+    """Rows (k + 1, n): the innovations' derivatives, by differences, 0 for what cannot move; and last the
+    innovations themselves."""
     rows = np.empty((len(vector) + 1, len(now)))
     first = 0 if known is None else len(known.rows)
     rows[-1] = now

@@ -62,7 +62,7 @@ class _Missed:
         self.problem, self.base = problem, base
         bare = problem.with_candidates(problem.candidates[:-1])
         now = innovations(bare, base, WHITE)
-        rows = jacobian(bare, base, now, WHITE, *bare.bounds()) if known is None else known
+        rows = jacobian(bare, base, now, WHITE, *bare.bounds())[:-1] if known is None else known
         self.nominal, _ = np.linalg.qr(rows.T)
         self.low, self.high = (bound[len(base) :] for bound in problem.bounds())
         self.before = self._square(now)

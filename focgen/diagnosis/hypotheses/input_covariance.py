@@ -23,7 +23,7 @@ def input_covariance(e: Explanation) -> np.ndarray:
     problem, vector, weighing = e.best.problem, e.best.vector, Weighing(e.ar)
     now = innovations(problem, vector, weighing)
     low, high = problem.bounds()
-    rows = jacobian(problem, vector, now, weighing, low, high)  # the fit's own are of an earlier vector
+    rows = jacobian(problem, vector, now, weighing, low, high)[:-1]  # the fit's own are of an earlier vector
     variance = float(np.mean(now**2))
     spread = _spread(products(rows) + variance * np.diag(problem.known[1]), variance)
     made = problem.simulate(vector)

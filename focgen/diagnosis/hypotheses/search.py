@@ -234,7 +234,7 @@ def footings(problem: Problem, base: np.ndarray) -> list[Footing]:
 
 def _footing(problem: Problem, vector: np.ndarray, first: int) -> Footing:
     now = innovations(problem, vector, WHITE)
-    known = Known.of(jacobian(problem, vector, now, WHITE, *problem.bounds()))
+    known = Known.of(jacobian(problem, vector, now, WHITE, *problem.bounds())[:-1])
     return Footing(vector, now, known, first)
 
 

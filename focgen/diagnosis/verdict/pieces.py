@@ -120,7 +120,7 @@ class _Cells:
         problem = fit.problem
         low, high = problem.bounds()
         now, ways = innovations(problem, fit.vector, weighing), np.eye(len(low))[high - low > FIXED]
-        rows = ways @ jacobian(problem, fit.vector, now, weighing, low, high)
+        rows = ways @ jacobian(problem, fit.vector, now, weighing, low, high)[:-1]
         ends = _ends(problem, len(now))
         cells = [(rows[:, a:b], now[a:b]) for a, b in pairwise(ends)]
         normal = _summed([r @ r.T for r, _ in cells])
