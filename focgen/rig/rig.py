@@ -69,7 +69,7 @@ class Actuator:
         made = np.full_like(pressure, self.gain[-1])
         for coefficient in reversed(self.gain[:-1]):  # Horner's rule
             made = made * pressure + coefficient
-        return made
+        return made[()]
 
     def drive(self, pressure: Any) -> Any:
         """K(p) p: what the dynamics settle at, any shape."""
