@@ -193,13 +193,14 @@ def test_how_long_it_rested_is_told_where_every_log_has_a_clock_of_its_own(
     assert _left(rig, list(told)) < 1.2 * NOISE
 
 
-def test_a_log_that_begins_with_its_first_step_was_at_rest_or_recalls(tmp_path: Path) -> None:
+@pytest.mark.parametrize("rest", [8.0, 20.0])  # told of a step from a little, and near 0 at first
+def test_a_log_that_begins_with_its_first_step_was_at_rest_or_recalls(tmp_path: Path, rest: float) -> None:
     """The input is not 0 at any sample ahead of the first step; that the output is near 0 says it was."""
     rig = _rig(tmp_path)
-    logs = [_from(log, 20) for log in _logs(8.0, first=0.3)]
+    logs = [_from(log, 20) for log in _logs(rest, first=0.3)]
     told = begun_session(rig, logs)
     assert [bool(log.before("pressure").known) for log in told] == [False, True, True]
-    assert _left(rig, told) < 0.5 * _left(rig, logs)
+    assert _left(rig, told) < 0.6 * _left(rig, logs)
     amid = [logs[0], _from(logs[1], 60)]  # in the middle of a hold
     assert not begun_session(rig, amid)[1].before("pressure").known
 
