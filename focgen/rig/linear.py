@@ -16,7 +16,7 @@ from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
 from focgen.rig.dynamics import Dynamics
-from focgen.rig.modes import Modes, between, fractional_lag, hold, respond, settled, tables
+from focgen.rig.modes import Modes, about_as_long, between, fractional_lag, hold, respond, settled, tables
 from focgen.rig.rig import UNITY
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
@@ -110,7 +110,7 @@ def _at_samples(
     if lag:
         gain, T, alpha = lag
         return gain * respond(x, rest, h, T, alpha, duration)
-    longest = 2.0 ** np.ceil(np.log2(duration))
+    longest = about_as_long(duration)
     rows, pair, through = _tables(transfer, h, longest)
     made = kernels.modes(x, rest, *rows, pair, through, switching=False)
     return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
@@ -127,7 +127,7 @@ def _between(
     """The response at the ``share`` of the way from the sample before to each."""
     if transfer.is_integer:
         return kernels.rational(x, rest, *_discrete_between(transfer, h, held, share))
-    lag, longest = single_lag(transfer), 2.0 ** np.ceil(np.log2(duration))
+    lag, longest = single_lag(transfer), about_as_long(duration)
     if lag:
         gain, T, alpha = lag
         modes = fractional_lag(T, alpha, h, longest)
@@ -182,7 +182,7 @@ def run_paced(
         b, a = _discrete(transfer, h, between == Between.HELD)
         c, _ = _discrete(transfer, h, False)
         return kernels.paced_rational(x, rest, b, c, a, slowness)
-    lag, longest = single_lag(transfer), 2.0 ** np.ceil(np.log2(duration))
+    lag, longest = single_lag(transfer), about_as_long(duration)
     if lag:
         gain, T, alpha = lag
         by, (_, *pace), share = slowness

@@ -87,12 +87,12 @@ def respond(
     if delay and dynamics == UNCHANGED:
         whole, part = split_delay(delay, h)
         if part:
-            modes = fractional_lag(T, alpha, h, _longest(duration))
+            modes = fractional_lag(T, alpha, h, about_as_long(duration))
             made = settled(between(x, rest, h, modes, 1.0 - part), x, rest, 1.0 - modes.gain)
             return shifted(made, rest, whole)
     if delay:
         return delayed(respond(x, rest, h, T, alpha, duration, dynamics), rest, h, delay)
-    unloading, longest = dynamics.unloading, _longest(duration)
+    unloading, longest = dynamics.unloading, about_as_long(duration)
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
     if dynamics.changed & {"bend", "loss", "preload"} or dynamics.place < 0.0:
@@ -103,7 +103,7 @@ def respond(
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
 
 
-def _longest(duration: float) -> float:
+def about_as_long(duration: float) -> float:
     """The next power of two, s: runs of about as long share their modes."""
     return 2.0 ** math.ceil(math.log2(duration))
 

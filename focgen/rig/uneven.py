@@ -28,11 +28,11 @@ def run(
     every sample. The part that x has may jump between samples, that of y runs in lines.
     """
     fastest = float(np.exp(min(pace.rate, 0.0)))
-    even = linear.run(transfer, x, run.rest, run.h, run.duration, between) / transfer.dc_gain
     scale, share = 1.0, np.empty(0)
     if pace.by == "time":
         share = fastest / np.exp(pace.rate * _moment(run))
     else:
+        even = linear.run(transfer, x, run.rest, run.h, run.duration, between) / transfer.dc_gain
         scale = float(np.max(np.abs(even if pace.by == "level" else x - even))) or 1.0
     slowness = _BY[pace.by], (transfer.dc_gain, fastest, pace.rate, scale), share
     y = linear.run_paced(_at(transfer, fastest), x, run.rest, run.h, run.duration, between, slowness)
