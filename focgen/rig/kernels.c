@@ -46,44 +46,37 @@ static void undisturbed(int n, const double *x, double *y, const unsigned char *
     }
 }
 
-/* Sum of first-order modes, input linear between samples (first-order hold), and one complex mode pair.
- * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
- * Coefficients come twice, for loading (first m) and unloading (next m): unloading is x[k] < y[k-1] where x > 0.
- * pair[s] = {a_re, a_im, b0_re, b0_im, b1_re, b1_im} for s = 0, 1.
- * Beyond y = `place` an obstacle takes `stiffness` (y - place) from x: y, linear in the present x, is solved for.
- * Friction takes `slide` from x against the motion since the last sample; what it takes to stay there it bears while that is no
- * more than `slide`, and than `stick` where nothing moved before. */
-void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0, const double *b1,
-                  const double *pair, double through, int switching, double place, double stiffness, double slide, double stick, double *z)
+/* focgen_modes where an obstacle, friction or two paces come in. In `z`, too, b1_i x[k] is left out until the next sample: the sum then
+ * says what the output is without the present input, which stands for itself. */
+static void disturbed(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
+                             const double *b1, const double *pair, double through, int switching, double place, double stiffness,
+                             double slide, double stick, double *z)
 {
-    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0;
+    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, at_once[2] = {through, through};
+    const double *lately = b1;
     int moving = 0;
-    if (!switching && stiffness <= 0.0 && stick <= 0.0 && m <= SEVERAL) {
-        undisturbed(n, x, y, rest, m, a, b0, b1, pair, through);
-        return;
-    }
+    for (int i = 0; i < 2 * m; i++) at_once[i >= m] += b1[i];
     for (int k = 0; k < n; k++) {
         if (rest[k]) {
             for (int i = 0; i < m; i++) z[i] = 0.0;
-            zr = zi = past = last = 0.0, moving = 0;
+            zr = zi = past = last = 0.0, moving = 0, lately = b1;
             if (rest[k] == BALANCED) {
                 double gr, gi, gain = gain_at_rest(m, a, b0, b1, pair, through, &gr, &gi);
                 double left = fabs(x[k]) > slide ? x[k] - (x[k] < 0.0 ? -slide : slide) : 0.0;
                 double beyond = (gain * left - place) / (1.0 + gain * stiffness);
                 past = stiffness > 0.0 && beyond > 0.0 ? left - stiffness * beyond : left;
                 settle(m, a, b0, b1, past, z);
+                for (int i = 0; i < m; i++) z[i] -= b1[i] * past;
                 zr = gr * past, zi = gi * past, last = gain * past;
             }
         }
         double now = x[k], sum = 0.0;
         int down = switching && fabs(now) < fabs(last);
-        const double *A = a + down * m, *B0 = b0 + down * m, *B1 = b1 + down * m, *P = pair + 6 * down;
+        const double *A = a + down * m, *B0 = b0 + down * m, *P = pair + 6 * down;
+        for (int i = 0; i < m; i++) z[i] = A[i] * (z[i] + lately[i] * past) + B0[i] * past, sum += z[i];
+        lately = b1 + down * m;
         if (stiffness > 0.0 || stick > 0.0) {
-            double still = P[0] * zr - P[1] * zi + P[2] * past, gain = through + P[4];
-            for (int i = 0; i < m; i++) {
-                still += A[i] * z[i] + B0[i] * past;
-                gain += B1[i];
-            }
+            double still = sum + P[0] * zr - P[1] * zi + P[2] * past, gain = at_once[down] + P[4];
             double pushed = stiffness > 0.0 && last > place ? stiffness * (last - place) : 0.0;
             double borne = now - pushed - (last - still) / gain; /* what stands still takes from x */
             if (stick > 0.0 && fabs(borne) <= (moving ? slide : stick)) {
@@ -94,13 +87,37 @@ void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, 
                 if (stiffness > 0.0 && beyond > 0.0) now -= stiffness * beyond;
             }
         }
-        for (int i = 0; i < m; i++) {
-            z[i] = A[i] * z[i] + B0[i] * past + B1[i] * now;
-            sum += z[i];
-        }
         turn(P, past, now, &zr, &zi);
         past = now;
-        last = y[k] = through * now + sum + zr;
+        last = y[k] = at_once[down] * now + sum + zr;
+    }
+}
+
+/* Both rows of m coefficients, each filled up with 0 to SEVERAL. */
+static void filled(int m, const double *rows, double *to)
+{
+    for (int i = 0; i < 2 * SEVERAL; i++) to[i] = i % SEVERAL < m ? rows[i / SEVERAL * m + i % SEVERAL] : 0.0;
+}
+
+/* Sum of first-order modes, input linear between samples (first-order hold), and one complex mode pair.
+ * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
+ * Coefficients come twice, for loading (first m) and unloading (next m): unloading is x[k] < y[k-1] where x > 0.
+ * pair[s] = {a_re, a_im, b0_re, b0_im, b1_re, b1_im} for s = 0, 1.
+ * Beyond y = `place` an obstacle takes `stiffness` (y - place) from x: y, linear in the present x, is solved for.
+ * Friction takes `slide` from x against the motion since the last sample; what it takes to stay there it bears while that is no
+ * more than `slide`, and than `stick` where nothing moved before. No more than SEVERAL modes are run as so many, which the compiler
+ * unrolls. */
+void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0, const double *b1,
+                  const double *pair, double through, int switching, double place, double stiffness, double slide, double stick, double *z)
+{
+    double A[2 * SEVERAL], B0[2 * SEVERAL], B1[2 * SEVERAL], Z[SEVERAL];
+    if (m > SEVERAL) {
+        disturbed(n, x, y, rest, m, a, b0, b1, pair, through, switching, place, stiffness, slide, stick, z);
+    } else if (switching || stiffness > 0.0 || stick > 0.0) {
+        filled(m, a, A), filled(m, b0, B0), filled(m, b1, B1);
+        disturbed(n, x, y, rest, SEVERAL, A, B0, B1, pair, through, switching, place, stiffness, slide, stick, Z);
+    } else {
+        undisturbed(n, x, y, rest, m, a, b0, b1, pair, through);
     }
 }
 
@@ -266,22 +283,35 @@ void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, 
     }
 }
 
+/* 1 - exp(-way): of short ways, as most are from sample to sample, by its series, to 1e-12 of it. */
+static double decayed(double way)
+{
+    if (way > 0.03) return 1.0 - exp(-way);
+    double square = way * way;
+    return way - square * ((0.5 - way * (1.0 / 6)) + square * ((1.0 / 24 - way * (1.0 / 120)) + square * (1.0 / 720)));
+}
+
 /* Bouc-Wen hysteretic variable, |z| <= 1, exactly: dz = dx/width on the way to 0, dx/width (1 - |z|) away from it. */
 void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width)
 {
     double z = 0.0, past = 0.0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) z = past = 0.0;
-        double way = fabs(x[k] - past) / width, side = x[k] < past ? -1.0 : 1.0, toward = side * z;
-        if (toward < 0.0) { /* in the direction of motion it is below 0: up to there in a line */
-            double inside = way < -toward ? way : -toward;
-            toward += inside, way -= inside;
-        }
-        if (way > 0.0) toward = 1.0 - (1.0 - toward) * exp(-way);
-        z = side * toward;
+        double way = fabs(x[k] - past) / width, side = x[k] < past ? -1.0 : 1.0, away = decayed(way);
+        if (side * z >= 0.0) z = (1.0 - away) * z + side * away;
+        else if (way <= fabs(z)) z += side * way;
+        else z = side * decayed(way - fabs(z));
         past = x[k];
         y[k] = z;
     }
+}
+
+/* (1 + u)^-n: of what is little, as most is from sample to sample, by the binomial series, to 1e-12. */
+static double lessened(double u, double n)
+{
+    if ((n + 5.0) * u > 0.01) return pow(1.0 + u, -n);
+    double later = 1.0 - (n + 2.0) * (1.0 / 3) * u * (1.0 - (n + 3.0) * (1.0 / 4) * u * (1.0 - (n + 4.0) * (1.0 / 5) * u));
+    return 1.0 - n * u * (1.0 - (n + 1.0) * (1.0 / 2) * u * later);
 }
 
 /* Power-law creep: dz/dt = sign(e) scale/tau |e/scale|^power, e = x - z, power > 1; exact for an input held at
@@ -293,7 +323,7 @@ void focgen_power_creep(int n, const double *x, double *y, const unsigned char *
     for (int k = 0; k < n; k++) {
         if (rest[k]) z = past = rest[k] == BALANCED ? x[k] : 0.0;
         double held = 0.5 * (past + x[k]), e = (held - z) / scale, size = fabs(e);
-        double slower = size > 0.0 ? pow(1.0 + left * h / tau * pow(size, left), -1.0 / left) : 1.0;
+        double slower = size > 0.0 ? lessened(left * h / tau * pow(size, left), 1.0 / left) : 1.0;
         z = held - scale * e * slower;
         past = x[k];
         y[k] = z;
@@ -336,43 +366,67 @@ void focgen_filter(int n, const double *x, double *y, const unsigned char *rest,
 
 enum { AT_ONCE = 1024 }; /* samples that stay in the processor's cache while they are looked at many times */
 
+/* The products of row `a` with four rows from `b` on, which lie `n` apart, over `count` samples: each sample of a is read once for four. */
+static void four(int count, const double *a, const double *b, int n, double *to)
+{
+    const double *c = b + n, *d = c + n, *e = d + n;
+    double sum[4] = {0.0};
+    for (int t = 0; t < count; t++) sum[0] += a[t] * b[t], sum[1] += a[t] * c[t], sum[2] += a[t] * d[t], sum[3] += a[t] * e[t];
+    for (int i = 0; i < 4; i++) to[i] += sum[i];
+}
+
 /* m[i][j] = sum over samples of r[i] r[j], for the k rows of n samples; one thread, for the rows are few and the calls many. `m` is 0 but
  * for the products of the first rows, which are known. */
 void focgen_products(int n, int k, int known, const double *r, double *m)
 {
     for (int first = 0; first < n; first += AT_ONCE) {
         int count = n - first < AT_ONCE ? n - first : AT_ONCE;
-        for (int i = known; i < k; i++) for (int j = 0; j <= i; j++) {
-            const double *a = r + (long)i * n + first, *b = r + (long)j * n + first;
-            double sum = 0.0;
-            for (int t = 0; t < count; t++) sum += a[t] * b[t];
-            m[i * k + j] += sum;
+        for (int i = known; i < k; i++) {
+            const double *a = r + (long)i * n + first;
+            int j = 0;
+            for (; j + 3 <= i; j += 4) four(count, a, r + (long)j * n + first, n, m + i * k + j);
+            for (; j <= i; j++) {
+                const double *b = r + (long)j * n + first;
+                double sum = 0.0;
+                for (int t = 0; t < count; t++) sum += a[t] * b[t];
+                m[i * k + j] += sum;
+            }
         }
     }
     for (int i = known; i < k; i++) for (int j = 0; j < i; j++) m[j * k + i] = m[i * k + j];
 }
 
+/* (y - made) weight of `count` values of `coarse` samples each, in the mean. */
+static void averaged(int count, int coarse, const double *y, const double *made, const double *weight, double *mean)
+{
+    for (int k = 0; k < count && coarse == 1; k++) mean[k] = weight[k] * (y[k] - made[k]);
+    for (int k = 0; k < count && coarse != 1; k++) {
+        double sum = 0.0;
+        for (int i = k * coarse; i < (k + 1) * coarse; i++) sum += weight[i] * (y[i] - made[i]);
+        mean[k] = sum / coarse;
+    }
+}
+
 /* Innovations of the residual (y - made) weight, experiment by experiment: means of `coarse` neighbours (what does not fill the
- * last one is left out), through the whitening filter `ar` of `order`, which knows no past; at most 1e3 in size. `mean` is scratch (n).
- * Returns how many there are in `out`. */
+ * last one is left out), through the whitening filter `ar` of `order`, which knows no past; at most 1e3 in size; `per` times what they are
+ * more than `less`, if that is not NULL. `mean` is scratch (n). Returns how many there are in `out`. */
 int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double *made, const double *weight,
-                       int coarse, int order, const double *ar, double *mean)
+                       int coarse, int order, const double *ar, const double *less, double per, double *mean)
 {
     int total = 0;
     for (int first = 0, last; first < n; first = last) {
         for (last = first + 1; last < n && !rest[last]; last++) ;
         int count = (last - first) / coarse;
-        for (int k = 0; k < count; k++) {
-            double sum = 0.0;
-            for (int i = first + k * coarse; i < first + (k + 1) * coarse; i++) sum += weight[i] * (y[i] - made[i]);
-            mean[k] = sum / coarse;
-        }
         double *to = out + total;
+        const double *from = less ? less + total : 0;
         for (int a = 0, b; a < count; a = b) {
             b = count - a < AT_ONCE ? count : a + AT_ONCE;
+            int at = first + a * coarse;
+            averaged(b - a, coarse, y + at, made + at, weight + at, mean + a);
             for (int k = a; k < b; k++) to[k] = ar[0] * mean[k];
             for (int i = 1; i <= order; i++) for (int k = i > a ? i : a; k < b; k++) to[k] += ar[i] * mean[k - i];
             for (int k = a; k < b; k++) to[k] = to[k] < -1e3 ? -1e3 : to[k] < 1e3 ? to[k] : 1e3;
+            for (int k = a; k < b && from; k++) to[k] = per * (to[k] - from[k]);
         }
         total += count;
     }

@@ -51,7 +51,8 @@ void focgen_power_creep(int n, const double *x, double *y, const unsigned char *
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
     const double *a, double *w);
 int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double
-    *made, const double *weight, int coarse, int order, const double *ar, double *mean);
+    *made, const double *weight, int coarse, int order, const double *ar, const double *less, double per,
+    double *mean);
 void focgen_products(int n, int k, int known, const double *r, double *m);
 void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const
     double *bend, const double *twist, int order, int base, int last, const double *numbers, const double
@@ -319,22 +320,33 @@ def products(rows: Array, known: Array | None = None) -> Array:
     return found
 
 
-def innovations(y: Array, made: Array, weight: Array, rest: Bytes, coarse: int, ar: Array) -> Array:
+def innovations(
+    y: Array,
+    made: Array,
+    weight: Array,
+    rest: Bytes,
+    coarse: int,
+    ar: Array,
+    less: Array | None = None,
+    per: float = 1.0,
+    into: Array | None = None,
+) -> Array:
     """(y − made) · weight of every experiment in means of ``coarse`` samples, whitened by ``ar``; all (n,)
-    but ``ar``."""
+    but ``ar``. With ``less`` ``per`` times what they are more than that; they are left in ``into``."""
     ffi, library = _library()
-    found, scratch = np.empty(len(y)), np.empty(len(y))
-    pointers = _doubles(y, made, weight, ar, found, scratch)
+    found = np.empty(len(y)) if into is None else into
+    pointers = _doubles(y, made, weight, ar, np.empty(len(y)))
     count = library.focgen_innovations(
         len(y),
         pointers[0],
-        pointers[4],
+        ffi.from_buffer("double[]", found),
         ffi.from_buffer("unsigned char[]", rest),
-        pointers[1],
-        pointers[2],
+        *pointers[1:3],
         coarse,
         len(ar) - 1,
         pointers[3],
-        pointers[5],
+        ffi.NULL if less is None else ffi.from_buffer("double[]", less),
+        per,
+        pointers[4],
     )
     return found[:count]

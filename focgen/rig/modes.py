@@ -9,6 +9,7 @@ of it. One formula then holds for all α, α = 1 included, where the pole alone 
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
 _LARGEST = 300.0  # of an exponent
+_SLOW = 1e-4  # of a mode's decay over a sample: below, (e^q − 1)/q loses its digits
 
 
 @dataclass(frozen=True)
@@ -46,25 +48,25 @@ class Modes:
 @lru_cache(maxsize=256)
 def fractional_lag(T: float, alpha: float, h: float, duration: float) -> Modes:
     """The modes of 1/(T s^α + 1) for responses from ``h`` to ``duration`` seconds."""
-    centre = -np.log(T) / alpha
-    first = np.floor((np.log(1e-3 / duration) - centre) / SPACING)
-    last = np.ceil((np.log(30.0 / h) - centre) / SPACING)
-    last = max(last, first + 2)
-    tail = np.ceil((np.log(1e6) / alpha) / SPACING) + 10  # far beyond the samples: acts at once
+    centre = -math.log(T) / alpha
+    first = math.floor((math.log(1e-3 / duration) - centre) / SPACING)
+    last = max(math.ceil((math.log(30.0 / h) - centre) / SPACING), first + 2)
+    tail = math.ceil((math.log(1e6) / alpha) / SPACING) + 10  # far beyond the samples: acts at once
     x = centre + (np.arange(first, max(last, 0) + tail) + 0.5) * SPACING
     power = np.exp(alpha * (x - centre))  # T ξ^α
-    density = power * np.sin(alpha * np.pi) / (np.pi * (1 + 2 * power * np.cos(alpha * np.pi) + power**2))
-    seen = x <= np.log(30.0 / h)
-    xi = np.exp(x[seen])  # of the others, at low orders, no number is large enough
-    weights = SPACING * xi * density[seen]
-    distance = np.pi * (1 - alpha) / alpha
-    share = 1.0 / (np.exp(np.minimum(2 * np.pi * distance / SPACING, 700.0)) + 1.0)
-    size = np.exp(np.clip(centre, -_LARGEST, _LARGEST))  # beyond, the pole has no share
-    pole = size * np.exp(1j * np.pi / alpha)
+    density = power * (math.sin(alpha * math.pi) / math.pi)
+    density /= 1 + power * (2 * math.cos(alpha * math.pi) + power)
+    seen = int(np.searchsorted(x, math.log(30.0 / h), side="right"))
+    xi = np.exp(x[:seen])  # of the others, at low orders, no number is large enough
+    weights = SPACING * xi * density[:seen]
+    distance = math.pi * (1 - alpha) / alpha
+    share = 1.0 / (math.exp(min(2 * math.pi * distance / SPACING, 700.0)) + 1.0)
+    size = math.exp(min(max(centre, -_LARGEST), _LARGEST))  # beyond, the pole has no share
+    pole = size * cmath.exp(1j * math.pi / alpha)
     residue = -2 * pole / alpha * share  # both of the pair: twice the real part of one
-    if distance > np.pi / 2:  # its share is below 1e-5 there, and the mode would grow
+    if distance > math.pi / 2:  # its share is below 1e-5 there, and the mode would grow
         pole, residue = -size + 0j, 0j
-    return Modes(xi, weights, complex(pole), complex(residue), float(np.sum(SPACING * density[~seen])))
+    return Modes(xi, weights, pole, residue, float(SPACING * np.sum(density[seen:])))
 
 
 def respond(
@@ -147,8 +149,8 @@ def tables(
     """What the compiled loop needs, rows loading and unloading."""
     modes = fractional_lag(T, alpha, h, duration)
     loading = speeded(modes, h, 1.0)
-    rows = [loading, loading if unloading == 1.0 else speeded(modes, h, unloading)]
-    a, past, now, pair = (np.stack(part) for part in zip(*rows))
+    falling = loading if unloading == 1.0 else speeded(modes, h, unloading)
+    a, past, now, pair = (np.array(rows) for rows in zip(loading, falling))
     return a, past, now, pair, modes.through
 
 
@@ -157,20 +159,26 @@ def speeded(modes: Modes, h: float, speed: float) -> tuple[Array, Array, Array, 
     (6,)."""
     a, b0, b1 = hold(-modes.rates * speed * h)
     gain = modes.weights / modes.rates
-    pa, p0, p1 = hold(np.array([modes.pole * speed * h]))
+    pa, p0, p1 = _held(modes.pole * speed * h)
     scale = -modes.residue / modes.pole
-    pair = [pa[0], scale * p0[0], scale * p1[0]]
-    return a, gain * b0, gain * b1, _parts(pair)
+    return a, gain * b0, gain * b1, _parts([pa, scale * p0, scale * p1])
+
+
+def _held(q: complex) -> tuple[complex, complex, complex]:
+    """:func:`hold` of one mode."""
+    a = cmath.exp(q)
+    mean = 1 + q / 2 + q * q / 6 if abs(q) < _SLOW else (a - 1) / q
+    return a, mean - a, 1 - mean
 
 
 def _parts(pair: Sequence[complex]) -> Array:
     """Real and imaginary parts in turn."""
-    return np.array([[c.real, c.imag] for c in pair]).ravel()
+    return np.array([part for c in pair for part in (c.real, c.imag)])
 
 
 def hold(q: Array) -> tuple[Array, Array, Array]:
     """Coefficients of z' = λ(z − x), λh = q, for x linear over the sample: a, of the past and of the present
     x."""
-    a = np.exp(q)
-    mean = np.where(np.abs(q) < 1e-4, 1 + q / 2 + q * q / 6, (a - 1) / np.where(q == 0, 1, q))
+    a, slow = np.exp(q), np.abs(q) < _SLOW
+    mean = np.where(slow, 1 + q / 2 + q * q / 6, (a - 1) / np.where(slow, 1, q))
     return a, mean - a, 1 - mean

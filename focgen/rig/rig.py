@@ -73,7 +73,11 @@ class Actuator:
 
     def drive(self, pressure: Any) -> Any:
         """K(p) p: what the dynamics settle at, any shape."""
-        return self.K(pressure) * pressure
+        pressure = np.asarray(pressure, float)
+        made = self.gain[-1] * pressure
+        for coefficient in reversed(self.gain[:-1]):
+            made = (made + coefficient) * pressure
+        return made[()]
 
     @cached_property
     def dynamics(self) -> TransferFunction:

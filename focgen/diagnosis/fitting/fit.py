@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from focgen.diagnosis.fitting.predictability import predictable_share
 from focgen.diagnosis.problem.problem import Problem
@@ -13,6 +14,7 @@ from focgen.rig.kernels import innovations as innovated
 from focgen.rig.kernels import products
 
 STEP = 1e-4
+_SURE, _NOTHING = 1e-10, 1e-12  # of the largest of a matrix: what is sure to be known, and what is not
 FIXED = 1e-6  # a parameter whose bounds are as close is none
 _STALE = 2  # iterations that rows of the Jacobian are kept for
 _LAGGING = 0.01  # of what a fit is behind another: one that gains less by an iteration will not reach it
@@ -95,15 +97,32 @@ def means(part: np.ndarray, coarse: int) -> np.ndarray:
     return part if coarse == 1 else part[: count * coarse].reshape(count, coarse).mean(axis=1)
 
 
-def innovations(problem: Problem, vector: np.ndarray, weighing: Weighing, probe: bool = False) -> np.ndarray:
+@dataclass(frozen=True, eq=False)
+class Since:
+    """Innovations ``now`` (n,) at a vector, and ``per`` which step from it derivatives are taken."""
+
+    now: np.ndarray
+    per: float
+
+
+def innovations(
+    problem: Problem,
+    vector: np.ndarray,
+    weighing: Weighing,
+    probe: bool = False,
+    since: Since | None = None,
+    into: np.ndarray | None = None,
+) -> np.ndarray:
     """The weighed residual, as a share of the output's level; ``probe``: of a step from a vector that was
-    simulated just before, and will be again."""
+    simulated just before, and will be again. ``since``: by how much more it is than there, per step. Left
+    ``into`` an array, where one is given."""
     segment = problem.segment
-    made, weight, rest = problem.simulate(vector, probe), segment.weight, segment.run.rest
-    if not segment.pace:
-        return innovated(segment.y, made, weight, rest, weighing.coarse, weighing.ar)
-    left = segment.recent(segment.y - made)
-    return innovated(left, np.zeros_like(left), weight, rest, weighing.coarse, weighing.ar)
+    y, made = segment.y, problem.simulate(vector, probe)
+    if segment.pace:
+        y = segment.recent(y - made)
+        made = np.zeros_like(y)
+    less, per = (since.now, 1.0 / since.per) if since else (None, 1.0)
+    return innovated(y, made, segment.weight, segment.run.rest, weighing.coarse, weighing.ar, less, per, into)
 
 
 def fit(
@@ -114,6 +133,7 @@ def fit(
     tolerance: float = 1e-3,
     known: Known | None = None,
     leader: Fit | None = None,
+    now: np.ndarray | None = None,
 ) -> Fit:
     """The likeliest vector within the problem's bounds, from ``start``: least squares, weighed against what
     is known beforehand; stops when the gain is below ``tolerance`` nats, or below a hundredth of those that
@@ -121,11 +141,12 @@ def fit(
 
     ``known``: the Jacobian of the first parameters, taken as it is: a quick fit that is a little off.
     Otherwise the rows ahead of the candidates' own are made anew only every third time, for they change
-    little, and the fit does not end on old ones.
+    little, and the fit does not end on old ones. ``now``: the innovations at ``start``, which lies within
+    the bounds, where they are known.
     """
     low, high = problem.bounds()
     vector = np.clip(start, low, high)
-    now = innovations(problem, vector, weighing)
+    now = innovations(problem, vector, weighing) if now is None else now
     sse, damping = float(now @ now), 1e-3
     cost, (expected, precision) = _cost(problem, vector, sse, len(now)), problem.known
     normal, kept, age, head = np.eye(len(vector)), known, 0, problem.head
@@ -188,8 +209,7 @@ def jacobian(
         step = STEP if vector[i] + STEP <= high[i] else -STEP
         moved = vector.copy()
         moved[i] += step
-        np.subtract(innovations(problem, moved, weighing, probe=True), now, out=rows[i])
-        rows[i] /= step
+        innovations(problem, moved, weighing, True, Since(now, step), rows[i])
     return rows
 
 
@@ -209,8 +229,18 @@ def _step(
         scale = np.diag(normal)[free]
         matrix = normal[np.ix_(free, free)]
         matrix.flat[:: len(scale) + 1] += damping * (scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12)
-        step[free] = np.linalg.lstsq(matrix, slope[free], rcond=1e-12)[0]
+        step[free] = _solved(matrix, slope[free])
     made: np.ndarray = np.clip(step, -1.0, 1.0)
+    return made
+
+
+def _solved(matrix: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """matrix⁻¹ slope, by Cholesky's factor, which is quick; where that shows a direction about which next to
+    nothing is known, by singular values, without it."""
+    factor, step, fault = dposv(matrix, slope)
+    made: np.ndarray = step
+    if fault or np.min(factor.diagonal()) ** 2 < _SURE * np.max(matrix.diagonal()):
+        made = np.linalg.lstsq(matrix, slope, rcond=_NOTHING)[0]
     return made
 
 

@@ -252,15 +252,22 @@ def best_start(problem: Problem, from_: Sequence[Footing], candidate: CandidateE
         for at in from_:
             fits.append((_quick(extended, np.r_[at.vector, start], at, 1), at))
     foremost = sorted(fits, key=lambda pair: pair[0].sse)[:_FOREMOST]
-    fits = [(_quick(extended, of.vector, at, at.first - 1), at) for of, at in foremost]
+    fits = [(_further(of, at, at.first - 1), at) for of, at in foremost]
     best, at = min(fits, key=lambda pair: pair[0].sse)
     if not np.isfinite(best.sse):
         return None
-    return min(best, _quick(extended, best.vector, at, _THEN), key=lambda f: f.sse)
+    return min(best, _further(best, at, _THEN), key=lambda f: f.sse)
 
 
-def _quick(problem: Problem, start: np.ndarray, at: Footing, iterations: int) -> Fit:
-    return fit(problem, start, WHITE, iterations, tolerance=0.1, known=at.known)
+def _quick(
+    problem: Problem, start: np.ndarray, at: Footing, iterations: int, now: np.ndarray | None = None
+) -> Fit:
+    return fit(problem, start, WHITE, iterations, tolerance=0.1, known=at.known, now=now)
+
+
+def _further(of: Fit, at: Footing, iterations: int) -> Fit:
+    """A quick fit from where another has come."""
+    return _quick(of.problem, of.vector, at, iterations, of.innovations)
 
 
 def raced(tried: Sequence[Fit], weighing: Weighing, iterations: int, tolerance: float) -> list[Fit]:
