@@ -32,7 +32,7 @@ _HALVED = 10  # times that a step is halved for an event: what is left is run al
 _SHORT = 0.2  # of a radian of the plant's motion: a step of the hysteretic spring
 _YIELDS = 0.2  # of the time in which friction that rises stops what moves: a step
 _SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
-_MOST, _ROUGHLY = 7, 4  # halvings at most of a step before any event, and where a run is rough
+_MOST, _ROUGHLY = 7, 5  # halvings at most of a step before any event, and where a run is rough
 _TERMS = 9  # of the exponential series
 _TINY = 0.05  # what a step has to be below, in the norm of its matrix, for the series to end there
 
@@ -81,7 +81,7 @@ def respond(
     ``between``: what the input does from one sample to the next. In straight lines it comes from 0 within the
     sample ahead of an experiment, as in :func:`~focgen.rig.linear.run`; else it jumps at the first sample.
     ``rough``: steps of a hysteretic or bent spring are twice as long, with an error below 1e-3 of the
-    motion, and no step is shorter than a 16th of a sample before an event.
+    motion, and no step is shorter than a 32nd of a sample before an event.
     """
     base, last = _levels(plant, dynamics, h, rough)
     falling = replace(plant, c=plant.c / dynamics.unloading)

@@ -3,11 +3,14 @@
 Red when work is done twice, or what is left out to save it changes an answer.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from focgen.diagnosis.fitting.fit import WHITE, fit, innovations, jacobian
+from focgen.diagnosis.fitting.fit import WHITE, _solved, fit, innovations, jacobian
 from focgen.diagnosis.hypotheses.nuisances import problem_of
+from focgen.diagnosis.hypotheses.search import best_start, footings
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import make
 from focgen.rig.effects import library
@@ -44,7 +47,7 @@ def test_a_derivatives_steps_leave_in_memory_what_they_set_out_from(problem):
     now = innovations(whole, vector, WHITE)
     before = {place: [id(made) for *_, made in kept] for place, kept in whole.memory.items()}
     jacobian(whole, vector, now, WHITE, *whole.bounds())
-    chain = [place for place in before if place not in ("rigs", "entered")]
+    chain = [place for place in before if place != "rigs"]
     assert chain and all([id(m) for *_, m in whole.memory[place]] == before[place] for place in chain)
 
 
@@ -69,3 +72,46 @@ def test_a_fit_far_behind_is_left_early_within_a_hundredth_of_what_it_is_behind(
     nats = 0.5 * len(left.innovations) * np.log([left.cost / ended.cost, left.cost / leader.cost])
     assert len(simulated) - whole < 0.8 * whole
     assert nats[1] > 1000.0 and nats[0] < 0.02 * nats[1]
+
+
+def test_an_input_beside_another_is_what_it_is_made_from_the_start(problem):
+    rng = np.random.default_rng(5)
+    ways = rng.standard_normal((len(problem.segment.x), 3))
+    segment = replace(problem.segment, input_modes=ways)
+    whole = replace(problem, segment=segment, memory={})
+    off = np.array([0.3, -0.2, 0.0])
+    base = whole._entered(-0.4, off, probe=False)
+    others = [
+        (-0.4001, off),
+        (0.1, off),
+        (0.0, off),
+        (-0.4, off + [0, 0, 1e-4]),
+        (-0.4, -off),
+        (0.0, 0 * off),
+    ]
+    for shift, moved in others:
+        made, exact = whole._entered(shift, moved, probe=True), whole._moved(shift, moved)
+        np.testing.assert_allclose(made, exact, atol=1e-13)
+        assert np.any(made != base)
+    assert whole._entered(-0.4, off, probe=True) is base
+
+
+def test_a_quick_fit_simulates_no_start_that_an_earlier_one_ended_at(problem, monkeypatch):
+    candidate = next(CandidateEffect("hysteresis", f, "actuator") for f in library()["hysteresis"].forms)
+    thin = problem.thinned(2)
+    from_ = footings(thin, thin.nominal())
+    simulated = counted(monkeypatch)
+    assert best_start(thin, from_, candidate).sse < np.sum(from_[0].now ** 2)
+    assert len({v.tobytes() for v in simulated}) == len(simulated)
+
+
+@pytest.mark.parametrize("known", [1.0, 1e-4, 0.0])
+def test_a_step_goes_nowhere_of_which_nothing_is_known(known):
+    rng = np.random.default_rng(3)
+    rows, scales = rng.standard_normal((5, 40)), np.array([1.0, 1e-2, 3.0, 0.1, known])
+    rows *= scales[:, None]
+    matrix, wanted = rows @ rows.T, rng.standard_normal(5)
+    step = _solved(matrix, matrix @ wanted)
+    sure = slice(None) if known else slice(4)
+    np.testing.assert_allclose(step[sure], wanted[sure], rtol=1e-6)
+    assert known or abs(step[4]) < 1e-9

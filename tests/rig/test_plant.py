@@ -341,3 +341,13 @@ def test_a_rough_run_takes_longer_steps_and_comes_as_close_as_it_says(power):
     dynamics = Dynamics(spring=Spring(0.5, 1.0, 3.0, power, 0.1))
     exact, rough = (respond(plant, x, rest(len(x)), h, dynamics, rough=r) for r in (False, True))
     assert 0.0 < np.max(np.abs(rough - exact)) < 1e-3 * np.max(np.abs(exact))
+
+
+@pytest.mark.parametrize("speed", [2e-3, 2e-2])
+def test_a_rough_run_of_friction_that_rises_steeply_is_as_close(speed):
+    h = 5 * H
+    t = h * np.arange(400)
+    x, plant = 2 * np.sin(3 * t) + 1.2 * np.sin(7.3 * t), Plant(2, 0.05, 3.0, 20.0)
+    dynamics = Dynamics(drag=Friction(0.05, 0.1), rise=Rise(0.2, speed))
+    exact, rough = (respond(plant, x, rest(len(x)), h, dynamics, rough=r) for r in (False, True))
+    assert np.max(np.abs(rough - exact)) < 1e-3 * np.max(np.abs(exact))
