@@ -79,13 +79,13 @@ def test_an_input_beside_another_is_what_it_is_made_from_the_start(problem):
     ways = rng.standard_normal((len(problem.segment.x), 3))
     segment = replace(problem.segment, input_modes=ways)
     whole = replace(problem, segment=segment, memory={})
-    off = np.array([0.3, -0.2, 0.0])
+    off, last = np.array([0.3, -0.2, 0.0]), np.array([0.0, 0.0, 1e-4])
     base = whole._entered(-0.4, off, probe=False)
     others = [
         (-0.4001, off),
         (0.1, off),
         (0.0, off),
-        (-0.4, off + [0, 0, 1e-4]),
+        (-0.4, off + last),
         (-0.4, -off),
         (0.0, 0 * off),
     ]
