@@ -3,6 +3,7 @@
  * or, where it is BALANCED, in equilibrium with x[k] as if that had been held for ever; a loop of friction comes to it from 0.
  */
 #include <math.h>
+#include <string.h>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -407,26 +408,47 @@ static void averaged(int count, int coarse, const double *y, const double *made,
     }
 }
 
+/* The first sample from `k` on at which an experiment begins, or n. */
+static int next_begin(const unsigned char *rest, int k, int n)
+{
+    for (unsigned long long eight = 0; k + 8 <= n && !eight; k += eight ? 0 : 8) memcpy(&eight, rest + k, 8);
+    while (k < n && !rest[k]) k++;
+    return k;
+}
+
+/* What the taps ar[1] … ar[order] add to `count` values of `to` from those before each in `from`, four taps at a time. */
+static void whiten(int count, int order, const double *ar, const double *from, double *to)
+{
+    int i = 1;
+    for (; i + 3 <= order; i += 4) {
+        const double *f = from - i;
+        for (int k = 0; k < count; k++) to[k] += ar[i] * f[k] + ar[i + 1] * f[k - 1] + ar[i + 2] * f[k - 2] + ar[i + 3] * f[k - 3];
+    }
+    for (; i <= order; i++) for (int k = 0; k < count; k++) to[k] += ar[i] * from[k - i];
+}
+
 /* Innovations of the residual (y - made) weight, experiment by experiment: means of `coarse` neighbours (what does not fill the
- * last one is left out), through the whitening filter `ar` of `order`, which knows no past; at most 1e3 in size; `per` times what they are
- * more than `less`, if that is not NULL. `mean` is scratch (n). Returns how many there are in `out`. */
+ * last one is left out), through the whitening filter `ar` of `order`, ahead of which all was 0; at most 1e3 in size; `per` times what
+ * they are more than `less`, if that is not NULL. `room` is scratch (AT_ONCE + order). Returns how many there are in `out`. */
 int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double *made, const double *weight,
-                       int coarse, int order, const double *ar, const double *less, double per, double *mean)
+                       int coarse, int order, const double *ar, const double *less, double per, double *room)
 {
     int total = 0;
+    double *mean = room + order;
     for (int first = 0, last; first < n; first = last) {
-        for (last = first + 1; last < n && !rest[last]; last++) ;
+        last = next_begin(rest, first + 1, n);
         int count = (last - first) / coarse;
-        double *to = out + total;
-        const double *from = less ? less + total : 0;
+        for (int i = 0; i < order; i++) room[i] = 0.0;
         for (int a = 0, b; a < count; a = b) {
             b = count - a < AT_ONCE ? count : a + AT_ONCE;
-            int at = first + a * coarse;
-            averaged(b - a, coarse, y + at, made + at, weight + at, mean + a);
-            for (int k = a; k < b; k++) to[k] = ar[0] * mean[k];
-            for (int i = 1; i <= order; i++) for (int k = i > a ? i : a; k < b; k++) to[k] += ar[i] * mean[k - i];
-            for (int k = a; k < b; k++) to[k] = to[k] < -1e3 ? -1e3 : to[k] < 1e3 ? to[k] : 1e3;
-            for (int k = a; k < b && from; k++) to[k] = per * (to[k] - from[k]);
+            int at = first + a * coarse, many = b - a;
+            double *to = out + total + a;
+            averaged(many, coarse, y + at, made + at, weight + at, mean);
+            for (int k = 0; k < many; k++) to[k] = ar[0] * mean[k];
+            whiten(many, order, ar, mean, to);
+            memmove(room, room + many, order * sizeof *room);
+            for (int k = 0; k < many; k++) to[k] = to[k] < -1e3 ? -1e3 : to[k] < 1e3 ? to[k] : 1e3;
+            for (int k = 0; k < many && less; k++) to[k] = per * (to[k] - less[total + a + k]);
         }
         total += count;
     }

@@ -22,6 +22,7 @@ from focgen.errors import BuildError
 from focgen.scratch import temporary_folder
 
 BALANCED = 2
+_AT_ONCE = 1024  # samples that a compiled loop looks at many times: AT_ONCE in ``kernels.c``
 _REGISTERS = 3  # a filter of order 2 is the quickest: one of order 1 is run as such
 _SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c", "pace.c")]
 _DECLARATIONS = """
@@ -52,7 +53,7 @@ void focgen_filter(int n, const double *x, double *y, const unsigned char *rest,
     const double *a, double *w);
 int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double
     *made, const double *weight, int coarse, int order, const double *ar, const double *less, double per,
-    double *mean);
+    double *room);
 void focgen_products(int n, int k, int known, const double *r, double *m);
 void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const
     double *bend, const double *twist, int order, int base, int last, const double *numbers, const double
@@ -335,7 +336,7 @@ def innovations(
     but ``ar``. With ``less`` ``per`` times what they are more than that; they are left in ``into``."""
     ffi, library = _library()
     found = np.empty(len(y)) if into is None else into
-    pointers = _doubles(y, made, weight, ar, np.empty(len(y)))
+    pointers = _doubles(y, made, weight, ar, np.empty(_AT_ONCE + len(ar)))
     count = library.focgen_innovations(
         len(y),
         pointers[0],

@@ -264,8 +264,9 @@ class Problem:
         return alike
 
     def _read(self, made: np.ndarray, zero: float = 0.0, gauge: float = 0.0) -> np.ndarray:
-        """What is read of a signal by gauges off by so much."""
-        return made * (1.0 + gauge) + zero * self.segment.level_out
+        """What is read of a signal by gauges off by so much; the same array where they are not."""
+        made = made * (1.0 + gauge) if gauge else made
+        return made + zero * self.segment.level_out if zero else made
 
     def _entered(self, shift: float, off: np.ndarray, probe: bool) -> np.ndarray:
         """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where
