@@ -42,7 +42,7 @@ def _changeable_in(stage: str, rig: Rig) -> frozenset[str]:
     """What effects may change of a stage's own equation."""
     if stage == "actuator":
         own = rig.actuator
-        return _paced(own.dynamics) | _changeable(own) if own else frozenset()
+        return _paced(own.dynamics) | _levered(own) | _changeable(own) if own else frozenset()
     if stage == "regulator":
         return _paced(rig.regulator) | _own_of(rig.regulator)
     return _paced(rig.sensor) | ({"loading", "unloading"} if lags.is_filled(rig.sensor) else set())
@@ -68,6 +68,11 @@ def _own_of(regulator: TransferFunction) -> frozenset[str]:
 def _has_spring(actuator: Actuator | LinearActuator) -> bool:
     """Whether a spring pulls it back, and what drives it pulls at that."""
     return isinstance(actuator, Actuator) or linear.holds_level(actuator.dynamics)
+
+
+def _levered(actuator: Actuator | LinearActuator) -> frozenset[str]:
+    """What effects may change of any actuator that comes to rest where it is driven to."""
+    return frozenset({"lever"} if _has_spring(actuator) and len(actuator.dynamics.den) > 1 else ())
 
 
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:

@@ -6,6 +6,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
+from focgen.arrays import Array
+
+FAR, LEAST = 1.1, 0.05  # of a lever: as in ``lever.c``
+
 
 @dataclass(frozen=True)
 class Friction:
@@ -59,6 +65,23 @@ class Power:
 
 
 @dataclass(frozen=True)
+class Lever:
+    """What drives y pulls 1 + ``first`` q + ``second`` q² times as strongly, q = y/``scale``, as y goes on:
+    the force factor of a voice coil, a tendon's arm, a muscle that has less force the shorter it is. Further
+    than :data:`FAR` either way it pulls as there, and never less than :data:`LEAST`."""
+
+    first: float = 0.0
+    second: float = 0.0
+    scale: float = 1.0
+
+    def strength(self, y: Array) -> Array:
+        """How many times as strongly x drives what is at ``y`` (n,)."""
+        q = np.clip(y / self.scale, -FAR, FAR)
+        made: Array = np.maximum(1.0 + (self.first + self.second * q) * q, LEAST)
+        return made
+
+
+@dataclass(frozen=True)
 class Rise:
     """What friction rises by as it moves, ``size`` (1 − exp(−|y'|/``speed``)), in units of the input; below 0
     it falls, as in lubricated bearings (R. Stribeck, Z. VDI 46, 1902)."""
@@ -96,7 +119,7 @@ class Pace:
 
 
 STRAIGHT, NO_FRICTION, LINEAR, LEVEL, EVEN = Bend(), Friction(), Spring(), Rise(), Power()
-FREE, WIDE, STEADY = Flow(), Throat(), Pace()
+SAME, FREE, WIDE, STEADY = Lever(), Flow(), Throat(), Pace()
 
 
 @dataclass(frozen=True)
@@ -108,7 +131,8 @@ class Dynamics:
     beyond y = ``place`` an obstacle pushes back with ``stiffness`` (y − place); a ``place`` below 0 stands
     for one on either side, as far away. Of that and of any other spring y follows ``bend``, and dry friction,
     the ``drag``, takes away from x, in its unit. So does a ``preload``, which presses the spring against a
-    seat at 0. A ``mass`` in s² adds mass·D² y. A ``loss`` goes with a power of y. Of a
+    seat at 0. A ``mass`` in s² adds mass·D² y. A ``loss`` goes with a power of y, and a ``lever`` changes
+    what x does where y is. Of a
     :class:`~focgen.rig.plant.Plant` with a mass: the hysteretic ``spring``, and the ``rise`` of its drag. Of
     a regulator: the pressure of its ``supply``, which it fills from; of one lag, too, ``loading``, by which
     every rate is multiplied while the load exceeds the response, ``unloading``, its highest ``flow``, the
@@ -124,6 +148,7 @@ class Dynamics:
     mass: float = 0.0
     bend: Bend = STRAIGHT
     loss: Power = EVEN
+    lever: Lever = SAME
     spring: Spring = LINEAR
     rise: Rise = LEVEL
     flow: Flow = FREE

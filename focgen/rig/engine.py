@@ -12,11 +12,12 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.present import present
 from focgen.rig import chamber, lags, linear, uneven
+from focgen.rig import lever as levers
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.changeable import IN_STEPS
 from focgen.rig.delay import delayed
-from focgen.rig.dynamics import FREE, STEADY, UNCHANGED, Dynamics, Pace
+from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever, Pace
 from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run, library
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
@@ -260,13 +261,31 @@ def _actuator(
     if dynamics.pace != STEADY:
         ahead = (("zero", actuator), lambda x, run: actuator.drive(x), None)
         return [ahead, *drive, _uneven(actuator.dynamics, dynamics.pace, between, delay)]
+    if dynamics.lever != SAME and delay:
+        return [*_actuator(actuator, here, between, 0.0), _transfer(UNITY, Between.STRAIGHT, delay)]
+    lever, dynamics = dynamics.lever, replace(dynamics, lever=SAME)
     if isinstance(actuator, LinearActuator):
         zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
-        steps = _linear(actuator, dynamics, between, delay)
+        steps = _levered(_linear(actuator, dynamics, between, delay), actuator, dynamics, lever, between)
         return [*zero, *drive, *weakened(steps, weak, actuator.dynamics.dc_gain)]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
     lag = _lag(1.0, actuator.T, actuator.alpha, replace(dynamics, mass=0.0), delay)
-    return [line, *drive, *weakened([lag, *_swung(actuator.T, dynamics.mass)], weak, 1.0)]
+    steps = _levered([lag, *_swung(actuator.T, dynamics.mass)], actuator, dynamics, lever, between)
+    return [line, *drive, *weakened(steps, weak, 1.0)]
+
+
+def _levered(
+    steps: list[Step],
+    actuator: Actuator | LinearActuator,
+    dynamics: Dynamics,
+    lever: Lever,
+    between: Between | bool,
+) -> list[Step]:
+    if lever == SAME or dynamics != UNCHANGED:
+        return levers.levered(steps, lever)
+    of = actuator.dynamics
+    between = between if isinstance(actuator, LinearActuator) else Between.STRAIGHT
+    return [((of, lever, between), lambda x, run: levers.run(of, x, run, lever, between), None)]
 
 
 def _linear(

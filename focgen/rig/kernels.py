@@ -1,5 +1,5 @@
 """The compiled loops of the chain simulator (``kernels.c``, ``bending.c``, ``plant.c``,
-``pace.c``) as functions.
+``pace.c``, ``lever.c``) as functions.
 
 The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
 behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), 1 where an experiment begins
@@ -24,7 +24,9 @@ from focgen.scratch import temporary_folder
 BALANCED = 2
 _AT_ONCE = 1024  # samples that a compiled loop looks at many times: AT_ONCE in ``kernels.c``
 _REGISTERS = 3  # a filter of order 2 is the quickest: one of order 1 is run as such
-_SOURCES = [Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c", "pace.c")]
+_SOURCES = [
+    Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c", "pace.c", "lever.c")
+]
 _DECLARATIONS = """
 void focgen_keep_memory(void);
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
@@ -68,6 +70,11 @@ void focgen_paced_modes(int n, const double *x, double *y, const unsigned char *
     double *share, double *z);
 void focgen_paced_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
     const double *c, const double *a, int by, const double *pace, const double *share, double *w);
+void focgen_levered_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double
+    *a, const double *b0, const double *b1, const double *pair, double through, const double *lever, double
+    *z);
+void focgen_levered_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double
+    *b, const double *a, const double *lever, double *w);
 """
 _FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
 
@@ -307,6 +314,25 @@ def paced_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, slowness
         table[: len(values)] = values
     *pointers, own, shares, room = _doubles(*tables, np.array(pace, float), share, scratch)
     return _call("focgen_paced_filter", x, rest, order, *pointers, by, own, shares, room)
+
+
+def levered_modes(
+    x: Array, rest: Bytes, a: Array, b0: Array, b1: Array, pair: Array, through: float, lever: Sequence[float]
+) -> Array:
+    """As :func:`modes` of a row (m,) or (6,) each, with the input as strong as ``lever`` (3,) says:
+    ``lever.c``."""
+    *pointers, own, room = _doubles(a, b0, b1, pair, np.array(lever, float), np.empty(len(a)))
+    return _call("focgen_levered_modes", x, rest, len(a), *pointers, float(through), own, room)
+
+
+def levered_rational(x: Array, rest: Bytes, b: Array, a: Array, lever: Sequence[float]) -> Array:
+    """As :func:`rational`, with the input as strong as ``lever`` (3,) says."""
+    order = max(len(a), len(b)) - 1
+    scratch, *tables = np.zeros((3, order + 1))
+    for table, values in zip(tables, (b, a)):
+        table[: len(values)] = values
+    pointers = _doubles(*tables, np.array(lever, float), scratch)
+    return _call("focgen_levered_filter", x, rest, order, *pointers)
 
 
 def products(rows: Array, known: Array | None = None) -> Array:

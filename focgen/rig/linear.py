@@ -15,8 +15,19 @@ from focgen.logs.between import Between
 from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
-from focgen.rig.dynamics import Dynamics
-from focgen.rig.modes import Modes, about_as_long, between, fractional_lag, hold, respond, settled, tables
+from focgen.rig.dynamics import Dynamics, Lever
+from focgen.rig.modes import (
+    Modes,
+    about_as_long,
+    between,
+    fractional_lag,
+    hold,
+    respond,
+    settled,
+    speeded,
+    tables,
+)
+from focgen.rig.poles import fractional_poles, residue_at
 from focgen.rig.rig import UNITY
 
 _SPACING = 0.2  # in ln ξ: fine, for poles may lie close to the cut
@@ -195,6 +206,35 @@ def run_paced(
     return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
 
 
+def run_levered(
+    transfer: TransferFunction,
+    x: Array,
+    rest: Bytes,
+    h: float,
+    duration: float,
+    between: Between | bool,
+    lever: Lever,
+) -> Array:
+    """As :func:`run` of a stage that :func:`holds_level`, whose input pulls as strongly as ``lever`` says."""
+    if between == Between.SMOOTH:
+        x = sharpened(np.ascontiguousarray(x, float), rest)
+    own = lever.first, lever.second, lever.scale
+    if transfer.is_integer:
+        return kernels.levered_rational(x, rest, *_discrete(transfer, h, between == Between.HELD), own)
+    lag, longest = single_lag(transfer), about_as_long(duration)
+    if lag:
+        gain, T, alpha = lag
+        a, b0, b1, pair, through = tables(T, alpha, h, longest, 1.0)
+        unit = lever.first, lever.second, lever.scale / gain
+        made = gain * kernels.levered_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, unit)
+        missing = gain * (1.0 - fractional_lag(T, alpha, h, longest).gain)
+    else:
+        (a, b0, b1), pair, through = _tables(transfer, h, longest)
+        made = kernels.levered_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, own)
+        missing = _missing(transfer, _fractional(transfer, h, longest))
+    return settled(made, x * lever.strength(made), rest, missing)
+
+
 def oscillator(x: Array, rest: Bytes, h: float, period: float, damping: float, speed: bool = False) -> Array:
     """The response of w²/(s² + 2 d w s + w²), w = 2π/``period`` (s), ``damping`` d < 1, input linear between
     samples; ``speed``: its rate of change over w instead."""
@@ -324,7 +364,7 @@ def _fractional(transfer: TransferFunction, h: float, duration: float) -> Modes:
     cut = transfer(xi * np.exp(1j * np.pi))
     weights = -np.imag(cut) / np.pi * xi * _SPACING
     poles = fractional_poles(transfer, 1e-3 / duration, 30.0 / h)
-    residues = np.array([_residue(transfer, p) for p in poles])
+    residues = np.array([residue_at(transfer, p) for p in poles])
     fast = float(np.real(transfer(np.array([30.0 / h * np.exp(0.0)]))[0]))
     through = fast - float(np.sum(weights / (xi + 30.0 / h)))
     rates, pair = xi, (-1.0 + 0j, 0j)
@@ -343,39 +383,6 @@ def _tables(
 ) -> tuple[tuple[Array, Array, Array], Array, float]:
     """What the compiled loop needs of them: rows of the modes, the pair, and what passes at once."""
     modes = _fractional(transfer, h, duration)
-    a = np.exp(-modes.rates * h)
-    mean = -np.expm1(-modes.rates * h) / (modes.rates * h)
-    gain = modes.weights / modes.rates
-    q = modes.pole * h
-    m, scale = (np.exp(q) - 1) / q, -modes.residue / modes.pole
-    pair = np.array([[c.real, c.imag] for c in (np.exp(q), scale * (m - np.exp(q)), scale * (1 - m))]).ravel()
-    a, past, now = (np.stack([row, row]) for row in (a, gain * (mean - a), gain * (1 - mean)))
-    return (a, past, now), np.stack([pair, pair]), modes.through
-
-
-def _residue(transfer: TransferFunction, pole: complex) -> complex:
-    num = sum(t.coefficient * pole**t.order for t in transfer.num)
-    slope = sum(t.coefficient * t.order * pole ** (t.order - 1) for t in transfer.den if t.order)
-    return num / slope
-
-
-def fractional_poles(transfer: TransferFunction, low: float, high: float) -> list[complex]:
-    """Zeros of the denominator on the principal sheet, upper half plane and negative-free axis, by Newton's
-    rule from places between ``low`` and ``high`` rad/s."""
-    radius, angle = np.meshgrid(np.geomspace(low, high, 60), np.linspace(0.0, 0.999 * np.pi, 24))
-    s = (radius * np.exp(1j * angle)).ravel()
-    with np.errstate(all="ignore"):
-        for _ in range(60):
-            value = sum(t.coefficient * s**t.order for t in transfer.den)
-            slope = sum(t.coefficient * t.order * s ** (t.order - 1) for t in transfer.den if t.order)
-            step = value / slope
-            step = step * np.minimum(1.0, 0.5 * np.abs(s) / np.maximum(np.abs(step), 1e-300))
-            s = s - step
-        size = sum(abs(t.coefficient) * np.abs(s) ** t.order for t in transfer.den)
-        good = np.isfinite(s) & (np.abs(value) < 1e-9 * size) & (np.abs(np.angle(s)) < np.pi * (1 - 1e-6))
-    found: list[complex] = []
-    for p in s[good]:
-        p = complex(p.real, abs(p.imag)) if abs(p.imag) > 1e-9 * abs(p) else complex(p.real, 0.0)
-        if all(abs(p - q) > 1e-6 * abs(p) for q in found):
-            found.append(p)
-    return found
+    *rows, pair = (np.array([row, row]) for row in speeded(modes, h, 1.0))
+    a, past, now = rows
+    return (a, past, now), pair, modes.through

@@ -11,9 +11,9 @@ from focgen.errors import RigError
 from focgen.fractional.decomposition import dense
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
-from focgen.rig import linear
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
+from focgen.rig.poles import fractional_poles
 from focgen.rig.rig import LinearActuator, Rig
 
 _GROWN = 25.0  # time constants that a pole may grow for: beyond, what it makes is no signal of a rig
@@ -76,5 +76,5 @@ def _growth(transfer: TransferFunction, h: float, seconds: float) -> float:
     if transfer.is_integer:
         poles = list(np.roots(dense(transfer.den)))
     else:
-        poles = linear.fractional_poles(transfer, 1e-3 / seconds, 30.0 / h)
+        poles = fractional_poles(transfer, 1e-3 / seconds, 30.0 / h)
     return max((float(pole.real) for pole in poles), default=0.0)

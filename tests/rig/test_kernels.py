@@ -1,4 +1,7 @@
-"""The compiled loops against the same sums written in Python, one sample and one mode at a time."""
+"""The compiled loops against the same sums written in Python, one sample and one mode at a time.
+
+Red when a loop that was made quicker is no longer what it was.
+"""
 
 import numpy as np
 import pytest

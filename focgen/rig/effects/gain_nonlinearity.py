@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.rig.dynamics import Bend, Dynamics, Power, Spring
+from focgen.rig.dynamics import Bend, Dynamics, Lever, Power, Spring
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 
@@ -39,6 +39,10 @@ def _power(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, loss=Power(*values))
 
 
+def _force_factor(x: Dynamics, values: Values, run: None) -> Dynamics:
+    return replace(x, lever=Lever(*values))
+
+
 _FIRST = Parameter("first", lower=-0.45, upper=20.0, starts=(0.2, -0.1, 1.0), zero=0.0)
 _SECOND = Parameter("second", lower=-0.3, upper=50.0, starts=(0.0, 0.0, 1.0), zero=0.0)
 # a share of the stiffness, and what of it a spring wound to the largest displacement has lost
@@ -49,11 +53,14 @@ _POWER = Parameter("power", lower=0.5, upper=4.0, starts=(1.0, 1.0))
 _LOST = Parameter("share", lower=0.0, upper=1.0, starts=(0.3, 0.8), zero=0.0)
 _POWER_OF = Parameter("power", lower=0.25, upper=4.0, starts=(0.5, 0.5))
 
+_SKEW = Parameter("first", lower=-0.9, upper=2.0, starts=(0.1, -0.1, 0.0), zero=0.0)
+_FALL = Parameter("second", lower=-0.9, upper=2.0, starts=(0.0, 0.0, -0.2), zero=0.0)
+
 EFFECT = Effect(
     name="gain_nonlinearity",
     stage="actuator",
     meaning="the static gain departs smoothly from the line K(p): stiffening, ballooning, "
-    "whether on the way to the spring or in it",
+    "whether on the way to the spring, in it, or in what drives it",
     reveals="six or more levels, up and down, in mixed order: the residual depends on level only",
     confused_with=("dead_zone", "contact", "softening", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
@@ -91,6 +98,8 @@ EFFECT = Effect(
         Form("yielding", "dynamics", (_SHARE, _YIELDING, _POWER, LARGEST), _yielding),
         # of a lag: the less there is, the slower it moves on
         Form("power", "dynamics", (_LOST, _POWER_OF, LARGEST), _power),
+        # of what drives it, where it is: coils, tendons' arms, muscles
+        Form("force_factor", "dynamics", (_SKEW, _FALL, LARGEST), _force_factor),
         _curves.quartic("drive"),
         _curves.spline("drive"),
         *_curves.behind("place"),
