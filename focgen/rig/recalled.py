@@ -6,6 +6,9 @@ several that suits the logs best. A fractional actuator forgets by a power of ti
 five response times its output is still off by some per cent. Experiments that are simulated in a row go on
 from one another. For one by itself the input's past is given as levels, means over windows that are the
 longer, the longer they are ago: what is left of it changes no faster.
+
+A log that begins a sample behind the end of the last one, its output where that was, goes on from
+it: one recording was cut in two. Its past is known, whatever its input is then.
 """
 
 from __future__ import annotations
@@ -27,9 +30,11 @@ from focgen.rig.session import joined, run_of
 
 NOTE = "begins before the rig has come to rest: the experiments before are simulated ahead of it"
 _RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers
+_CONTRADICTED = 1.02  # of the same: less does not speak against what is known
 _LONGEST = 250.0  # response times: what is longer ago counts as 0
 _WIDTH = 0.1  # of how long ago it is: a window
 _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0, as in focgen.rig.initial
+_NEXT = 1.4  # samples after the last one of another log: what begins there goes on from it
 _SEEN = 5e-4  # of the output's largest magnitude, in root mean square: less does not show
 _PAUSES = (0.0, *(2.0**k for k in range(-2, 8)))  # response times: of what is longer ago ever less is left
 _CLOSER = (2.0**0.5, 2.0**0.25, 2.0**0.125)  # times longer, or shorter, than the best of those
@@ -42,7 +47,9 @@ def with_recalled(
     placed: Sequence[Placed] = (),
 ) -> tuple[Experiment, ...]:
     """The experiments as :func:`recalled` has them where that leaves less by ``left``, a mean square; else as
-    they are. Where the pauses between them are not known, each is as long as suits them best."""
+    they are. Where the pauses between them are not known, each is as long as suits them best. That a log goes
+    on from another is known, and has only to leave no more."""
+    logs = _with_cut(rig, logs, left, placed)
     paused = any(log.paused for log in logs)
     response = response_time(rig, logs[0].sample_time, longest(logs)) if paused else 0.0
 
@@ -58,6 +65,20 @@ def with_recalled(
     return best[2] if np.isfinite(best[0]) and best[0] < _RECALLED * left(logs) else tuple(logs)
 
 
+def _with_cut(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    left: Callable[[Sequence[Experiment]], float],
+    placed: Sequence[Placed],
+) -> Sequence[Experiment]:
+    """The experiments, those that go on from others with what was before them, unless that leaves more."""
+    cut = [goes_on(log, logs[:n]) for n, log in enumerate(logs)]
+    if not any(cut):
+        return logs
+    found = [a if on else b for on, a, b in zip(cut, recalled(rig, logs, placed, closer=False), logs)]
+    return found if left(found) < _CONTRADICTED * left(logs) else logs
+
+
 def _spaced(logs: Sequence[Experiment], pause: float) -> tuple[Experiment, ...]:
     """The session with a pause, s, wherever its clock does not tell how long that was."""
     if not pause:
@@ -69,8 +90,8 @@ def _spaced(logs: Sequence[Experiment], pause: float) -> tuple[Experiment, ...]:
 def recalled(
     rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = (), closer: bool = True
 ) -> tuple[Experiment, ...]:
-    """The experiments, each that begins with an input of 0 with what the earlier ones put in; as they are
-    where that would not show, or come no ``closer``, or in a rig that integrates."""
+    """The experiments, each that begins with an input of 0, or goes on from the last, with what the earlier
+    ones put in; as they are where that would not show, or come no ``closer``, or in a rig that integrates."""
     if len(logs) < 2 or not all(map(len, logs)) or integrations(rig):
         return tuple(logs)
     past = memory(rig, logs)
@@ -92,7 +113,7 @@ def ended(log: Experiment) -> float:
 
 def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float) -> Experiment:
     roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
-    begins = {role: begin_after(log, earlier, role, past) for role in roles if _idle(log, earlier, role)}
+    begins = {role: begin_after(log, earlier, role, past) for role in roles if _is_known(log, earlier, role)}
     begins = {role: begin for role, begin in begins.items() if not begin.at_rest}
     if not begins:
         return log
@@ -100,15 +121,27 @@ def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float) -> Ex
     return replace(log, begins=begins, notes=(*notes, NOTE))
 
 
-def _idle(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
-    """Whether an input was 0 until the experiment begins: it is at first, or what it moves still is, as where
-    a log begins with its first step; or its first samples tell of a step then, from next to nothing."""
+def _is_known(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
+    """Whether what an input was until the experiment begins is known. That is 0 where it is so at first, or
+    what it moves still is, as where a log begins with its first step; or its first samples tell of a step
+    then, from next to nothing. Where the log goes on from another, that one tells."""
+    if goes_on(log, earlier):
+        return True
     inputs = [r for r in ENTERS if r in log and all(r in other for other in earlier)]
     moved = [*inputs[inputs.index(role) :], *([] if log.begins else ["output"])]
     if any(_starts_at_zero(log, earlier, r) for r in moved if r in log):
         return True
     begin, least = log.before(role), _NOTHING * _largest(log, earlier, role)
     return bool(begin.ago) and begin.ago[-1] <= log.sample_time and abs(begin.levels[-2]) <= least
+
+
+def goes_on(log: Experiment, earlier: Sequence[Experiment]) -> bool:
+    """Whether a log goes on where the last of the ``earlier`` ones ended."""
+    last = max((other for other in earlier if "output" in other), key=ended, default=None)
+    if last is None or "output" not in log or log.start - ended(last) >= _NEXT * log.sample_time:
+        return False
+    jump = abs(float(log["output"][0]) - float(last["output"][-1]))
+    return jump <= _NOTHING * _largest(log, earlier, "output")
 
 
 def _starts_at_zero(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
@@ -131,8 +164,10 @@ def begin_after(log: Experiment, earlier: Sequence[Experiment], role: str, past:
         edges.append(edges[-1] * (1.0 + _WIDTH) + log.sample_time)
     sums, _ = np.histogram(ago[seen], edges, weights=x[seen])
     means = sums * log.sample_time / np.diff(edges)
-    after = log.start - max(map(ended, earlier))
-    return Begin((0.0, *map(float, means[::-1]), 0.0), tuple(edges[::-1]), known=True, after=after)
+    last = max(earlier, key=ended)
+    since = float(last[role][-1]) if goes_on(log, earlier) else 0.0
+    levels = (0.0, *map(float, means[::-1]), since)
+    return Begin(levels, tuple(edges[::-1]), known=True, after=log.start - ended(last))
 
 
 def _ago(log: Experiment, other: Experiment) -> Array:
@@ -163,10 +198,11 @@ def _shows(
         return False
     if not closer:
         return True
-    idle = np.concatenate([_still(log, entry) for log in found if log.before(entry).known])
-    known = np.concatenate([np.full(len(log), log.before(entry).known) for log in found])
-    after, before = (y - after)[known][idle], (y - before)[known][idle]
-    return bool(np.sum(after**2) < np.sum(before**2))
+    asked = [log.before(entry).known and not goes_on(log, found[:n]) for n, log in enumerate(found)]
+    if not any(asked):
+        return True
+    idle = np.concatenate([_still(log, entry) & a for log, a in zip(found, asked)])
+    return bool(np.sum((y - after)[idle] ** 2) < np.sum((y - before)[idle] ** 2))
 
 
 def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry: str, leaves: str) -> Array:

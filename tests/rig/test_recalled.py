@@ -220,3 +220,33 @@ def test_rigs_that_each_began_at_rest_have_no_pauses(tmp_path: Path) -> None:
         ]
         told = begun_session(rig, reset)
         assert [(log.start, dict(log.begins)) for log in told] == [(log.start, {}) for log in reset]
+
+
+def _cut(at: int) -> list[Experiment]:
+    """One recording in two files, cut where the input is held."""
+    x, y, ((_, end), *_) = _session(rest=10.0)
+    signals = [{"pressure": x[a:b], "output": y[a:b]} for a, b in ((0, at), (at, end))]
+    return [Experiment(f"part {k}", H, s, start=k * at * H) for k, s in enumerate(signals)]
+
+
+@pytest.mark.parametrize("at", [182, 300, 400], ids=["just behind a step", "later", "at another level"])
+def test_a_recording_cut_in_two_goes_on_whatever_its_input_is(tmp_path: Path, at: int) -> None:
+    rig, parts = _rig(tmp_path), _cut(at)
+    whole = {role: np.concatenate([p[role] for p in parts]) for role in ("pressure", "output")}
+    told = begun_session(rig, parts)
+    assert [log.before("pressure").known for log in told] == [False, True]
+    exact = simulate_session(rig, [Experiment("whole", H, whole)])[0]["output"]
+    made = np.concatenate([m["output"] for m in simulate_session(rig, told)])
+    np.testing.assert_array_equal(made, exact)
+
+
+@pytest.mark.parametrize("change", ["late", "moved"])
+def test_a_log_that_begins_elsewhere_or_later_does_not_go_on(tmp_path: Path, change: str) -> None:
+    rig, (first, second) = _rig(tmp_path), _cut(100)
+    if change == "late":
+        second = replace(second, start=second.start + 3 * H)
+    else:
+        moved = second["output"] - 0.2 * np.max(first["output"])
+        second = replace(second, signals={**second.signals, "output": moved})
+    told = recalled(rig, [first, second], closer=False)
+    assert not any(log.before("pressure").known for log in told)
